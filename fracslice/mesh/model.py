@@ -1,0 +1,77 @@
+"""The triangle mesh that travels from extraction to the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles over shared vertices.
+
+    vertices: float64 [n, 3], in mm once in print space; triangles: int32 [m, 3], counter-clockwise seen from outside.
+    """
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Corner positions, float64 [m, 3, 3]: triangle, corner, axis."""
+        return self.vertices[self.triangles]
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lowest and highest corner of the box around all vertices, float64 [2, 3]; zeros for an empty mesh."""
+        if not len(self.vertices):
+            return np.zeros((2, 3))
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @property
+    def size(self) -> NDArray[np.float64]:
+        """Extent along x, y and z, float64 [3]."""
+        low, high = self.bounds
+        return high - low
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """Normal of each triangle, as long as twice its area, float64 [m, 3]."""
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        return np.cross(b - a, c - a)
+
+    @property
+    def area(self) -> float:
+        """Sum of the triangles' areas."""
+        return float(np.linalg.norm(self.normals, axis=1).sum() / 2)
+
+    @property
+    def volume(self) -> float:
+        """Signed volume: positive when the triangles look outwards (divergence theorem)."""
+        return float(self.triangle_volumes().sum())
+
+    def triangle_volumes(self) -> NDArray[np.float64]:
+        """Signed volume of the tetrahedron each triangle spans with the middle of the bounds, float64 [m]."""
+        centred = self.vertices - self.bounds.mean(axis=0)
+        a, b, c = (centred[self.triangles[:, k]] for k in range(3))
+        return np.einsum("ij,ij->i", np.cross(a, b), c) / 6
+
+    def translated(self, offset: tuple[float, float, float] | NDArray[np.float64]) -> Mesh:
+        """A copy moved by `offset`."""
+        return replace(self, vertices=self.vertices + np.asarray(offset, dtype=np.float64))
+
+    def scaled(self, factor: float) -> Mesh:
+        """A copy scaled about the origin; `factor` must be positive, for a mirror image would be inside out."""
+        if not factor > 0:
+            raise ValueError(f"scale factor must be positive, not {factor}")
+        return replace(self, vertices=self.vertices * factor)
+
+    def selected(self, keep: NDArray[np.bool_]) -> Mesh:
+        """A copy with the triangles where `keep` (bool [m]) is true, and only the vertices that those use."""
+        triangles = self.triangles[keep]
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[triangles] = True
+        renumbered = np.cumsum(used, dtype=np.int32) - np.int32(1)
+        return Mesh(self.vertices[used], renumbered[triangles])
