@@ -1,0 +1,100 @@
+"""One field from the values of others: union, intersection, difference, offset, shell."""
+
+from __future__ import annotations
+
+from functools import reduce
+
+from .box import Box
+from .parameters import REQUIRED, Number
+from .registry import Formula, Node, blend
+from .vocabulary import absolute, maximum, minimum
+
+SMOOTH = Number(
+    0.0, "width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)", least=0
+)
+
+
+@blend((1, None), smooth=SMOOTH)
+def union(a, b, smooth):  # type: ignore[no-untyped-def]
+    """All that is in any of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013, quadratic)."""
+    h = maximum(smooth - absolute(a - b), 0.0)
+    return minimum(a, b) - h * h / (4.0 * smooth)
+
+
+def hard_union(a, b):  # type: ignore[no-untyped-def]
+    return minimum(a, b)
+
+
+@blend((1, None), smooth=SMOOTH)
+def intersection(a, b, smooth):  # type: ignore[no-untyped-def]
+    """What is in all of the elements."""
+    h = maximum(smooth - absolute(a - b), 0.0)
+    return maximum(a, b) + h * h / (4.0 * smooth)
+
+
+def hard_intersection(a, b):  # type: ignore[no-untyped-def]
+    return maximum(a, b)
+
+
+@blend((1, None), smooth=SMOOTH)
+def difference(a, b, smooth):  # type: ignore[no-untyped-def]
+    """The first element without the others."""
+    h = maximum(smooth - absolute(a + b), 0.0)
+    return maximum(a, -b) + h * h / (4.0 * smooth)
+
+
+def hard_difference(a, b):  # type: ignore[no-untyped-def]
+    return maximum(a, -b)
+
+
+def _sharp_when_zero(formula: Formula, hard) -> None:  # type: ignore[no-untyped-def]
+    formula.select(lambda node: formula.function if node["smooth"] else hard)
+    formula.arguments(lambda node: {"smooth": node["smooth"]} if node["smooth"] else {})
+
+
+_sharp_when_zero(union, hard_union)
+_sharp_when_zero(intersection, hard_intersection)
+_sharp_when_zero(difference, hard_difference)
+
+
+@union.bounds
+def _(node: Node) -> Box:
+    seams = len(node.children) - 1
+    return reduce(Box.__or__, (c.facts.box for c in node.children)).grown(seams * node["smooth"] / 4)
+
+
+@intersection.bounds
+def _(node: Node) -> Box:
+    return reduce(Box.__and__, (c.facts.box for c in node.children))
+
+
+@difference.bounds
+def _(node: Node) -> Box:
+    return node.children[0].facts.box
+
+
+@blend((1, 1), distance=Number(REQUIRED, "how far outward the surface moves, in scene units; negative: inward"))
+def offset(a, distance):  # type: ignore[no-untyped-def]
+    """The element grown or shrunk; exact where its field is a distance."""
+    return a - distance
+
+
+@offset.bounds
+def _(node: Node) -> Box:
+    return node.children[0].facts.box.grown(node["distance"])
+
+
+@offset.identity
+def _(node: Node) -> bool:
+    return bool(node["distance"] == 0)
+
+
+@blend((1, 1), thickness=Number(REQUIRED, "of the wall, in scene units; its outer face is the element's surface", above=0))
+def shell(a, thickness):  # type: ignore[no-untyped-def]
+    """The element made hollow: what is deeper inside than the thickness is taken out."""
+    return maximum(a, -(a + thickness))
+
+
+@shell.bounds
+def _(node: Node) -> Box:
+    return node.children[0].facts.box

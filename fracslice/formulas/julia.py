@@ -1,0 +1,78 @@
+"""Quaternion Julia sets: q -> q^2 + c."""
+
+from __future__ import annotations
+
+import math
+
+from .box import Box
+from .escape import levels, potential_distance
+from .parameters import AUTO, Count, Number, Vector
+from .registry import Fixed, Node, shape
+from .vocabulary import any_of, maximum, sqrt, where
+
+
+@shape(
+    lipschitz=2.0,
+    weak=True,
+    c=Vector((-0.2, 0.8, 0.0, 0.0), "the constant added in each step: real part, i, j, k", sizes=(4,), least=-4, most=4),
+    iterations=Count(AUTO, 'steps of the orbit; "auto" takes the depth whose detail is a voxel', least=1, auto=True),
+    bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
+)
+def julia(x, y, z, c, iterations, first_level, last_level, escape2, flat):  # type: ignore[no-untyped-def]
+    """The solid filled Julia set of q^2 + c in the quaternions, cut at k = 0.
+
+    Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman 1989, "Ray
+    Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is Koebe's bound for
+    complex Julia sets; the worst quotient seen in 10^5 points of five sets was 1.54.
+    """
+    cr, ci, cj, ck = c
+    r2 = x * x + y * y + z * z
+    d2 = 0.0 * x + 1.0
+    k = 0.0 * x
+    level = 0.0 * x + first_level
+    end_r2, end_d2, steepest2 = r2, d2, d2
+    alive = r2 < escape2
+    for _ in range(iterations):
+        if not any_of(alive):
+            break
+        d2 = 4.0 * r2 * d2
+        twice = x + x
+        square = x * x - (y * y + z * z) + cr
+        y = twice * y + ci
+        z = twice * z + cj
+        if flat:
+            x = square
+            r2 = x * x + y * y + z * z
+        else:
+            x = square - k * k
+            k = twice * k + ck
+            r2 = x * x + y * y + z * z + k * k
+        steepest2 = maximum(steepest2, d2)
+        end_r2 = where(alive, r2, end_r2)
+        end_d2 = where(alive, d2, end_d2)
+        level = where(alive, level + level, level)
+        alive = alive & (r2 < escape2)
+    return potential_distance(end_r2, sqrt(end_d2), sqrt(steepest2), level, first_level, last_level)
+
+
+@julia.arguments
+def _(node: Node) -> dict[str, object]:
+    first, last, escape2 = levels(2, node["iterations"], node["bailout"])
+    flat = Fixed(node["c"][3] == 0)
+    return {
+        "c": node["c"],
+        "iterations": node["iterations"],
+        "first_level": first,
+        "last_level": last,
+        "escape2": escape2,
+        "flat": flat,
+    }
+
+
+@julia.bounds
+def _(node: Node) -> Box:
+    # |w_n+1| >= |w_n|^2 - |c|, so |w_N| <= R bounds |w_n| backwards, down to the point itself.
+    radius, steps = node["bailout"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
+    for _ in range(steps):
+        radius = math.sqrt(radius + math.hypot(*node["c"]))
+    return Box.centred(radius)

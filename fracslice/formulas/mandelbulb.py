@@ -1,0 +1,169 @@
+"""The Mandelbulb: w -> w^n + p in White and Nylander's triplex numbers, or w^n + c (its Julia sets)."""
+
+from __future__ import annotations
+
+import math
+
+from .box import Box
+from .escape import JUMP, levels, potential_distance
+from .parameters import AUTO, Count, Number, Vector
+from .registry import Fixed, Node, shape
+from .vocabulary import absolute, any_of, atan2, cos, exp, log, maximum, rsqrt, sin, where
+
+
+@shape(
+    lipschitz=2.0,
+    weak=True,
+    power=Number(8.0, "the exponent; whole numbers need no trigonometry and are several times faster", least=2, most=32),
+    iterations=Count(AUTO, 'steps of the orbit; "auto" takes the depth whose detail is a voxel', least=1, auto=True),
+    bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
+    julia=Vector(None, "adds this point in each step instead of the start point: a Julia set of the Mandelbulb", most=4, least=-4),
+)
+def mandelbulb(  # type: ignore[no-untyped-def]
+    x, y, z, power, iterations, first_level, last_level, escape2, c, digits, slope_digits, fixed_c
+):
+    """The Mandelbulb of an integer power, by complex multiplication.
+
+    White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
+    w = (rho (u, v), z), (u, v) a unit vector, w^n = (Im (u + iv)^n (z + i rho)^n...): both powers are products, and
+    Im (z + i rho)^n is carried divided by rho, so nothing is divided by zero at the poles.
+
+    The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of latitude.
+    The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles; with it, faded out
+    towards the escape radius, where the map of a whole neighbourhood is radial, no quotient above 1.4 was seen in 10^5
+    points for powers 2, 3, 5 and 8 and a Julia set (60 directions each, roots by bisection). L = 2 is used.
+    """
+    cx, cy, cz = x, y, z
+    grow = 1.0
+    if fixed_c:
+        cx, cy, cz = c
+        grow = 0.0
+    r2 = x * x + y * y + z * z
+    dr = 0.0 * x + 1.0
+    level = 0.0 * x + first_level
+    end_r2, end_dr, steepest = r2, dr, dr
+    alive = r2 < escape2
+    for _ in range(iterations):
+        if not any_of(alive):
+            break
+        r = r2 * rsqrt(maximum(r2, 1e-30))
+        rho2 = maximum(x * x + y * y, 1e-30)
+        over_rho = rsqrt(rho2)
+        u = x * over_rho
+        v = y * over_rho
+        re, im, cu, cv = z, 0.0 * x + 1.0, u, v
+        for odd in digits:
+            re, im = re * re - im * im * rho2, (re + re) * im
+            cu, cv = cu * cu - cv * cv, (cu + cu) * cv
+            if odd:
+                re, im = re * z - im * rho2, re + im * z
+                cu, cv = cu * u - cv * v, cu * v + cv * u
+        meridian = r
+        for odd in slope_digits:
+            meridian = meridian * meridian
+            if odd:
+                meridian = meridian * r
+        latitude = absolute(im) * (1.0 - r2 * (1.0 / escape2))
+        dr = power * maximum(meridian, latitude) * dr + grow
+        s = im * rho2 * over_rho
+        x = s * cu + cx
+        y = s * cv + cy
+        z = re + cz
+        r2 = x * x + y * y + z * z
+        steepest = maximum(steepest, dr)
+        end_r2 = where(alive, r2, end_r2)
+        end_dr = where(alive, dr, end_dr)
+        level = where(alive, level * power, level)
+        alive = alive & (r2 < escape2)
+    return potential_distance(end_r2, end_dr, steepest, level, first_level, last_level)
+
+
+def mandelbulb_real(x, y, z, power, iterations, first_level, last_level, escape2, c, fixed_c):  # type: ignore[no-untyped-def]
+    """The Mandelbulb of any power, in polar coordinates."""
+    cx, cy, cz = x, y, z
+    grow = 1.0
+    if fixed_c:
+        cx, cy, cz = c
+        grow = 0.0
+    r2 = x * x + y * y + z * z
+    dr = 0.0 * x + 1.0
+    level = 0.0 * x + first_level
+    end_r2, end_dr, steepest = r2, dr, dr
+    alive = r2 < escape2
+    for _ in range(iterations):
+        if not any_of(alive):
+            break
+        safe = maximum(r2, 1e-30)
+        rho2 = maximum(x * x + y * y, 1e-30)
+        rho = rho2 * rsqrt(rho2)
+        theta = power * atan2(rho, z)
+        phi = power * atan2(y, x)
+        rn = exp(0.5 * power * log(safe))
+        meridian = rn * rsqrt(safe)
+        latitude = absolute(rn * sin(theta) / rho) * (1.0 - r2 * (1.0 / escape2))
+        dr = power * maximum(meridian, latitude) * dr + grow
+        s = rn * sin(theta)
+        x = s * cos(phi) + cx
+        y = s * sin(phi) + cy
+        z = rn * cos(theta) + cz
+        r2 = x * x + y * y + z * z
+        steepest = maximum(steepest, dr)
+        end_r2 = where(alive, r2, end_r2)
+        end_dr = where(alive, dr, end_dr)
+        level = where(alive, level * power, level)
+        alive = alive & (r2 < escape2)
+    return potential_distance(end_r2, end_dr, steepest, level, first_level, last_level)
+
+
+def _whole(power: float) -> bool:
+    return power == int(power)
+
+
+def _digits(n: int) -> tuple[int, ...]:
+    """The binary digits of n after the first: square for each, multiply where it is 1."""
+    return tuple(int(d) for d in bin(n)[3:])
+
+
+@mandelbulb.select
+def _(node: Node):  # type: ignore[no-untyped-def]
+    return mandelbulb.function if _whole(node["power"]) else mandelbulb_real
+
+
+@mandelbulb.arguments
+def _(node: Node) -> dict[str, object]:
+    power = node["power"]
+    first, last, escape2 = levels(power, node["iterations"], node["bailout"])
+    arguments = {
+        "power": power,
+        "iterations": node["iterations"],
+        "first_level": first,
+        "last_level": last,
+        "escape2": escape2,
+        "c": node["julia"] or (0.0, 0.0, 0.0),
+        "fixed_c": Fixed(node["julia"] is not None),
+    }
+    if _whole(power):
+        n = int(power)
+        arguments |= {"digits": Fixed(_digits(n)), "slope_digits": Fixed(_digits(n - 1))}
+    return arguments
+
+
+@mandelbulb.check
+def _(node: Node) -> None:
+    if node["bailout"] ** node["power"] > 1e15:
+        raise node.fail(
+            f"bailout={node['bailout']:g}: expected at most {1e15 ** (1 / node['power']):.4g} for power {node['power']:g}"
+        )
+
+
+@mandelbulb.bounds
+def _(node: Node) -> Box:
+    # |w_n+1| >= |w_n|^power - |c|, c the start point or the constant: backwards from |w_N| <= R, from above.
+    power, steps = node["power"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
+    constant = math.hypot(*node["julia"]) if node["julia"] else None
+    radius = node["bailout"] + JUMP
+    for _ in range(100):
+        start, radius = radius, node["bailout"]
+        for _ in range(steps):
+            radius = (radius + (start if constant is None else constant)) ** (1 / power)
+    return Box.centred(radius)

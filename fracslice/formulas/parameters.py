@@ -1,0 +1,162 @@
+"""What a parameter of a formula can be: how it is read, checked, written and described.
+
+Each kind turns text from a scene file into a value (`read`), refuses what cannot be (`check`, a `ValueError` that says
+what is expected) and writes the value back (`text`). The schema and the documentation are made from the same objects.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+REQUIRED: Any = ...
+AUTO = "auto"
+
+
+@dataclass(frozen=True)
+class Number:
+    """One finite number. `above` and `below` exclude their own value, `least` and `most` include it."""
+
+    default: Any
+    doc: str
+    above: float = -math.inf
+    least: float = -math.inf
+    most: float = math.inf
+    below: float = math.inf
+
+    @property
+    def expects(self) -> str:
+        return "a number" + _range(self)
+
+    def read(self, text: str) -> Any:
+        return self.check(_number(text, self.expects))
+
+    def check(self, value: Any) -> Any:
+        return float(_checked(value, self))
+
+    def text(self, value: Any) -> str:
+        return _shortest(value)
+
+
+@dataclass(frozen=True)
+class Count:
+    """A whole number; with `auto`, also the word "auto"."""
+
+    default: Any
+    doc: str
+    least: int = 0
+    most: int = 10_000
+    auto: bool = False
+
+    @property
+    def expects(self) -> str:
+        return f"a whole number from {self.least} to {self.most}" + (' or "auto"' if self.auto else "")
+
+    def read(self, text: str) -> Any:
+        text = text.strip()
+        if self.auto and text == AUTO:
+            return AUTO
+        try:
+            return self.check(int(text))
+        except ValueError:
+            raise ValueError(self.expects) from None
+
+    def check(self, value: Any) -> Any:
+        if self.auto and value == AUTO:
+            return AUTO
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        if not whole or not self.least <= value <= self.most:
+            raise ValueError(self.expects)
+        return value
+
+    def text(self, value: Any) -> str:
+        return str(value)
+
+
+@dataclass(frozen=True)
+class Vector:
+    """Several finite numbers, separated by spaces. `sizes` says how many there may be."""
+
+    default: Any
+    doc: str
+    sizes: tuple[int, ...] = (3,)
+    above: float = -math.inf
+    least: float = -math.inf
+    most: float = math.inf
+    below: float = math.inf
+    nonzero: bool = False
+    whole: bool = False
+
+    @property
+    def expects(self) -> str:
+        kind = "whole numbers" if self.whole else "numbers"
+        nonzero = ", not all zero" if self.nonzero else ""
+        return f"{' or '.join(map(str, self.sizes))} {kind}{_range(self)}{nonzero}"
+
+    def read(self, text: str) -> Any:
+        return self.check(tuple(_number(word, self.expects) for word in text.split()))
+
+    def check(self, value: Any) -> Any:
+        items: Sequence[Any] = value if isinstance(value, Sequence) and not isinstance(value, str) else (value,)
+        if len(items) not in self.sizes:
+            raise ValueError(self.expects)
+        numbers = tuple(float(_checked(item, self)) for item in items)
+        if self.nonzero and not any(numbers):
+            raise ValueError(self.expects)
+        if self.whole and any(n != int(n) for n in numbers):
+            raise ValueError(self.expects)
+        return tuple(int(n) for n in numbers) if self.whole else numbers
+
+    def text(self, value: Any) -> str:
+        return " ".join(map(_shortest, value))
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One of the letters x, y and z."""
+
+    default: Any
+    doc: str
+    expects: str = field(default='"x", "y" or "z"', init=False)
+
+    def read(self, text: str) -> Any:
+        return self.check(text.strip())
+
+    def check(self, value: Any) -> Any:
+        if value not in ("x", "y", "z"):
+            raise ValueError(self.expects)
+        return value
+
+    def text(self, value: Any) -> str:
+        return str(value)
+
+
+Parameter = Number | Count | Vector | Axis
+
+
+def _number(text: str, expects: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(expects) from None
+
+
+def _checked(value: Any, kind: Number | Vector) -> Any:
+    numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not numeric or not math.isfinite(value):
+        raise ValueError(kind.expects)
+    if not (kind.above < value < kind.below and kind.least <= value <= kind.most):
+        raise ValueError(kind.expects)
+    return value
+
+
+def _range(kind: Number | Vector) -> str:
+    low = f" > {kind.above:g}" if math.isfinite(kind.above) else f" >= {kind.least:g}" if math.isfinite(kind.least) else ""
+    high = f" < {kind.below:g}" if math.isfinite(kind.below) else f" <= {kind.most:g}" if math.isfinite(kind.most) else ""
+    return low + (" and" if low and high else "") + high
+
+
+def _shortest(value: Any) -> str:
+    return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))

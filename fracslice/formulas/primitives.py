@@ -1,0 +1,211 @@
+"""The solids that everything else is cut with: exact distances, after Quilez, "Distance functions" (2008-2020)."""
+
+from __future__ import annotations
+
+import math
+
+from .box import Box
+from .parameters import Number, Vector
+from .registry import Node, shape
+from .vocabulary import absolute, maximum, minimum, sqrt, where
+
+
+@shape(radius=Number(1.0, "the radius", above=0))
+def sphere(x, y, z, radius):  # type: ignore[no-untyped-def]
+    """A sphere around the origin."""
+    return sqrt(x * x + y * y + z * z) - radius
+
+
+@sphere.bounds
+def _(node: Node) -> Box:
+    return Box.centred(node["radius"])
+
+
+@shape(
+    size=Vector((1.0, 1.0, 1.0), "the three edge lengths", above=0),
+    round=Number(0.0, "radius of the rounded edges and corners, within the size", least=0),
+)
+def box(x, y, z, half, round):  # type: ignore[no-untyped-def]
+    """A box around the origin, its edges sharp or rounded."""
+    hx, hy, hz = half
+    qx = absolute(x) - hx
+    qy = absolute(y) - hy
+    qz = absolute(z) - hz
+    ox = maximum(qx, 0.0)
+    oy = maximum(qy, 0.0)
+    oz = maximum(qz, 0.0)
+    return sqrt(ox * ox + oy * oy + oz * oz) + minimum(maximum(qx, maximum(qy, qz)), 0.0) - round
+
+
+@box.check
+def _(node: Node) -> None:
+    if 2 * node["round"] > min(node["size"]):
+        raise node.fail(f"round={node['round']:g}: expected at most half the shortest edge, {min(node['size']) / 2:g}")
+
+
+@box.arguments
+def _(node: Node) -> dict[str, object]:
+    return {"half": tuple(s / 2 - node["round"] for s in node["size"]), "round": node["round"]}
+
+
+@box.bounds
+def _(node: Node) -> Box:
+    return Box.centred(*(s / 2 for s in node["size"]))
+
+
+@shape(
+    radius=Number(1.0, "from the centre to the middle of the tube", above=0),
+    tube=Number(0.25, "radius of the tube", above=0),
+)
+def torus(x, y, z, radius, tube):  # type: ignore[no-untyped-def]
+    """A torus around the z axis."""
+    q = sqrt(x * x + y * y) - radius
+    return sqrt(q * q + z * z) - tube
+
+
+@torus.bounds
+def _(node: Node) -> Box:
+    outer = node["radius"] + node["tube"]
+    return Box.centred(outer, outer, node["tube"])
+
+
+@shape(
+    radius=Number(0.5, "the radius", above=0),
+    height=Number(1.0, "the height along z, centred at the origin", above=0),
+)
+def cylinder(x, y, z, radius, half):  # type: ignore[no-untyped-def]
+    """A cylinder along the z axis, with flat ends."""
+    q = sqrt(x * x + y * y) - radius
+    h = absolute(z) - half
+    oq = maximum(q, 0.0)
+    oh = maximum(h, 0.0)
+    return sqrt(oq * oq + oh * oh) + minimum(maximum(q, h), 0.0)
+
+
+@cylinder.arguments
+def _(node: Node) -> dict[str, object]:
+    return {"radius": node["radius"], "half": node["height"] / 2}
+
+
+@cylinder.bounds
+def _(node: Node) -> Box:
+    return Box.centred(node["radius"], node["radius"], node["height"] / 2)
+
+
+@shape(
+    **{
+        "from": Vector((0.0, 0.0, -0.5), "centre of one end"),
+        "to": Vector((0.0, 0.0, 0.5), "centre of the other end"),
+        "radius": Number(0.25, "the radius", above=0),
+    }
+)
+def capsule(x, y, z, start, along, scale, radius):  # type: ignore[no-untyped-def]
+    """All points within the radius of a segment."""
+    sx, sy, sz = start
+    ax, ay, az = along
+    px = x - sx
+    py = y - sy
+    pz = z - sz
+    t = minimum(maximum((px * ax + py * ay + pz * az) * scale, 0.0), 1.0)
+    qx = px - t * ax
+    qy = py - t * ay
+    qz = pz - t * az
+    return sqrt(qx * qx + qy * qy + qz * qz) - radius
+
+
+@capsule.arguments
+def _(node: Node) -> dict[str, object]:
+    along = tuple(b - a for a, b in zip(node["from"], node["to"], strict=True))
+    length2 = sum(a * a for a in along)
+    return {
+        "start": node["from"],
+        "along": along,
+        "scale": 1.0 / length2 if length2 > 0 else 0.0,
+        "radius": node["radius"],
+    }
+
+
+@capsule.bounds
+def _(node: Node) -> Box:
+    return Box.around([node["from"], node["to"]]).grown(node["radius"])
+
+
+@shape(
+    radius=Number(0.5, "radius of the base", above=0),
+    height=Number(1.0, "from the base up to the tip along z, centred at the origin", above=0),
+)
+def cone(x, y, z, radius, half, scale):  # type: ignore[no-untyped-def]
+    """A cone along the z axis, its tip up."""
+    # In the half plane (q, z): the distance to the base segment and to the side, the sign from both.
+    q = sqrt(x * x + y * y)
+    base = maximum(q - radius, 0.0)
+    below = -half - z
+    t = minimum(maximum((q * radius + (half - z) * (2.0 * half)) * scale, 0.0), 1.0)
+    sq = q - t * radius
+    sz = z - half + t * (2.0 * half)
+    nearest = sqrt(minimum(base * base + below * below, sq * sq + sz * sz))
+    outside_side = (q - radius) * (2.0 * half) + (z + half) * radius
+    return where(maximum(below, outside_side) < 0.0, -nearest, nearest)
+
+
+@cone.arguments
+def _(node: Node) -> dict[str, object]:
+    radius, height = node["radius"], node["height"]
+    return {"radius": radius, "half": height / 2, "scale": 1.0 / (radius * radius + height * height)}
+
+
+@cone.bounds
+def _(node: Node) -> Box:
+    return Box.centred(node["radius"], node["radius"], node["height"] / 2)
+
+
+@shape(
+    normal=Vector((0.0, 0.0, 1.0), "points out of the solid; any length", nonzero=True),
+    offset=Number(0.0, "distance of the plane from the origin along the normal"),
+)
+def plane(x, y, z, normal, offset):  # type: ignore[no-untyped-def]
+    """The half space behind a plane."""
+    nx, ny, nz = normal
+    return x * nx + y * ny + z * nz - offset
+
+
+@plane.arguments
+def _(node: Node) -> dict[str, object]:
+    length = math.hypot(*node["normal"])
+    return {"normal": tuple(n / length for n in node["normal"]), "offset": node["offset"]}
+
+
+@plane.bounds
+def _(node: Node) -> Box:
+    lo, hi = [-math.inf] * 3, [math.inf] * 3
+    used = [axis for axis in range(3) if node["normal"][axis]]
+    if len(used) == 1:
+        sign = math.copysign(1, node["normal"][used[0]])
+        (hi if sign > 0 else lo)[used[0]] = sign * node["offset"]
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
+
+
+@shape(radius=Number(1.0, "from the centre to each of the six corners", above=0))
+def octahedron(x, y, z, radius):  # type: ignore[no-untyped-def]
+    """A regular octahedron around the origin."""
+    ax = absolute(x)
+    ay = absolute(y)
+    az = absolute(z)
+    m = ax + ay + az - radius
+    # The nearest of the face and, where its foot leaves the face, the edge opposite to the smallest coordinate.
+    in_x = 3.0 * ax < m
+    in_y = 3.0 * ay < m
+    in_z = 3.0 * az < m
+    qx = where(in_x, ax, where(in_y, ay, az))
+    qy = where(in_x, ay, where(in_y, az, ax))
+    qz = where(in_x, az, where(in_y, ax, ay))
+    k = minimum(maximum(0.5 * (qz - qy + radius), 0.0), radius)
+    dy = qy - radius + k
+    dz = qz - k
+    edge = sqrt(qx * qx + dy * dy + dz * dz)
+    return where(in_x | in_y | in_z, edge, m * 0.57735026918962576)
+
+
+@octahedron.bounds
+def _(node: Node) -> Box:
+    return Box.centred(node["radius"])

@@ -1,0 +1,231 @@
+"""One formula, one registration: the scene reader, the kernels, the schema, the docs and the tests follow from it.
+
+A *shape* is a distance field ``f(x, y, z, ...)``: negative inside, zero exactly on the surface. A *blend* makes one
+field of the values of others. A *warp* decides at which points its child is evaluated; it is written as a function whose
+first argument is the child. All three are plain functions in the words of `fracslice.formulas.vocabulary`; decorating
+one makes it a `Formula`, and calling a `Formula` makes a `Node` of a scene tree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Literal
+
+from ..errors import SceneError
+from .box import Box
+from .parameters import REQUIRED, Parameter
+
+Kind = Literal["shape", "blend", "warp"]
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """An argument that is compiled into the kernel instead of being passed to it: it changes which code is needed."""
+
+    value: Any
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known of a field without evaluating it.
+
+    box: encloses all points where the field is negative, in the node's own coordinates.
+    lipschitz: L such that the distance from p to the surface is at least ``|f(p)| / L``. For all formulas but the
+        escape-time ones it is more: ``|f(p) - f(q)| <= L |p - q|``.
+    weak: True if inside values are much smaller than the distance to the surface (escape-time fractals), so that the
+        inside cannot be recognised from afar.
+    """
+
+    box: Box
+    lipschitz: float
+    weak: bool
+
+
+Hook = Callable[["Node"], Any]
+
+
+@dataclass(eq=False)
+class Formula:
+    """A registered formula. Its hooks take a `Node` and tell what the kernel and the sampler need to know."""
+
+    name: str
+    kind: Kind
+    function: Callable[..., Any]
+    parameters: Mapping[str, Parameter]
+    children: tuple[int, int | None] = (0, 0)
+    lipschitz: float = 1.0
+    weak: bool = False
+    hooks: dict[str, Hook] = field(default_factory=dict)
+
+    def __call__(self, *children: Node, place: str | None = None, **values: Any) -> Node:
+        """A scene node. Raises `SceneError` if a value or the number of children is not possible."""
+        unknown = sorted(set(values) - set(self.parameters))
+        if unknown:
+            raise SceneError(f"<{self.name}> has no attribute {unknown[0]!r}")
+        checked = {name: self._value(name, values.get(name)) for name in self.parameters}
+        node = Node(self, MappingProxyType(checked), self._grouped(children), place)
+        self.hooks.get("check", lambda _: None)(node)
+        return node
+
+    def _value(self, name: str, value: Any) -> Any:
+        kind = self.parameters[name]
+        if value is None:
+            if kind.default is REQUIRED:
+                raise SceneError(f"<{self.name}> needs {name}: {kind.expects}")
+            return kind.default
+        try:
+            return kind.check(value)
+        except ValueError as error:
+            raise SceneError(f"<{self.name}> {name}={value!r}: expected {error}") from None
+
+    def _grouped(self, children: tuple[Node, ...]) -> tuple[Node, ...]:
+        least, most = self.children
+        if len(children) < least or (most == 0 and children):
+            wanted = "no elements" if most == 0 else f"at least {least} element{'s' if least > 1 else ''}"
+            raise SceneError(f"<{self.name}> takes {wanted} inside it, found {len(children)}")
+        if most == 1 and len(children) > 1:
+            return (get("union")(*children),)
+        return tuple(children)
+
+    # The hooks, set by decorating a function with them.
+    def bounds(self, hook: Callable[[Node], Box]) -> Callable[[Node], Box]:
+        """The box that encloses the inside."""
+        return self._hook("bounds", hook)
+
+    def slope(self, hook: Callable[[Node], float]) -> Callable[[Node], float]:
+        """The Lipschitz bound, where it depends on parameters or children."""
+        return self._hook("slope", hook)
+
+    def arguments(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
+        """The function's arguments after the points or values, where they are not the parameters themselves."""
+        return self._hook("arguments", hook)
+
+    def select(self, hook: Callable[[Node], Callable[..., Any]]) -> Callable[[Node], Callable[..., Any]]:
+        """Another function for these parameters, when they need less or different code."""
+        return self._hook("select", hook)
+
+    def identity(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """True if the node changes nothing and can be left out."""
+        return self._hook("identity", hook)
+
+    def check(self, hook: Callable[[Node], None]) -> Callable[[Node], None]:
+        """Raises `SceneError` for values that are possible alone but not together."""
+        return self._hook("check", hook)
+
+    def _hook(self, name: str, hook: Hook) -> Hook:
+        self.hooks[name] = hook
+        return hook
+
+    @property
+    def doc(self) -> str:
+        return (self.function.__doc__ or "").strip()
+
+
+@dataclass(frozen=True)
+class Node:
+    """A formula with its parameters and children: one element of a scene. Immutable; `place` is "file:line"."""
+
+    formula: Formula
+    values: Mapping[str, Any]
+    children: tuple[Node, ...] = ()
+    place: str | None = field(default=None, compare=False)
+
+    def __getitem__(self, parameter: str) -> Any:
+        return self.values[parameter]
+
+    def __repr__(self) -> str:
+        changed = [f"{k}={v!r}" for k, v in self.values.items() if v != self.formula.parameters[k].default]
+        return f"{self.formula.name}({', '.join([*map(repr, self.children), *changed])})"
+
+    def __hash__(self) -> int:
+        return hash((self.formula.name, tuple(self.values.items()), self.children))
+
+    def walk(self) -> Iterator[Node]:
+        """This node and all below it, parents first."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    def changed(self, children: tuple[Node, ...] | None = None, **values: Any) -> Node:
+        """A copy with other values or children."""
+        kept = self.children if children is None else children
+        return self.formula(*kept, place=self.place, **{**_given(self), **values})
+
+    def fail(self, message: str) -> SceneError:
+        """The error to raise about this node: file, line and element, then `message`."""
+        return SceneError(f"{self.place + ': ' if self.place else ''}<{self.formula.name}> {message}")
+
+    @cached_property
+    def facts(self) -> Facts:
+        """Box, Lipschitz bound and weakness of this field."""
+        hooks, below = self.formula.hooks, [child.facts for child in self.children]
+        if "bounds" in hooks:
+            box = hooks["bounds"](self)
+        else:
+            box = below[0].box
+        slope = hooks["slope"](self) if "slope" in hooks else max([self.formula.lipschitz, *(b.lipschitz for b in below)])
+        return Facts(box, slope, self.formula.weak or any(b.weak for b in below))
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What the kernel's function is called with: numbers, tuples of numbers, or `Fixed`."""
+        hook = self.formula.hooks.get("arguments")
+        return hook(self) if hook else dict(self.values)
+
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The function to compile for this node."""
+        hook = self.formula.hooks.get("select")
+        return hook(self) if hook else self.formula.function
+
+    @property
+    def is_identity(self) -> bool:
+        hook = self.formula.hooks.get("identity")
+        return bool(hook and hook(self))
+
+
+def _given(node: Node) -> dict[str, Any]:
+    return {name: value for name, value in node.values.items() if value is not None}
+
+
+_REGISTRY: dict[str, Formula] = {}
+
+
+def shape(lipschitz: float = 1.0, weak: bool = False, **parameters: Parameter) -> Callable[..., Formula]:
+    """Registers ``f(x, y, z, ...)`` under the function's name."""
+    return _register("shape", (0, 0), parameters, lipschitz=lipschitz, weak=weak)
+
+
+def blend(children: tuple[int, int | None], **parameters: Parameter) -> Callable[..., Formula]:
+    """Registers ``f(a, ...)`` of one child's values, or ``f(a, b, ...)`` that folds the values of several."""
+    return _register("blend", children, parameters)
+
+
+def warp(**parameters: Parameter) -> Callable[..., Formula]:
+    """Registers ``f(child, x, y, z, ...)``, which calls ``child(x, y, z)``."""
+    return _register("warp", (1, 1), parameters)
+
+
+def _register(kind: Kind, children: tuple[int, int | None], parameters: dict[str, Parameter], **known: Any) -> Any:
+    def decorate(function: Callable[..., Any]) -> Formula:
+        name = function.__name__.rstrip("_")
+        formula = Formula(name, kind, function, MappingProxyType(parameters), children, **known)
+        if name in _REGISTRY:
+            raise ValueError(f"two formulas are called {name!r}")
+        _REGISTRY[name] = formula
+        return formula
+
+    return decorate
+
+
+def get(name: str) -> Formula:
+    """The formula called `name`; `KeyError` if there is none."""
+    return _REGISTRY[name]
+
+
+def names() -> list[str]:
+    """The names of all formulas, sorted."""
+    return sorted(_REGISTRY)
