@@ -1,0 +1,154 @@
+"""The CPU back end: a scene's field as machine code, from the cache or compiled once.
+
+A kernel is an object file named by the hash of everything that made it. Loading one needs llvmlite but not Numba, and
+takes milliseconds; its functions are called with the interpreter unlocked, so plain threads scale.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cached_property, lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ..formulas.registry import Node
+from .linker import Linked, link
+
+Precision = Literal["float32", "float64"]
+
+
+class CpuKernel:
+    """The compiled field of one scene. Safe to call from many threads at once."""
+
+    def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
+        self.dtype = np.dtype(precision)
+        self.width = _lane_count(self.dtype.itemsize * 8)
+        self._parameters = linked.parameters.astype(self.dtype)
+        self._points, self._bricks = _load(linked, self.dtype.itemsize * 8, self.width)
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Field values at points.
+
+        x, y, z: arrays of one shape, any float type, scene units. Returns that shape in the kernel's dtype. A point with a
+        NaN gives NaN.
+        """
+        shape, n = np.shape(x), np.size(x)
+        padded = -(-max(n, 1) // self.width) * self.width
+        coordinates = np.zeros((4, padded), self.dtype)
+        with np.errstate(over="ignore"):
+            for row, values in zip(coordinates, (x, y, z), strict=False):
+                row[:n] = np.ravel(values)
+        self._points(self._address(self._parameters), *(row.ctypes.data for row in coordinates), padded)
+        return coordinates[3, :n].reshape(shape)
+
+    def bricks(self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray) -> None:
+        """Field values on bricks of 8 x 8 x 8 grid points.
+
+        corners: int32 [n, 3], C-contiguous, the grid index of each brick's first sample. out: [n, 512] of the kernel's
+        dtype, C-contiguous, offset x*64 + y*8 + z. A grid point lies at ``origin + voxel * index``; its value depends on
+        nothing else.
+        """
+        assert corners.dtype == np.int32 and corners.flags.c_contiguous and out.flags.c_contiguous
+        assert out.dtype == self.dtype and out.shape == (len(corners), 512)
+        frame = np.array([*origin, voxel], self.dtype)
+        offsets = (row.ctypes.data for row in self._brick_offsets)
+        self._bricks(self._address(self._parameters), frame.ctypes.data, *offsets, corners.ctypes.data, out.ctypes.data, len(corners))
+
+    @cached_property
+    def _brick_offsets(self) -> np.ndarray:
+        return np.ascontiguousarray(np.indices((8, 8, 8)).reshape(3, 512).astype(self.dtype))
+
+    @staticmethod
+    def _address(array: np.ndarray) -> int:
+        return array.ctypes.data
+
+
+@lru_cache(maxsize=32)
+def _kernel(source: str, parameters: bytes, precision: Precision) -> CpuKernel:
+    return CpuKernel(Linked(source, np.frombuffer(parameters)), precision)
+
+
+def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
+    """The kernel of a scene tree whose depths are resolved. Raises `KernelError`."""
+    linked = link(root)
+    return _kernel(linked.source, linked.parameters.tobytes(), precision)
+
+
+def cache_folder() -> Path:
+    """Where kernels are kept: $FRACSLICE_CACHE, else fracslice/ in the user's cache folder."""
+    given = os.environ.get("FRACSLICE_CACHE")
+    base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    return Path(given or Path(base) / "fracslice" / "kernels").expanduser()
+
+
+def _lane_count(bits: int) -> int:
+    """Two registers in flight hide the latency of the arithmetic."""
+    register = 512 if "+avx512f" in host()[1].split(",") else 256
+    return 2 * register // bits
+
+
+@lru_cache(maxsize=1)
+def host() -> tuple[str, str]:
+    """The CPU's name and features, as LLVM spells them."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+@lru_cache(maxsize=1)
+def _toolchain() -> str:
+    """Everything beside the scene that the machine code depends on."""
+    here = Path(__file__).parent
+    texts = [(here / name).read_text() for name in ("lanes.py", "lanes_math.py", "compiler.py")]
+    versions = [version(p) for p in ("numba", "llvmlite")]
+    return "\n".join([*host(), *versions, *texts])
+
+
+def _load(linked: Linked, bits: int, width: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    key = hashlib.sha256("\n".join([linked.source, str(bits), str(width), _toolchain()]).encode()).hexdigest()[:32]
+    path = cache_folder() / f"{key}.o"
+    try:
+        code = path.read_bytes()
+    except OSError:
+        from .compiler import Target, compile_object
+
+        code = compile_object(linked, Target(bits, width, *host()))
+        _keep(path, code)
+    return _functions(code)
+
+
+def _keep(path: Path, code: bytes) -> None:
+    """Written beside and renamed, so that two processes cannot spoil it; a folder that cannot be written is no error."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+            file.write(code)
+        os.replace(file.name, path)
+    except OSError:
+        return
+
+
+_ENGINES: list[Any] = []
+
+
+def _functions(code: bytes) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    import llvmlite.binding as llvm
+
+    machine = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(jit=True)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    _ENGINES.append(engine)  # the code lives as long as its engine
+    pointer, count = ctypes.c_void_p, ctypes.c_ssize_t
+    points = ctypes.CFUNCTYPE(None, *[pointer] * 5, count)(engine.get_function_address("points"))
+    bricks = ctypes.CFUNCTYPE(None, *[pointer] * 7, count)(engine.get_function_address("bricks"))
+    return points, bricks

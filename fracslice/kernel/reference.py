@@ -1,0 +1,26 @@
+"""The reference back end: the linked scene on NumPy float64 arrays. Slow, and the oracle of every other one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..formulas import vocabulary
+from ..formulas.registry import Node
+from .linker import FIELD, link
+
+
+def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:
+    """``f(x, y, z)`` of float64 arrays of one shape, the signed field of a scene tree."""
+    linked = link(root)
+    scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
+    exec(compile(linked.source, "<linked scene>", "exec"), scope)
+    function = scope[FIELD]
+
+    def evaluate(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            points = [np.asarray(a, dtype=np.float64) for a in (x, y, z)]
+            return np.asarray(function(*points, linked.parameters))
+
+    return evaluate
