@@ -1,0 +1,1 @@
+"""From a field to sparse samples around its surface, and to OpenVDB."""

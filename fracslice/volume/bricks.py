@@ -1,0 +1,37 @@
+"""The record that the sampler hands to the mesher and to OpenVDB: bricks of samples around a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+OUTSIDE, INSIDE = -1, -2
+
+
+@dataclass(frozen=True, eq=False)
+class Bricks:
+    """Samples of a signed field on the grid points near its zero set.
+
+    origin: position of grid point (0, 0, 0), scene units. voxel: spacing, scene units.
+    ijk: int32 [n, 3], C-contiguous: grid index of each brick's first sample, multiples of 8, in lexicographic order.
+    values: float32 [n, 512], offset x*64 + y*8 + z; negative inside, never NaN.
+    index: int32 [bx, by, bz]: the row of each brick, or `OUTSIDE` or `INSIDE` where no sample is needed.
+
+    No sign change crosses a face between a brick with samples and one without, or between two without; all beyond
+    `index` is outside. So the surface is closed and wholly within the samples.
+
+    evaluations: how many times the field was evaluated, probing included. repaired: bricks that a violated Lipschitz
+    bound would have lost, found by the closure rule.
+    """
+
+    origin: tuple[float, float, float]
+    voxel: float
+    ijk: np.ndarray
+    values: np.ndarray
+    index: np.ndarray
+    evaluations: int = field(default=0, kw_only=True)
+    repaired: int = field(default=0, kw_only=True)
+
+    def __len__(self) -> int:
+        return len(self.ijk)

@@ -1,0 +1,229 @@
+"""Sparse sampling: from a distance field to bricks that hold its whole surface and little else.
+
+Top down, a cell is dropped when the field at its centre says that no sign change is in it or within a voxel of it:
+``|f| > L * (half diagonal + voxel)``. What remains at brick size are candidates. They are sampled from the outside in: a
+candidate next to empty space, or whose centre is outside, is sampled; then every neighbour that a sampled brick shows an
+outside sample to, until none is left. The inside of an escape-time fractal, which costs every iteration and cannot be
+recognised from afar, is so never entered beyond its first layer.
+
+The same rule is the safety net: where a sign change would leave the samples, the neighbour is sampled too, whatever the
+bound said. All results depend on the field only, not on threads or order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import VolumeError
+from ..formulas.registry import Facts
+from ..kernel import CpuKernel
+from ..work import Work, chunks
+from .bricks import INSIDE, OUTSIDE, Bricks
+from .lattice import BRICK, Lattice
+
+COARSEST = 16
+"""Bricks along a cell of the first level: 128 voxels, as in OpenVDB's tree."""
+
+EMPTY, CANDIDATE, FULL, QUEUED = 0, 1, 2, 3
+CHUNK = 64
+
+
+def sample(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> Bricks:
+    """Samples a scene's field around its surface.
+
+    kernel: the scene's float32 kernel. facts: the scene's facts, whose Lipschitz bound prunes. Raises `VolumeError` if
+    there is no surface, or if it leaves the lattice; `Cancelled`.
+    """
+    run = _Run(kernel, facts, lattice, work or Work())
+    state, outside = run.probe()
+    run.explore(state, run.seeds(state, outside))
+    return run.finished(state)
+
+
+@dataclass
+class _Run:
+    kernel: CpuKernel
+    facts: Facts
+    lattice: Lattice
+    work: Work
+    evaluations: int = 0
+    repaired: int = 0
+    corners: list[np.ndarray] = field(default_factory=list)
+    signs: list[np.ndarray] = field(default_factory=list)
+    values: list[np.ndarray] = field(default_factory=list)
+
+    # --- top down ---------------------------------------------------------------------------------------------------
+    def probe(self) -> tuple[np.ndarray, np.ndarray]:
+        """state uint8 [bx, by, bz] of every brick, and a bool array: candidates whose centre is outside."""
+        state = np.full(self.lattice.bricks, EMPTY, np.uint8)
+        outside = np.zeros(self.lattice.bricks, bool)
+        size = COARSEST
+        cells = _grid(*(-(-n // size) for n in self.lattice.bricks)) * size
+        while True:
+            f = self.centres(cells, size)
+            reach = self.facts.lipschitz * np.sqrt(3) * self.lattice.voxel * (size * BRICK + 1) / 2
+            for cell in cells[f < -reach]:
+                state[tuple(slice(c, c + size) for c in cell)] = FULL
+            near = ~(np.abs(f) > reach)
+            cells, f = cells[near], f[near]
+            if size == 1:
+                break
+            size //= 2
+            cells = (cells[:, None] + _grid(2, 2, 2)[None] * size).reshape(-1, 3)
+            cells = cells[(cells < self.lattice.bricks).all(1)]
+        state[tuple(cells.T)] = CANDIDATE
+        outside[tuple(cells.T)] = ~(f < 0)
+        return state, outside
+
+    def centres(self, cells: np.ndarray, size: int) -> np.ndarray:
+        """The field at the centres of cells of `size` bricks."""
+        middle = cells * BRICK + (size * BRICK - 1) / 2
+        points = np.asarray(self.lattice.origin)[:, None] + self.lattice.voxel * middle.T
+        f = np.empty(len(cells), self.kernel.dtype)
+
+        def task(part: slice) -> None:
+            f[part] = self.kernel.points(*points[:, part])
+
+        self.work.map(task, chunks(len(cells), 1 << 14))
+        self.evaluations += len(cells)
+        return f
+
+    def seeds(self, state: np.ndarray, outside: np.ndarray) -> np.ndarray:
+        """The candidates to start from, int32 [n, 3] in bricks.
+
+        Where the inside is as recognisable as the outside, these are all of them.
+        """
+        candidate = state == CANDIDATE
+        if self.facts.weak:
+            candidate &= _beside(state == EMPTY, True) | outside
+        # Said to be full next to what is said to be empty: the bound is wrong there.
+        wrong = (state == FULL) & _beside(state == EMPTY, True)
+        self.repaired += int(wrong.sum())
+        return np.argwhere(candidate | wrong).astype(np.int32)
+
+    # --- outside in -------------------------------------------------------------------------------------------------
+    def explore(self, state: np.ndarray, front: np.ndarray) -> None:
+        """Samples the front, then what it shows a sign change to, until the samples are closed."""
+        state[tuple(front.T)] = QUEUED
+        while len(front):
+            signs = self.sampled(front)
+            self.signs.append(signs)
+            known = int((state == QUEUED).sum())
+            self.work.progress("sampling", known / max(known + int((state == CANDIDATE).sum()), 1))
+            front = self.neighbours(state, front, signs)
+            state[tuple(front.T)] = QUEUED
+
+    def sampled(self, bricks: np.ndarray) -> np.ndarray:
+        """Samples bricks; returns their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set where inside."""
+        corners = np.ascontiguousarray(bricks * BRICK, np.int32)
+        values = np.empty((len(bricks), BRICK**3), np.float32)
+        signs = np.empty((len(bricks), 64), np.uint8)
+
+        def task(part: slice) -> None:
+            out = values[part]
+            self.kernel.bricks(corners[part], self.lattice.origin, self.lattice.voxel, out)
+            if np.isnan(out.max()):
+                np.nan_to_num(out, copy=False, nan=self.lattice.voxel)
+            signs[part] = np.packbits(out < 0, axis=1, bitorder="little")
+
+        self.work.map(task, chunks(len(bricks), CHUNK))
+        self.evaluations += values.size
+        self.corners.append(corners)
+        self.values.append(values)
+        return signs.reshape(-1, 8, 8)
+
+    def neighbours(self, state: np.ndarray, bricks: np.ndarray, signs: np.ndarray) -> np.ndarray:
+        """The bricks that must be sampled because of what these show on their faces."""
+        found = [np.empty((0, 3), np.int32)]
+        for axis, step in _FACES:
+            shows_inside, shows_outside = _face(signs, axis, step)
+            beside = bricks + step * np.eye(3, dtype=np.int32)[axis]
+            within = (beside[:, axis] >= 0) & (beside[:, axis] < state.shape[axis])
+            if (shows_inside & ~within).any():
+                raise VolumeError("the solid reaches the border of what is sampled; give it finite <bounds>")
+            beside, shows_inside, shows_outside = beside[within], shows_inside[within], shows_outside[within]
+            there = state[tuple(beside.T)]
+            lost = (there == EMPTY) & shows_inside | (there == FULL) & shows_outside
+            found.append(beside[lost | (there == CANDIDATE) & shows_outside])
+            self.repaired += int(lost.sum())
+        return np.unique(np.concatenate(found), axis=0)
+
+    # --- the result -------------------------------------------------------------------------------------------------
+    def finished(self, state: np.ndarray) -> Bricks:
+        """The bricks that a crossing edge touches, in order."""
+        ijk = np.concatenate([np.empty((0, 3), np.int32), *self.corners])
+        signs = np.concatenate([np.empty((0, 8, 8), np.uint8), *self.signs])
+        index = np.where((state == EMPTY), OUTSIDE, INSIDE).astype(np.int32)
+        kept = self.crossed(ijk // BRICK, signs, index)
+        if not kept.any():
+            raise VolumeError("there is no surface: the scene is empty or smaller than a voxel")
+        order = np.flatnonzero(kept)[np.lexsort(ijk[kept].T[::-1])]
+        index[tuple(ijk[order].T // BRICK)] = np.arange(len(order))
+        return Bricks(
+            self.lattice.origin,
+            self.lattice.voxel,
+            np.ascontiguousarray(ijk[order]),
+            self.gathered(order),
+            index,
+            evaluations=self.evaluations,
+            repaired=self.repaired,
+        )
+
+    def crossed(self, bricks: np.ndarray, signs: np.ndarray, index: np.ndarray) -> np.ndarray:
+        """Which sampled bricks have a sign change in them or to a neighbour; the others' sign is written to `index`."""
+        any_in, any_out = (signs != 0).any((1, 2)), (signs != 255).any((1, 2))
+        index[tuple(bricks.T)] = np.where(any_in, INSIDE, OUTSIDE)
+        row = np.full(index.shape, -1, np.int32)
+        row[tuple(bricks.T)] = np.arange(len(bricks))
+        kept = any_in & any_out
+        for axis, step in _FACES:
+            beside = bricks + step * np.eye(3, dtype=np.int32)[axis]
+            within = (beside[:, axis] >= 0) & (beside[:, axis] < index.shape[axis])
+            other = np.full(len(bricks), -1, np.int32)
+            other[within] = row[tuple(beside[within].T)]
+            facing_in, facing_out = _face(signs, axis, -step)
+            kept |= (other >= 0) & np.where(any_in, facing_out[other], facing_in[other])
+        return kept
+
+    def gathered(self, order: np.ndarray) -> np.ndarray:
+        """The values of the sampled bricks in `order`; each wave is let go as soon as it is copied."""
+        out = np.empty((len(order), BRICK**3), np.float32)
+        start = 0
+        while self.values:
+            part = self.values.pop(0)
+            mine = np.flatnonzero((order >= start) & (order < start + len(part)))
+            out[mine] = part[order[mine] - start]
+            start += len(part)
+        return out
+
+
+_FACES = [(axis, step) for axis in range(3) for step in (-1, 1)]
+
+
+def _grid(*shape: int) -> np.ndarray:
+    """All indices of a small grid, int32 [n, 3]."""
+    return np.ascontiguousarray(np.indices(shape, np.int32).reshape(len(shape), -1).T)
+
+
+def _face(signs: np.ndarray, axis: int, step: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of sign bits [n, 8, 8]: whether the outermost layer on one side has inside samples, and outside ones."""
+    if axis == 2:
+        bit = np.uint8(128 if step > 0 else 1)
+        layer = (signs & bit).reshape(len(signs), -1)
+        return (layer != 0).any(1), (layer == 0).any(1)
+    layer = signs.take(7 if step > 0 else 0, axis=1 + axis)
+    return (layer != 0).any(1), (layer != 255).any(1)
+
+
+def _beside(cells: np.ndarray, beyond: bool) -> np.ndarray:
+    """Which cells of a boolean grid have a true neighbour on a face; `beyond` stands for what is outside the grid."""
+    padded = np.pad(cells, 1, constant_values=beyond)
+    found = np.zeros_like(cells)
+    for axis in range(3):
+        for start in (0, 2):
+            part = [slice(1, -1)] * 3
+            part[axis] = slice(start, start + cells.shape[axis])
+            found |= padded[tuple(part)]
+    return found

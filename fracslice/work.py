@@ -1,0 +1,69 @@
+"""How work is done, apart from what is done: threads, progress, and a way to stop it."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from .errors import Cancelled
+
+T = TypeVar("T")
+
+
+def _silent(stage: str, done: float) -> None:
+    """Progress that nobody looks at."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """threads: how many to use (default: all cores). progress: called as ``progress(stage, fraction)`` from time to time.
+    cancel: set it from anywhere and the work stops within a fraction of a second with `Cancelled`."""
+
+    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
+    progress: Callable[[str, float], None] = _silent
+    cancel: threading.Event = field(default_factory=threading.Event)
+
+    def check(self) -> None:
+        """Raises `Cancelled` once somebody asked to stop."""
+        if self.cancel.is_set():
+            raise Cancelled("cancelled")
+
+    def map(self, task: Callable[[T], None], items: Sequence[T]) -> None:
+        """Runs `task` on every item, in parallel. Tasks write to places of their own; their order must not matter."""
+        if self.threads == 1 or len(items) <= 1:
+            for item in items:
+                self.check()
+                task(item)
+            return
+        queue = iter(items)
+        lock = threading.Lock()
+
+        def drain() -> None:
+            while not self.cancel.is_set():
+                with lock:
+                    item = next(queue, None)
+                if item is None:
+                    return
+                task(item)
+
+        with ThreadPoolExecutor(self.threads) as pool:
+            futures = [pool.submit(drain) for _ in range(min(self.threads, len(items)))]
+            try:
+                finished, _ = wait(futures, return_when=FIRST_EXCEPTION)
+            except BaseException:
+                self.cancel.set()
+                raise
+            for future in finished:
+                future.result()
+        self.check()
+
+
+def chunks(count: int, size: int) -> list[slice]:
+    """The slices that cut `count` things into pieces of at most `size`."""
+    return [slice(i, min(i + size, count)) for i in range(0, count, size)]
+
+
