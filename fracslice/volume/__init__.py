@@ -1,1 +1,43 @@
 """From a field to sparse samples around its surface, and to OpenVDB."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..formulas.box import Box
+from ..formulas.registry import Node
+from ..kernel import compile_scene
+from ..work import Work
+from .bricks import Bricks
+from .depth import resolve_depths
+from .extent import extent
+from .lattice import Lattice
+from .sampler import sample
+
+__all__ = ["Bricks", "Lattice", "Plan", "extent", "plan", "resolve_depths", "sample", "sample_scene"]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is about to be sampled: the scene with all depths known, the object's box and the voxel, in scene units."""
+
+    root: Node
+    box: Box
+    voxel: float
+
+
+def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
+    """Finds the object's size and the depths that a resolution needs.
+
+    resolution: voxels along the object's longest side (need not be whole). Raises `VolumeError`.
+    """
+    rough = resolve_depths(root, max(root.facts.box.size) / resolution) if root.facts.box.finite else root
+    box = extent(compile_scene(rough), rough.facts, work)
+    voxel = max(box.size) / resolution
+    return Plan(resolve_depths(root, voxel), box, voxel)
+
+
+def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
+    """Samples a planned scene around its surface. Raises `VolumeError`, `Cancelled`."""
+    lattice = Lattice.around(planned.box, planned.voxel)
+    return sample(compile_scene(planned.root), planned.root.facts, lattice, work)

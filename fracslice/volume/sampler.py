@@ -27,7 +27,7 @@ COARSEST = 16
 """Bricks along a cell of the first level: 128 voxels, as in OpenVDB's tree."""
 
 EMPTY, CANDIDATE, FULL, QUEUED = 0, 1, 2, 3
-CHUNK = 64
+CHUNK = 256
 
 
 def sample(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> Bricks:
