@@ -76,7 +76,7 @@ def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
     an index out of range or a coordinate that is not finite.
     """
     from fracslice.mesh.crossings import crossing_triangles
-    from fracslice.mesh.links import links, parts
+    from fracslice.mesh.links import links, parts, shell_volumes
     from fracslice.mesh.tree import build
 
     if not len(mesh.triangles):
@@ -89,10 +89,11 @@ def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
         raise MeshError("the mesh has only triangles without area")
     link = links(whole.triangles, len(whole.vertices))
     labels, shells = parts(whole.triangles, len(whole.vertices))
-    volumes = np.bincount(labels, whole.triangle_volumes(), minlength=shells)
+    volumes = shell_volumes(whole.vertices, whole.triangles, labels, shells)
     tree = build(whole)
     closed = not (link.open_edges or link.misoriented_edges)
     misplaced = _misplaced(whole, labels, volumes, tree) if closed else 0
+    crossing = crossing_triangles(whole, tree, threads)
     normals = np.linalg.norm(mesh.normals, axis=1)
     cavities = int((volumes < 0).sum()) if closed else 0
     return MeshReport(
@@ -101,9 +102,9 @@ def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
         watertight=link.open_edges == 0,
         manifold=not (link.open_edges or link.crowded_edges or link.extra_fans),
         oriented=not (link.misoriented_edges or misplaced),
-        self_intersections=int(crossing_triangles(whole, tree, threads).sum()),
+        self_intersections=int(crossing.sum()),
         degenerate_triangles=int((normals == 0).sum()),
-        duplicate_triangles=_duplicates(whole.triangles),
+        duplicate_triangles=_duplicates(whole.triangles[crossing]),
         open_edges=link.open_edges,
         nonmanifold_edges=link.crowded_edges,
         nonmanifold_vertices=link.extra_fans,
@@ -127,9 +128,6 @@ def _misplaced(mesh: Mesh, labels: NDArray[np.int32], volumes: NDArray[np.float6
 
 def _duplicates(triangles: NDArray[np.int32]) -> int:
     """How many triangles have the three corners of an earlier one, in whatever order."""
-    low, high = triangles.min(axis=1), triangles.max(axis=1)
-    if len(np.unique(low.astype(np.int64) << 32 | high)) == len(triangles):
-        return 0
     return len(triangles) - len(np.unique(np.sort(triangles, axis=1), axis=0))
 
 

@@ -42,10 +42,10 @@ class Shells:
 
 def shells(mesh: Mesh) -> Shells:
     """Find the shells of a closed, oriented mesh: triangles that share vertices, O(m log m)."""
-    from fracslice.mesh.links import parts
+    from fracslice.mesh.links import parts, shell_volumes
 
     labels, count = parts(mesh.triangles, len(mesh.vertices))
-    volumes = np.bincount(labels, mesh.triangle_volumes(), minlength=count)
+    volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
     body = np.arange(count)
     cavities = np.flatnonzero(volumes < 0)
     if len(cavities):

@@ -40,6 +40,29 @@ def parts(triangles: NDArray[np.int32], vertices: int) -> tuple[NDArray[np.int32
     return labels, int(count)
 
 
+def shell_volumes(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int32], labels: NDArray[np.int32], count: int
+) -> NDArray[np.float64]:
+    """Signed volume of each part, float64 [count]; measured from a vertex of its own, so that dust keeps its digits."""
+    return _shell_volumes(vertices, triangles, labels, count)
+
+
+@njit(cache=True, nogil=True)
+def _shell_volumes(vertices, triangles, labels, count):
+    volumes = np.zeros(count)
+    origin = np.full(count, -1, np.int64)
+    for t in range(len(triangles)):
+        part = labels[t]
+        if origin[part] < 0:
+            origin[part] = triangles[t, 0]
+        o, a, b, c = vertices[origin[part]], vertices[triangles[t, 0]], vertices[triangles[t, 1]], vertices[triangles[t, 2]]
+        ax, ay, az = a[0] - o[0], a[1] - o[1], a[2] - o[2]
+        bx, by, bz = b[0] - o[0], b[1] - o[1], b[2] - o[2]
+        cx, cy, cz = c[0] - o[0], c[1] - o[1], c[2] - o[2]
+        volumes[part] += (ay * bz - az * by) * cx + (az * bx - ax * bz) * cy + (ax * by - ay * bx) * cz
+    return volumes / 6
+
+
 @njit(cache=True, nogil=True)
 def _corners(triangles, vertices):
     """Corners grouped by vertex: start int64 [n + 1], corner int64 [3 m]."""

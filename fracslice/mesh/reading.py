@@ -1,0 +1,210 @@
+"""Model files in: STL, 3MF, PLY, OBJ, GLB, as a slicer would see them, nothing repaired."""
+
+from __future__ import annotations
+
+import re
+import struct
+import zipfile
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fracslice.errors import MeshError
+from fracslice.mesh.model import Mesh
+from fracslice.mesh.rounding import rounded
+
+STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+MILLIMETRES = {
+    "micron": 1e-3,
+    "millimeter": 1.0,
+    "centimeter": 10.0,
+    "inch": 25.4,
+    "foot": 304.8,
+    "meter": 1000.0,
+}
+MODEL_RELATION = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read a model in mm: coordinates as float32, equal positions welded, every triangle kept.
+
+    STL, PLY and OBJ have no unit and count as mm; 3MF and GLB say theirs. Raises MeshError with one line for a file that
+    is missing, of an unknown kind, cut off or otherwise broken.
+    """
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise MeshError(f"{path}: not a model file that can be read; known are {', '.join(sorted(READERS))}")
+    try:
+        mesh = rounded(reader(path))
+    except FileNotFoundError:
+        raise MeshError(f"{path}: no such file") from None
+    except (OSError, MeshError) as error:
+        raise MeshError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+    if not len(mesh.triangles):
+        raise MeshError(f"{path}: the file has no triangles")
+    return mesh
+
+
+def _read_stl(path: Path) -> Mesh:
+    data = path.read_bytes()
+    count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
+    if len(data) >= 84 and len(data) == 84 + STL_TRIANGLE.itemsize * count:
+        corners = np.frombuffer(data, STL_TRIANGLE, offset=84)["corners"].reshape(-1, 3)
+    elif data[:5] == b"solid" and b"facet" in data[:4096]:
+        corners = _ascii_corners(data)
+    elif len(data) < 84:
+        raise MeshError("not an STL file: shorter than its header")
+    else:
+        there = (len(data) - 84) / STL_TRIANGLE.itemsize
+        raise MeshError(f"not a whole STL file: it announces {count} triangles and holds {there:.1f}")
+    return Mesh(corners.astype(np.float64), np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+
+
+def _ascii_corners(data: bytes) -> NDArray[np.float32]:
+    words = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
+    if b"endsolid" not in data[-1024:] or len(words) != 3 * data.count(b"endfacet"):
+        raise MeshError("not a whole STL file: the text ends in the middle")
+    try:
+        return np.array(words, dtype=np.bytes_).astype(np.float32).reshape(-1, 3)
+    except ValueError:
+        raise MeshError("not an STL file: a coordinate is not a number") from None
+
+
+def _read_3mf(path: Path) -> Mesh:
+    from lxml import etree
+
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open(_model_part(archive)) as part:
+            return _Package().read(part)
+    except (zipfile.BadZipFile, EOFError, KeyError, zipfile.zlib.error) as error:
+        raise MeshError(f"not a whole 3MF file: {str(error).strip(chr(34))}") from error
+    except (etree.XMLSyntaxError, ValueError, TypeError) as error:
+        raise MeshError(f"not a valid 3MF file: {error}") from error
+
+
+def _model_part(archive: zipfile.ZipFile) -> str:
+    """The part that the package's relations call its 3D model."""
+    from lxml import etree
+
+    relations = etree.fromstring(archive.read("_rels/.rels"), _safe(etree.XMLParser))
+    for relation in relations:
+        if relation.get("Type") == MODEL_RELATION:
+            return relation.get("Target", "").lstrip("/")
+    raise MeshError("not a 3MF file: it names no 3D model")
+
+
+def _safe(parser: Any, **more: Any) -> Any:
+    return parser(resolve_entities=False, no_network=True, load_dtd=False, **more)
+
+
+class _Package:
+    """Gathers the meshes of a 3MF model while its XML streams by, then lays out what the build asks for."""
+
+    def __init__(self) -> None:
+        self.meshes: dict[str, Mesh] = {}
+        self.parts: dict[str, list[tuple[str, NDArray[np.float64]]]] = {}
+        self.build: list[tuple[str, NDArray[np.float64]]] = []
+
+    def read(self, part: IO[bytes]) -> Mesh:
+        from lxml import etree
+
+        vertices: list[tuple[float, float, float]] = []
+        triangles: list[tuple[int, int, int]] = []
+        components: list[tuple[str, NDArray[np.float64]]] = []
+        unit = "millimeter"
+        for _, element in etree.iterparse(
+            part, resolve_entities=False, no_network=True, load_dtd=False, huge_tree=True
+        ):
+            get = element.get
+            match etree.QName(element).localname:
+                case "vertex":
+                    vertices.append((float(get("x")), float(get("y")), float(get("z"))))
+                case "triangle":
+                    triangles.append((int(get("v1")), int(get("v2")), int(get("v3"))))
+                case "component":
+                    components.append((get("objectid"), _matrix(get("transform"))))
+                case "object":
+                    self.meshes[get("id")] = _indexed(vertices, triangles)
+                    self.parts[get("id")] = components
+                    vertices, triangles, components = [], [], []
+                case "item":
+                    self.build.append((get("objectid"), _matrix(get("transform"))))
+                case "model":
+                    unit = get("unit", "millimeter")
+                case _:
+                    continue
+            element.clear()
+            while element.getprevious() is not None:
+                del element.getparent()[0]
+        if unit not in MILLIMETRES:
+            raise MeshError(f"not a valid 3MF file: no such unit: {unit}")
+        if not self.build:
+            raise MeshError("the 3MF file asks to build nothing")
+        return joined([self.placed(*item, depth=0) for item in self.build]).scaled(MILLIMETRES[unit])
+
+    def placed(self, name: str, matrix: NDArray[np.float64], depth: int) -> Mesh:
+        """An object and its components in the frame of the build."""
+        if name not in self.meshes or depth > 32:
+            raise MeshError(f"not a valid 3MF file: no such object: {name}")
+        inner = [self.placed(part, at, depth + 1) for part, at in self.parts[name]]
+        whole = joined([self.meshes[name], *inner])
+        order = -1 if np.linalg.det(matrix[:3]) < 0 else 1
+        return Mesh(whole.vertices @ matrix[:3] + matrix[3], whole.triangles[:, ::order])
+
+
+def _matrix(text: str | None) -> NDArray[np.float64]:
+    """A 3MF transform: four rows of three numbers, applied to row vectors."""
+    if text is None:
+        return np.vstack([np.eye(3), np.zeros(3)])
+    return np.array(text.split(), dtype=np.float64).reshape(4, 3)
+
+
+def _indexed(vertices: list[Any], triangles: list[Any]) -> Mesh:
+    corners = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+    indices = np.array(triangles, dtype=np.int64).reshape(-1, 3)
+    if len(indices) and not 0 <= indices.min() <= indices.max() < len(corners):
+        raise MeshError("not a valid 3MF file: a triangle names a vertex that does not exist")
+    if (indices == np.roll(indices, 1, axis=1)).any():
+        raise MeshError("not a valid 3MF file: a triangle names a vertex twice")
+    return Mesh(corners, indices.astype(np.int32))
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """Several meshes as one, side by side."""
+    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    triangles = [mesh.triangles + np.int32(offset) for mesh, offset in zip(meshes, offsets, strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))
+
+
+def _read_by_trimesh(path: Path) -> Mesh:
+    """PLY, OBJ and GLB. trimesh raises whatever its parsers run into; all of it means that the file is broken."""
+    import trimesh
+
+    with path.open("rb") as file:
+        try:
+            scene = trimesh.load_scene(file, file_type=path.suffix.lower()[1:], process=False, skip_materials=True)
+            mesh = scene.to_mesh()
+            triangles = np.asarray(mesh.faces, dtype=np.int32).reshape(-1, 3)
+            model = Mesh(np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3), triangles)
+        except Exception as error:
+            raise MeshError(f"not a valid model file: {type(error).__name__}: {error}".splitlines()[0]) from error
+    return model
+
+
+def _read_glb(path: Path) -> Mesh:
+    """glTF counts in metres and its y axis goes up."""
+    model = _read_by_trimesh(path)
+    x, y, z = model.vertices.T * 1000
+    return Mesh(np.stack([x, -z, y], axis=1), model.triangles)
+
+
+READERS = {
+    ".stl": _read_stl,
+    ".3mf": _read_3mf,
+    ".ply": _read_by_trimesh,
+    ".obj": _read_by_trimesh,
+    ".glb": _read_glb,
+}
