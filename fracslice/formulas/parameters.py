@@ -59,7 +59,7 @@ class Count:
         if self.auto and text == AUTO:
             return AUTO
         try:
-            return self.check(int(text))
+            return self.check(int(_plain(text)))
         except ValueError:
             raise ValueError(self.expects) from None
 
@@ -138,9 +138,16 @@ Parameter = Number | Count | Vector | Axis
 
 def _number(text: str, expects: str) -> float:
     try:
-        return float(text)
+        return float(_plain(text))
     except ValueError:
         raise ValueError(expects) from None
+
+
+def _plain(text: str) -> str:
+    """Refuses what only Python takes for a number: 1_000, and digits of other scripts."""
+    if "_" in text or not text.isascii():
+        raise ValueError
+    return text
 
 
 def _checked(value: Any, kind: Number | Vector) -> Any:

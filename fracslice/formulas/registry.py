@@ -83,6 +83,9 @@ class Formula:
 
     def _grouped(self, children: tuple[Node, ...]) -> tuple[Node, ...]:
         least, most = self.children
+        for child in children:
+            if not isinstance(child, Node):
+                raise SceneError(f"<{self.name}> takes elements such as sphere() inside it, found {child!r:.60}")
         if len(children) < least or (most == 0 and children):
             wanted = "no elements" if most == 0 else f"at least {least} element{'s' if least > 1 else ''}"
             raise SceneError(f"<{self.name}> takes {wanted} inside it, found {len(children)}")
