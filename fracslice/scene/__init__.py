@@ -1,0 +1,8 @@
+"""Scene files: read, checked, built in Python, written."""
+
+from .lengths import parse_length
+from .model import Scene, scene
+from .reader import read, reads
+from .writer import to_xml
+
+__all__ = ["Scene", "parse_length", "read", "reads", "scene", "to_xml"]

@@ -1,0 +1,64 @@
+"""The elements of a scene file that are not formulas: what stands around them, and with which attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from ..formulas import get, names
+from ..formulas.parameters import REQUIRED, Parameter
+from ..formulas.registry import Formula
+from .lengths import Length
+
+
+@dataclass(frozen=True)
+class Section:
+    """`<scene>` or an element directly under it; described like a `Formula`, so that it reads like one."""
+
+    name: str
+    doc: str
+    parameters: Mapping[str, Parameter | Length | Version]
+    children: tuple[int, int | None] = (0, 0)
+
+
+Element = Formula | Section
+
+
+@dataclass(frozen=True)
+class Version:
+    """The version of the file format: the only one there is."""
+
+    default: Any = REQUIRED
+    doc: str = "of the file format"
+    expects: str = "1"
+
+    def read(self, text: str) -> int:
+        if text.strip() != self.expects:
+            raise ValueError(self.expects)
+        return VERSION
+
+    def text(self, value: int) -> str:
+        return str(value)
+
+
+VERSION = 1
+SCENE = Section(
+    "scene",
+    "The whole file.",
+    MappingProxyType({"version": Version()}),
+    (1, None),
+)
+SOLID = Section(
+    "solid",
+    "The object to make. Several elements inside it are a union.",
+    MappingProxyType({"size": Length(REQUIRED, "the longest side of the finished object")}),
+    (1, None),
+)
+SECTIONS = {section.name: section for section in (SOLID,)}
+
+
+def formulas() -> list[Formula]:
+    """Every registered formula, by name."""
+    return [get(name) for name in names()]

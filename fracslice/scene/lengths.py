@@ -1,0 +1,52 @@
+"""Lengths with a unit: how big the finished object is, how fine its detail."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import SceneError
+
+MILLIMETRES = {"um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
+SMALLEST, LARGEST = 1e-6, 1e6
+EXPECTS = "a length above zero such as 80mm, 8cm, 3.1in or 250um, from 0.001um to 1000m"
+NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_LENGTH = re.compile(rf"\s*({NUMBER})\s*({'|'.join(MILLIMETRES)})?\s*")
+
+
+def parse_length(value: str | float, what: str = "length") -> float:
+    """`value` in mm; a bare number is in mm already. Raises `SceneError`, which calls it `what`.
+
+    >>> parse_length("2.5 cm"), parse_length(80)
+    (25.0, 80.0)
+    """
+    try:
+        return Length(None, "").read(value) if isinstance(value, str) else Length(None, "").check(value)
+    except ValueError as error:
+        raise SceneError(f"{what} {str(value)!r}: expected {error}") from None
+
+
+@dataclass(frozen=True)
+class Length:
+    """A parameter that is a length; its value is in mm."""
+
+    default: Any
+    doc: str
+    expects: str = EXPECTS
+
+    def read(self, text: str) -> float:
+        match = _LENGTH.fullmatch(text)
+        if not match:
+            raise ValueError(self.expects)
+        return self.check(float(match[1]) * MILLIMETRES[match[2] or "mm"])
+
+    def check(self, value: Any) -> float:
+        numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not numeric or not math.isfinite(value) or not SMALLEST <= value <= LARGEST:
+            raise ValueError(self.expects)
+        return float(value)
+
+    def text(self, value: float) -> str:
+        return f"{int(value) if value.is_integer() else value!r}mm"

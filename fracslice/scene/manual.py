@@ -1,0 +1,93 @@
+"""The documentation of every element, made from the registry."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+from ..formulas.parameters import REQUIRED
+from ..formulas.registry import Formula
+from .layout import SCENE, SECTIONS, Element, formulas
+
+_GROUPS = {
+    "shape": ("Shapes", "Solids of their own; they take no elements inside them."),
+    "blend": ("Blends", "One solid made of the elements inside."),
+    "warp": ("Warps", "The element inside, looked at elsewhere. Several elements inside are a union."),
+}
+
+_START = """\
+# Scene files
+
+*Made from the registry of formulas by `python docs/generate.py`; do not edit.*
+
+A scene file is XML. It says what the object is, in units of its own, and how large it is to be when finished:
+
+```xml
+<scene version="1">
+  <solid size="80mm">
+    <union smooth="0.05">
+      <mandelbulb power="8" iterations="auto"/>
+      <transform translate="0 0 -1.1" rotate="1 0 0 90" scale="0.4"><menger level="3"/></transform>
+      <repeat period="0.5 0.5 0.5" count="3 3 1"><sphere radius="0.2"/></repeat>
+    </union>
+  </solid>
+</scene>
+```
+
+Numbers are finite and separated by spaces. Lengths in scene units have no unit; `size` takes `mm` (the
+default), `cm`, `m`, `in` or `um`. Comments may stand anywhere. Document types, entities and includes are not
+allowed. An editor completes and checks with the RELAX NG schema `fracslice/scene/scene.rng`, which ships with the
+package; `python -c "from fracslice.scene import schema; print(schema.PATH)"` says where it is.
+
+In Python every element is a function of the same name in `fracslice.formulas`, and `fracslice.scene.scene(...)`
+stands for `<scene>` and `<solid>`; `fracslice.scene.to_xml` writes the file.
+"""
+
+
+def markdown() -> str:
+    """The page of all elements."""
+    return "\n".join(_page())
+
+
+def _page() -> Iterator[str]:
+    yield _START
+    yield "## The frame\n"
+    for section in (SCENE, *SECTIONS.values()):
+        yield from _described(section)
+    for kind, (title, doc) in _GROUPS.items():
+        yield f"## {title}\n\n{doc}\n"
+        for formula in formulas():
+            if formula.kind == kind:
+                yield from _described(formula)
+
+
+def _described(element: Element) -> Iterator[str]:
+    yield f"### `<{element.name}>`\n\n{prose(element.doc)}\n"
+    if element.parameters:
+        yield "| attribute | default | expected | meaning |\n|---|---|---|---|"
+        for name, kind in element.parameters.items():
+            cells = (f"`{name}`", _code(default(kind)), kind.expects, kind.doc)
+            yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+        yield ""
+
+
+def _code(text: str) -> str:
+    return f"`{text}`" if text not in ("", "required") else text
+
+
+def default(kind: Any) -> str:
+    """A default as text: "required" if there is none, "" if leaving it out is a choice of its own."""
+    if kind.default is REQUIRED:
+        return "required"
+    return "" if kind.default is None else str(kind.text(kind.default))
+
+
+def prose(doc: str) -> str:
+    """A docstring without its indentation."""
+    return inspect.cleandoc(doc)
+
+
+def summary(formula: Formula) -> str:
+    """The first line of its documentation."""
+    return formula.doc.partition("\n")[0].strip()

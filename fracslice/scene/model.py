@@ -1,0 +1,74 @@
+"""What a scene file says, as frozen records, and the one expression that builds a scene in Python."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from ..errors import SceneError
+from ..formulas import Node, get
+from .lengths import parse_length
+
+DEEPEST = 100
+"""How deep elements may be nested: far above any use, far below Python's limit on recursion."""
+TOO_DEEP = f"is nested too deeply: expected at most {DEEPEST} elements inside each other"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One solid and how large to make it.
+
+    root: the tree of formulas. size_mm: the longest side of the finished object. name: a label, not content.
+    Raises `SceneError` for a tree that makes no sense as a whole: a twist of something unbounded, say.
+    """
+
+    root: Node
+    size_mm: float
+    name: str = field(default="scene", compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size_mm", parse_length(self.size_mm, "size"))
+        _refuse_too_deep(self.root)
+        _ = self.root.facts  # raises what only the whole tree can tell
+
+    @cached_property
+    def hash(self) -> str:
+        """12 hexadecimal digits of the SHA-256 of the canonical XML: equal for equal scenes, everywhere."""
+        from .writer import to_xml
+
+        return hashlib.sha256(to_xml(self).encode()).hexdigest()[:12]
+
+    def with_values(self, settings: Iterable[str]) -> Scene:
+        """A copy with settings such as "mandelbulb.power=6", "box[2].round=0.1" (the second), "solid.size=4cm".
+
+        Without a number in brackets every element of that name changes. Elements are counted from 1 in the
+        order of the file. Raises `SceneError` for a name that the scene does not have or an impossible value.
+        """
+        from .values import changed
+
+        return changed(self, settings)
+
+
+def scene(*elements: Node, size: str | float, name: str = "scene") -> Scene:
+    """A scene of one or more elements; several are a union.
+
+    >>> from fracslice.formulas import sphere, transform
+    >>> ball = scene(sphere(radius=0.5), transform(sphere(), translate=(1, 0, 0)), size="4cm")
+    >>> ball.size_mm, ball.root
+    (40.0, union(sphere(radius=0.5), transform(sphere(), translate=(1.0, 0.0, 0.0))))
+    """
+    if not elements:
+        raise SceneError("a scene needs at least one element")
+    root = elements[0] if len(elements) == 1 else get("union")(*elements)
+    return Scene(root, parse_length(size, "size"), name)
+
+
+def _refuse_too_deep(root: Node) -> None:
+    level = [root]
+    for _ in range(DEEPEST):
+        level = [child for node in level for child in node.children]
+        if not level:
+            return
+    raise level[0].fail(TOO_DEEP)

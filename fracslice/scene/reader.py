@@ -1,0 +1,167 @@
+"""XML -> Scene.
+
+Parsed by expat, which reports where a tag starts, stops at a document type declaration before it can declare
+anything, and opens no other file: no entity is ever expanded, nothing is included, nothing fetched.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+from ..errors import SceneError
+from ..formulas import Node
+from ..formulas.parameters import REQUIRED
+from .layout import SCENE, SECTIONS, SOLID, Element, Section, formulas
+from .model import DEEPEST, TOO_DEEP, Scene, scene
+from .nearest import hint
+
+LARGEST_FILE = 16 << 20
+
+
+def read(path: str | os.PathLike[str]) -> Scene:
+    """The scene in a file, named after it. Raises `SceneError`: "file:line: <element> what is wrong"."""
+    source = os.fspath(path)
+    try:
+        with open(source, "rb") as file:
+            data = file.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise SceneError(f"{source}: {error.strerror or error}") from None
+    return _scene(data, source, Path(source).stem)
+
+
+def reads(text: str | bytes, name: str = "scene") -> Scene:
+    """The scene in a string. Raises `SceneError`, which calls the file `name`."""
+    return _scene(text.encode() if isinstance(text, str) else text, name, name)
+
+
+def _scene(data: bytes, source: str, name: str) -> Scene:
+    if len(data) > LARGEST_FILE:
+        raise SceneError(f"{source}: expected a scene file of at most {LARGEST_FILE >> 20} MB")
+    if not data.strip():
+        raise SceneError(f"{source}: expected a scene, the file is empty")
+    sections = _Builder(source).sections(data)
+    solid = sections[SOLID.name]
+    return scene(*solid.children, size=solid.values["size"], name=name)
+
+
+@dataclass
+class _Open:
+    """An element whose end tag has not come yet."""
+
+    element: Element
+    place: str
+    values: dict[str, Any]
+    children: list[Node] = field(default_factory=list)
+
+    def fail(self, message: str) -> SceneError:
+        return SceneError(f"{self.place}: <{self.element.name}> {message}")
+
+
+class _Builder:
+    """Makes nodes from the inside out while the file is parsed: without recursion, whatever the depth."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+        self.open: list[_Open] = []
+        self.done: dict[str, _Open] = {}
+        self.formulas = {formula.name: formula for formula in formulas()}
+        self.parser = expat.ParserCreate()
+        self.parser.buffer_text = True
+        self.parser.StartDoctypeDeclHandler = self.doctype
+        self.parser.StartElementHandler = self.start
+        self.parser.EndElementHandler = self.end
+        self.parser.CharacterDataHandler = self.text
+
+    @property
+    def place(self) -> str:
+        return f"{self.source}:{self.parser.CurrentLineNumber}"
+
+    def sections(self, data: bytes) -> dict[str, _Open]:
+        """The elements under `<scene>` by name."""
+        try:
+            self.parser.Parse(data, True)
+        except expat.ExpatError as error:
+            place = f"{self.source}:{error.lineno}"
+            raise SceneError(f"{place}: not well-formed XML: {expat.ErrorString(error.code)}") from None
+        except (LookupError, ValueError) as error:
+            raise SceneError(f"{self.source}:1: cannot decode the file: {error}") from None
+        return self.done
+
+    def doctype(self, *_: object) -> None:
+        raise SceneError(f"{self.place}: <!DOCTYPE>: document types and entities are not allowed in a scene")
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        if len(self.open) > DEEPEST + 1:
+            raise SceneError(f"{self.place}: <{name}> {TOO_DEEP}")
+        opened = _Open(self.element(name), self.place, {})
+        for attribute, text in attributes.items():
+            opened.values[attribute] = _value(opened, attribute, text)
+        for attribute, kind in opened.element.parameters.items():
+            if kind.default is REQUIRED and attribute not in attributes:
+                raise opened.fail(f'needs the attribute {attribute}="...": expected {kind.expects}')
+        self.open.append(opened)
+
+    def element(self, name: str) -> Element:
+        """What may stand here under this name."""
+        if not self.open:
+            allowed: Mapping[str, Element] = {SCENE.name: SCENE}
+        elif self.open[-1].element is SCENE:
+            allowed = SECTIONS
+        else:
+            allowed = self.formulas
+            if self.open[-1].element.children[1] == 0:
+                raise self.open[-1].fail(f"takes no elements inside it, found <{name}>")
+        if name not in allowed:
+            known = {SCENE.name, *SECTIONS, *self.formulas}
+            wrong = "cannot stand here" if name in known else "is not a known element"
+            raise SceneError(f"{self.place}: <{name}> {wrong}; {hint(name, allowed, '<{}>')}")
+        if name in self.done:
+            raise SceneError(f"{self.place}: <{name}> may only stand once in a scene")
+        return allowed[name]
+
+    def end(self, name: str) -> None:
+        closed = self.open.pop()
+        if isinstance(closed.element, Section):
+            self.close_section(closed)
+            return
+        try:
+            node = closed.element(*closed.children, place=closed.place, **closed.values)
+        except SceneError as error:
+            placed = str(error).startswith(closed.place)
+            raise error if placed else SceneError(f"{closed.place}: {error}") from None
+        self.open[-1].children.append(node)
+
+    def close_section(self, closed: _Open) -> None:
+        if closed.element is not SCENE:
+            if len(closed.children) < closed.element.children[0]:
+                raise closed.fail("expected at least one element inside it")
+            self.done[closed.element.name] = closed
+        elif SOLID.name not in self.done:
+            raise closed.fail(f"expected <{SOLID.name}> inside it")
+
+    def text(self, text: str) -> None:
+        if text.strip():
+            shown = " ".join(text.split())[:40]
+            raise self.open[-1].fail(f"holds the text {shown!r}: expected elements only")
+
+
+def _value(opened: _Open, attribute: str, text: str) -> Any:
+    kind = opened.element.parameters.get(attribute)
+    if kind is None:
+        near = hint(attribute, opened.element.parameters)
+        raise opened.fail(f"{attribute}={_quoted(text)}: is not an attribute of it; {near}")
+    try:
+        return kind.read(text)
+    except ValueError as error:
+        raise opened.fail(f"{attribute}={_quoted(text)}: expected {error}") from None
+
+
+def _quoted(text: str) -> str:
+    """The value as one short line, whatever it holds."""
+    line = "".join(c if c.isprintable() else "?" for c in text)
+    return f'"{line if len(line) <= 60 else line[:57] + "..."}"'

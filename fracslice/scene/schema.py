@@ -1,0 +1,128 @@
+"""The RELAX NG schema of scene files, made from the registry: editors complete and check with it.
+
+Clark and Murata 2001, "RELAX NG Specification"; data types of XML Schema part 2; documentation and defaults
+as in "RELAX NG DTD Compatibility" (OASIS 2001). What no grammar can say (min < max), only the reader checks.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as Tree
+
+from ..formulas.parameters import AUTO, REQUIRED, Axis, Count, Number, Vector
+from .layout import SCENE, SECTIONS, VERSION, Element, Version, formulas
+from .lengths import MILLIMETRES, Length
+
+PATH = Path(__file__).with_name("scene.rng")
+"""The schema as it ships."""
+
+_NOTES = "http://relaxng.org/ns/compatibility/annotations/1.0"
+_FACETS = {"above": "minExclusive", "least": "minInclusive", "below": "maxExclusive", "most": "maxInclusive"}
+_LENGTH = rf"\s*\+?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+\-]?[0-9]+)?\s*({'|'.join(MILLIMETRES)})?\s*"
+
+
+def relaxng() -> str:
+    """The schema in XML form."""
+    grammar = Tree.Element(
+        "grammar",
+        {
+            "xmlns": "http://relaxng.org/ns/structure/1.0",
+            "xmlns:a": _NOTES,
+            "datatypeLibrary": "http://www.w3.org/2001/XMLSchema-datatypes",
+        },
+    )
+    Tree.SubElement(Tree.SubElement(grammar, "start"), "ref", name="scene")
+    _define(grammar, SCENE)
+    for section in SECTIONS.values():
+        _define(grammar, section)
+    choice = Tree.SubElement(Tree.SubElement(grammar, "define", name="formula"), "choice")
+    for formula in formulas():
+        Tree.SubElement(choice, "ref", name=formula.name)
+        _define(grammar, formula)
+    Tree.indent(grammar)
+    return Tree.tostring(grammar, encoding="unicode", xml_declaration=False) + "\n"
+
+
+def _define(grammar: Tree.Element, element: Element) -> None:
+    define = Tree.SubElement(grammar, "define", name=element.name)
+    body = Tree.SubElement(define, "element", name=element.name)
+    Tree.SubElement(body, "a:documentation").text = " ".join(element.doc.split("\n\n")[0].split())
+    for name, kind in element.parameters.items():
+        _attribute(body, name, kind)
+    if element is SCENE:
+        inside = Tree.SubElement(body, "interleave")
+        for section in SECTIONS.values():
+            Tree.SubElement(inside, "ref", name=section.name)
+    elif element.children[1] != 0:
+        Tree.SubElement(Tree.SubElement(body, "oneOrMore"), "ref", name="formula")
+
+
+def _attribute(body: Tree.Element, name: str, kind: Any) -> None:
+    required = kind.default is REQUIRED
+    parent = body if required else Tree.SubElement(body, "optional")
+    attribute = Tree.SubElement(parent, "attribute", name=name)
+    if not required and kind.default is not None:
+        attribute.set("a:defaultValue", kind.text(kind.default))
+    Tree.SubElement(attribute, "a:documentation").text = f"{kind.doc} ({kind.expects})"
+    _PATTERNS[type(kind)](attribute, kind)
+
+
+def _number(parent: Tree.Element, kind: Number) -> None:
+    _data(parent, "double", kind)
+
+
+def _count(parent: Tree.Element, kind: Count) -> None:
+    if kind.auto:
+        parent = Tree.SubElement(parent, "choice")
+        Tree.SubElement(parent, "value").text = AUTO
+    _data(parent, "integer", kind)
+
+
+def _vector(parent: Tree.Element, kind: Vector) -> None:
+    if len(kind.sizes) > 1:
+        parent = Tree.SubElement(parent, "choice")
+    for size in kind.sizes:
+        items = Tree.SubElement(parent, "list")
+        for _ in range(size):
+            _data(items, "integer" if kind.whole else "double", kind)
+
+
+def _axis(parent: Tree.Element, kind: Axis) -> None:
+    choice = Tree.SubElement(parent, "choice")
+    for letter in "xyz":
+        Tree.SubElement(choice, "value").text = letter
+
+
+def _length(parent: Tree.Element, kind: Length) -> None:
+    _param(Tree.SubElement(parent, "data", type="string"), "pattern", _LENGTH)
+
+
+def _version(parent: Tree.Element, kind: Version) -> None:
+    Tree.SubElement(parent, "value").text = str(VERSION)
+
+
+_PATTERNS: dict[type, Any] = {
+    Number: _number,
+    Count: _count,
+    Vector: _vector,
+    Axis: _axis,
+    Length: _length,
+    Version: _version,
+}
+
+
+def _data(parent: Tree.Element, kind: str, limits: Number | Count | Vector) -> None:
+    """A data type with its limits."""
+    data = Tree.SubElement(parent, "data", type=kind)
+    for name, facet in _FACETS.items():
+        limit = getattr(limits, name, math.inf)
+        if math.isfinite(limit):
+            _param(data, facet, f"{int(limit) if float(limit).is_integer() else limit}")
+    if kind == "double":
+        _param(data, "pattern", "[^NI]*")  # neither NaN nor INF
+
+
+def _param(data: Tree.Element, name: str, text: str) -> None:
+    Tree.SubElement(data, "param", name=name).text = text

@@ -1,0 +1,78 @@
+"""Single values changed from outside: what --set does."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..errors import SceneError
+from ..formulas import Node
+from .layout import SECTIONS, SOLID, Element
+from .model import Scene
+from .nearest import hint
+
+FORM = "ELEMENT.ATTRIBUTE=VALUE, such as mandelbulb.power=6 or box[2].round=0.1"
+_FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*(\d+)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One change: of every element of that name, or of the one with this number."""
+
+    source: str
+    element: str
+    number: int | None
+    attribute: str
+    text: str
+
+    def fail(self, message: str) -> SceneError:
+        return SceneError(f"{self.source}: {message}")
+
+    def value(self, element: Element) -> Any:
+        """The text as a value of this element's attribute."""
+        kind = element.parameters.get(self.attribute)
+        if kind is None:
+            near = hint(self.attribute, element.parameters)
+            raise self.fail(f"<{element.name}> has no attribute {self.attribute!r}; {near}")
+        try:
+            return kind.read(self.text)
+        except ValueError as error:
+            raise self.fail(f"expected {error}") from None
+
+
+def changed(scene: Scene, settings: Iterable[str]) -> Scene:
+    """`scene` with the settings applied, later ones over earlier ones. Raises `SceneError`."""
+    for source in settings:
+        scene = _changed(scene, _parsed(source))
+    return scene
+
+
+def _parsed(source: str) -> Setting:
+    match = _FORM.fullmatch(source)
+    if not match:
+        raise SceneError(f"{source!r}: expected {FORM}")
+    element, number, attribute, text = match.groups()
+    return Setting(source, element, int(number) if number else None, attribute, text)
+
+
+def _changed(scene: Scene, setting: Setting) -> Scene:
+    if setting.element == SOLID.name:
+        return replace(scene, size_mm=setting.value(SOLID))
+    present = Counter(node.formula.name for node in scene.root.walk())
+    if setting.element not in present:
+        known = hint(setting.element, present | dict.fromkeys(SECTIONS, 1), "<{}>")
+        raise setting.fail(f"the scene has no <{setting.element}>; {known}")
+    if setting.number is not None and not 1 <= setting.number <= present[setting.element]:
+        raise setting.fail(f"the scene has {present[setting.element]} <{setting.element}>, counted from 1")
+    return replace(scene, root=_rebuilt(scene.root, setting, Counter()))
+
+
+def _rebuilt(node: Node, setting: Setting, seen: Counter[str]) -> Node:
+    seen[node.formula.name] += 1
+    meant = node.formula.name == setting.element and setting.number in (None, seen[node.formula.name])
+    values: Mapping[str, Any] = {setting.attribute: setting.value(node.formula)} if meant else {}
+    children = tuple(_rebuilt(child, setting, seen) for child in node.children)
+    return node.changed(children, **values)

@@ -1,0 +1,41 @@
+"""Scene -> XML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+from ..formulas import Node
+from .layout import SCENE, SOLID, VERSION, Element
+from .model import Scene
+
+
+def to_xml(scene: Scene) -> str:
+    """The canonical scene file: only what differs from the defaults, two spaces a level. Reads back equal."""
+    return "\n".join(_lines(scene)) + "\n"
+
+
+def _lines(scene: Scene) -> Iterator[str]:
+    yield f"<{SCENE.name}{_attributes(SCENE, {'version': VERSION})}>"
+    yield f"  <{SOLID.name}{_attributes(SOLID, {'size': scene.size_mm})}>"
+    yield from _element(scene.root, "    ")
+    yield f"  </{SOLID.name}>"
+    yield f"</{SCENE.name}>"
+
+
+def _element(node: Node, indent: str) -> Iterator[str]:
+    start = f"{indent}<{node.formula.name}{_attributes(node.formula, node.values)}"
+    if not node.children:
+        yield start + "/>"
+        return
+    yield start + ">"
+    for child in node.children:
+        yield from _element(child, indent + "  ")
+    yield f"{indent}</{node.formula.name}>"
+
+
+def _attributes(element: Element, values: Mapping[str, Any]) -> str:
+    kinds = element.parameters
+    changed = {name: value for name, value in values.items() if value != kinds[name].default}
+    return "".join(f" {name}={quoteattr(kinds[name].text(value))}" for name, value in changed.items())
