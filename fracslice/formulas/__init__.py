@@ -1,13 +1,15 @@
 """The formulas: one fractal per file, primitives, blends and warps. Importing this registers them all."""
 
-from .blends import difference, intersection, offset, shell, union
+from .blends import difference, intersection, shell, union
 from .box import Box
+from .confining import bounds, offset, repeat
+from .deformations import bend, twist
 from .julia import julia
 from .mandelbulb import mandelbulb
 from .menger import menger
 from .primitives import box, capsule, cone, cylinder, octahedron, plane, sphere, torus
 from .registry import Formula, Node, get, names
-from .warps import bend, bounds, mirror, repeat, transform, twist
+from .transforms import mirror, transform
 
 __all__ = [
     "Box",

@@ -1,4 +1,4 @@
-"""One field from the values of others: union, intersection, difference, offset, shell."""
+"""One field from the values of others: union, intersection, difference, shell."""
 
 from __future__ import annotations
 
@@ -71,22 +71,6 @@ def _(node: Node) -> Box:
 @difference.bounds
 def _(node: Node) -> Box:
     return node.children[0].facts.box
-
-
-@blend((1, 1), distance=Number(REQUIRED, "how far outward the surface moves, in scene units; negative: inward"))
-def offset(a, distance):  # type: ignore[no-untyped-def]
-    """The element grown or shrunk; exact where its field is a distance."""
-    return a - distance
-
-
-@offset.bounds
-def _(node: Node) -> Box:
-    return node.children[0].facts.box.grown(node["distance"])
-
-
-@offset.identity
-def _(node: Node) -> bool:
-    return bool(node["distance"] == 0)
 
 
 @blend((1, 1), thickness=Number(REQUIRED, "of the wall, in scene units; its outer face is the element's surface", above=0))

@@ -30,7 +30,7 @@ def potential_distance(r2, dr, steepest, level, first_level, last_level):  # typ
     distance to the surface (the largest quotient seen in 30,000 points of 9 parameter sets was 2.8 of L = 2, in the
     Mandelbulb's inside; 1.5 for Julia sets).
     """
-    r2 = maximum(r2, 1e-4)
+    r2 = minimum(maximum(r2, 1e-4), 1e30)
     dr = where(dr < 1e30, dr, 1e30)
     steepest = where(steepest < 1e30, steepest, 1e30)
     level = minimum(level, last_level)

@@ -10,19 +10,21 @@ from ..kernel import compile_scene
 from ..work import Work
 from .bricks import Bricks
 from .depth import resolve_depths
-from .extent import extent
+from .extent import Extent, extent
 from .lattice import Lattice
 from .sampler import sample
 
-__all__ = ["Bricks", "Lattice", "Plan", "extent", "plan", "resolve_depths", "sample", "sample_scene"]
+__all__ = ["Bricks", "Extent", "Lattice", "Plan", "extent", "plan", "resolve_depths", "sample", "sample_scene"]
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is about to be sampled: the scene with all depths known, the object's box and the voxel, in scene units."""
+    """What is about to be sampled: the scene with all depths known, the object's box, a box that surely encloses it, and
+    the voxel, all in scene units."""
 
     root: Node
     box: Box
+    outer: Box
     voxel: float
 
 
@@ -32,12 +34,12 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
     resolution: voxels along the object's longest side (need not be whole). Raises `VolumeError`.
     """
     rough = resolve_depths(root, max(root.facts.box.size) / resolution) if root.facts.box.finite else root
-    box = extent(compile_scene(rough), rough.facts, work)
-    voxel = max(box.size) / resolution
-    return Plan(resolve_depths(root, voxel), box, voxel)
+    found = extent(compile_scene(rough), rough.facts, work)
+    voxel = max(found.box.size) / resolution
+    return Plan(resolve_depths(root, voxel), found.box, found.outer, voxel)
 
 
 def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
     """Samples a planned scene around its surface. Raises `VolumeError`, `Cancelled`."""
-    lattice = Lattice.around(planned.box, planned.voxel)
+    lattice = Lattice.around(planned.outer, planned.voxel)
     return sample(compile_scene(planned.root), planned.root.facts, lattice, work)

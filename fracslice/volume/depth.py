@@ -6,7 +6,7 @@ import numpy as np
 
 from ..formulas.parameters import AUTO
 from ..formulas.registry import Node
-from ..formulas.warps import affine
+from ..formulas.transforms import affine
 from ..kernel import compile_scene
 
 DEEPEST = 60

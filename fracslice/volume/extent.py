@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..errors import VolumeError
@@ -15,15 +17,23 @@ FIRST = 16
 
 LEVELS = 9
 GROWTHS = 6
-WIDEST = 2000
-"""Cells that are kept per direction and level. A flat face has more, and any of them will do."""
+MOST = 100_000
+"""Cells of the last level. A flat face has ever more of them; then its place is known a little less exactly."""
 
 
-def extent(kernel: CpuKernel, facts: Facts, work: Work | None = None) -> Box:
-    """The box of the points where the field is negative, its faces to about 1/5000 of the longest side.
+@dataclass(frozen=True)
+class Extent:
+    """The object's box, as near as it was found, and a box that surely encloses it."""
+
+    box: Box
+    outer: Box
+
+
+def extent(kernel: CpuKernel, facts: Facts, work: Work | None = None) -> Extent:
+    """The box of the points where the field is negative, its faces to about 1/4000 of the longest side; 1/500 if flat.
 
     Cells that cannot be inside (``f > L * half diagonal``), or that do not reach beyond an inside point known already, are
-    dropped; of too many, those that may reach furthest are kept; they are cut in eight. The box that the formulas promise is doubled as long as the object reaches its
+    dropped; the rest are cut in eight. The box that the formulas promise is doubled as long as the object reaches its
     border (an offset or smooth union of a field that underestimates distances can). Raises `VolumeError` if nothing is
     inside, or the object has no end.
     """
@@ -34,15 +44,15 @@ def extent(kernel: CpuKernel, facts: Facts, work: Work | None = None) -> Box:
         axes = [a for a, s in zip("xyz", box.size, strict=True) if not np.isfinite(s)]
         raise VolumeError(f"the scene has no end along {' and '.join(axes)}; put <bounds> around it")
     for _ in range(GROWTHS):
-        found, at_border = _search(kernel, facts, box, work or Work())
-        if not at_border:
+        found = _search(kernel, facts, box, work or Work())
+        if found:
             return found
         box = box.grown(max(box.size) / 2)
     raise VolumeError("the object has no end that could be found; put <bounds> around it")
 
 
-def _search(kernel: CpuKernel, facts: Facts, box: Box, work: Work) -> tuple[Box, bool]:
-    """The object's box within `box`, and whether it reaches into the cells on the border."""
+def _search(kernel: CpuKernel, facts: Facts, box: Box, work: Work) -> Extent | None:
+    """The object's extent within `box`; None if it reaches into the cells on the border."""
     longest = max(box.size) or 1.0
     half = np.maximum(np.array(box.size), longest * 1e-3) / 2 * FIRST / (FIRST - 2)
     step = 2 * half / FIRST
@@ -55,32 +65,27 @@ def _search(kernel: CpuKernel, facts: Facts, box: Box, work: Work) -> tuple[Box,
         f = _values(kernel, centres, work)
         inside = f < 0
         if level == 0 and (inside & rim).any():
-            return box, True
+            return None
         if inside.any():
             lo, hi = np.minimum(lo, centres[:, inside].min(1)), np.maximum(hi, centres[:, inside].max(1))
         possible = ~(f > facts.lipschitz * np.linalg.norm(step) / 2)
-        centres = centres[:, possible & _furthest(centres, np.where(possible, f, np.inf), step, lo, hi)]
-        if level < LEVELS - 1:
-            centres = (centres[:, :, None] + offsets * step[:, None, None]).reshape(3, -1)
-            step = step / 2
+        reach = step[:, None] / 2
+        beyond = ((centres + reach > hi[:, None]) | (centres - reach < lo[:, None])).any(0)
+        centres = centres[:, possible & beyond]
+        if level == LEVELS - 1 or 8 * centres.shape[1] > MOST and level > 3:
+            break
+        centres = (centres[:, :, None] + offsets * step[:, None, None]).reshape(3, -1)
+        step = step / 2
     if not (lo <= hi).all():
         raise VolumeError("there is no surface: nothing in the scene is inside")
-    # The true face lies between the outermost inside point and half a cell beyond.
-    return Box(tuple((lo - step / 4).tolist()), tuple((hi + step / 4).tolist())), False
+    outer_lo = np.minimum(lo, centres.min(1, initial=np.inf)) - step / 2
+    outer_hi = np.maximum(hi, centres.max(1, initial=-np.inf)) + step / 2
+    # A face lies between the outermost inside centre and the next one, half a cell on average.
+    return Extent(_box(lo - step / 2, hi + step / 2), _box(outer_lo, outer_hi))
 
 
-def _furthest(centres: np.ndarray, f: np.ndarray, step: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
-    """The cells that may hold the outermost point in one of the six directions."""
-    kept = np.zeros(len(f), bool)
-    for axis in range(3):
-        for sign, best in ((1, hi[axis]), (-1, -lo[axis])):
-            reach = sign * centres[axis] + step[axis] / 2
-            rows = np.flatnonzero(reach > best)
-            if len(rows) > WIDEST:
-                score = reach[rows] - np.maximum(f[rows], 0)
-                rows = rows[np.argpartition(-score, WIDEST)[:WIDEST]]
-            kept[rows] = True
-    return kept
+def _box(lo: np.ndarray, hi: np.ndarray) -> Box:
+    return Box(tuple(lo.tolist()), tuple(hi.tolist()))
 
 
 def _values(kernel: CpuKernel, points: np.ndarray, work: Work) -> np.ndarray:

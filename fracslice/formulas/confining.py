@@ -1,0 +1,181 @@
+"""Operators that know where their element ends: a bounding volume, offset, endless repetition."""
+
+from __future__ import annotations
+
+import math
+
+from .box import Box
+from .parameters import REQUIRED, Number, Vector
+from .registry import Fixed, Node, warp
+from .vocabulary import absolute, any_of, floor, maximum, minimum
+
+
+# Each operator below that confines its child returns ``maximum(d, minimum(child, 2 m - d))`` with d a distance to a
+# volume around the child and m > 0. The surface is unchanged where d <= 0, the result does not jump, and where d >= m it
+# is d whatever the child's value: there the child need not be evaluated, and its Lipschitz bound is not needed either.
+
+
+@warp(
+    min=Vector(REQUIRED, "the corner with the smallest coordinates"),
+    max=Vector(REQUIRED, "the corner with the largest coordinates"),
+)
+def bounds(child, x, y, z, centre, half, margin):  # type: ignore[no-untyped-def]
+    """What is inside a box; the element is not looked at far from it, however much of it there is."""
+    cx, cy, cz = centre
+    hx, hy, hz = half
+    d = maximum(absolute(x - cx) - hx, maximum(absolute(y - cy) - hy, absolute(z - cz) - hz))
+    f = d
+    if any_of(d < margin):
+        f = maximum(d, minimum(child(x, y, z), 2.0 * margin - d))
+    return f
+
+
+@bounds.check
+def _(node: Node) -> None:
+    if any(a >= b for a, b in zip(node["min"], node["max"], strict=True)):
+        raise node.fail("min and max: expected min < max on every axis")
+
+
+@bounds.arguments
+def _(node: Node) -> dict[str, object]:
+    box = Box(node["min"], node["max"])
+    half = tuple(s / 2 for s in box.size)
+    return {"centre": box.centre, "half": half, "margin": max(half) / 4}
+
+
+@bounds.bounds
+def _(node: Node) -> Box:
+    return Box(node["min"], node["max"]) & node.children[0].facts.box
+
+
+@bounds.slope
+def _(node: Node) -> float:
+    return max(1.0, node.children[0].facts.lipschitz)
+
+
+@warp(distance=Number(REQUIRED, "how far outward the surface moves, in scene units; negative: inward"))
+def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-def]
+    """The element grown or shrunk; exact where its field is a distance.
+
+    A field that underestimates distances would grow further than it should; it is cut off at the grown box.
+    """
+    cx, cy, cz = centre
+    hx, hy, hz = half
+    d = maximum(absolute(x - cx) - hx, maximum(absolute(y - cy) - hy, absolute(z - cz) - hz))
+    return maximum(child(x, y, z) - distance, d)
+
+
+@offset.arguments
+def _(node: Node) -> dict[str, object]:
+    return {"distance": node["distance"], **_frame(node.facts.box)}
+
+
+@offset.bounds
+def _(node: Node) -> Box:
+    return node.children[0].facts.box.grown(node["distance"])
+
+
+@offset.slope
+def _(node: Node) -> float:
+    return max(1.0, node.children[0].facts.lipschitz)
+
+
+@offset.identity
+def _(node: Node) -> bool:
+    return bool(node["distance"] == 0)
+
+
+def _frame(box: Box) -> dict[str, object]:
+    """The box' centre, zero along endless axes, and half sizes."""
+    return {
+        "centre": tuple(c if math.isfinite(c) else 0.0 for c in box.centre),
+        "half": tuple(s / 2 for s in box.size),
+    }
+
+
+@warp(
+    period=Vector(REQUIRED, "distance between copies along x, y and z", above=0),
+    count=Vector((0, 0, 0), "copies along x, y and z, centred at the origin; 0: without end", least=0, most=1e6, whole=True),
+)
+def repeat(child, x, y, z, period, first, last, centre, half, middle, reach, gap, nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Copies on a lattice. Every copy that can be the nearest is looked at, so cell borders are right.
+
+    Copies further than `gap` are not; the value never exceeds it inside the lattice, so that leaving one out is not
+    seen. A copy's value is at least the distance to its box, for the same reason.
+    """
+    px, py, pz = period
+    fx, fy, fz = first
+    lx, ly, lz = last
+    cx, cy, cz = centre
+    hx, hy, hz = half
+    mx, my, mz = middle
+    rx, ry, rz = reach
+    kx = minimum(maximum(floor((x - cx) / px - fx) - 0.5 * (nx - 2.0), 0.0), lx - (nx - 1.0))
+    ky = minimum(maximum(floor((y - cy) / py - fy) - 0.5 * (ny - 2.0), 0.0), ly - (ny - 1.0))
+    kz = minimum(maximum(floor((z - cz) / pz - fz) - 0.5 * (nz - 2.0), 0.0), lz - (nz - 1.0))
+    f = maximum(gap, maximum(absolute(x - mx) - rx, maximum(absolute(y - my) - ry, absolute(z - mz) - rz)))
+    for i in range(nx):
+        qx = x - (kx + (fx + i)) * px
+        for j in range(ny):
+            qy = y - (ky + (fy + j)) * py
+            for k in range(nz):
+                qz = z - (kz + (fz + k)) * pz
+                d = maximum(absolute(qx - cx) - hx, maximum(absolute(qy - cy) - hy, absolute(qz - cz) - hz))
+                f = minimum(f, maximum(d, child(qx, qy, qz)))
+    return f
+
+
+ENDLESS = 1 << 20
+
+
+def _window(node: Node, axis: int) -> int:
+    """How many neighbouring copies can be nearest along an axis."""
+    box, period, count = node.children[0].facts.box, node["period"][axis], node["count"][axis]
+    if count == 1:
+        return 1
+    overlap = box.size[axis] / 2 / period
+    if not overlap <= 3:
+        raise node.fail(f"period: expected at least a sixth of the element's size, {box.size[axis]:.4g}, along {'xyz'[axis]}")
+    window = 2 * math.ceil(max(overlap, 0.0) + 0.5)
+    return min(window, count or window)
+
+
+@repeat.arguments
+def _(node: Node) -> dict[str, object]:
+    box, period, count = node.children[0].facts.box, node["period"], node["count"]
+    windows = [_window(node, axis) for axis in range(3)]
+    number = [c or ENDLESS for c in count]
+    first = tuple(-((c - 1) / 2) if c else -float(ENDLESS // 2) for c in count)
+    gaps = [w / 2 * p - s / 2 for w, p, s, n in zip(windows, period, box.size, number, strict=True) if n > w]
+    whole = _frame(_lattice(node))
+    return {
+        "period": period,
+        "first": first,
+        "last": tuple(float(n - 1) for n in number),
+        **_frame(box),
+        "middle": whole["centre"],
+        "reach": whole["half"],
+        "gap": min(gaps, default=math.inf),
+        "nx": Fixed(windows[0]),
+        "ny": Fixed(windows[1]),
+        "nz": Fixed(windows[2]),
+    }
+
+
+def _lattice(node: Node) -> Box:
+    box, lo, hi = node.children[0].facts.box, [], []
+    for a, b, p, c in zip(box.lo, box.hi, node["period"], node["count"], strict=True):
+        reach = (c - 1) / 2 * p if c else math.inf
+        lo.append(a - reach)
+        hi.append(b + reach)
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
+
+
+@repeat.bounds
+def _(node: Node) -> Box:
+    return _lattice(node)
+
+
+@repeat.slope
+def _(node: Node) -> float:
+    return max(1.0, node.children[0].facts.lipschitz)

@@ -1,0 +1,173 @@
+"""Twisted and bent space (Barr 1984, "Global and Local Deformations of Solid Primitives"). They confine, see `confining`."""
+
+from __future__ import annotations
+
+import math
+
+from .box import Box
+from .parameters import REQUIRED, Axis, Number
+from .registry import Node, warp
+from .transforms import along
+from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt
+
+
+@warp(
+    axis=Axis("z", "the axis to turn about"),
+    degrees=Number(REQUIRED, "how far to turn per unit of length along the axis"),
+)
+def twist(child, x, y, z, rate, radius, margin, along_x, along_y):  # type: ignore[no-untyped-def]
+    """Turned about an axis, further the further along it (Barr 1984, "Global and Local Deformations of Solid Primitives").
+
+    At radius rho space is sheared by s = rate rho, which stretches by (s + sqrt(s^2 + 4)) / 2. The bound is taken at
+    5/4 of the element's own radius; beyond, the value is the distance to the cylinder around it.
+    """
+    if along_x:
+        a, b, t = y, z, x
+    elif along_y:
+        a, b, t = z, x, y
+    else:
+        a, b, t = x, y, z
+    d = sqrt(a * a + b * b) - radius
+    f = d
+    if any_of(d < margin):
+        c = cos(rate * t)
+        s = sin(rate * t)
+        p = c * a + s * b
+        q = c * b - s * a
+        if along_x:
+            inner = child(t, p, q)
+        elif along_y:
+            inner = child(q, t, p)
+        else:
+            inner = child(p, q, t)
+        f = maximum(d, minimum(inner, 2.0 * margin - d))
+    return f
+
+
+def _twist_radius(node: Node) -> float:
+    across = [a for a in range(3) if a != "xyz".index(node["axis"])]
+    radius = node.children[0].facts.box.radius(*across)
+    if not math.isfinite(radius):
+        raise node.fail(f"can only twist what is bounded across the {node['axis']} axis; put <bounds> around it")
+    return max(radius, 1e-30)
+
+
+@twist.identity
+def _(node: Node) -> bool:
+    return bool(node["degrees"] == 0)
+
+
+@twist.arguments
+def _(node: Node) -> dict[str, object]:
+    radius = _twist_radius(node)
+    return {"rate": math.radians(node["degrees"]), "radius": radius, "margin": radius / 4, **along(node)}
+
+
+@twist.bounds
+def _(node: Node) -> Box:
+    axis, radius, box = "xyz".index(node["axis"]), _twist_radius(node), node.children[0].facts.box
+    lo, hi = [-radius] * 3, [radius] * 3
+    lo[axis], hi[axis] = box.lo[axis], box.hi[axis]
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
+
+
+@twist.slope
+def _(node: Node) -> float:
+    shear = abs(math.radians(node["degrees"])) * 1.25 * _twist_radius(node)
+    return max(1.0, node.children[0].facts.lipschitz * (shear + math.sqrt(shear * shear + 4)) / 2)
+
+
+@warp(
+    axis=Axis("z", "the hinge, which stays straight: z bends x towards y, x bends y towards z, y bends z towards x"),
+    degrees=Number(REQUIRED, "how far to turn per unit of length along the bent axis"),
+)
+def bend(child, x, y, z, curvature, side, inner_radius, half, slope, margin, along_x, along_y):  # type: ignore[no-untyped-def]
+    """A straight axis made an arc (Barr 1984, "Global and Local Deformations of Solid Primitives").
+
+    In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is looked at in
+    theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; the bound is taken at half the smallest
+    radius the element reaches. Nearer than that, and near the cut opposite to it, the value is a distance to the sector
+    that holds the element.
+    """
+    if along_x:
+        a, b, t = y, side * z, x
+    elif along_y:
+        a, b, t = z, side * x, y
+    else:
+        a, b, t = x, side * y, z
+    centre = 1.0 / curvature
+    up = centre - b
+    r = sqrt(a * a + up * up)
+    u = atan2(a, up) * centre
+    v = side * (centre - r)
+    d = maximum(inner_radius - r, minimum(slope * (absolute(u) - half), 0.5 * inner_radius))
+    f = d
+    if any_of(d < margin):
+        if along_x:
+            inner = child(t, u, v)
+        elif along_y:
+            inner = child(v, t, u)
+        else:
+            inner = child(u, v, t)
+        f = maximum(d, minimum(inner, 2.0 * margin - d))
+    return f
+
+
+def _bend_frame(node: Node) -> tuple[float, float, float, float]:
+    """Curvature, side (+1 or -1), the smallest radius the element reaches, and its half length along the bent axis."""
+    hinge, box = "xyz".index(node["axis"]), node.children[0].facts.box
+    along, across = (hinge + 1) % 3, (hinge + 2) % 3
+    curvature, side = abs(math.radians(node["degrees"])), math.copysign(1.0, node["degrees"])
+    half = max(abs(box.lo[along]), abs(box.hi[along]))
+    inward = box.hi[across] if side > 0 else -box.lo[across]
+    if not half * curvature < 0.999 * math.pi:
+        raise node.fail(f"degrees={node['degrees']:g}: expected less than {math.degrees(math.pi / half):.4g}, a full circle")
+    if not inward * curvature < 0.99:
+        raise node.fail(f"degrees={node['degrees']:g}: expected less than {math.degrees(1 / inward):.4g}, or it is bent through itself")
+    return curvature, side, min(1 / curvature - inward, 1 / curvature), half
+
+
+@bend.identity
+def _(node: Node) -> bool:
+    return bool(node["degrees"] == 0)
+
+
+@bend.arguments
+def _(node: Node) -> dict[str, object]:
+    curvature, side, inner_radius, half = _bend_frame(node)
+    slope = curvature * inner_radius / math.pi
+    margin = min(inner_radius / 2, slope * (math.pi / curvature - half))
+    return {
+        "curvature": curvature,
+        "side": side,
+        "inner_radius": inner_radius,
+        "half": half,
+        "slope": slope,
+        "margin": margin,
+        **along(node),
+    }
+
+
+@bend.bounds
+def _(node: Node) -> Box:
+    if node.is_identity:
+        return node.children[0].facts.box
+    curvature, side, inner_radius, half = _bend_frame(node)
+    hinge, box = "xyz".index(node["axis"]), node.children[0].facts.box
+    along, across = (hinge + 1) % 3, (hinge + 2) % 3
+    outer = 1 / curvature - min(side * box.lo[across], side * box.hi[across])
+    top = half * curvature
+    turns = [t for t in (-math.pi / 2, 0.0, math.pi / 2) if abs(t) <= top] + [-top, top]
+    points = [(r * math.sin(t), side * (1 / curvature - r * math.cos(t))) for t in turns for r in (inner_radius, outer)]
+    lo, hi = list(box.lo), list(box.hi)
+    for axis, values in ((along, [p[0] for p in points]), (across, [p[1] for p in points])):
+        lo[axis], hi[axis] = min(values), max(values)
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
+
+
+@bend.slope
+def _(node: Node) -> float:
+    if node.is_identity:
+        return node.children[0].facts.lipschitz
+    curvature, _, inner_radius, _ = _bend_frame(node)
+    return max(1.0, node.children[0].facts.lipschitz * 2 / (curvature * inner_radius))

@@ -1,0 +1,134 @@
+"""Where an element is looked at: scaled, turned, moved, mirrored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from .box import Box
+from .parameters import REQUIRED, Axis, Vector
+from .registry import Fixed, Node, warp
+from .vocabulary import absolute
+
+
+@warp(
+    translate=Vector((0.0, 0.0, 0.0), "moves by this, last"),
+    rotate=Vector(None, "an axis and an angle in degrees, counter-clockwise seen against the axis", sizes=(4,)),
+    scale=Vector((1.0,), "one factor, or one per axis, first", sizes=(1, 3)),
+    matrix=Vector(None, "3 x 4 or 4 x 4 numbers row by row, applied before the other three", sizes=(12, 16)),
+)
+def transform(child, x, y, z, inverse, shrink):  # type: ignore[no-untyped-def]
+    """Scaled, then rotated, then moved.
+
+    The child's field is multiplied by the smallest stretch of the map, its smallest singular value: f never grows faster
+    than the child's, and is a distance where the scale is uniform.
+    """
+    a, b, c, d, e, f, g, h, i, tx, ty, tz = inverse
+    return shrink * child(
+        a * x + b * y + c * z + tx,
+        d * x + e * y + f * z + ty,
+        g * x + h * y + i * z + tz,
+    )
+
+
+def moved(child, x, y, z, offset):  # type: ignore[no-untyped-def]
+    tx, ty, tz = offset
+    return child(x - tx, y - ty, z - tz)
+
+
+def _rotation(rotate: Sequence[float]) -> np.ndarray:
+    """Rodrigues' formula."""
+    axis = np.array(rotate[:3]) / np.linalg.norm(rotate[:3])
+    angle = math.radians(rotate[3])
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+
+
+def affine(node: Node) -> tuple[np.ndarray, np.ndarray]:
+    """The 3 x 3 matrix and the translation of a transform node."""
+    linear = np.diag(np.broadcast_to(np.array(node["scale"]), 3))
+    if node["rotate"]:
+        linear = _rotation(node["rotate"]) @ linear
+    offset = np.array(node["translate"])
+    if node["matrix"]:
+        given = np.array(node["matrix"][:12]).reshape(3, 4)
+        offset = offset + linear @ given[:, 3]
+        linear = linear @ given[:, :3]
+    return linear, offset
+
+
+@transform.check
+def _(node: Node) -> None:
+    if node["rotate"] and not any(node["rotate"][:3]):
+        raise node.fail("rotate: expected an axis that is not zero, then degrees")
+    if node["matrix"] and len(node["matrix"]) == 16 and node["matrix"][12:] != (0, 0, 0, 1):
+        raise node.fail("matrix: expected the last row 0 0 0 1")
+    stretch = np.linalg.svd(affine(node)[0], compute_uv=False)
+    if not stretch[-1] > 1e-9 * stretch[0]:
+        raise node.fail("scale or matrix: expected a map that does not flatten space")
+
+
+@transform.identity
+def _(node: Node) -> bool:
+    linear, offset = affine(node)
+    return bool((linear == np.eye(3)).all() and not offset.any())
+
+
+@transform.select
+def _(node: Node):  # type: ignore[no-untyped-def]
+    return moved if (affine(node)[0] == np.eye(3)).all() else transform.function
+
+
+@transform.arguments
+def _(node: Node) -> dict[str, object]:
+    linear, offset = affine(node)
+    if node.function is moved:
+        return {"offset": tuple(offset.tolist())}
+    inverse = np.linalg.inv(linear)
+    flat = [*inverse.ravel().tolist(), *(-inverse @ offset).tolist()]
+    return {"inverse": tuple(flat), "shrink": float(np.linalg.svd(linear, compute_uv=False)[-1])}
+
+
+@transform.bounds
+def _(node: Node) -> Box:
+    box = node.children[0].facts.box
+    if box.empty:
+        return box
+    linear, offset = affine(node)
+    lo, hi = np.array(box.lo), np.array(box.hi)
+    with np.errstate(invalid="ignore"):
+        ends = np.stack([linear * lo, linear * hi])
+    ends = np.where(linear == 0, 0.0, ends)
+    low, high = ends.min(0).sum(1) + offset, ends.max(0).sum(1) + offset
+    return Box(tuple(low.tolist()), tuple(high.tolist()))
+
+
+@warp(axis=Axis(REQUIRED, "the axis that is mirrored: what is on its positive side also appears on its negative side"))
+def mirror(child, x, y, z, along_x, along_y):  # type: ignore[no-untyped-def]
+    """The half of the element on the axis' positive side, and its mirror image."""
+    if along_x:
+        x = absolute(x)
+    elif along_y:
+        y = absolute(y)
+    else:
+        z = absolute(z)
+    return child(x, y, z)
+
+
+@mirror.arguments
+def _(node: Node) -> dict[str, object]:
+    return along(node)
+
+
+@mirror.bounds
+def _(node: Node) -> Box:
+    axis, box = "xyz".index(node["axis"]), node.children[0].facts.box
+    lo, hi = list(box.lo), list(box.hi)
+    lo[axis] = -hi[axis]
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
+
+
+def along(node: Node) -> dict[str, object]:
+    return {"along_x": Fixed(node["axis"] == "x"), "along_y": Fixed(node["axis"] == "y")}
