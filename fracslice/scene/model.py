@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from ..errors import SceneError
 from ..formulas import Node, get
+from ..formulas.parameters import AUTO
 from .lengths import parse_length
 
 DEEPEST = 100
@@ -31,7 +34,7 @@ class Scene:
     def __post_init__(self) -> None:
         object.__setattr__(self, "size_mm", parse_length(self.size_mm, "size"))
         _refuse_too_deep(self.root)
-        _ = self.root.facts  # raises what only the whole tree can tell
+        _refuse_impossible(self.root)
 
     @cached_property
     def hash(self) -> str:
@@ -41,7 +44,7 @@ class Scene:
         return hashlib.sha256(to_xml(self).encode()).hexdigest()[:12]
 
     def with_values(self, settings: Iterable[str]) -> Scene:
-        """A copy with settings such as "mandelbulb.power=6", "box[2].round=0.1" (the second), "solid.size=4cm".
+        """A copy with settings: "mandelbulb.power=6", "box[2].round=0.1" (the second), "solid.size=4cm".
 
         Without a number in brackets every element of that name changes. Elements are counted from 1 in the
         order of the file. Raises `SceneError` for a name that the scene does not have or an impossible value.
@@ -72,3 +75,23 @@ def _refuse_too_deep(root: Node) -> None:
         if not level:
             return
     raise level[0].fail(TOO_DEEP)
+
+
+def _refuse_impossible(root: Node) -> None:
+    """Works out, from the leaves up, all that a kernel will ask for: what only the whole tree can tell."""
+    for node in reversed(list(root.walk())):
+        with computing(node.fail):
+            depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
+            _ = node.facts, (node.changed(**depths) if depths else node).arguments
+
+
+@contextmanager
+def computing(fail: Callable[[str], SceneError]) -> Iterator[None]:
+    """Numbers that overflow, or vanish where they must not, become the error that `fail` makes."""
+    import numpy as np
+
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            yield
+    except (ArithmeticError, ValueError):
+        raise fail("has numbers too large or too small to compute with") from None

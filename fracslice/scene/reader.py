@@ -17,7 +17,7 @@ from ..errors import SceneError
 from ..formulas import Node
 from ..formulas.parameters import REQUIRED
 from .layout import SCENE, SECTIONS, SOLID, Element, Section, formulas
-from .model import DEEPEST, TOO_DEEP, Scene, scene
+from .model import DEEPEST, TOO_DEEP, Scene, computing, scene
 from .nearest import hint
 
 LARGEST_FILE = 16 << 20
@@ -130,7 +130,8 @@ class _Builder:
             self.close_section(closed)
             return
         try:
-            node = closed.element(*closed.children, place=closed.place, **closed.values)
+            with computing(closed.fail):
+                node = closed.element(*closed.children, place=closed.place, **closed.values)
         except SceneError as error:
             placed = str(error).startswith(closed.place)
             raise error if placed else SceneError(f"{closed.place}: {error}") from None

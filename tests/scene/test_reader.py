@@ -66,6 +66,16 @@ def refused(text: str | bytes) -> str:
             "<transform scale='0'><box/></transform>",
             "f.xml:3: <transform> scale or matrix: expected a map that does not",
         ),
+        (
+            "<bend degrees='5e-324'><box/></bend>",
+            "f.xml:3: <bend> has numbers too large or too small to compute with",
+        ),
+        (
+            "<transform scale='1e308'><sphere radius='10'/></transform>",
+            "f.xml:3: <transform> has numbers too",
+        ),
+        ("<cone radius='1e-200' height='1e-200'/>", "f.xml:3: <cone> has numbers too large or too small"),
+        ("<repeat period='.1 1 1'><box/></repeat>", "f.xml:3: <repeat> period: expected at least a sixth"),
         ("<union/>", "f.xml:3: <union> takes at least 1 element inside it, found 0"),
         ("<shell thickness='1'/>", "f.xml:3: <shell> takes at least 1 element inside it, found 0"),
         ("<box>\n<sphere/></box>", "f.xml:3: <box> takes no elements inside it, found <sphere>"),

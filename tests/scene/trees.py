@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from fracslice.errors import SceneError
 from fracslice.formulas import Node
 from fracslice.formulas.parameters import AUTO, REQUIRED, Axis, Count, Number, Vector
+from fracslice.scene import scene
 from fracslice.scene.layout import formulas
+from fracslice.scene.model import computing
 
 SHAPES = [f for f in formulas() if f.children[1] == 0]
 OTHERS = [f for f in formulas() if f.children[1] != 0]
@@ -52,8 +54,9 @@ _POSSIBLE: dict[type, Any] = {
 def _made(draw: Any, formula: Any, children: tuple[Node, ...]) -> Node:
     values = {name: draw(value(kind)) for name, kind in formula.parameters.items()}
     try:
-        node = formula(*children, **values)
-        _ = node.facts
+        with computing(SceneError):
+            node = formula(*children, **values)
+        scene(node, size=1)
     except SceneError:  # values that are possible alone but not together
         return draw(st.sampled_from(SHAPES[0:1]))()
     return node
