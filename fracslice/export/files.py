@@ -1,0 +1,82 @@
+"""Files that are whole or not there: written beside the target, then renamed."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from fracslice.errors import ExportError
+
+
+def check_target(path: str | Path) -> Path:
+    """Where a file for `path` would go (links followed), if it can be made there; changes nothing.
+
+    Raises ExportError if the folder is missing or not writable, or if `path` is itself a folder.
+    """
+    target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise ExportError(f"{path}: the folder {target.parent} does not exist")
+    if target.is_dir():
+        raise ExportError(f"{path}: is a folder")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise ExportError(f"{path}: the folder {target.parent} is not writable")
+    return target
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a file that appears at `path` complete when the block ends, and never otherwise.
+
+    The bytes go to a hidden temporary file in the same folder, to the disk, and only then to their name. Any error,
+    KeyboardInterrupt too, removes the temporary file and leaves what was at `path` before. Raises ExportError for what
+    the file system refuses.
+    """
+    target = check_target(path)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=".part", dir=target.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(name, _mode(target))
+            os.replace(name, target)
+        except BaseException:
+            with suppress(FileNotFoundError):
+                os.unlink(name)
+            raise
+        _settle(target.parent)
+    except OSError as error:
+        raise ExportError(f"{path}: {_reason(error)}") from error
+
+
+def _mode(target: Path) -> int:
+    """The permissions the target has, or those a new file gets (mkstemp gives it to its owner alone)."""
+    if target.exists():
+        return target.stat().st_mode & 0o7777
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask
+
+
+def _settle(folder: Path) -> None:
+    """Bring the folder's new entry to the disk, where the system can."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _reason(error: OSError) -> str:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return "the disk is full; nothing was written"
+    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        return "not allowed to write there"
+    return error.strerror or str(error)
