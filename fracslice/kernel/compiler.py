@@ -2,39 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from types import FunctionType
+from typing import Any
 
 import llvmlite.binding as llvm
 from numba import cfunc, njit, types
+from numba.core.errors import NumbaError
 
+from ..errors import KernelError
+from ..formulas.vocabulary import NAMES
 from . import lanes, lanes_math
-from .linker import FIELD, Linked
+from .linker import Linked
+from .loops import Loop
 
-VOCABULARY = "where sqrt rsqrt log exp sin cos atan2 floor minimum maximum absolute any_of".split()
-
-LOOPS = '''
-def points(P, X, Y, Z, F, n):
-    for i in range(0, n, WIDTH):
-        x = load(X, i)
-        y = load(Y, i)
-        z = load(Z, i)
-        f = field(x, y, z, P)
-        store(F, i, where((x == x) & (y == y) & (z == z), f, x + y + z))
-
-
-def bricks(P, FRAME, I, J, K, corners, F, n):
-    h = FRAME[3]
-    for b in range(n):
-        x0 = corners[3 * b]
-        y0 = corners[3 * b + 1]
-        z0 = corners[3 * b + 2]
-        for s in range(0, 512, WIDTH):
-            x = (load(I, s) + x0) * h + FRAME[0]
-            y = (load(J, s) + y0) * h + FRAME[1]
-            z = (load(K, s) + z0) * h + FRAME[2]
-            store(F, 512 * b + s, field(x, y, z, P))
-'''
-
+SOURCE = "<linked scene>"
 
 @dataclass(frozen=True)
 class Target:
@@ -46,33 +29,30 @@ class Target:
     features: str
 
 
-def compile_object(linked: Linked, target: Target) -> bytes:
-    """An object file with the C functions `points` and `bricks` over the scene's field.
-
-    ``points(P, X, Y, Z, F, n)``: n a multiple of the width. ``bricks(P, frame, I, J, K, corners, F, n)``: 512 samples of
-    each of n bricks at ``frame[:3] + frame[3] * (corner + (I, J, K))``. All arrays of the target's float type but
-    `corners`, int32 [n, 3].
-    """
+def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> bytes:
+    """An object file with one C function per loop over the scene's field. Raises `KernelError`."""
     lanes_math.HOST_FEATURES = frozenset(f[1:] for f in target.features.split(",") if f.startswith("+"))
     kind = lanes.Lanes(target.bits, target.width)
-    scope = {name: getattr(lanes, name) for name in VOCABULARY}
+    scope: dict[str, Any] = {name: getattr(lanes, name) for name in NAMES}
     scope |= {"load": lanes.loader(kind), "store": lanes.store, "WIDTH": target.width}
-    exec(compile(linked.source, "<linked scene>", "exec"), scope)
+    exec(compile(linked.source, SOURCE, "exec"), scope)
     for name, value in list(scope.items()):
-        if callable(value) and getattr(value, "__code__", None) and value.__code__.co_filename == "<linked scene>":
+        if isinstance(value, FunctionType) and value.__code__.co_filename == SOURCE:
             scope[name] = njit(forceinline=True, error_model="numpy")(value)
-    assert FIELD in scope
-    exec(LOOPS, scope)
-    real = types.CPointer(types.float32 if target.bits == 32 else types.float64)
-    corner = types.CPointer(types.int32)
-    n = types.intp
-    signatures = {
-        "points": types.void(real, real, real, real, real, n),
-        "bricks": types.void(real, real, real, real, real, corner, real, n),
+    letters = {
+        "r": types.CPointer(types.float32 if target.bits == 32 else types.float64),
+        "i": types.CPointer(types.int32),
+        "n": types.intp,
     }
-    modules = [_exported(scope[name], signature, name) for name, signature in signatures.items()]
-    whole = llvm.parse_assembly(modules[0])
-    whole.link_in(llvm.parse_assembly(modules[1]))
+    whole = llvm.parse_assembly("")
+    for loop in loops:
+        exec(loop.source, scope)
+        signature = types.void(*[letters[a] for a in loop.arguments])
+        try:
+            text = _exported(scope[loop.name], signature, loop.name)
+        except NumbaError as error:
+            raise KernelError(f"a formula cannot be compiled: {str(error).strip().splitlines()[0]}") from error
+        whole.link_in(llvm.parse_assembly(text))
     return bytes(_machine(target).emit_object(whole))
 
 

@@ -10,7 +10,7 @@ import ctypes
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -20,6 +20,7 @@ import numpy as np
 
 from ..formulas.registry import Node
 from .linker import Linked, link
+from .loops import BRICKS, POINTS, Loop
 
 Precision = Literal["float32", "float64"]
 
@@ -29,9 +30,10 @@ class CpuKernel:
 
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
-        self.width = _lane_count(self.dtype.itemsize * 8)
+        self.width = lane_count(self.dtype.itemsize * 8)
         self._parameters = linked.parameters.astype(self.dtype)
-        self._points, self._bricks = _load(linked, self.dtype.itemsize * 8, self.width)
+        functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (POINTS, BRICKS))
+        self._points, self._bricks = functions["points"], functions["bricks"]
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Field values at points.
@@ -88,8 +90,8 @@ def cache_folder() -> Path:
     return Path(given or Path(base) / "fracslice" / "kernels").expanduser()
 
 
-def _lane_count(bits: int) -> int:
-    """Two registers in flight hide the latency of the arithmetic."""
+def lane_count(bits: int) -> int:
+    """Lanes of a vector of this float width. Two registers in flight hide the latency of the arithmetic."""
     register = 512 if "+avx512f" in host()[1].split(",") else 256
     return 2 * register // bits
 
@@ -113,17 +115,22 @@ def _toolchain() -> str:
     return "\n".join([*host(), *versions, *texts])
 
 
-def _load(linked: Linked, bits: int, width: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    key = hashlib.sha256("\n".join([linked.source, str(bits), str(width), _toolchain()]).encode()).hexdigest()[:32]
+def load_functions(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Callable[..., None]]:
+    """The C functions of loops over a linked scene, by name: from the cache, or compiled and kept there.
+
+    They take addresses and whole numbers, release the interpreter, and may run in many threads. Raises `KernelError`.
+    """
+    parts = [linked.source, *(loop.source for loop in loops), str(bits), str(width), _toolchain()]
+    key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
     path = cache_folder() / f"{key}.o"
     try:
         code = path.read_bytes()
     except OSError:
         from .compiler import Target, compile_object
 
-        code = compile_object(linked, Target(bits, width, *host()))
+        code = compile_object(linked, Target(bits, width, *host()), loops)
         _keep(path, code)
-    return _functions(code)
+    return _functions(code, loops)
 
 
 def _keep(path: Path, code: bytes) -> None:
@@ -138,9 +145,10 @@ def _keep(path: Path, code: bytes) -> None:
 
 
 _ENGINES: list[Any] = []
+_C_TYPES = {"r": ctypes.c_void_p, "i": ctypes.c_void_p, "n": ctypes.c_ssize_t}
 
 
-def _functions(code: bytes) -> tuple[Callable[..., Any], Callable[..., Any]]:
+def _functions(code: bytes, loops: Sequence[Loop]) -> dict[str, Callable[..., None]]:
     import llvmlite.binding as llvm
 
     machine = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(jit=True)
@@ -148,7 +156,7 @@ def _functions(code: bytes) -> tuple[Callable[..., Any], Callable[..., Any]]:
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     _ENGINES.append(engine)  # the code lives as long as its engine
-    pointer, count = ctypes.c_void_p, ctypes.c_ssize_t
-    points = ctypes.CFUNCTYPE(None, *[pointer] * 5, count)(engine.get_function_address("points"))
-    bricks = ctypes.CFUNCTYPE(None, *[pointer] * 7, count)(engine.get_function_address("bricks"))
-    return points, bricks
+    return {
+        loop.name: ctypes.CFUNCTYPE(None, *[_C_TYPES[a] for a in loop.arguments])(engine.get_function_address(loop.name))
+        for loop in loops
+    }
