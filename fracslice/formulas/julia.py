@@ -8,7 +8,7 @@ from .box import Box
 from .escape import levels, potential_distance
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
-from .vocabulary import any_of, maximum, sqrt, where
+from .vocabulary import any_of, maximum, minimum, rsqrt, where
 
 
 @shape(
@@ -30,7 +30,7 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, flat):  # ty
     d2 = 0.0 * x + 1.0
     k = 0.0 * x
     level = 0.0 * x + first_level
-    end_r2, end_d2, steepest2 = r2, d2, d2
+    end_r2, slope2 = r2, d2
     alive = r2 < escape2
     for _ in range(iterations):
         if not any_of(alive):
@@ -47,12 +47,12 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, flat):  # ty
             x = square - k * k
             k = twice * k + ck
             r2 = x * x + y * y + z * z + k * k
-        steepest2 = maximum(steepest2, d2)
         end_r2 = where(alive, r2, end_r2)
-        end_d2 = where(alive, d2, end_d2)
+        slope2 = where(alive, maximum(d2, slope2), slope2)
         level = where(alive, level + level, level)
         alive = alive & (r2 < escape2)
-    return potential_distance(end_r2, sqrt(end_d2), sqrt(steepest2), level, first_level, last_level)
+    slope2 = minimum(slope2, 1e30)
+    return potential_distance(end_r2, slope2 * rsqrt(slope2), level, first_level, last_level)
 
 
 @julia.arguments

@@ -20,7 +20,7 @@ from .vocabulary import absolute, any_of, atan2, cos, exp, log, maximum, rsqrt, 
     julia=Vector(None, "adds this point in each step instead of the start point: a Julia set of the Mandelbulb", most=4, least=-4),
 )
 def mandelbulb(  # type: ignore[no-untyped-def]
-    x, y, z, power, iterations, first_level, last_level, escape2, c, digits, slope_digits, fixed_c
+    x, y, z, power, iterations, first_level, last_level, escape2, over_escape2, c, digits, half_digits, even, linear, fixed_c
 ):
     """The Mandelbulb of an integer power, by complex multiplication.
 
@@ -41,7 +41,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     r2 = x * x + y * y + z * z
     dr = 0.0 * x + 1.0
     level = 0.0 * x + first_level
-    end_r2, end_dr, steepest = r2, dr, dr
+    end_r2, slope = r2, dr
     alive = r2 < escape2
     for _ in range(iterations):
         if not any_of(alive):
@@ -58,27 +58,30 @@ def mandelbulb(  # type: ignore[no-untyped-def]
             if odd:
                 re, im = re * z - im * rho2, re + im * z
                 cu, cv = cu * u - cv * v, cu * v + cv * u
-        meridian = r
-        for odd in slope_digits:
+        meridian = r2
+        for odd in half_digits:
             meridian = meridian * meridian
             if odd:
-                meridian = meridian * r
-        latitude = absolute(im) * (1.0 - r2 * (1.0 / escape2))
+                meridian = meridian * r2
+        if even:
+            meridian = meridian * r
+        if linear:
+            meridian = r
+        latitude = absolute(im) * (1.0 - r2 * over_escape2)
         dr = power * maximum(meridian, latitude) * dr + grow
         s = im * rho2 * over_rho
         x = s * cu + cx
         y = s * cv + cy
         z = re + cz
         r2 = x * x + y * y + z * z
-        steepest = maximum(steepest, dr)
         end_r2 = where(alive, r2, end_r2)
-        end_dr = where(alive, dr, end_dr)
+        slope = where(alive, maximum(dr, slope), slope)
         level = where(alive, level * power, level)
         alive = alive & (r2 < escape2)
-    return potential_distance(end_r2, end_dr, steepest, level, first_level, last_level)
+    return potential_distance(end_r2, slope, level, first_level, last_level)
 
 
-def mandelbulb_real(x, y, z, power, iterations, first_level, last_level, escape2, c, fixed_c):  # type: ignore[no-untyped-def]
+def mandelbulb_real(x, y, z, power, iterations, first_level, last_level, escape2, over_escape2, c, fixed_c):  # type: ignore[no-untyped-def]
     """The Mandelbulb of any power, in polar coordinates."""
     cx, cy, cz = x, y, z
     grow = 1.0
@@ -88,7 +91,7 @@ def mandelbulb_real(x, y, z, power, iterations, first_level, last_level, escape2
     r2 = x * x + y * y + z * z
     dr = 0.0 * x + 1.0
     level = 0.0 * x + first_level
-    end_r2, end_dr, steepest = r2, dr, dr
+    end_r2, slope = r2, dr
     alive = r2 < escape2
     for _ in range(iterations):
         if not any_of(alive):
@@ -100,19 +103,18 @@ def mandelbulb_real(x, y, z, power, iterations, first_level, last_level, escape2
         phi = power * atan2(y, x)
         rn = exp(0.5 * power * log(safe))
         meridian = rn * rsqrt(safe)
-        latitude = absolute(rn * sin(theta) / rho) * (1.0 - r2 * (1.0 / escape2))
+        latitude = absolute(rn * sin(theta) / rho) * (1.0 - r2 * over_escape2)
         dr = power * maximum(meridian, latitude) * dr + grow
         s = rn * sin(theta)
         x = s * cos(phi) + cx
         y = s * sin(phi) + cy
         z = rn * cos(theta) + cz
         r2 = x * x + y * y + z * z
-        steepest = maximum(steepest, dr)
         end_r2 = where(alive, r2, end_r2)
-        end_dr = where(alive, dr, end_dr)
+        slope = where(alive, maximum(dr, slope), slope)
         level = where(alive, level * power, level)
         alive = alive & (r2 < escape2)
-    return potential_distance(end_r2, end_dr, steepest, level, first_level, last_level)
+    return potential_distance(end_r2, slope, level, first_level, last_level)
 
 
 def _whole(power: float) -> bool:
@@ -139,12 +141,14 @@ def _(node: Node) -> dict[str, object]:
         "first_level": first,
         "last_level": last,
         "escape2": escape2,
+        "over_escape2": 1 / escape2,
         "c": node["julia"] or (0.0, 0.0, 0.0),
         "fixed_c": Fixed(node["julia"] is not None),
     }
     if _whole(power):
         n = int(power)
-        arguments |= {"digits": Fixed(_digits(n)), "slope_digits": Fixed(_digits(n - 1))}
+        half = Fixed(_digits((n - 1) // 2))
+        arguments |= {"digits": Fixed(_digits(n)), "half_digits": half, "even": Fixed(n % 2 == 0), "linear": Fixed(n == 2)}
     return arguments
 
 

@@ -35,6 +35,11 @@ def rsqrt(a: np.ndarray) -> np.ndarray:
     return 1.0 / np.sqrt(a)
 
 
+def inverse(a: np.ndarray) -> np.ndarray:
+    """1/a of a positive, finite argument, faster than a division on the lanes."""
+    return 1.0 / a
+
+
 NAMES = frozenset(
-    "where sqrt rsqrt log exp sin cos atan2 floor minimum maximum absolute any_of".split()
+    "where sqrt rsqrt inverse log exp sin cos atan2 floor minimum maximum absolute any_of".split()
 )  # fmt: skip

@@ -169,10 +169,20 @@ def rsqrt(a: Vec) -> Vec:
     """1/sqrt(a): the hardware's 14-bit estimate and Newton steps where there is one, else a division."""
     if not _has_estimate(a):
         return a.const(1.0) / sqrt(a)
-    y = _estimate(a)
+    y = _estimate(a, "rsqrt14")
     half = a * 0.5
     for _ in range(1 if a.bits == 32 else 2):
         y = y * (a.const(1.5) - half * y * y)
+    return y
+
+
+def inverse(a: Vec) -> Vec:
+    """1/a: as `rsqrt`."""
+    if not _has_estimate(a):
+        return a.const(1.0) / a
+    y = _estimate(a, "rcp14")
+    for _ in range(1 if a.bits == 32 else 2):
+        y = y + y * (a.const(1.0) - a * y)
     return y
 
 
@@ -184,12 +194,12 @@ def _has_estimate(a: Vec) -> bool:
     return "avx512f" in HOST_FEATURES and a.value.type.count * a.bits % 512 == 0
 
 
-def _estimate(a: Vec) -> Vec:
-    """AVX-512's rsqrt14 on each 512-bit part."""
+def _estimate(a: Vec, instruction: str) -> Vec:
+    """AVX-512's rsqrt14 or rcp14 on each 512-bit part."""
     count = 512 // a.bits
     part = ir.VectorType(a.value.type.element, count)
     mask = ir.IntType(count)
-    name = f"llvm.x86.avx512.rsqrt14.p{'s' if a.bits == 32 else 'd'}.512"
+    name = f"llvm.x86.avx512.{instruction}.p{'s' if a.bits == 32 else 'd'}.512"
     function = _declare(a.builder.module, ir.FunctionType(part, [part, part, mask]), name)
     zero = ir.Constant(part, None)
     parts = []
@@ -235,7 +245,7 @@ def log(x: Vec) -> Vec:
     shifted = x.as_whole().plus(one - root_half)
     exponent = shifted.right(mantissa).plus(-(one >> mantissa)).to_real()
     f = shifted.masked((1 << mantissa) - 1).plus(root_half).as_real() - 1.0
-    s = f / (f + 2.0)
+    s = f * inverse(f + 2.0)
     z = s * s
     half_square = f * f * 0.5
     r = z * _polynomial(z, _LOG[x.bits])

@@ -151,3 +151,17 @@ def test_random_trees_keep_their_bounds(root: Node) -> None:
     if inside.size:
         assert (inside >= np.array(promised.box.lo)[:, None] - 1e-9).all()
         assert (inside <= np.array(promised.box.hi)[:, None] + 1e-9).all()
+
+
+@pytest.mark.parametrize("power", [2, 3, 4, 5, 8, 9])
+def test_the_mandelbulbs_derivative_bounds_its_growth(power: int) -> None:
+    """|grad log |w_1|| <= 1/|w_1| (n r^(n-1) max(1, |sin n t / sin t|) + 1): one step from outside, by differences."""
+    from fracslice.formulas import mandelbulb
+
+    rng = np.random.default_rng(4)
+    points = rng.uniform(-1.1, 1.1, (3, 4000))
+    f = reference(mandelbulb(power=power, iterations=1, bailout=1.5))
+    near = np.abs(f(*points)) < 0.05
+    points, h = points[:, near], 1e-6
+    gradient = [(f(*(points + h * e[:, None])) - f(*(points - h * e[:, None]))) / (2 * h) for e in np.eye(3)]
+    assert near.sum() > 50 and np.linalg.norm(gradient, axis=0).max() < 1.35
