@@ -159,9 +159,9 @@ def test_the_mandelbulbs_derivative_bounds_its_growth(power: int) -> None:
     from fracslice.formulas import mandelbulb
 
     rng = np.random.default_rng(4)
-    points = rng.uniform(-1.1, 1.1, (3, 4000))
+    points = rng.uniform(-1.2, 1.2, (3, 200_000))
     f = reference(mandelbulb(power=power, iterations=1, bailout=1.5))
-    near = np.abs(f(*points)) < 0.05
+    near = np.abs(f(*points)) < 0.002
     points, h = points[:, near], 1e-6
     gradient = [(f(*(points + h * e[:, None])) - f(*(points - h * e[:, None]))) / (2 * h) for e in np.eye(3)]
-    assert near.sum() > 50 and np.linalg.norm(gradient, axis=0).max() < 1.35
+    assert near.sum() > 50 and np.linalg.norm(gradient, axis=0).max() < 1.05
