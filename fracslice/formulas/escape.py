@@ -27,7 +27,7 @@ def potential_distance(r2, slope, level, first_level, last_level):  # type: igno
     and n = N.
 
     The largest, not the last: inside, an attracting orbit lets the derivative decay and the quotient grow without limit.
-    There ``0.25 / slope`` keeps it below the distance to the surface.
+    There ``0.1 / slope`` keeps it below the distance to the surface.
     """
     r2 = minimum(maximum(r2, 1e-4), 1e30)
     slope = minimum(slope, 1e30)
@@ -35,7 +35,7 @@ def potential_distance(r2, slope, level, first_level, last_level):  # type: igno
     height = 0.5 * log(r2)
     damping = level + 2.0 * first_level * maximum(height, 0.0)
     over = inverse(slope * damping)
-    return maximum((height - level) * level * r2 * rsqrt(r2) * over, -0.25 * damping * over)
+    return maximum((height - level) * level * r2 * rsqrt(r2) * over, -0.1 * damping * over)
 
 
 def levels(power: float, iterations: int, bailout: float) -> tuple[float, float, float]:

@@ -21,8 +21,9 @@ class Bricks:
     No sign change crosses a face between a brick with samples and one without, or between two without; all beyond
     `index` is outside. So the surface is closed and wholly within the samples.
 
-    evaluations: how many times the field was evaluated, probing included. repaired: bricks that a violated Lipschitz
-    bound would have lost, found by the closure rule.
+    evaluations: how many times the field was evaluated, probing included. audited: points that were looked at outside the
+    samples, to test the bounds that pruning relies on. repaired: bricks that a violated bound would have lost, found by
+    the audit or the closure rule, and sampled.
     """
 
     origin: tuple[float, float, float]
@@ -32,6 +33,7 @@ class Bricks:
     index: np.ndarray
     evaluations: int = field(default=0, kw_only=True)
     repaired: int = field(default=0, kw_only=True)
+    audited: int = field(default=0, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.ijk)

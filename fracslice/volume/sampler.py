@@ -6,8 +6,9 @@ candidate next to empty space, or whose centre is outside, is sampled; then ever
 outside sample to, until none is left. The inside of an escape-time fractal, which costs every iteration and cannot be
 recognised from afar, is so never entered beyond its first layer.
 
-The same rule is the safety net: where a sign change would leave the samples, the neighbour is sampled too, whatever the
-bound said. All results depend on the field only, not on threads or order.
+The same rule is a safety net: where a sign change would leave the samples, the neighbour is sampled too, whatever the
+bound said. A second one is the audit: grid points at random in what was not sampled, one in every brick beside the
+samples and many of the rest; where the sign is not the one assumed, sampling goes on from there. All results depend on the field only, not on threads or order.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ COARSEST = 16
 
 EMPTY, CANDIDATE, FULL, QUEUED = 0, 1, 2, 3
 CHUNK = 256
+AUDITS = 8
+FAR_AUDITS = 1 << 15
 
 
 def sample(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> Bricks:
@@ -38,7 +41,12 @@ def sample(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None 
     """
     run = _Run(kernel, facts, lattice, work or Work())
     state, outside = run.probe()
-    run.explore(state, run.seeds(state, outside))
+    front = run.seeds(state, outside)
+    for turn in range(AUDITS):
+        run.explore(state, front)
+        front = run.audit(state, turn)
+        if not len(front):
+            break
     return run.finished(state)
 
 
@@ -50,6 +58,7 @@ class _Run:
     work: Work
     evaluations: int = 0
     repaired: int = 0
+    audited: int = 0
     corners: list[np.ndarray] = field(default_factory=list)
     signs: list[np.ndarray] = field(default_factory=list)
     values: list[np.ndarray] = field(default_factory=list)
@@ -79,15 +88,18 @@ class _Run:
 
     def centres(self, cells: np.ndarray, size: int) -> np.ndarray:
         """The field at the centres of cells of `size` bricks."""
-        middle = cells * BRICK + (size * BRICK - 1) / 2
-        points = np.asarray(self.lattice.origin)[:, None] + self.lattice.voxel * middle.T
-        f = np.empty(len(cells), self.kernel.dtype)
+        return self.values_at(cells * BRICK + (size * BRICK - 1) / 2)
+
+    def values_at(self, indices: np.ndarray) -> np.ndarray:
+        """The field at positions given in grid indices, [n, 3]."""
+        points = np.asarray(self.lattice.origin)[:, None] + self.lattice.voxel * indices.T
+        f = np.empty(len(indices), self.kernel.dtype)
 
         def task(part: slice) -> None:
             f[part] = self.kernel.points(*points[:, part])
 
-        self.work.map(task, chunks(len(cells), 1 << 14))
-        self.evaluations += len(cells)
+        self.work.map(task, chunks(len(indices), 1 << 14))
+        self.evaluations += len(indices)
         return f
 
     def seeds(self, state: np.ndarray, outside: np.ndarray) -> np.ndarray:
@@ -150,6 +162,21 @@ class _Run:
             self.repaired += int(lost.sum())
         return np.unique(np.concatenate(found), axis=0)
 
+    def audit(self, state: np.ndarray, turn: int) -> np.ndarray:
+        """Bricks without samples that have a sample of the other sign than assumed; always the same points."""
+        rng = np.random.default_rng(turn)
+        bare = state != QUEUED
+        near = np.argwhere(bare & _beside(~bare, False))
+        far = np.flatnonzero(bare)
+        far = np.unravel_index(rng.choice(far, min(FAR_AUDITS, len(far)), replace=False), state.shape)
+        bricks = np.concatenate([near, np.stack(far, 1)]).astype(np.int32)
+        points = bricks * BRICK + rng.integers(0, BRICK, bricks.shape)
+        inside = self.values_at(points) < 0
+        wrong = inside != (state[tuple(bricks.T)] != EMPTY)
+        self.audited += len(bricks)
+        self.repaired += int(wrong.sum())
+        return np.unique(bricks[wrong], axis=0)
+
     # --- the result -------------------------------------------------------------------------------------------------
     def finished(self, state: np.ndarray) -> Bricks:
         """The bricks that a crossing edge touches, in order."""
@@ -169,6 +196,7 @@ class _Run:
             index,
             evaluations=self.evaluations,
             repaired=self.repaired,
+            audited=self.audited,
         )
 
     def crossed(self, bricks: np.ndarray, signs: np.ndarray, index: np.ndarray) -> np.ndarray:

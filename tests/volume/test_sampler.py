@@ -90,6 +90,16 @@ def test_a_wrong_lipschitz_bound_is_repaired() -> None:
     assert open_edges(bricks) == 0 and bricks.repaired > 0
 
 
+def test_the_audit_finds_what_nothing_leads_to() -> None:
+    """A ball that a wrong bound hides, far from all that is sampled."""
+    root = union(box(size=(0.4, 0.4, 0.4)), transform(sphere(radius=0.3), translate=(2, 0, 0)))
+    lattice, kernel = Lattice.around(root.facts.box, 2.5 / 96), compile_scene(root)
+    truthful = sample(kernel, root.facts, lattice)
+    lying = sample(kernel, Facts(root.facts.box, 0.05, False), lattice)
+    assert truthful.repaired == 0 and lying.repaired > 0 and truthful.audited > 0
+    assert len(lying) == len(truthful) and open_edges(lying) == 0
+
+
 def test_inside_is_not_filled() -> None:
     """Bricks and evaluations grow with the surface, not with the volume."""
     small, large = (sample_scene(plan(EXAMPLES["mandelbulb"], n)) for n in (64, 128))
