@@ -5,8 +5,11 @@ from __future__ import annotations
 import re
 import struct
 import zipfile
+import zlib
+from array import array
 from pathlib import Path
 from typing import IO, Any
+from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,30 +77,40 @@ def _ascii_corners(data: bytes) -> NDArray[np.float32]:
 
 
 def _read_3mf(path: Path) -> Mesh:
-    from lxml import etree
-
     try:
-        with zipfile.ZipFile(path) as archive, archive.open(_model_part(archive)) as part:
-            return _Package().read(part)
-    except (zipfile.BadZipFile, EOFError, KeyError, zipfile.zlib.error) as error:
+        with zipfile.ZipFile(path) as archive:
+            relations, package = _Relations(), _Package()
+            with archive.open("_rels/.rels") as part:
+                _parse(part, relations.start)
+            with archive.open(relations.model.lstrip("/")) as part:
+                _parse(part, package.start, package.end)
+            return package.laid_out()
+    except (zipfile.BadZipFile, EOFError, KeyError, zlib.error) as error:
         raise MeshError(f"not a whole 3MF file: {str(error).strip(chr(34))}") from error
-    except (etree.XMLSyntaxError, ValueError, TypeError) as error:
+    except (expat.ExpatError, ValueError) as error:
         raise MeshError(f"not a valid 3MF file: {error}") from error
 
 
-def _model_part(archive: zipfile.ZipFile) -> str:
-    """The part that the package's relations call its 3D model."""
-    from lxml import etree
-
-    relations = etree.fromstring(archive.read("_rels/.rels"), _safe(etree.XMLParser))
-    for relation in relations:
-        if relation.get("Type") == MODEL_RELATION:
-            return relation.get("Target", "").lstrip("/")
-    raise MeshError("not a 3MF file: it names no 3D model")
+def _parse(part: IO[bytes], start: Any, end: Any = None) -> None:
+    """Stream XML through handlers; no document type, hence no entities."""
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartDoctypeDeclHandler = _refuse
+    parser.ParseFile(part)
 
 
-def _safe(parser: Any, **more: Any) -> Any:
-    return parser(resolve_entities=False, no_network=True, load_dtd=False, **more)
+def _refuse(*_: Any) -> None:
+    raise MeshError("not a valid 3MF file: it has a document type")
+
+
+class _Relations:
+    """Finds the part that the package's relations call its 3D model."""
+
+    model = ""
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        if attributes.get("Type") == MODEL_RELATION:
+            self.model = attributes.get("Target", "")
 
 
 class _Package:
@@ -107,45 +120,39 @@ class _Package:
         self.meshes: dict[str, Mesh] = {}
         self.parts: dict[str, list[tuple[str, NDArray[np.float64]]]] = {}
         self.build: list[tuple[str, NDArray[np.float64]]] = []
+        self.unit, self.object = "millimeter", ""
+        self.vertices, self.triangles = array("d"), array("q")
 
-    def read(self, part: IO[bytes]) -> Mesh:
-        from lxml import etree
+    def start(self, name: str, get: dict[str, str]) -> None:
+        match name.rpartition(":")[2]:
+            case "triangle":
+                self.triangles.extend((int(get["v1"]), int(get["v2"]), int(get["v3"])))
+            case "vertex":
+                self.vertices.extend((float(get["x"]), float(get["y"]), float(get["z"])))
+            case "object":
+                self.object = get["id"]
+                self.parts[self.object] = []
+            case "component":
+                self.parts[self.object].append((get["objectid"], _matrix(get.get("transform"))))
+            case "item":
+                self.build.append((get["objectid"], _matrix(get.get("transform"))))
+            case "model":
+                self.unit = get.get("unit", self.unit)
 
-        vertices: list[tuple[float, float, float]] = []
-        triangles: list[tuple[int, int, int]] = []
-        components: list[tuple[str, NDArray[np.float64]]] = []
-        unit = "millimeter"
-        for _, element in etree.iterparse(
-            part, resolve_entities=False, no_network=True, load_dtd=False, huge_tree=True
-        ):
-            get = element.get
-            match etree.QName(element).localname:
-                case "vertex":
-                    vertices.append((float(get("x")), float(get("y")), float(get("z"))))
-                case "triangle":
-                    triangles.append((int(get("v1")), int(get("v2")), int(get("v3"))))
-                case "component":
-                    components.append((get("objectid"), _matrix(get("transform"))))
-                case "object":
-                    self.meshes[get("id")] = _indexed(vertices, triangles)
-                    self.parts[get("id")] = components
-                    vertices, triangles, components = [], [], []
-                case "item":
-                    self.build.append((get("objectid"), _matrix(get("transform"))))
-                case "model":
-                    unit = get("unit", "millimeter")
-                case _:
-                    continue
-            element.clear()
-            while element.getprevious() is not None:
-                del element.getparent()[0]
-        if unit not in MILLIMETRES:
-            raise MeshError(f"not a valid 3MF file: no such unit: {unit}")
+    def end(self, name: str) -> None:
+        if name.rpartition(":")[2] == "object":
+            self.meshes[self.object] = _indexed(self.vertices, self.triangles)
+            self.vertices, self.triangles = array("d"), array("q")
+
+    def laid_out(self) -> Mesh:
+        """What the build asks for, in mm."""
+        if self.unit not in MILLIMETRES:
+            raise MeshError(f"not a valid 3MF file: no such unit: {self.unit}")
         if not self.build:
             raise MeshError("the 3MF file asks to build nothing")
-        return joined([self.placed(*item, depth=0) for item in self.build]).scaled(MILLIMETRES[unit])
+        return joined([self.placed(*item) for item in self.build]).scaled(MILLIMETRES[self.unit])
 
-    def placed(self, name: str, matrix: NDArray[np.float64], depth: int) -> Mesh:
+    def placed(self, name: str, matrix: NDArray[np.float64], depth: int = 0) -> Mesh:
         """An object and its components in the frame of the build."""
         if name not in self.meshes or depth > 32:
             raise MeshError(f"not a valid 3MF file: no such object: {name}")
@@ -156,13 +163,13 @@ class _Package:
 
 
 def _matrix(text: str | None) -> NDArray[np.float64]:
-    """A 3MF transform: four rows of three numbers, applied to row vectors."""
+    """A 3MF transform: four rows of three numbers, applied to row vectors. Raises ValueError."""
     if text is None:
         return np.vstack([np.eye(3), np.zeros(3)])
     return np.array(text.split(), dtype=np.float64).reshape(4, 3)
 
 
-def _indexed(vertices: list[Any], triangles: list[Any]) -> Mesh:
+def _indexed(vertices: array[float], triangles: array[int]) -> Mesh:
     corners = np.array(vertices, dtype=np.float64).reshape(-1, 3)
     indices = np.array(triangles, dtype=np.int64).reshape(-1, 3)
     if len(indices) and not 0 <= indices.min() <= indices.max() < len(corners):

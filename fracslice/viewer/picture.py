@@ -1,0 +1,64 @@
+"""A shaded picture of a mesh, without a screen."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from fracslice.errors import RenderError
+from fracslice.export import replacing
+from fracslice.mesh.model import Mesh
+from fracslice.viewer import stage
+
+SOFTWARE = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow"}
+SECONDS = 600
+
+
+def picture(
+    mesh: Mesh,
+    path: str | Path,
+    size: tuple[int, int] = (1280, 960),
+    background: Literal["light", "dark"] = "light",
+) -> Path:
+    """Draw the mesh in matte clay from a three-quarter view into a PNG of size[0] x size[1] pixels; returns the path.
+
+    Needs no screen, but OpenGL in software or hardware (Debian: libegl1 with libgl1-mesa-dri, or libosmesa6). Raises
+    RenderError when pyvista is not installed, the machine cannot draw or the mesh is empty, ExportError when the file
+    cannot be written.
+    """
+    if background not in stage.BACKGROUNDS or not all(1 <= pixels <= 16384 for pixels in size):
+        raise ValueError(f"no such picture: size={size}, background={background!r}")
+    if not len(mesh.triangles):
+        raise RenderError("the mesh has no triangles to draw")
+    if find_spec("pyvista") is None:
+        raise RenderError("pictures of meshes need pyvista: pip install 'fracslice[view]'")
+    with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, replacing(path) as file:
+        source, target = os.path.join(folder, "mesh.npz"), os.path.join(folder, "picture.png")
+        np.savez(source, vertices=mesh.vertices, triangles=mesh.triangles)
+        _draw([source, target, *map(str, size), background])
+        file.write(Path(target).read_bytes())
+    return Path(path)
+
+
+def _draw(arguments: list[str]) -> None:
+    """Draw in another process, first as the machine is set up, then with OSMesa."""
+    command = [sys.executable, "-P", stage.__file__, *arguments]
+    for extra in ({}, SOFTWARE):
+        try:
+            run = subprocess.run(
+                command, env=os.environ | extra, capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL
+            )
+        except subprocess.TimeoutExpired:
+            raise RenderError(f"the picture was not ready after {SECONDS} seconds") from None
+        if run.returncode == 0 and os.path.exists(arguments[1]):
+            return
+    raise RenderError(
+        "this machine cannot draw without a screen; install libegl1 and libgl1-mesa-dri (or libosmesa6)"
+    )

@@ -1,0 +1,95 @@
+"""Light, material and camera for a mesh. Run as a program it draws one picture off screen.
+
+It imports nothing else of fracslice: `picture` starts it by its path, in a process of its own, since VTK ends the process
+where the machine cannot draw.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pyvista
+
+CLAY = "#efe3d0"
+INSIDE = "#b3543f"  # what a cut lays open
+CLAY_LIGHT = {"ambient": 0.2, "diffuse": 1.0, "specular": 0.06, "specular_power": 12}
+BACKGROUNDS = {"light": ("#c4c9cd", "#f4f5f5"), "dark": ("#08090b", "#2a2f37")}  # below, above
+SHARP = 50.0  # degrees between triangles that make an edge look sharp
+THREE_QUARTER = (0.62, -1.0, 0.52)
+FILLED = 0.86  # of the picture, by the model
+
+
+def body(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> pyvista.PolyData:
+    """The mesh for VTK, smooth but for its sharp edges."""
+    import pyvista
+
+    surface = pyvista.PolyData.from_regular_faces(vertices.astype(np.float32), triangles)
+    return surface.compute_normals(
+        cell_normals=False, split_vertices=True, feature_angle=SHARP, consistent_normals=False
+    )
+
+
+def set_stage(
+    plotter: pyvista.Plotter, surface: pyvista.PolyData, background: str, brightness: float = 1.0
+) -> pyvista.Actor:
+    """Put the mesh in matte clay under a key, a fill and a rim light, seen from a three-quarter view; returns its actor.
+
+    brightness: 1 where ambient occlusion darkens the picture, less without.
+    """
+    import pyvista
+
+    below, above = BACKGROUNDS[background]
+    plotter.set_background(below, top=above)
+    actor = plotter.add_mesh(surface, color=CLAY, **CLAY_LIGHT, backface_params={"color": INSIDE})
+    plotter.remove_all_lights()
+    for position, intensity, tint in (
+        ((-0.7, 1.0, 1.2), 0.95, "#fff4e2"),
+        ((1.3, 0.1, 0.6), 0.38, "#d5e3ff"),
+        ((0.2, 0.9, -1.4), 0.4, "#ffffff"),
+    ):
+        plotter.add_light(
+            pyvista.Light(
+                position=position, intensity=intensity * brightness, color=tint, light_type="camera light"
+            )
+        )
+    look(plotter, surface)
+    return actor
+
+
+def look(plotter: pyvista.Plotter, surface: pyvista.PolyData) -> None:
+    """The three-quarter view from the front, a little from above, near enough to fill the picture."""
+    plotter.view_vector(THREE_QUARTER, viewup=(0, 0, 1))
+    camera = plotter.camera
+    back = np.array(camera.position) - np.array(camera.focal_point)
+    distance = np.linalg.norm(back)
+    back /= distance
+    right = np.cross((0, 0, 1), back)
+    right /= np.linalg.norm(right)
+    points = np.asarray(surface.points, dtype=np.float64) - camera.focal_point
+    depth = (distance - points @ back) * np.tan(np.radians(camera.view_angle / 2))
+    width, height = plotter.window_size
+    across = np.abs(points @ right / depth).max() * height / width
+    upright = np.abs(points @ np.cross(back, right) / depth).max()
+    camera.zoom(FILLED / max(across, upright))
+
+
+def draw(source: str, target: str, width: int, height: int, background: str) -> None:
+    """Draw the vertices and triangles of an .npz file into a PNG."""
+    import pyvista
+
+    with np.load(source) as arrays:
+        surface = body(arrays["vertices"], arrays["triangles"])
+    plotter = pyvista.Plotter(off_screen=True, window_size=[width, height])
+    set_stage(plotter, surface, background)
+    plotter.enable_ssao(radius=surface.length / 25, bias=surface.length / 2000, kernel_size=64, blur=True)
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.screenshot(target)
+
+
+if __name__ == "__main__":
+    draw(sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), sys.argv[5])
