@@ -72,7 +72,7 @@ class _Run:
         cells = _grid(*(-(-n // size) for n in self.lattice.bricks)) * size
         while True:
             f = self.centres(cells, size)
-            reach = self.facts.lipschitz * np.sqrt(3) * self.lattice.voxel * (size * BRICK + 1) / 2
+            reach = self.reach(size * BRICK)
             for cell in cells[f < -reach]:
                 state[tuple(slice(c, c + size) for c in cell)] = FULL
             near = ~(np.abs(f) > reach)
@@ -118,14 +118,28 @@ class _Run:
     # --- outside in -------------------------------------------------------------------------------------------------
     def explore(self, state: np.ndarray, front: np.ndarray) -> None:
         """Samples the front, then what it shows a sign change to, until the samples are closed."""
-        state[tuple(front.T)] = QUEUED
         while len(front):
+            empty = self.emptied(front) & (state[tuple(front.T)] == CANDIDATE)
+            bare, front = front[empty], front[~empty]
+            state[tuple(bare.T)] = EMPTY
+            state[tuple(front.T)] = QUEUED
             signs = self.sampled(front)
             self.signs.append(signs)
             known = int((state == QUEUED).sum())
             self.work.progress("sampling", known / max(known + int((state == CANDIDATE).sum()), 1))
-            front = self.neighbours(state, front, signs)
-            state[tuple(front.T)] = QUEUED
+            front = np.concatenate([self.neighbours(state, front, signs), _around(state, bare)])
+            front = np.unique(front, axis=0)
+
+    def emptied(self, bricks: np.ndarray) -> np.ndarray:
+        """Which bricks are empty after all, looked at in eight cells: 8 evaluations to save 512."""
+        size = BRICK // 2
+        middle = _grid(2, 2, 2) * size + (size - 1) / 2
+        f = self.values_at((bricks[:, None] * BRICK + middle).reshape(-1, 3)).reshape(-1, 8)
+        return (f > self.reach(size)).all(1)
+
+    def reach(self, size: int) -> float:
+        """The least |f| at the centre of a cell of `size` samples that leaves no sign change within a voxel of it."""
+        return self.facts.lipschitz * float(np.sqrt(3)) * self.lattice.voxel * (size + 1) / 2
 
     def sampled(self, bricks: np.ndarray) -> np.ndarray:
         """Samples bricks; returns their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set where inside."""
@@ -160,7 +174,7 @@ class _Run:
             lost = (there == EMPTY) & shows_inside | (there == FULL) & shows_outside
             found.append(beside[lost | (there == CANDIDATE) & shows_outside])
             self.repaired += int(lost.sum())
-        return np.unique(np.concatenate(found), axis=0)
+        return np.concatenate(found)
 
     def audit(self, state: np.ndarray, turn: int) -> np.ndarray:
         """Bricks without samples that have a sample of the other sign than assumed; always the same points."""
@@ -239,10 +253,17 @@ def _face(signs: np.ndarray, axis: int, step: int) -> tuple[np.ndarray, np.ndarr
     """Of sign bits [n, 8, 8]: whether the outermost layer on one side has inside samples, and outside ones."""
     if axis == 2:
         bit = np.uint8(128 if step > 0 else 1)
-        layer = (signs & bit).reshape(len(signs), -1)
-        return (layer != 0).any(1), (layer == 0).any(1)
+        layer = signs & bit
+        return (layer != 0).any((1, 2)), (layer == 0).any((1, 2))
     layer = signs.take(7 if step > 0 else 0, axis=1 + axis)
     return (layer != 0).any(1), (layer != 255).any(1)
+
+
+def _around(state: np.ndarray, bricks: np.ndarray) -> np.ndarray:
+    """The candidates on the faces of bricks."""
+    near = np.concatenate([bricks + step * np.eye(3, dtype=np.int32)[axis] for axis, step in _FACES])
+    near = near[((near >= 0) & (near < state.shape)).all(1)]
+    return near[state[tuple(near.T)] == CANDIDATE]
 
 
 def _beside(cells: np.ndarray, beyond: bool) -> np.ndarray:
