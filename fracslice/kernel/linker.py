@@ -43,15 +43,17 @@ class Linked:
 
 def link(root: Node) -> Linked:
     """Links a scene tree. Raises `KernelError` where a depth is still "auto"."""
-    linker = _Linker()
+    linker = Linker()
     top = linker.node(root)
     linker.functions.append(f"def {FIELD}(x, y, z, P):\n    return {top}(x, y, z, P)")
-    source = "\n\n\n".join([*linker.shared.values(), *linker.functions]) + "\n"
-    return Linked(source, np.array(linker.parameters or [0.0], dtype=np.float64))
+    return Linked(linker.text(), np.array(linker.parameters or [0.0], dtype=np.float64))
 
 
 @dataclass
-class _Linker:
+class Linker:
+    """Writes functions and collects parameters; `given` are names that the text will have from elsewhere."""
+
+    given: frozenset[str] = frozenset()
     parameters: list[float] = field(default_factory=list)
     functions: list[str] = field(default_factory=list)
     shared: dict[str, str] = field(default_factory=dict)
@@ -115,12 +117,28 @@ class _Linker:
             self.shared[name] = ast.unparse(ast.fix_missing_locations(tree))
         return name
 
+    def bind(self, name: str, function: Callable[..., Any], values: dict[str, Any]) -> None:
+        """Writes ``name(rest..., P)``: the function with `values` taken from P (or fixed), the rest of its arguments open.
+
+        A function that has an argument P of its own is passed it.
+        """
+        fixed = {k: v.value for k, v in values.items() if isinstance(v, Fixed)}
+        called = self.share(function, fixed)
+        arguments = [a for a in inspect.signature(function).parameters if a not in fixed]
+        passed = [self.argument(values[a]) if a in values else a for a in arguments]
+        rest = [a for a in arguments if a not in values and a != "P"]
+        self.functions.append(f"def {name}({', '.join([*rest, 'P'])}):\n    return {called}({', '.join(passed)})")
+
+    def text(self) -> str:
+        """All that was written, callees first."""
+        return "\n\n\n".join([*self.shared.values(), *self.functions]) + "\n"
+
     def helpers(self, tree: ast.FunctionDef, function: Callable[..., Any]) -> None:
         """Writes the functions and fills in the numbers that a function takes from its module."""
         scope = function.__globals__  # type: ignore[attr-defined]
         names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
         used = {n.id for n in names if isinstance(n.ctx, ast.Load)} - {n.id for n in names if isinstance(n.ctx, ast.Store)}
-        used -= vocabulary.NAMES
+        used -= vocabulary.NAMES | self.given
         for name in sorted(used & set(scope)):
             if isinstance(scope[name], FunctionType):
                 self.share(scope[name], {})
