@@ -1,4 +1,4 @@
-"""Files out: one format per module, each `write(mesh, file, metadata)`; found here by the ending of the file's name."""
+"""Files out: one format per module, each `write(mesh, file, metadata)`, found by the ending of the name."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def application() -> str:
 
 
 def check_format(path: str | Path) -> str:
-    """The ending that names the format of `path`; raises ExportError, with those that are known, for any other."""
+    """The ending that names the format of `path`; raises ExportError, naming those known, for any other."""
     ending = Path(path).suffix.lower()
     if ending not in FORMATS:
         raise ExportError(f"{path}: unknown kind of file; known are {', '.join(FORMATS)}")
@@ -42,10 +42,10 @@ def check_format(path: str | Path) -> str:
 def write(mesh: Mesh, path: str | Path, metadata: Mapping[str, str] | None = None) -> Path:
     """Write a mesh in mm to a file of the kind its name ends in, whole or not at all; same mesh, same bytes.
 
-    metadata: names and values that the format has room for, such as Title, Description or scene_hash; Application is
-    added. Coordinates are written as float32: pass a mesh through `fracslice.mesh.rounding.rounded` first, and check
-    that. Returns the path. Raises ExportError in one line for an empty mesh, an unknown ending, or what the file
-    system refuses.
+    metadata: names and values that the format has room for, such as Title, Description or scene_hash;
+    Application is added. Coordinates are written as float32: pass a mesh through
+    `fracslice.mesh.rounding.rounded` first, and check that. Returns the path. Raises ExportError in one line
+    for an empty mesh, an unknown ending, or what the file system refuses.
     """
     format_write = FORMATS[check_format(path)]
     if not len(mesh.triangles):

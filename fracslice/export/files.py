@@ -32,9 +32,9 @@ def check_target(path: str | Path) -> Path:
 def replacing(path: str | Path) -> Iterator[BinaryIO]:
     """Open a file that appears at `path` complete when the block ends, and never otherwise.
 
-    The bytes go to a hidden temporary file in the same folder, to the disk, and only then to their name. Any error,
-    KeyboardInterrupt too, removes the temporary file and leaves what was at `path` before. Raises ExportError for what
-    the file system refuses.
+    The bytes go to a hidden temporary file in the same folder, to the disk, and only then to their name. Any
+    error, KeyboardInterrupt too, removes the temporary file and leaves what was at `path` before. Raises
+    ExportError for what the file system refuses.
     """
     target = check_target(path)
     try:

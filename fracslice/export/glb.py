@@ -1,4 +1,7 @@
-"""Binary glTF 2.0. Coordinates stay in mm with z up, bit by bit; the node turns and scales them to glTF's metres with y up."""
+"""Binary glTF 2.0.
+
+Coordinates stay in mm with z up, bit by bit; the node turns and scales them to glTF's metres with y up.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,12 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
 def _document(positions: np.ndarray, indices: np.ndarray, metadata: Mapping[str, str]) -> dict[str, Any]:
     views = [
         {"buffer": 0, "byteOffset": 0, "byteLength": positions.nbytes, "target": ARRAY_BUFFER},
-        {"buffer": 0, "byteOffset": positions.nbytes, "byteLength": indices.nbytes, "target": ELEMENT_ARRAY_BUFFER},
+        {
+            "buffer": 0,
+            "byteOffset": positions.nbytes,
+            "byteLength": indices.nbytes,
+            "target": ELEMENT_ARRAY_BUFFER,
+        },
     ]
     box = {"min": positions.min(axis=0).tolist(), "max": positions.max(axis=0).tolist()}
     accessors = [

@@ -34,7 +34,10 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
 def _unit_normals(corners: np.ndarray) -> np.ndarray:
     """Normals of length one, zero for a triangle without area; float64 [m, 3]."""
     u, v = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    normals = np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]], axis=1)
+    normals = np.stack(
+        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]], axis=1
+    )
     length = np.sqrt(np.einsum("ij,ij->i", normals, normals))
     length[length == 0] = 1
-    return normals / length[:, None]
+    normals /= length[:, None]
+    return normals

@@ -16,7 +16,8 @@ HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 TYPES = (
     HEAD + '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
     '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
-    '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>'
+    '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>'
+    "</Types>"
 )
 RELATIONS = (
     HEAD + '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
@@ -25,7 +26,8 @@ RELATIONS = (
 )
 MODEL = (
     HEAD + '<model unit="millimeter" xml:lang="en-US" '
-    'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" xmlns:fracslice="urn:fracslice:metadata">\n'
+    'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" '
+    'xmlns:fracslice="urn:fracslice:metadata">\n'
 )
 CORE_NAMES = {"Title", "Designer", "Description", "Copyright", "LicenseTerms", "Rating", "Application"}
 CORE_NAMES |= {"CreationDate", "ModificationDate"}
@@ -33,7 +35,7 @@ LEVEL = 3  # of deflate: a third of the time of the usual 6, and files a twentie
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh in mm, streaming; names of metadata that 3MF does not know go into fracslice's own namespace."""
+    """Write a mesh in mm, streaming; metadata that 3MF has no name for goes into fracslice's namespace."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
         _add(archive, "[Content_Types].xml", [TYPES.encode()])
         _add(archive, "_rels/.rels", [RELATIONS.encode()])
@@ -48,7 +50,7 @@ def _add(archive: zipfile.ZipFile, name: str, texts: Iterable[bytes], large: boo
 
 
 def _is_large(mesh: Mesh) -> bool:
-    """Whether the text may pass the 2 GiB that a plain ZIP member is sure to hold; at most 66 and 54 bytes a row."""
+    """Whether the text may pass the 2 GiB of a plain ZIP member; rows take at most 66 and 54 bytes."""
     return 66 * len(mesh.vertices) + 54 * len(mesh.triangles) > 2**31 - 2**20
 
 

@@ -17,10 +17,11 @@ from fracslice.mesh.rounding import rounded
 class MeshReport:
     """What `check` found; every field is plain JSON. Counts of defects are zero on a good solid.
 
-    watertight: every edge has two or more triangles; manifold: exactly two, and each vertex one fan; oriented: neighbours
-    run the same way round and every shell looks out of the material. self_intersections counts the triangles that cut,
-    touch or cover another. components counts outer bodies, cavities sealed shells inside them. genus is the sum over
-    all shells, None where the surface is not a closed 2-manifold. bbox_mm is (low corner, high corner).
+    watertight: every edge has two or more triangles; manifold: exactly two, and each vertex one fan;
+    oriented: neighbours run the same way round and every shell looks out of the material. self_intersections
+    counts the triangles that cut, touch or cover another. components counts outer bodies, cavities sealed
+    shells inside them. genus is the sum over all shells, None where the surface is not a closed 2-manifold.
+    bbox_mm is (low corner, high corner).
     """
 
     triangles: int
@@ -61,7 +62,7 @@ class MeshReport:
 
     @property
     def printable(self) -> bool:
-        """Whether slicers take the mesh as it is: closed, manifold, oriented, free of crossings, positive volume."""
+        """Whether slicers take it as it is: closed, manifold, oriented, no crossings, positive volume."""
         return not self.problems
 
     def as_dict(self) -> dict[str, Any]:
@@ -70,10 +71,10 @@ class MeshReport:
 
 
 def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
-    """Examine a mesh as its file will be read: coordinates rounded to float32, equal positions welded, nothing repaired.
+    """Examine a mesh as its file will be read: rounded to float32, equal positions welded, nothing repaired.
 
-    All counts are exact. Self-intersections take most of the time. Raises MeshError for a mesh without triangles, with
-    an index out of range or a coordinate that is not finite.
+    All counts are exact. Self-intersections take most of the time. Raises MeshError for a mesh without
+    triangles, with an index out of range or a coordinate that is not finite.
     """
     from fracslice.mesh.crossings import crossing_triangles
     from fracslice.mesh.links import links, parts, shell_volumes
@@ -112,7 +113,9 @@ def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
         misplaced_shells=misplaced,
         components=shells - cavities,
         cavities=cavities,
-        genus=_genus(whole, link.edges, shells) if closed and not (link.crowded_edges or link.extra_fans) else None,
+        genus=_genus(whole, link.edges, shells)
+        if closed and not (link.crowded_edges or link.extra_fans)
+        else None,
         volume_mm3=float(volumes.sum()),
         area_mm2=float(normals.sum() / 2),
         bbox_mm=_box(mesh),
@@ -120,7 +123,7 @@ def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
 
 
 def _misplaced(mesh: Mesh, labels: NDArray[np.int32], volumes: NDArray[np.float64], tree: Any) -> int:
-    """Shells whose outside is not empty space, or, for a cavity, whose outside is not the material of one body."""
+    """Shells whose outside is not empty space, or, for a cavity, not the material of one body."""
     from fracslice.mesh.nesting import nesting
 
     return int((nesting(mesh, labels, volumes, tree).winding != (volumes < 0)).sum())

@@ -14,7 +14,7 @@ from fracslice.mesh.model import Mesh
 
 @dataclass(frozen=True)
 class Removed:
-    """What `select` took away: outer bodies and their volume, sealed cavities and the volume of those that were filled."""
+    """What `select` took away: bodies and their volume, cavities and the volume of those that were filled."""
 
     bodies: int = 0
     bodies_mm3: float = 0.0
@@ -26,8 +26,8 @@ class Removed:
 class Shells:
     """The connected closed surfaces of a mesh.
 
-    labels: int32 [m], the shell of each triangle; volumes: float64 [s], signed, negative for a cavity;
-    body: int64 [s], the outer shell that each belongs to (itself, or for a cavity the smallest body around it).
+    labels: int32 [m], the shell of each triangle; volumes: float64 [s], signed, negative for a cavity; body:
+    int64 [s], the outer shell that each belongs to (itself, or for a cavity the smallest body around it).
     """
 
     labels: NDArray[np.int32]
@@ -37,7 +37,9 @@ class Shells:
     @property
     def solid_volumes(self) -> NDArray[np.float64]:
         """Volume of material of each shell's body, cavities taken off; zero at cavities. float64 [s]."""
-        return np.bincount(self.body, self.volumes, minlength=len(self.volumes))
+        volumes = np.zeros(len(self.volumes))
+        np.add.at(volumes, self.body, self.volumes)
+        return volumes
 
 
 def shells(mesh: Mesh) -> Shells:
@@ -65,9 +67,10 @@ def select(
     dust_mm3: float = 0.0,
     cavities: Literal["keep", "fill"] = "keep",
 ) -> tuple[Mesh, Removed]:
-    """Keep all bodies or the largest, drop those with less than `dust_mm3` of material, keep or fill sealed cavities.
+    """Keep all bodies or the largest, drop dust of less than `dust_mm3`, keep or fill sealed cavities.
 
-    A cavity goes with its body. Raises MeshError when nothing would be left, or the mesh has a shell that is inside out.
+    A cavity goes with its body. Raises MeshError when nothing would be left, or the mesh has a shell that is
+    inside out.
     """
     if keep not in ("all", "largest") or cavities not in ("keep", "fill"):
         raise ValueError(f"no such choice: keep={keep!r}, cavities={cavities!r}")

@@ -1,8 +1,9 @@
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators
 """Which triangles of a mesh cut, touch or cover others: exact, coplanar overlaps included.
 
-Pairs come from a tree of boxes, each pair is decided by the signs of exact predicates alone (the idea of Guigue and Devillers,
-"Fast and Robust Triangle-Triangle Overlap Test Using Orientation Predicates", 2003). Neighbours may share what their shared
-vertices span and nothing else. Importing this module imports Numba.
+Pairs come from a tree of boxes, each pair is decided by the signs of exact predicates alone (the idea of
+Guigue and Devillers, "Fast and Robust Triangle-Triangle Overlap Test Using Orientation Predicates", 2003).
+Neighbours may share what their shared vertices span and nothing else. Importing this module imports Numba.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ def crossing_triangles(mesh: Mesh, tree: Tree | None = None, threads: int | None
     steps = range(0, runs, 4096)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         jobs = [
-            pool.submit(_mark, mesh.vertices, mesh.triangles, drop, *tree, begin, min(begin + 4096, runs), marks)
+            pool.submit(
+                _mark, mesh.vertices, mesh.triangles, drop, *tree, begin, min(begin + 4096, runs), marks
+            )
             for begin in steps
         ]
         for job in jobs:
@@ -77,7 +80,18 @@ def _mark(vertices, triangles, drop, order, low, high, begin, end, marks):
                 stack[height], stack[height + 1] = 2 * other, 2 * other + 1
                 height += 2
             elif other >= node:
-                _mark_runs(vertices, triangles, drop, order, low_box, high_box, first, last, (other - leaves) * LEAF, marks)
+                _mark_runs(
+                    vertices,
+                    triangles,
+                    drop,
+                    order,
+                    low_box,
+                    high_box,
+                    first,
+                    last,
+                    (other - leaves) * LEAF,
+                    marks,
+                )
 
 
 @njit(cache=True, nogil=True)
@@ -90,15 +104,15 @@ def _set_box(vertices, triangles, t, low, high, row):
 
 @njit(cache=True, nogil=True)
 def _boxes_meet(low, high, a, b):
+    apart = False
     for k in range(3):
-        if low[a, k] > high[b, k] or high[a, k] < low[b, k]:
-            return False
-    return True
+        apart |= low[a, k] > high[b, k] or high[a, k] < low[b, k]
+    return not apart
 
 
 @njit(cache=True, nogil=True)
 def _mark_runs(vertices, triangles, drop, order, low, high, first, last, begin, marks):
-    """Mark the crossing pairs of the run first..last-1, whose boxes are low, high[:LEAF], with the run at `begin`."""
+    """Mark the crossing pairs of the run first..last-1, of known boxes, with the run at `begin`."""
     for j in range(begin, min(len(order), begin + LEAF)):
         t = order[j]
         if drop[t] < 0:

@@ -1,7 +1,9 @@
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators
 """How triangles hang together: the edges and fans around every vertex, and the parts they form.
 
-Around vertex v each triangle is an arrow from its next corner to the one before. On a closed, oriented surface every
-neighbour of v then has one arrow in and one out, and all arrows form one ring. Importing this module imports Numba.
+Around vertex v each triangle is an arrow from its next corner to the one before. On a closed, oriented
+surface every neighbour of v then has one arrow in and one out, and all arrows form one ring. Importing this
+module imports Numba.
 """
 
 from __future__ import annotations
@@ -24,17 +26,19 @@ class Links(NamedTuple):
 
 
 def links(triangles: NDArray[np.int32], vertices: int) -> Links:
-    """Edges with one triangle, with more than two, with two that run the same way, and vertices that join separate fans.
+    """Edges of one triangle, of more than two, of two that run the same way; vertices that join fans.
 
-    triangles: int32 [m, 3], each with three different indices below `vertices`. O(m), or O(m log d) at vertices of degree d.
+    triangles: int32 [m, 3], each with three different indices below `vertices`. O(m), or O(m log d) at
+    vertices of degree d.
     """
-    return Links(*(int(n) for n in _links(triangles, *_corners(triangles, vertices))))
+    return Links(*(int(n) for n in _links(triangles, *corners_by_vertex(triangles, vertices))))
 
 
 def parts(triangles: NDArray[np.int32], vertices: int) -> tuple[NDArray[np.int32], int]:
-    """The connected part each triangle belongs to (int32 [m], numbered by first appearance), and how many there are.
+    """The connected part of each triangle (int32 [m], numbered by first appearance), and how many there are.
 
-    Triangles with a common vertex are connected. Union by lowest index with path halving (Tarjan, van Leeuwen, 1984).
+    Triangles with a common vertex are connected. Union by lowest index with path halving (Tarjan, van
+    Leeuwen, 1984).
     """
     labels, count = _parts(triangles, vertices)
     return labels, int(count)
@@ -43,8 +47,9 @@ def parts(triangles: NDArray[np.int32], vertices: int) -> tuple[NDArray[np.int32
 def shell_volumes(
     vertices: NDArray[np.float64], triangles: NDArray[np.int32], labels: NDArray[np.int32], count: int
 ) -> NDArray[np.float64]:
-    """Signed volume of each part, float64 [count]; measured from a vertex of its own, so that dust keeps its digits."""
-    return _shell_volumes(vertices, triangles, labels, count)
+    """Signed volume of each part, float64 [count], from a vertex of its own: dust keeps its digits."""
+    volumes: NDArray[np.float64] = _shell_volumes(vertices, triangles, labels, count)
+    return volumes
 
 
 @njit(cache=True, nogil=True)
@@ -55,7 +60,12 @@ def _shell_volumes(vertices, triangles, labels, count):
         part = labels[t]
         if origin[part] < 0:
             origin[part] = triangles[t, 0]
-        o, a, b, c = vertices[origin[part]], vertices[triangles[t, 0]], vertices[triangles[t, 1]], vertices[triangles[t, 2]]
+        o, a, b, c = (
+            vertices[origin[part]],
+            vertices[triangles[t, 0]],
+            vertices[triangles[t, 1]],
+            vertices[triangles[t, 2]],
+        )
         ax, ay, az = a[0] - o[0], a[1] - o[1], a[2] - o[2]
         bx, by, bz = b[0] - o[0], b[1] - o[1], b[2] - o[2]
         cx, cy, cz = c[0] - o[0], c[1] - o[1], c[2] - o[2]
@@ -64,7 +74,7 @@ def _shell_volumes(vertices, triangles, labels, count):
 
 
 @njit(cache=True, nogil=True)
-def _corners(triangles, vertices):
+def corners_by_vertex(triangles, vertices):
     """Corners grouped by vertex: start int64 [n + 1], corner int64 [3 m]."""
     start = np.zeros(vertices + 1, np.int64)
     for t in range(len(triangles)):
@@ -114,7 +124,7 @@ def _links(triangles, start, corner):
 
 @njit(cache=True, nogil=True)
 def _set_spokes(triangles, corner, begin, degree, spokes, fan):
-    """Sort the two spokes of each corner at a vertex by neighbour; a spoke is (neighbour, corner, inward) in one number."""
+    """Sort the spokes of the corners at a vertex: (neighbour, corner, inward), each as one number."""
     for i in range(degree):
         t, k = corner[begin + i] // 3, corner[begin + i] % 3
         spokes[2 * i] = np.int64(triangles[t, (k + 1) % 3]) * (2 * degree) + 2 * i

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 class Mesh:
     """Triangles over shared vertices.
 
-    vertices: float64 [n, 3], in mm once in print space; triangles: int32 [m, 3], counter-clockwise seen from outside.
+    vertices: float64 [n, 3], in mm once in print space; triangles: int32 [m, 3], counter-clockwise seen from
+    outside.
     """
 
     vertices: NDArray[np.float64]
@@ -25,7 +26,7 @@ class Mesh:
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lowest and highest corner of the box around all vertices, float64 [2, 3]; zeros for an empty mesh."""
+        """Low and high corner of the box around all vertices, float64 [2, 3]; zeros for an empty mesh."""
         if not len(self.vertices):
             return np.zeros((2, 3))
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
@@ -34,7 +35,8 @@ class Mesh:
     def size(self) -> NDArray[np.float64]:
         """Extent along x, y and z, float64 [3]."""
         low, high = self.bounds
-        return high - low
+        size: NDArray[np.float64] = high - low
+        return size
 
     @property
     def normals(self) -> NDArray[np.float64]:
@@ -59,7 +61,7 @@ class Mesh:
         return replace(self, vertices=self.vertices + np.asarray(offset, dtype=np.float64))
 
     def scaled(self, factor: float) -> Mesh:
-        """A copy scaled about the origin; `factor` must be positive, for a mirror image would be inside out."""
+        """A copy scaled about the origin; `factor` must be positive: a mirror image would be inside out."""
         if not factor > 0:
             raise ValueError(f"scale factor must be positive, not {factor}")
         return replace(self, vertices=self.vertices * factor)

@@ -1,3 +1,4 @@
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators
 """Which shell of a mesh lies inside which: rays straight up, decided by exact predicates.
 
 Importing this module imports Numba.
@@ -17,7 +18,7 @@ from fracslice.mesh.tree import LEAF, Tree, build
 
 
 class Nesting(NamedTuple):
-    """winding: int64 [s], how often the other shells surround each shell; parent: int64 [s], the smallest shell around it, or -1."""
+    """winding: int64 [s], how often others surround each shell; parent: int64 [s], the smallest, or -1."""
 
     winding: NDArray[np.int64]
     parent: NDArray[np.int64]
@@ -28,8 +29,9 @@ def nesting(
 ) -> Nesting:
     """Where each closed shell of a mesh lies.
 
-    labels: int32 [m], the shell of each triangle; volumes: float64 [s], signed. A ray from one vertex of each shell goes
-    up and adds the winding of every triangle it passes; edges and vertices on the ray count once (half-open edges).
+    labels: int32 [m], the shell of each triangle; volumes: float64 [s], signed. A ray from one vertex of each
+    shell goes up and adds the winding of every triangle it passes; edges and vertices on the ray count once
+    (half-open edges).
     """
     count = len(volumes)
     if count < 2:
@@ -60,7 +62,7 @@ def _nesting(vertices, triangles, labels, sizes, first, order, low, high):
 
 @njit(cache=True, nogil=True)
 def _around(vertices, triangles, labels, vertex, order, low, high, around, seen):
-    """Add to `around` the winding of every shell about a vertex; the shells met go to `seen`, each once if not cancelled out."""
+    """Add to `around` the winding of every shell about a vertex; the shells met go to `seen`, each once."""
     x, y, z = vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2]
     leaves, count = len(low) // 2, 0
     stack = np.empty(128, np.int64)
@@ -68,7 +70,13 @@ def _around(vertices, triangles, labels, vertex, order, low, high, around, seen)
     while height > 0:
         height -= 1
         node = stack[height]
-        if x < low[node, 0] or x > high[node, 0] or y < low[node, 1] or y > high[node, 1] or z > high[node, 2]:
+        if (
+            x < low[node, 0]
+            or x > high[node, 0]
+            or y < low[node, 1]
+            or y > high[node, 1]
+            or z > high[node, 2]
+        ):
             continue
         if node < leaves:
             stack[height], stack[height + 1] = 2 * node, 2 * node + 1
@@ -88,10 +96,7 @@ def _around(vertices, triangles, labels, vertex, order, low, high, around, seen)
 
 @njit(cache=True, nogil=True)
 def _contains(values, count, value):
-    for i in range(count):
-        if values[i] == value:
-            return True
-    return False
+    return (values[:count] == value).any()
 
 
 @njit(cache=True, nogil=True)

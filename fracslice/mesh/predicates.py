@@ -1,9 +1,10 @@
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators
 """On which side does a point lie: answered exactly, and fast where the answer is clear.
 
-Method: Jonathan Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates" (1997), in
-two stages. A plain float64 determinant decides when it exceeds its error bound; otherwise the determinant is summed
-without rounding as a floating-point expansion. Exact as long as products of three coordinates neither overflow nor underflow.
-Importing this module imports Numba.
+Method: Jonathan Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates"
+(1997), in two stages. A plain float64 determinant decides when it exceeds its error bound; otherwise the
+determinant is summed without rounding as a floating-point expansion. Exact as long as products of three
+coordinates neither overflow nor underflow. Importing this module imports Numba.
 """
 
 from __future__ import annotations

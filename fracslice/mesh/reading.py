@@ -33,8 +33,8 @@ MODEL_RELATION = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 def read_mesh(path: str | Path) -> Mesh:
     """Read a model in mm: coordinates as float32, equal positions welded, every triangle kept.
 
-    STL, PLY and OBJ have no unit and count as mm; 3MF and GLB say theirs. Raises MeshError with one line for a file that
-    is missing, of an unknown kind, cut off or otherwise broken.
+    STL, PLY and OBJ have no unit and count as mm; 3MF and GLB say theirs. Raises MeshError with one line for
+    a file that is missing, of an unknown kind, cut off or otherwise broken.
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
@@ -187,17 +187,21 @@ def joined(meshes: list[Mesh]) -> Mesh:
 
 
 def _read_by_trimesh(path: Path) -> Mesh:
-    """PLY, OBJ and GLB. trimesh raises whatever its parsers run into; all of it means that the file is broken."""
+    """PLY, OBJ and GLB. trimesh raises whatever its parsers run into; all of it means a broken file."""
     import trimesh
 
     with path.open("rb") as file:
         try:
-            scene = trimesh.load_scene(file, file_type=path.suffix.lower()[1:], process=False, skip_materials=True)
+            scene = trimesh.load_scene(
+                file, file_type=path.suffix.lower()[1:], process=False, skip_materials=True
+            )
             mesh = scene.to_mesh()
             triangles = np.asarray(mesh.faces, dtype=np.int32).reshape(-1, 3)
             model = Mesh(np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3), triangles)
         except Exception as error:
-            raise MeshError(f"not a valid model file: {type(error).__name__}: {error}".splitlines()[0]) from error
+            raise MeshError(
+                f"not a valid model file: {type(error).__name__}: {error}".splitlines()[0]
+            ) from error
     return model
 
 

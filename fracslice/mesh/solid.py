@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _REASONS = {
     "NonFiniteVertex": "a coordinate is not a finite number",
-    "NotManifold": "it is not closed, or an edge does not join exactly two triangles that run the same way round",
+    "NotManifold": "it is not closed, or an edge does not join exactly two triangles of the same sense",
     "VertexOutOfBounds": "a triangle names a vertex that does not exist",
     "ResultTooLarge": "it has too many triangles",
 }
@@ -58,7 +58,9 @@ def cut_base(mesh: Mesh, height: float) -> Mesh:
     """
     low, high = mesh.bounds[:, 2]
     if not 0 <= height < high - low:
-        raise MeshError(f"a base cut of {height:g} mm does not leave anything of a solid {high - low:g} mm high")
+        raise MeshError(
+            f"a base cut of {height:g} mm does not leave anything of a solid {high - low:g} mm high"
+        )
     return from_manifold(to_manifold(mesh).trim_by_plane((0.0, 0.0, 1.0), low + height))
 
 

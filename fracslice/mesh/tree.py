@@ -1,7 +1,9 @@
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators
 """A tree of boxes over the triangles of a mesh, for questions about neighbours in space.
 
-Triangles are put in Morton order (G. M. Morton, 1966) and cut into runs of `LEAF`; a complete binary tree of boxes stands
-on the runs, stored as a heap: node i has the children 2i and 2i + 1. Importing this module imports Numba.
+Triangles are put in Morton order (G. M. Morton, 1966) and cut into runs of `LEAF`; a complete binary tree of
+boxes stands on the runs, stored as a heap: node i has the children 2i and 2i + 1. Importing this module
+imports Numba.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ LEAF = 8
 
 
 class Tree(NamedTuple):
-    """order: int64 [m], triangles in Morton order; low, high: float64 [2 * leaves, 3], the boxes; node 1 is the root."""
+    """order: int64 [m], triangles in Morton order; low, high: float64 [nodes, 3], boxes; 1 is the root."""
 
     order: NDArray[np.int64]
     low: NDArray[np.float64]

@@ -1,3 +1,4 @@
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators
 """Equal corners made one vertex, bit by bit, as a slicer does with the loose triangles of an STL.
 
 Importing this module imports Numba.
@@ -13,7 +14,8 @@ from numpy.typing import NDArray
 def weld(points: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Find equal points: float32 [n, 3], finite, without negative zeros.
 
-    Returns the first of each set of equal points (int64 [k], ascending) and the set of each point (int32 [n]).
+    Returns the first of each set of equal points (int64 [k], ascending) and the set of each point (int32
+    [n]).
     """
     slots = 1 << max(4, int(2 * len(points)).bit_length())
     first, labels, count = _weld(np.ascontiguousarray(points).view(np.uint32), np.full(slots, -1, np.int32))
@@ -28,7 +30,11 @@ def _weld(bits, table):
     mask, count = np.uint64(len(table) - 1), 0
     for i in range(len(bits)):
         x, y, z = np.uint64(bits[i, 0]), np.uint64(bits[i, 1]), np.uint64(bits[i, 2])
-        mixed = (x * np.uint64(0x9E3779B97F4A7C15)) ^ (y * np.uint64(0xC2B2AE3D27D4EB4F)) ^ (z * np.uint64(0x165667B19E3779F9))
+        mixed = (
+            (x * np.uint64(0x9E3779B97F4A7C15))
+            ^ (y * np.uint64(0xC2B2AE3D27D4EB4F))
+            ^ (z * np.uint64(0x165667B19E3779F9))
+        )
         slot = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
         slot = (slot ^ (slot >> np.uint64(32))) & mask
         while True:

@@ -27,11 +27,11 @@ def picture(
     size: tuple[int, int] = (1280, 960),
     background: Literal["light", "dark"] = "light",
 ) -> Path:
-    """Draw the mesh in matte clay from a three-quarter view into a PNG of size[0] x size[1] pixels; returns the path.
+    """Draw the mesh in matte clay from a three-quarter view into a PNG of `size` pixels; returns the path.
 
-    Needs no screen, but OpenGL in software or hardware (Debian: libegl1 with libgl1-mesa-dri, or libosmesa6). Raises
-    RenderError when pyvista is not installed, the machine cannot draw or the mesh is empty, ExportError when the file
-    cannot be written.
+    Needs no screen, but OpenGL in software or hardware (Debian: libegl1 with libgl1-mesa-dri, or libosmesa6).
+    Raises RenderError when pyvista is not installed, the machine cannot draw or the mesh is empty,
+    ExportError when the file cannot be written.
     """
     if background not in stage.BACKGROUNDS or not all(1 <= pixels <= 16384 for pixels in size):
         raise ValueError(f"no such picture: size={size}, background={background!r}")
@@ -53,7 +53,11 @@ def _draw(arguments: list[str]) -> None:
     for extra in ({}, SOFTWARE):
         try:
             run = subprocess.run(
-                command, env=os.environ | extra, capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL
+                command,
+                env=os.environ | extra,
+                capture_output=True,
+                timeout=SECONDS,
+                stdin=subprocess.DEVNULL,
             )
         except subprocess.TimeoutExpired:
             raise RenderError(f"the picture was not ready after {SECONDS} seconds") from None

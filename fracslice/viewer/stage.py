@@ -1,19 +1,16 @@
 """Light, material and camera for a mesh. Run as a program it draws one picture off screen.
 
-It imports nothing else of fracslice: `picture` starts it by its path, in a process of its own, since VTK ends the process
-where the machine cannot draw.
+It imports nothing else of fracslice: `picture` starts it by its path, in a process of its own, since VTK ends
+the process where the machine cannot draw.
 """
 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    import pyvista
 
 CLAY = "#efe3d0"
 INSIDE = "#b3543f"  # what a cut lays open
@@ -24,20 +21,20 @@ THREE_QUARTER = (0.62, -1.0, 0.52)
 FILLED = 0.86  # of the picture, by the model
 
 
-def body(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> pyvista.PolyData:
+def body(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Any:
     """The mesh for VTK, smooth but for its sharp edges."""
     import pyvista
 
-    surface = pyvista.PolyData.from_regular_faces(vertices.astype(np.float32), triangles)
+    surface: Any = pyvista.PolyData()
+    surface.points = vertices.astype(np.float32)
+    surface.regular_faces = triangles
     return surface.compute_normals(
         cell_normals=False, split_vertices=True, feature_angle=SHARP, consistent_normals=False
     )
 
 
-def set_stage(
-    plotter: pyvista.Plotter, surface: pyvista.PolyData, background: str, brightness: float = 1.0
-) -> pyvista.Actor:
-    """Put the mesh in matte clay under a key, a fill and a rim light, seen from a three-quarter view; returns its actor.
+def set_stage(plotter: Any, surface: Any, background: str, brightness: float = 1.0) -> Any:
+    """The mesh in matte clay under a key, a fill and a rim light, in a three-quarter view; returns its actor.
 
     brightness: 1 where ambient occlusion darkens the picture, less without.
     """
@@ -61,7 +58,7 @@ def set_stage(
     return actor
 
 
-def look(plotter: pyvista.Plotter, surface: pyvista.PolyData) -> None:
+def look(plotter: Any, surface: Any) -> None:
     """The three-quarter view from the front, a little from above, near enough to fill the picture."""
     plotter.view_vector(THREE_QUARTER, viewup=(0, 0, 1))
     camera = plotter.camera
@@ -84,7 +81,7 @@ def draw(source: str, target: str, width: int, height: int, background: str) -> 
 
     with np.load(source) as arrays:
         surface = body(arrays["vertices"], arrays["triangles"])
-    plotter = pyvista.Plotter(off_screen=True, window_size=[width, height])
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=[width, height])
     set_stage(plotter, surface, background)
     plotter.enable_ssao(radius=surface.length / 25, bias=surface.length / 2000, kernel_size=64, blur=True)
     plotter.enable_anti_aliasing("ssaa")

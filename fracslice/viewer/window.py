@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from fracslice.errors import RenderError
 from fracslice.mesh.model import Mesh
@@ -21,8 +22,8 @@ HELP = "drag: turn   wheel: zoom   W, S: wires, surface   C: cut open   V: first
 def show(mesh: Mesh | str | Path) -> None:
     """Open a window on a mesh or a model file and return when it is closed.
 
-    Keys: W wires, S surface, C a plane that cuts the model open (drag it) on and off, V first view, Q close. Raises
-    RenderError when there is no pyvista or no screen, MeshError when the file cannot be read.
+    Keys: W wires, S surface, C a plane that cuts the model open (drag it) on and off, V first view, Q close.
+    Raises RenderError when there is no pyvista or no screen, MeshError when the file cannot be read.
     """
     name = "" if isinstance(mesh, Mesh) else f"{Path(mesh).name}: "
     model = mesh if isinstance(mesh, Mesh) else read_mesh(mesh)
@@ -34,7 +35,7 @@ def show(mesh: Mesh | str | Path) -> None:
 
 
 def _has_screen() -> bool:
-    """On Linux, whether an X server answers; VTK ends the process where none does. Elsewhere there is always one."""
+    """On Linux, whether an X server answers: VTK ends the process where none does. Elsewhere always."""
     if not sys.platform.startswith("linux"):
         return True
     library = ctypes.util.find_library("X11")
@@ -54,16 +55,20 @@ def caption(mesh: Mesh) -> str:
     return f"{x:.1f} x {y:.1f} x {z:.1f} mm, {len(mesh.triangles):,} triangles"
 
 
+def _plotter(title: str) -> Any:
+    import pyvista
+
+    return pyvista.Plotter(title=title, window_size=[1280, 960], off_screen=False)
+
+
 class Window:
     """A pyvista window with its keys."""
 
     def __init__(self, mesh: Mesh, name: str) -> None:
-        import pyvista
-
         self.surface = body(mesh.vertices, mesh.triangles)
         self.cutting = False
         title = name + caption(mesh)
-        self.plotter = pyvista.Plotter(title=f"fracslice  {title}", window_size=[1280, 960], off_screen=False)
+        self.plotter = _plotter(f"fracslice  {title}")
         self.actor = set_stage(self.plotter, self.surface, "light", brightness=0.72)
         self.view, self.angle = self.plotter.camera_position, self.plotter.camera.view_angle
         self.plotter.add_text(title, position="upper_left", font_size=10, color=INK)
@@ -87,7 +92,7 @@ class Window:
         self.plotter.render()
 
     def cut(self, normal: tuple[float, float, float], origin: tuple[float, float, float]) -> None:
-        """Hide what lies before the plane; the graphics card does it, so that large models follow the pointer."""
+        """Hide what lies before the plane, on the graphics card, so that large models follow the pointer."""
         from vtkmodules.vtkCommonDataModel import vtkPlane
 
         plane = vtkPlane()
