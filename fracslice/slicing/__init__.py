@@ -1,0 +1,7 @@
+"""From a field to a printer's layers, with no mesh between."""
+
+from .contours import Contours
+from .layers import Layer, Slicer
+from .stack import SliceJob, Stack, plan_stack
+
+__all__ = ["Contours", "Layer", "SliceJob", "Slicer", "Stack", "plan_stack"]

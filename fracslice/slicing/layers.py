@@ -1,0 +1,130 @@
+"""Layers one after the other: computed in parallel, slab by slab, handed out in order, and let go."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+
+from ..kernel import CpuKernel, compile_scene
+from ..work import Work
+from . import marching
+from .contours import Contours, contours
+from .slab import Sampler
+from .stack import Stack
+from .tiles import Tiles
+
+SLAB = 8
+"""Layers that are computed together."""
+
+T = TypeVar("T")
+
+
+@dataclass(eq=False)
+class Layer:
+    """One layer of a stack, before it is given a form. evaluations: of the field for this layer, about."""
+
+    stack: Stack
+    index: int
+    evaluations: float
+    tiles: Tiles
+    place: int
+    exact: CpuKernel
+
+    @property
+    def top(self) -> float:
+        """The layer's upper face, mm above the object's lowest point."""
+        return float(self.stack.tops[self.index])
+
+    @property
+    def height(self) -> float:
+        """mm."""
+        return float(self.stack.heights[self.index])
+
+    @cached_property
+    def _painted(self) -> tuple[np.ndarray, float, int]:
+        image = np.zeros(self.stack.shape, np.uint8)
+        area, partly = marching.paint(*self._words, self.place, image)
+        return image, area, partly
+
+    @property
+    def _words(self) -> tuple[np.ndarray, ...]:
+        return self.tiles.where, *self.tiles.arrays[2:]
+
+    @property
+    def coverage(self) -> np.ndarray:
+        """How much of each pixel is inside, uint8 [ny, nx], 255 wholly; row 0 is the front (lowest y).
+
+        The area that the contour, its crossings interpolated linearly, cuts from each pixel.
+        """
+        return self._painted[0]
+
+    @property
+    def area(self) -> float:
+        """mm^2, of the coverage before it is rounded."""
+        return self._painted[1] * self.stack.pixel[0] * self.stack.pixel[1]
+
+    @property
+    def boundary(self) -> int:
+        """The number of pixels that the contour cuts."""
+        return self._painted[2]
+
+    @cached_property
+    def contours(self) -> Contours:
+        """Polygons, each crossing within 0.001 pixels of the zero set."""
+        return contours(self.tiles, self.place, float(self.stack.z[self.index]), self.stack, self.exact)
+
+
+@dataclass(frozen=True, eq=False)
+class Slicer:
+    """Cuts a planned stack."""
+
+    stack: Stack
+    work: Work = field(default_factory=Work)
+
+    def map(self, make: Callable[[Layer], T], start: int = 0) -> Iterator[T]:
+        """``make(layer)`` of every layer from `start` on, in order.
+
+        `make` runs in worker threads; results do not depend on their number. At most a few slabs are held at a time.
+        Raises `SliceError`, `Cancelled`, or what `make` raises.
+        """
+        root, shape = self.stack.root, self.stack.shape
+        exact = compile_scene(root, "float64")
+        sampler = Sampler(compile_scene(root), root.facts, self.stack.frame, (shape[0] + 1, shape[1] + 1))
+        total = len(self.stack.z)
+
+        def slab(first: int) -> list[T]:
+            self.work.check()
+            z = self.stack.z[first : first + SLAB]
+            tiles, spent = sampler.sample(z)
+            made = []
+            for k in range(max(start - first, 0), len(z)):
+                self.work.check()
+                made.append(make(Layer(self.stack, first + k, spent / len(z), tiles, k, exact)))
+            return made
+
+        ahead: deque[Future[list[T]]] = deque()
+        firsts = iter(range(start - start % SLAB, total, SLAB))
+        done = start
+        with ThreadPoolExecutor(self.work.threads) as pool:
+            try:
+                for first in firsts:
+                    ahead.append(pool.submit(slab, first))
+                    if len(ahead) <= self.work.threads + 1:
+                        continue
+                    for result in ahead.popleft().result():
+                        yield result
+                        done += 1
+                    self.work.progress("slicing", done / total)
+                while ahead:
+                    yield from ahead.popleft().result()
+                self.work.progress("slicing", 1.0)
+            except BaseException:
+                for future in ahead:
+                    future.cancel()
+                raise
