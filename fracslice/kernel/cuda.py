@@ -1,0 +1,180 @@
+"""The CUDA back end: a scene's field on an NVIDIA GPU, by numba-cuda.
+
+Importing this is cheap and always possible. `available` says whether there is a GPU; what needs one raises
+`KernelError` with a line that says what is missing. The machine code is kept in the cache folder, beside
+the text that it was made of.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import math
+import os
+import sys
+import tempfile
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ..errors import KernelError
+from ..formulas.registry import Node
+from . import cuda_source
+from .cpu import Precision, cache_folder
+from .linker import Linked, link
+
+BLOCK = 128
+"""Threads of a block."""
+
+CONSTANTS = 512
+"""Parameters that are passed as constants of the launch; more go through memory."""
+
+LOOPS = cuda_source.POINTS + cuda_source.BRICKS
+
+
+def missing() -> str | None:
+    """What keeps this process from using CUDA, in one line; None if nothing does."""
+    if importlib.util.find_spec("numba_cuda") is None:
+        return 'CUDA needs numba-cuda, which is not installed: pip install "fracslice[cuda]"'
+    from . import cuda_words
+
+    if not cuda_words.cuda.is_available():
+        return "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
+    return None
+
+
+def available() -> bool:
+    """Whether there is a GPU to compile for."""
+    return missing() is None
+
+
+def require() -> Any:
+    """Numba's ``cuda`` module. Raises `KernelError` if there is no GPU to use."""
+    reason = missing()
+    if reason:
+        raise KernelError(reason)
+    from . import cuda_words
+
+    return cuda_words.cuda
+
+
+class CudaKernel:
+    """The compiled field of one scene on the GPU, with the face of `CpuKernel`. Many threads may call it."""
+
+    def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
+        self._cuda = require()
+        self.dtype = np.dtype(precision)
+        self._loops = load_loops(linked, precision, LOOPS)
+        self._parameters = parameters(linked, precision)
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Field values at points.
+
+        x, y, z: arrays of one shape, any float type, scene units. Returns that shape in the kernel's dtype.
+        A point with a NaN gives NaN."""
+        shape = np.shape(x)
+        if np.size(x) == 0:
+            return np.empty(shape, self.dtype)
+        coordinates = np.empty((3, np.size(x)), self.dtype)
+        with np.errstate(over="ignore"):
+            for row, values in zip(coordinates, (x, y, z), strict=True):
+                row[:] = np.ravel(values)
+        placed = self._cuda.to_device(coordinates)
+        out = self._cuda.device_array(coordinates.shape[1], self.dtype)
+        self.points_on_device(placed[0], placed[1], placed[2], out)
+        found: np.ndarray = out.copy_to_host()
+        return found.reshape(shape)
+
+    def bricks(
+        self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
+    ) -> None:
+        """Field values on bricks of 8 x 8 x 8 grid points.
+
+        corners: int32 [n, 3], C-contiguous, the grid index of each brick's first sample. out: [n, 512] of
+        the kernel's dtype, C-contiguous, offset x*64 + y*8 + z. A grid point lies at ``origin + voxel *
+        index``; its value depends on nothing else."""
+        assert corners.dtype == np.int32
+        assert out.dtype == self.dtype
+        assert out.shape == (len(corners), 512)
+        if len(corners):
+            filled = self._cuda.device_array(out.shape, self.dtype)
+            self.bricks_on_device(self._cuda.to_device(corners), origin, voxel, filled)
+            filled.copy_to_host(out)
+
+    def points_on_device(self, x: Any, y: Any, z: Any, out: Any) -> None:
+        """`points` on arrays of the GPU (Numba's, CuPy's, PyTorch's, ...), 1-D and of the kernel's dtype.
+        Copies nothing and does not wait for the GPU."""
+        self._loops.points[-(-math.prod(out.shape) // BLOCK), BLOCK](self._parameters, x, y, z, out)
+
+    def bricks_on_device(
+        self, corners: Any, origin: tuple[float, float, float], voxel: float, out: Any
+    ) -> None:
+        """`bricks` on arrays of the GPU. Copies nothing and does not wait for the GPU."""
+        frame = [self.dtype.type(v) for v in (*origin, voxel)]
+        self._loops.bricks[-(-math.prod(out.shape) // BLOCK), BLOCK](self._parameters, *frame, corners, out)
+
+
+@lru_cache(maxsize=32)
+def _kernel(source: str, values: bytes, precision: Precision) -> CudaKernel:
+    return CudaKernel(Linked(source, np.frombuffer(values)), precision)
+
+
+def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
+    """The kernel of a scene tree whose depths are resolved. Raises `KernelError`, also if there is no GPU."""
+    linked = link(root)
+    return _kernel(linked.source, linked.parameters.tobytes(), precision)
+
+
+def parameters(linked: Linked, precision: Precision) -> Any:
+    """A linked scene's P, as the loops take it."""
+    values = linked.parameters.astype(precision)
+    return tuple(values) if len(values) <= CONSTANTS else require().to_device(values)
+
+
+def load_loops(linked: Linked, precision: Precision, loops: str) -> ModuleType:
+    """Loops over a linked scene, as attributes of a module; each is compiled for the types of its first
+    call's arguments.
+
+    loops: as `cuda_source.module` takes them. Raises `KernelError` if there is no GPU.
+    """
+    require()
+    text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)
+    name = f"cuda_{hashlib.sha256((text + _toolchain()).encode()).hexdigest()[:32]}"
+    return sys.modules.get(name) or _imported(name, text)
+
+
+@lru_cache(maxsize=1)
+def _toolchain() -> str:
+    """Everything beside the module's own text that the machine code depends on."""
+    return (Path(__file__).parent / "cuda_words.py").read_text() + version("numba-cuda")
+
+
+def _imported(name: str, text: str) -> ModuleType:
+    """Numba caches the machine code of a function beside its file, so the text becomes a file that stays."""
+    path = _kept(cache_folder(), name, text) or _kept(Path(tempfile.mkdtemp(prefix="fracslice-")), name, text)
+    assert path
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return sys.modules.setdefault(name, module)
+
+
+def _kept(folder: Path, name: str, text: str) -> Path | None:
+    """The file with this text; None if the folder cannot be written. Its date is that of the first who
+    wrote it, which Numba's cache asks for."""
+    path = folder / f"{name}.py"
+    try:
+        if not path.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile("w", dir=folder, delete=False) as file:
+                file.write(text)
+            os.replace(file.name, path)
+    except OSError:
+        return None
+    return path

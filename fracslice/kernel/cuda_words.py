@@ -1,0 +1,123 @@
+"""The vocabulary of the formulas on one CUDA thread, for the modules that `cuda_source` writes.
+
+No fast-math flag is set: they let the compiler assume that there is no NaN and no infinity, and reorder
+sums (a Mandelbulb rendered so loses its normals). Instead each word names its instruction. In float32 most
+are the GPU's own approximations, wrong by about 2 units in the last place (NVIDIA, "PTX ISA": rsqrt, rcp,
+sqrt, lg2, div.full), with denormal arguments taken as zero; NaN and infinity behave. Multiply-add is fused,
+as on the lanes. In float64 they are right to the last place or two.
+
+On Numba's CUDA simulator the words are those of the reference, on single numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from ..formulas import vocabulary
+
+if not hasattr(np, "row_stack"):  # NumPy 2.5 removed what numba-cuda 0.30 still imports
+    np.row_stack = np.vstack
+
+from llvmlite import ir
+
+cuda: Any = import_module("numba.cuda")
+SIMULATED = bool(cuda.config.ENABLE_CUDASIM)
+_types: Any = np if SIMULATED else import_module("numba.cuda.types")
+float32, float64, int32 = _types.float32, _types.float64, _types.int32
+device = cuda.jit(device=True) if SIMULATED else cuda.jit(device=True, forceinline=True)
+kernel = cuda.jit(cache=True)
+
+Instruction = str | Callable[..., Any]
+
+
+def _word(arity: int, single: Instruction, double: Instruction) -> Any:
+    """A function of reals, in float32 and float64.
+
+    Each is a PTX instruction, a function of NVIDIA's libdevice where the name begins with ``__nv_``, or a
+    Python function.
+    """
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        wide = sig.return_type.bitwidth == 64
+        real, meaning = (ir.DoubleType(), double) if wide else (ir.FloatType(), single)
+        if not isinstance(meaning, str):
+            return context.compile_internal(builder, meaning, sig, args)
+        kind = ir.FunctionType(real, [real] * arity)
+        if meaning.startswith("__nv_"):
+            known = builder.module.globals.get(meaning)
+            return builder.call(
+                known if known is not None else ir.Function(builder.module, kind, meaning), args
+            )
+        operands, letter = ", ".join(f"${i}" for i in range(arity + 1)), "d" if wide else "f"
+        return builder.asm(
+            kind, f"{meaning} {operands};", ",".join(["=" + letter, *[letter] * arity]), args, False
+        )
+
+    def unary(typing: Any, a: Any) -> Any:
+        return a(a), generate
+
+    def binary(typing: Any, a: Any, b: Any) -> Any:
+        return a(a, a), generate
+
+    return intrinsic(unary if arity == 1 else binary)
+
+
+if SIMULATED:
+    globals().update({name: getattr(vocabulary, name) for name in vocabulary.NAMES})
+    divide = np.divide
+else:
+    intrinsic = import_module("numba.cuda.extending").intrinsic
+    LOG_2 = float32(math.log(2))
+    _log2 = _word(1, "lg2.approx.ftz.f32", "__nv_log2")
+
+    def _log(a):  # type: ignore[no-untyped-def]
+        return _log2(a) * LOG_2
+
+    @device
+    def _sine(x, quarter_turns):  # type: ignore[no-untyped-def]
+        """As on the lanes (fdlibm's reduction by parts of pi/2): libdevice's own reduces in float64."""
+        turns = floor(x * float32(2 / math.pi) + float32(0.5))
+        r = x - turns * float32(1.5703125)
+        r = r - turns * float32(4.837512969970703125e-4)
+        r = r - turns * float32(7.549789954891882e-8)
+        z = r * r
+        quadrant = int32(turns) + quarter_turns
+        s = z * float32(2.75573137e-06) - float32(1.98412698e-04)
+        s = r + r * z * (z * (z * s + float32(8.33333333e-03)) - float32(1.66666667e-01))
+        c = z * float32(2.48015873e-05) - float32(1.38888889e-03)
+        c = (z * z * (z * c + float32(4.16666667e-02)) - z * float32(0.5)) + float32(1.0)
+        value = c if quadrant & int32(1) else s
+        return -value if quadrant & int32(2) else value
+
+    def _sin(x):  # type: ignore[no-untyped-def]
+        return _sine(x, int32(0))
+
+    def _cos(x):  # type: ignore[no-untyped-def]
+        return _sine(x, int32(1))
+
+    sqrt = _word(1, "sqrt.approx.ftz.f32", "sqrt.rn.f64")
+    rsqrt = _word(1, "rsqrt.approx.ftz.f32", "__nv_rsqrt")
+    inverse = _word(1, "rcp.approx.ftz.f32", "rcp.rn.f64")
+    divide = _word(2, "div.full.ftz.f32", "div.rn.f64")
+    log = _word(1, _log, "__nv_log")
+    exp = _word(1, "__nv_expf", "__nv_exp")
+    sin = _word(1, _sin, "__nv_sin")
+    cos = _word(1, _cos, "__nv_cos")
+    atan2 = _word(2, "__nv_atan2f", "__nv_atan2")
+    floor = _word(1, "__nv_floorf", "__nv_floor")
+    minimum = _word(2, "__nv_fminf", "__nv_fmin")
+    maximum = _word(2, "__nv_fmaxf", "__nv_fmax")
+    absolute = _word(1, "__nv_fabsf", "__nv_fabs")
+
+    @device
+    def where(mask, a, b):  # type: ignore[no-untyped-def]
+        return a if mask else b
+
+    @device
+    def any_of(mask):  # type: ignore[no-untyped-def]
+        return mask

@@ -1,0 +1,58 @@
+"""Run by test_cuda.py in a process of its own, on Numba's CUDA simulator, and fails as a test does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fracslice.formulas import mandelbulb
+from fracslice.kernel import cuda, reference
+from tests.examples import EXAMPLES
+
+TOLERANCE = {"float32": 2e-5, "float64": 1e-13}
+
+
+def main() -> None:
+    assert cuda.available()
+    with np.errstate(all="ignore"):
+        for name, root in EXAMPLES.items():
+            for precision in ("float32", "float64"):
+                points(name, cuda.compile_scene(root, precision), reference(root))
+        bricks()
+        many_parameters()
+
+
+def points(name: str, kernel: cuda.CudaKernel, expected: Callable[..., np.ndarray]) -> None:
+    p = np.random.default_rng(3).uniform(-1.6, 1.6, (3, 8)).astype(kernel.dtype)
+    p[:2, 0] = 0.0
+    got, tolerance = kernel.points(*p), TOLERANCE[kernel.dtype.name]
+    assert got.dtype == kernel.dtype
+    np.testing.assert_allclose(got, expected(*p), rtol=tolerance, atol=tolerance, err_msg=name)
+    assert np.isnan(kernel.points(*np.array([(np.nan, 0, 0), (0, np.nan, 0), (0, 0, np.nan)]).T)).all(), name
+
+
+def bricks() -> None:
+    """Each sample of each brick is the value at its own point; arrays may have any shape or be empty."""
+    kernel = cuda.compile_scene(EXAMPLES["capsule"])
+    corners, out = np.array([(0, 0, 0), (8, 0, 16), (16, 8, 8)], np.int32), np.empty((3, 512), np.float32)
+    kernel.bricks(corners, (-1.5, -1.25, -1.375), 0.125, out)
+    index = corners[:, None] + np.indices((8, 8, 8)).reshape(3, -1).T
+    alone = kernel.points(*np.moveaxis(np.array([-1.5, -1.25, -1.375]) + 0.125 * index, -1, 0))
+    assert (alone == out).all()
+    assert kernel.points(*np.empty((3, 0))).shape == (0,)
+    kernel.bricks(corners[:0], (0, 0, 0), 1.0, out[:0])
+
+
+def many_parameters() -> None:
+    """Where they are too many for constants of the launch they go through memory, and give the same."""
+    root, p = mandelbulb(iterations=4), np.full((3, 1), 0.7)
+    expected = cuda.compile_scene(root).points(*p)
+    cuda.CONSTANTS, kept = 0, cuda.CONSTANTS
+    cuda._kernel.cache_clear()
+    assert cuda.compile_scene(root).points(*p) == expected
+    cuda.CONSTANTS = kept
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""The CUDA back end where there is no GPU: what it compiles to, and what it computes on Numba's simulator.
+
+On a real GPU: ``python -m tests.benchmarks.gpu.parity``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fracslice.errors import KernelError
+from fracslice.formulas import Node, sphere
+from fracslice.kernel import cuda, cuda_source, link
+from tests.examples import EXAMPLES
+
+installed = pytest.mark.skipif(
+    importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not installed"
+)
+
+
+@installed
+class TestMachineCode:
+    """PTX for an H100 or H200, which needs no GPU to be compiled."""
+
+    @pytest.mark.parametrize("name", EXAMPLES)
+    def test_float32_kernels_hold_no_float64(self, name: str, tmp_path: Path) -> None:
+        ptx = compiled(EXAMPLES[name], 32, tmp_path)
+        assert ".f32" in ptx
+        assert ".f64" not in ptx
+
+    @pytest.mark.parametrize("name", ["sphere", "repeat", "mandelbulb", "mandelbulb 7.5", "twist"])
+    def test_float64_kernels_compute_in_float64(self, name: str, tmp_path: Path) -> None:
+        instructions = re.findall(
+            r"(?:add|sub|mul|fma)\S*\.(f32|f64)", compiled(EXAMPLES[name], 64, tmp_path)
+        )
+        assert set(instructions) == {"f64"}
+
+    @pytest.mark.parametrize("name", ["mandelbulb", "menger", "union"])
+    def test_everything_is_inlined_into_registers(self, name: str, tmp_path: Path) -> None:
+        ptx = compiled(EXAMPLES[name], 32, tmp_path)
+        assert "call" not in ptx
+        assert ".local" not in ptx
+
+    def test_nothing_assumes_that_there_is_no_nan(self, tmp_path: Path) -> None:
+        assert "setp.nan" in compiled(EXAMPLES["mandelbulb"], 32, tmp_path)
+
+
+def compiled(root: Node, bits: int, folder: Path) -> str:
+    """The PTX of the points loop for compute capability 9.0."""
+    names = ("numba.cuda", "numba.cuda.dispatcher", "numba.cuda.types")
+    numba_cuda, dispatcher, types = (importlib.import_module(name) for name in names)
+    linked = link(root)
+    path = folder / "scene.py"
+    path.write_text(cuda_source.module(linked, bits, cuda_source.POINTS + cuda_source.BRICKS))
+    spec = importlib.util.spec_from_file_location("scene", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    real = types.float32 if bits == 32 else types.float64
+    array, P = types.Array(real, 1, "C"), types.UniTuple(real, len(linked.parameters))
+    with pytest.MonkeyPatch.context() as patch:
+        # Numba asks the GPU for its capability even where it is told one.
+        patch.setattr(
+            dispatcher, "get_current_device", lambda: type("H200", (), {"compute_capability": (9, 0)})
+        )
+        ptx, _ = numba_cuda.compile(
+            module.points.py_func, (P, array, array, array, array), cc=(9, 0), output="ptx"
+        )
+    return str(ptx)
+
+
+@installed
+def test_every_example_agrees_with_the_reference_on_the_simulator() -> None:
+    run_simulated("tests.kernel.cuda_simulated")
+
+
+@installed
+def test_without_a_gpu_one_line_says_so() -> None:
+    if cuda.available():
+        pytest.skip("this machine has a GPU")
+    with pytest.raises(KernelError, match="no NVIDIA GPU, or no driver"):
+        cuda.compile_scene(sphere())
+
+
+def test_without_numba_cuda_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert not cuda.available()
+    with pytest.raises(KernelError, match=r'pip install "fracslice\[cuda\]"'):
+        cuda.compile_scene(sphere())
+
+
+def test_asking_for_nothing_imports_nothing() -> None:
+    script = "import sys, fracslice.kernel.cuda; print('numba' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+class TestTyping:
+    def test_numbers_counters_and_divisions(self) -> None:
+        text = cuda_source.typed(
+            "def f(x, P):\n    for i in range(int(P[1])):\n        x = x / 2 + (i - 1) * P[0]\n    return -x"
+        )
+        assert text == (
+            "@device\ndef f(x, P):\n    for i in range(whole(P[1])):\n"
+            "        x = divide(x, real(2)) + (real(i) - real(1)) * P[0]\n    return -x\n"
+        )
+
+    def test_truth_values_stay(self) -> None:
+        assert "return True" in cuda_source.typed("def f(x):\n    return True")
+
+
+def run_simulated(module: str) -> None:
+    """Runs a module in a process whose CUDA is Numba's simulator, which is chosen when Numba is imported."""
+    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1"}
+    done = subprocess.run([sys.executable, "-m", module], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
