@@ -14,6 +14,7 @@ from fracslice.formulas import (
     intersection,
     julia,
     mandelbulb,
+    material,
     menger,
     mirror,
     octahedron,
@@ -70,6 +71,7 @@ EXAMPLES: dict[str, Node] = {
     "twist x": twist(BAR, axis="x", degrees=-80),
     "bend": bend(BAR, degrees=70),
     "bend y": bend(transform(BAR, rotate=(0, 1, 0, 90)), axis="y", degrees=-50),
+    "material": material(torus(), colour=(0.9, 0.2, 0.1), reflect=0.3),
     "example of the documentation": union(
         mandelbulb(power=8, iterations=4),
         transform(menger(level=3), translate=(0, 0, -1.1), rotate=(1, 0, 0, 90), scale=0.4),

@@ -6,6 +6,7 @@ from .confining import bounds, offset, repeat
 from .deformations import bend, twist
 from .julia import julia
 from .mandelbulb import mandelbulb
+from .material import material
 from .menger import menger
 from .primitives import box, capsule, cone, cylinder, octahedron, plane, sphere, torus
 from .registry import Formula, Node, get, names
@@ -26,6 +27,7 @@ __all__ = [
     "intersection",
     "julia",
     "mandelbulb",
+    "material",
     "menger",
     "mirror",
     "names",

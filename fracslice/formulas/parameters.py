@@ -133,7 +133,31 @@ class Axis:
         return str(value)
 
 
-Parameter = Number | Count | Vector | Axis
+@dataclass(frozen=True)
+class Choice:
+    """One of some words."""
+
+    default: Any
+    doc: str
+    words: tuple[str, ...]
+
+    @property
+    def expects(self) -> str:
+        return f"{', '.join(self.words[:-1])} or {self.words[-1]}"
+
+    def read(self, text: str) -> Any:
+        return self.check(text.strip())
+
+    def check(self, value: Any) -> Any:
+        if value not in self.words:
+            raise ValueError(self.expects)
+        return value
+
+    def text(self, value: Any) -> str:
+        return str(value)
+
+
+Parameter = Number | Count | Vector | Axis | Choice
 
 
 def _number(text: str, expects: str) -> float:

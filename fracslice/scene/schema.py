@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
 
-from ..formulas.parameters import AUTO, REQUIRED, Axis, Count, Number, Vector
+from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
 from .layout import SCENE, SECTIONS, VERSION, Element, Version, formulas
 from .lengths import MILLIMETRES, Length
 
@@ -95,6 +95,12 @@ def _axis(parent: Tree.Element, kind: Axis) -> None:
         Tree.SubElement(choice, "value").text = letter
 
 
+def _words(parent: Tree.Element, kind: Choice) -> None:
+    choice = Tree.SubElement(parent, "choice")
+    for word in kind.words:
+        Tree.SubElement(choice, "value").text = word
+
+
 def _length(parent: Tree.Element, kind: Length) -> None:
     _param(Tree.SubElement(parent, "data", type="string"), "pattern", _LENGTH)
 
@@ -108,6 +114,7 @@ _PATTERNS: dict[type, Any] = {
     Count: _count,
     Vector: _vector,
     Axis: _axis,
+    Choice: _words,
     Length: _length,
     Version: _version,
 }

@@ -1,0 +1,34 @@
+"""What an element looks like. It changes no shape: meshes are the same with and without."""
+
+from __future__ import annotations
+
+from .parameters import Number, Vector
+from .registry import Node, warp
+
+
+@warp(
+    colour=Vector(
+        (0.8, 0.8, 0.8),
+        "red, green and blue; several colours, three numbers each, are a palette for the orbit",
+        sizes=tuple(range(3, 25, 3)),
+        least=0,
+        most=1,
+    ),
+    repeats=Number(1.0, "how often the palette is run through", above=0, most=1000),
+    shift=Number(0.0, "where in the palette it starts, from 0 to 1", least=0, most=1),
+    specular=Number(0.2, "strength of the highlight", least=0, most=100),
+    shininess=Number(32.0, "sharpness of the highlight", least=1, most=10000),
+    glow=Number(0.0, "light of its own, in its colour", least=0, most=1000),
+    reflect=Number(0.0, "the part of light that is mirrored head on; more is at grazing angles", least=0, most=1),
+    clear=Number(0.0, "the part of light that goes through", least=0, most=1),
+    index=Number(1.5, "how strongly that light is bent: 1.33 water, 1.5 glass, 2.4 diamond", least=1, most=4),
+    absorb=Vector((0.0, 0.0, 0.0), "how quickly red, green and blue fade inside, per scene unit", least=0, most=1e6),
+)
+def material(child, x, y, z):  # type: ignore[no-untyped-def]
+    """What the element inside looks like in pictures. A material further inside takes precedence."""
+    return child(x, y, z)
+
+
+@material.identity
+def _(node: Node) -> bool:
+    return True

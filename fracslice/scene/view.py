@@ -1,0 +1,216 @@
+"""How a scene is looked at: the records behind `<camera>`, `<film>`, `<light>`, `<fog>` and `<shading>`.
+
+Every field carries the kind that reads, checks, writes and describes it, as the parameters of a formula do.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, ClassVar
+
+from ..errors import SceneError
+from ..formulas.box import Box
+from ..formulas.parameters import Choice, Count, Number, Vector
+
+Triple = tuple[float, float, float]
+WHITE = (1.0, 1.0, 1.0)
+
+
+def described(kind: Any) -> Any:
+    """A field of a record, with the kind's default."""
+    return field(default=kind.default, metadata={"kind": kind})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """What the records have in common. Raises `SceneError` for a value that its kind refuses."""
+
+    element: ClassVar[str]
+    place: str | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, kind in self.kinds().items():
+            value = getattr(self, name)
+            if value is None and kind.default is None:
+                continue
+            try:
+                object.__setattr__(self, name, kind.check(value))
+            except ValueError as error:
+                raise self.fail(f"{name}={value!r}: expected {error}") from None
+        self.validate()
+
+    def validate(self) -> None:
+        """Raises `SceneError` for values that are possible alone but not together."""
+
+    @classmethod
+    def kinds(cls) -> dict[str, Any]:
+        """The parameters by name."""
+        return {f.name: f.metadata["kind"] for f in fields(cls) if "kind" in f.metadata}
+
+    def fail(self, message: str) -> SceneError:
+        """The error to raise about this element."""
+        return SceneError(f"{self.place + ': ' if self.place else ''}<{self.element}> {message}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Camera(Part):
+    """From where and how the scene is looked at; without one, the whole object is in view."""
+
+    element = "camera"
+    eye: Triple = described(Vector((2.2, -2.0, 1.4), "where the camera is, in scene units"))
+    target: Triple = described(Vector((0.0, 0.0, 0.0), "the point in the middle of the picture"))
+    up: Triple = described(Vector((0.0, 0.0, 1.0), "the direction that is up in the picture", nonzero=True))
+    fov: float = described(Number(40.0, "the angle between the picture's upper and lower edge, in degrees", above=0, below=179))
+    aperture: float = described(Number(0.0, "radius of the lens, in scene units: what is out of focus blurs; 0: all is sharp", least=0))
+    focus: float | None = described(Number(None, "distance of what is sharp; without it, that of the target", above=0))
+
+    def validate(self) -> None:
+        if not 0 < math.dist(self.eye, self.target) < math.inf:
+            raise self.fail("eye and target: expected two different points")
+        if math.hypot(*_cross(self.forward, _unit(self.up))) < 1e-6:
+            raise self.fail("up: expected a direction other than the one the camera looks in")
+
+    @classmethod
+    def around(cls, box: Box) -> Camera:
+        """A camera that has the whole of a finite box in view."""
+        reach = math.hypot(*box.size) / 2
+        eye = _along(box.centre, _unit((2.2, -2.0, 1.4)), reach / math.sin(math.radians(20)) * 0.9)
+        return cls(eye=eye, target=box.centre)
+
+    @property
+    def forward(self) -> Triple:
+        return _unit(_minus(self.target, self.eye))
+
+    @property
+    def right(self) -> Triple:
+        return _unit(_cross(self.forward, self.up))
+
+    @property
+    def above(self) -> Triple:
+        """What is up in the picture, at right angles to where the camera looks."""
+        return _cross(self.right, self.forward)
+
+    def moved(self, forward: float = 0.0, right: float = 0.0, up: float = 0.0) -> Camera:
+        """Flown by so much, in scene units, looking in the same direction."""
+        shift = tuple(
+            forward * f + right * r + up * u for f, r, u in zip(self.forward, self.right, self.above, strict=True)
+        )
+        return replace(self, eye=_plus(self.eye, shift), target=_plus(self.target, shift))
+
+    def turned(self, yaw: float = 0.0, pitch: float = 0.0) -> Camera:
+        """Looking elsewhere from the same place: so many degrees to the right, and up (never over the zenith)."""
+        ahead = math.asin(max(-1.0, min(1.0, _dot(self.forward, _unit(self.up)))))
+        rise = max(-1.55, min(1.55, ahead + math.radians(pitch))) - ahead
+        level = _turn(self.forward, self.right, rise)
+        turned = _turn(level, _unit(self.up), -math.radians(yaw))
+        return replace(self, target=_along(self.eye, turned, math.dist(self.eye, self.target)))
+
+    def orbited(self, degrees: float) -> Camera:
+        """Carried around the target, about the direction that is up."""
+        arm = _turn(_minus(self.eye, self.target), _unit(self.up), math.radians(degrees))
+        return replace(self, eye=_plus(self.target, arm))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Film(Part):
+    """The picture: how large, how clean, and how light becomes colour."""
+
+    element = "film"
+    width: int = described(Count(1280, "pixels across", least=1, most=32768))
+    height: int = described(Count(720, "pixels down", least=1, most=32768))
+    samples: int = described(Count(64, "the most samples that a pixel gets", least=1, most=1_000_000))
+    tone: str = described(Choice("filmic", "how bright light is brought into range", ("filmic", "reinhard", "none")))
+    exposure: float = described(Number(0.0, "brighter by so many stops", least=-20, most=20))
+    bloom: float = described(Number(0.0, "the part of bright light that spreads in the lens", least=0, most=1))
+    background: Triple = described(Vector((0.08, 0.08, 0.12), "colour where nothing is, without a sky", least=0, most=1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Light(Part):
+    """A source of light; there may be several. Without any, a sun and a sky."""
+
+    element = "light"
+    kind: str = described(Choice("sun", "far away, near, or all around", ("sun", "lamp", "sky")))
+    position: Triple = described(
+        Vector((-1.0, -2.0, 3.0), "where a lamp is, or the direction in which the sun stands", nonzero=True)
+    )
+    colour: Triple = described(Vector(WHITE, "red, green and blue; of a sky, at its zenith", least=0, most=1))
+    horizon: Triple = described(Vector(WHITE, "of a sky, its colour at the horizon", least=0, most=1))
+    ground: Triple = described(Vector((0.3, 0.28, 0.26), "of a sky, its colour from below", least=0, most=1))
+    strength: float = described(Number(1.0, "multiplies the colour; of a lamp, at distance 1", least=0, most=1e6))
+    size: float = described(
+        Number(0.0, "of a lamp its radius, of a sun the angle in degrees it fills: above zero, shadows are soft", least=0, most=90)
+    )
+    shadows: str = described(Choice("yes", "whether it is blocked by what is in its way", ("yes", "no")))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fog(Part):
+    """Haze that hides what is far."""
+
+    element = "fog"
+    colour: Triple = described(Vector((0.7, 0.75, 0.8), "red, green and blue", least=0, most=1))
+    density: float = described(Number(0.1, "of light, exp(-density distance) comes through", least=0, most=1e6))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shading(Part):
+    """What is shown of the surface."""
+
+    element = "shading"
+    mode: str = described(
+        Choice(
+            "light",
+            "light: lit by the lights; normal: its direction; depth: how far along the view; distance: how far from the eye; "
+            "steps: how many steps the ray took, the more the darker",
+            ("light", "normal", "depth", "distance", "steps"),
+        )
+    )
+    ambient: float = described(Number(0.0, "light that is everywhere", least=0, most=100))
+    occlusion: float = described(Number(0.0, "how much narrow places darken ambient light", least=0, most=4))
+    reach: float = described(Number(0.2, "how far occlusion looks, in scene units", above=0))
+    bounces: int = described(Count(4, "how often a ray is reflected or refracted at most", most=16))
+
+
+@dataclass(frozen=True)
+class View:
+    """All of it; what is left out is None or empty, and chosen for the scene."""
+
+    camera: Camera | None = None
+    film: Film = Film()
+    lights: tuple[Light, ...] = ()
+    fog: Fog | None = None
+    shading: Shading = Shading()
+
+
+def _minus(a: Triple, b: Triple) -> Triple:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _plus(a: Triple, b: tuple[float, ...]) -> Triple:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _along(a: Triple, direction: Triple, by: float) -> Triple:
+    return a[0] + by * direction[0], a[1] + by * direction[1], a[2] + by * direction[2]
+
+
+def _dot(a: Triple, b: Triple) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _unit(a: Triple) -> Triple:
+    length = math.hypot(*a)
+    return a[0] / length, a[1] / length, a[2] / length
+
+
+def _turn(a: Triple, axis: Triple, angle: float) -> Triple:
+    """Rodrigues' rotation about a unit axis."""
+    c, s, cross, along = math.cos(angle), math.sin(angle), _cross(axis, a), _dot(axis, a)
+    x, y, z = (c * p + s * q + (1 - c) * along * r for p, q, r in zip(a, cross, axis, strict=True))
+    return x, y, z
