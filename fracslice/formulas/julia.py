@@ -8,7 +8,7 @@ from .box import Box
 from .escape import levels, potential_distance
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
-from .vocabulary import any_of, maximum, minimum, rsqrt, where
+from .vocabulary import any_of, maximum, minimum, orbit, rsqrt, where
 
 
 @shape(
@@ -47,6 +47,7 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, flat):  # ty
             x = square - k * k
             k = twice * k + ck
             r2 = x * x + y * y + z * z + k * k
+        orbit(r2, alive)
         end_r2 = where(alive, r2, end_r2)
         slope2 = where(alive, maximum(d2, slope2), slope2)
         level = where(alive, level + level, level)

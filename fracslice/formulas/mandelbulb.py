@@ -8,7 +8,7 @@ from .box import Box
 from .escape import JUMP, levels, potential_distance
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
-from .vocabulary import absolute, any_of, atan2, cos, exp, log, maximum, rsqrt, sin, where
+from .vocabulary import absolute, any_of, atan2, cos, exp, log, maximum, orbit, rsqrt, sin, where
 
 
 @shape(
@@ -74,6 +74,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
         y = s * cv + cy
         z = re + cz
         r2 = x * x + y * y + z * z
+        orbit(r2, alive)
         end_r2 = where(alive, r2, end_r2)
         slope = where(alive, maximum(dr, slope), slope)
         level = where(alive, level * power, level)
@@ -110,6 +111,7 @@ def mandelbulb_real(x, y, z, power, iterations, first_level, last_level, escape2
         y = s * sin(phi) + cy
         z = rn * cos(theta) + cz
         r2 = x * x + y * y + z * z
+        orbit(r2, alive)
         end_r2 = where(alive, r2, end_r2)
         slope = where(alive, maximum(dr, slope), slope)
         level = where(alive, level * power, level)

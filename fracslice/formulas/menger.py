@@ -5,7 +5,7 @@ from __future__ import annotations
 from .box import Box
 from .parameters import Count
 from .registry import Node, shape
-from .vocabulary import absolute, floor, maximum, minimum, sqrt
+from .vocabulary import absolute, floor, maximum, minimum, orbit, sqrt
 
 
 @shape(level=Count(3, "how many times holes are cut; level 0 is a cube", most=20))
@@ -33,6 +33,7 @@ def menger(x, y, z, level):  # type: ignore[no-untyped-def]
         ry = absolute(1.0 - 6.0 * qy)
         rz = absolute(1.0 - 6.0 * qz)
         cross = minimum(maximum(rx, ry), minimum(maximum(ry, rz), maximum(rz, rx)))
+        orbit(4.0 * (qx * qx + qy * qy + qz * qz), (cross - 1.0) * cell > d)
         d = maximum(d, (cross - 1.0) * cell)
         scale = scale * 3.0
         cell = cell * (1.0 / 3.0)

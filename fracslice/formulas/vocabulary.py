@@ -40,6 +40,10 @@ def inverse(a: np.ndarray) -> np.ndarray:
     return 1.0 / a
 
 
+def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
+    """Marks a step of an orbit that is r2 = |w|^2 away from the origin where `alive`; only pictures with palettes look."""
+
+
 NAMES = frozenset(
     "where sqrt rsqrt inverse log exp sin cos atan2 floor minimum maximum absolute any_of".split()
 )  # fmt: skip

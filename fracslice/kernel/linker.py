@@ -96,7 +96,7 @@ class Linker:
         return "\n".join([*lines, "    return f"])
 
     def warp(self, name: str, function: Callable[..., Any], fixed: dict, passed: list[str], children: list[str]) -> str:
-        tree = _specialised(function, fixed)
+        tree = specialised(function, fixed)
         arguments = [a.arg for a in tree.args.args][4:]
         tree.name = name
         tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P")]
@@ -111,7 +111,7 @@ class Linker:
         suffix = "".join(f"_{k}_{v}" for k, v in sorted(fixed.items()))
         name = function.__name__ + "".join(c if c.isalnum() else "_" for c in suffix)
         if name not in self.shared:
-            tree = _specialised(function, fixed)
+            tree = _Forget().visit(specialised(function, fixed))
             tree.name = name
             self.helpers(tree, function)
             self.shared[name] = ast.unparse(ast.fix_missing_locations(tree))
@@ -151,7 +151,7 @@ def _text(function: Callable[..., Any]) -> str:
     return textwrap.dedent(inspect.getsource(function))
 
 
-def _specialised(function: Callable[..., Any], fixed: dict[str, Any]) -> ast.FunctionDef:
+def specialised(function: Callable[..., Any], fixed: dict[str, Any]) -> ast.FunctionDef:
     """The function's tree without decorators, docstring and hints, its fixed arguments replaced by their values."""
     tree = ast.parse(_text(function)).body[0]
     assert isinstance(tree, ast.FunctionDef)
@@ -194,6 +194,19 @@ class _Prune(ast.NodeTransformer):
         if isinstance(node.test, ast.Constant):
             return node.body if node.test.value else node.orelse
         return node
+
+
+class _Forget(ast.NodeTransformer):
+    """Marks of orbits left out: a field does not look at them."""
+
+    def visit_Expr(self, node: ast.Expr) -> Any:
+        return None if is_mark(node) else node
+
+
+def is_mark(node: ast.AST) -> bool:
+    """True of the statement ``orbit(...)``."""
+    call = node.value if isinstance(node, ast.Expr) else None
+    return isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "orbit"
 
 
 class _CallsChild(ast.NodeTransformer):
