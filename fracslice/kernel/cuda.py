@@ -13,6 +13,7 @@ import math
 import os
 import sys
 import tempfile
+import threading
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -32,6 +33,9 @@ BLOCK = 128
 
 CONSTANTS = 512
 """Parameters that are passed as constants of the launch; more go through memory."""
+
+_LAUNCH = threading.Lock()
+"""Numba's first launch of a kernel may happen once only, and launching holds the interpreter anyway."""
 
 LOOPS = cuda_source.POINTS + cuda_source.BRICKS
 
@@ -96,7 +100,8 @@ class CudaKernel:
 
         corners: int32 [n, 3], C-contiguous, the grid index of each brick's first sample. out: [n, 512] of
         the kernel's dtype, C-contiguous, offset x*64 + y*8 + z. A grid point lies at ``origin + voxel *
-        index``; its value depends on nothing else."""
+        index``; its value depends on nothing else, and can differ from that of `points` in the last place.
+        """
         assert corners.dtype == np.int32
         assert out.dtype == self.dtype
         assert out.shape == (len(corners), 512)
@@ -108,14 +113,18 @@ class CudaKernel:
     def points_on_device(self, x: Any, y: Any, z: Any, out: Any) -> None:
         """`points` on arrays of the GPU (Numba's, CuPy's, PyTorch's, ...), 1-D and of the kernel's dtype.
         Copies nothing and does not wait for the GPU."""
-        self._loops.points[-(-math.prod(out.shape) // BLOCK), BLOCK](self._parameters, x, y, z, out)
+        with _LAUNCH:
+            self._loops.points[-(-math.prod(out.shape) // BLOCK), BLOCK](self._parameters, x, y, z, out)
 
     def bricks_on_device(
         self, corners: Any, origin: tuple[float, float, float], voxel: float, out: Any
     ) -> None:
         """`bricks` on arrays of the GPU. Copies nothing and does not wait for the GPU."""
         frame = [self.dtype.type(v) for v in (*origin, voxel)]
-        self._loops.bricks[-(-math.prod(out.shape) // BLOCK), BLOCK](self._parameters, *frame, corners, out)
+        with _LAUNCH:
+            self._loops.bricks[-(-math.prod(out.shape) // BLOCK), BLOCK](
+                self._parameters, *frame, corners, out
+            )
 
 
 @lru_cache(maxsize=32)

@@ -26,6 +26,7 @@ if not hasattr(np, "row_stack"):  # NumPy 2.5 removed what numba-cuda 0.30 still
 from llvmlite import ir
 
 cuda: Any = import_module("numba.cuda")
+cuda.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # a few points are few on purpose
 SIMULATED = bool(cuda.config.ENABLE_CUDASIM)
 _types: Any = np if SIMULATED else import_module("numba.cuda.types")
 float32, float64, int32 = _types.float32, _types.float64, _types.int32
@@ -110,9 +111,16 @@ else:
     cos = _word(1, _cos, "__nv_cos")
     atan2 = _word(2, "__nv_atan2f", "__nv_atan2")
     floor = _word(1, "__nv_floorf", "__nv_floor")
-    minimum = _word(2, "__nv_fminf", "__nv_fmin")
-    maximum = _word(2, "__nv_fmaxf", "__nv_fmax")
     absolute = _word(1, "__nv_fabsf", "__nv_fabs")
+
+    # Not min.f32 and max.f32: they lose a NaN, and a point at infinity would be inside.
+    @device
+    def minimum(a, b):  # type: ignore[no-untyped-def]
+        return a if a < b else b
+
+    @device
+    def maximum(a, b):  # type: ignore[no-untyped-def]
+        return a if a > b else b
 
     @device
     def where(mask, a, b):  # type: ignore[no-untyped-def]

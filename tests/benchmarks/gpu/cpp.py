@@ -1,0 +1,145 @@
+"""A linked scene as CUDA C++, word for word: what nvcc makes of the same arithmetic is the bound to compare
+with."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+
+WORDS = {
+    "where": "({} ? {} : {})",
+    "any_of": "{}",
+    "sqrt": "sqrtf({})",
+    "rsqrt": "rsqrtf({})",
+    "inverse": "(1.0f / {})",
+    "log": "logf({})",
+    "exp": "expf({})",
+    "sin": "sinf({})",
+    "cos": "cosf({})",
+    "atan2": "atan2f({}, {})",
+    "floor": "floorf({})",
+    "minimum": "fminf({}, {})",
+    "maximum": "fmaxf({}, {})",
+    "absolute": "fabsf({})",
+    "int": "int({})",
+}
+OPERATORS = {
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.BitAnd: "&",
+    ast.BitOr: "|",
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.Not: "!",
+    ast.USub: "-",
+}
+
+PRELUDE = """
+#include <cmath>
+template <int N> struct Tuple {{
+    float v[N];
+    __host__ __device__ float operator[](int i) const {{ return v[i]; }}
+}};
+using Parameters = Tuple<{count}>;
+"""
+
+
+def translated(source: str, parameters: Sequence[float]) -> str:
+    """The functions of a linked scene, each name with a ``_`` behind it, and its parameters GIVEN. C++20."""
+    functions = [_function(f) for f in ast.parse(source).body if isinstance(f, ast.FunctionDef)]
+    given = f"const Parameters GIVEN = {{{{{', '.join(_number(p) for p in parameters)}}}}};"
+    return "\n".join([PRELUDE.format(count=len(parameters)), *functions, given, ""])
+
+
+def _number(value: float) -> str:
+    return "INFINITY" if value == float("inf") else f"{float(value)!r}f"
+
+
+def _function(node: ast.FunctionDef) -> str:
+    arguments = [a.arg for a in node.args.args]
+    declared = {**_assigned(node), **dict.fromkeys(arguments, "")}
+    lines = [f"{kind} {name};" for name, kind in declared.items() if kind]
+    body = [line for statement in node.body for line in _statement(statement)]
+    head = f"__device__ __forceinline__ auto {node.name}_({', '.join(f'auto {a}' for a in arguments)})"
+    return "\n    ".join([f"{head} {{", *lines, *body]) + "\n}"
+
+
+def _assigned(node: ast.FunctionDef) -> dict[str, str]:
+    """The C++ type of each name that a function assigns: bool for what is compared, else float."""
+    found: dict[str, str] = {}
+    for inner in ast.walk(node):
+        if isinstance(inner, ast.Assign) and not _makes_tuple(inner):
+            target = inner.targets[0]
+            for name in target.elts if isinstance(target, ast.Tuple) else [target]:
+                assert isinstance(name, ast.Name)
+                mask = isinstance(inner.value, ast.Compare) or (
+                    isinstance(inner.value, ast.BinOp) and isinstance(inner.value.op, (ast.BitAnd, ast.BitOr))
+                )
+                found[name.id] = "bool" if mask else "float"
+    return found
+
+
+def _makes_tuple(node: ast.Assign) -> bool:
+    return isinstance(node.targets[0], ast.Name) and isinstance(node.value, ast.Tuple)
+
+
+def _statement(node: ast.stmt) -> list[str]:
+    match node:
+        case ast.Assign([ast.Name(name)], ast.Tuple() as value):
+            return [f"auto {name} = {_expression(value)};"]
+        case ast.Assign([ast.Name(name)], value):
+            return [f"{name} = {_expression(value)};"]
+        case ast.Assign([ast.Tuple(targets)], ast.Tuple(values)):
+            news = [f"auto new{i} = {_expression(v)};" for i, v in enumerate(values)]
+            sets = [f"{_expression(t)} = new{i};" for i, t in enumerate(targets)]
+            return ["{", *news, *sets, "}"]
+        case ast.Assign([ast.Tuple(targets)], value):
+            sets = [f"{_expression(t)} = all[{i}];" for i, t in enumerate(targets)]
+            return ["{", f"auto all = {_expression(value)};", *sets, "}"]
+        case ast.If(test, body, orelse):
+            other = ["} else {", *(line for s in orelse for line in _statement(s))] if orelse else []
+            return [
+                f"if ({_expression(test)}) {{",
+                *(line for s in body for line in _statement(s)),
+                *other,
+                "}",
+            ]
+        case ast.For(ast.Name(i), ast.Call(ast.Name("range"), [end]), body):
+            head = f"for (int {i} = 0; {i} < {_count(end)}; {i}++) {{"
+            return [head, *(line for s in body for line in _statement(s)), "}"]
+        case ast.Break():
+            return ["break;"]
+        case ast.Return(value) if value is not None:
+            return [f"return {_expression(value)};"]
+    raise NotImplementedError(ast.unparse(node))
+
+
+def _count(node: ast.expr) -> str:
+    return str(node.value) if isinstance(node, ast.Constant) else _expression(node)
+
+
+def _expression(node: ast.expr) -> str:
+    match node:
+        case ast.Name(name):
+            return name
+        case ast.Constant(bool(value)):
+            return str(value).lower()
+        case ast.Constant(value):
+            return _number(value)
+        case ast.Subscript(value, ast.Constant(index)):
+            return f"{_expression(value)}[{index}]"
+        case ast.Tuple(values):
+            return f"Tuple<{len(values)}>{{{{{', '.join(map(_expression, values))}}}}}"
+        case ast.UnaryOp(op, value):
+            return f"({OPERATORS[type(op)]}{_expression(value)})"
+        case ast.BinOp(left, op, right) | ast.Compare(left, [op], [right]):
+            return f"({_expression(left)} {OPERATORS[type(op)]} {_expression(right)})"
+        case ast.Call(ast.Name(name), arguments):
+            passed = [_expression(a) for a in arguments]
+            return WORDS[name].format(*passed) if name in WORDS else f"{name}_({', '.join(passed)})"
+    raise NotImplementedError(ast.unparse(node))

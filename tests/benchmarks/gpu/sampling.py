@@ -1,0 +1,86 @@
+"""Sampling of bricks on a real GPU: ``python -m tests.benchmarks.gpu.sampling``.
+
+The kernel alone, on arrays of the GPU, against nvcc on the same arithmetic; then whole runs of the sampler.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from fracslice import kernel as cpu
+from fracslice.formulas import Node, mandelbulb, menger
+from fracslice.kernel import cuda, link
+from fracslice.volume import Lattice, sample
+
+from . import native
+
+SCENES: dict[str, Node] = {"mandelbulb": mandelbulb(iterations=8), "menger": menger(level=5)}
+SIZE, HALF = 512, 1.2
+ORIGIN, VOXEL = (-HALF, -HALF, -HALF), 2 * HALF / SIZE
+
+
+def dense() -> np.ndarray:
+    """The corners of all bricks of a cube of SIZE^3 samples."""
+    return np.ascontiguousarray(8 * np.indices((SIZE // 8,) * 3).reshape(3, -1).T, np.int32)
+
+
+def surface(root: Node) -> np.ndarray:
+    """The corners of the bricks that the surface passes through, in that cube."""
+    return sample(cuda.compile_scene(root), root.facts, Lattice(ORIGIN, VOXEL, (SIZE // 8,) * 3)).ijk
+
+
+def best(run: Callable[[], None], rounds: int = 10) -> float:
+    """The shortest of a few times on the GPU, ms; it is kept busy before, so that launching costs nothing."""
+    numba_cuda, times = cuda.require(), []
+    for _ in range(rounds):
+        start, end = numba_cuda.event(), numba_cuda.event()
+        run()
+        start.record()
+        run()
+        end.record()
+        end.synchronize()
+        times.append(numba_cuda.event_elapsed_time(start, end))
+    return float(min(times))
+
+
+def rates(root: Node, corners: np.ndarray) -> dict[str, tuple[float, int]]:
+    """By back end: G evaluations/s, and how many samples are inside."""
+    numba_cuda, kernel = cuda.require(), cuda.compile_scene(root)
+    count, placed = 512 * len(corners), cuda.require().to_device(corners)
+    out = numba_cuda.device_array((len(corners), 512), np.float32)
+    took = best(lambda: kernel.bricks_on_device(placed, ORIGIN, VOXEL, out))
+    found = {"fracslice": (count / took / 1e6, int((out.copy_to_host() < 0).sum()))}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "corners"
+        corners.tofile(path)
+        for name, flags in native.FLAGS.items():
+            took, inside, error = native.run(
+                link(root), native.SAMPLING, flags, str(path), *(str(v) for v in (*ORIGIN, VOXEL))
+            )
+            assert error == 0
+            found[name] = (count / took / 1e6, int(inside))
+    return found
+
+
+def main() -> None:
+    for name, root in SCENES.items():
+        for part, corners in {"dense": dense(), "surface": surface(root)}.items():
+            for back_end, (rate, inside) in rates(root, corners).items():
+                print(f"{name} {part:<8} {back_end:<20} {rate:8.2f} G evaluations/s, {inside} inside")
+        lattice = Lattice(ORIGIN, VOXEL, (SIZE // 8,) * 3)
+        for back_end, kernel in {"CPU": cpu.compile_scene(root), "CUDA": cuda.compile_scene(root)}.items():
+            sample(kernel, root.facts, lattice)  # type: ignore[arg-type]
+            start = time.perf_counter()
+            bricks = sample(kernel, root.facts, lattice)  # type: ignore[arg-type]
+            took = time.perf_counter() - start
+            counts = f"{len(bricks)} bricks, {bricks.evaluations} evaluations"
+            print(f"{name} sampler on {back_end}: {took:.3f} s, {counts}")
+
+
+if __name__ == "__main__":
+    main()
