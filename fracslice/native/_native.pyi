@@ -1,0 +1,79 @@
+"""C++ parts of fracslice: marching cubes on bricks, and OpenVDB. Callers use `fracslice.mesh.extract` and
+`fracslice.volume.grid`.
+
+Arrays are C-contiguous and as `fracslice.volume.bricks.Bricks` describes them. Long calls let other threads run.
+"""
+
+from numpy import float32, float64, int32, uint8, uint32
+from numpy.typing import NDArray
+
+Point = tuple[float, float, float]
+
+def marching_cubes(
+    ijk: NDArray[int32],
+    values: NDArray[float32],
+    index: NDArray[int32],
+    origin: Point,
+    voxel: float,
+    clamp: float,
+    threads: int = 0,
+) -> tuple[NDArray[float64], NDArray[int32], NDArray[int32], NDArray[uint8]]:
+    """The surface between the samples < 0 and the others: closed, an oriented 2-manifold, free of self-crossings.
+
+    clamp: how near a grid point a vertex may come, as a share of the edge. threads: 0 for all cores; the result is
+    the same for any number.
+
+    Returns vertices float64 [n, 3] at origin + voxel * (grid position); triangles int32 [m, 3], counter-clockwise seen
+    from outside; and the grid edge that each vertex lies on, by its lower grid point int32 [n, 3] and its axis
+    uint8 [n]. Marching cubes after Lorensen and Cline (1987), with a table that `make_cases.py` derives.
+
+    Raises ValueError if a sign change leaves the samples or the arrays contradict each other, and for a surface of
+    more than 2^31 vertices or triangles.
+    """
+
+def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:
+    """How many grid edges with a sign change touch a point without a sample: 0 if the surface is closed."""
+
+class Grid:
+    """A sparse OpenVDB level set."""
+
+    @staticmethod
+    def from_bricks(
+        ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32], origin: Point, voxel: float
+    ) -> Grid:
+        """Active where sampled; the background is the largest sample, negative inside."""
+
+    @staticmethod
+    def read(path: str, name: str = "") -> Grid:
+        """The float grid of that name in a .vdb file, or the first one. Raises RuntimeError."""
+
+    def write(self, path: str, metadata: dict[str, str]) -> None:
+        """Writes a .vdb file. Raises RuntimeError if not all of it could be written."""
+
+    def to_bricks(self) -> tuple[list[float], float, NDArray[int32], NDArray[float32], NDArray[int32]]:
+        """origin, voxel, ijk, values, index. Raises ValueError unless voxels are axis-aligned cubes."""
+
+    def mesh(self, adaptivity: float = 0.0) -> tuple[NDArray[float32], NDArray[uint32], NDArray[uint32]]:
+        """OpenVDB's own surface (dual contouring): points [n, 3], triangles [m, 3], quads [k, 4], outwards."""
+
+    def redistance(self) -> Grid:
+        """The same surface in a field of distances, found by fast sweeping (Zhao, 2004). Raises ValueError."""
+
+    def offset(self, distance: float) -> Grid:
+        """The surface of a field of distances moved outwards, in scene units. Raises ValueError."""
+
+    def surfaces(self) -> list[Grid]:
+        """One grid for each connected piece of the surface, the largest first."""
+
+    name: str
+    @property
+    def metadata(self) -> dict[str, str]: ...
+    @property
+    def background(self) -> float: ...
+    @property
+    def active_voxels(self) -> int: ...
+    @property
+    def leaves(self) -> int: ...
+    @property
+    def memory(self) -> int:
+        """Bytes."""

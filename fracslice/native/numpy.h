@@ -1,0 +1,42 @@
+// Arrays across the border: views of NumPy arrays in, owned NumPy arrays out.
+#pragma once
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+
+#include <cstring>
+
+#include "marching_cubes.h"
+
+namespace fracslice {
+
+namespace nb = nanobind;
+
+using IjkArray = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using ValuesArray = nb::ndarray<const float, nb::shape<-1, kSamples>, nb::c_contig, nb::device::cpu>;
+using IndexArray = nb::ndarray<const int32_t, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+
+inline Bricks view(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index) {
+    if (ijk.shape(0) != values.shape(0)) throw nb::value_error("ijk and values differ in length");
+    std::array<int, 3> size = {int(index.shape(0)), int(index.shape(1)), int(index.shape(2))};
+    return {ijk.data(), values.data(), ijk.shape(0), index.data(), size};
+}
+
+template <class T>
+nb::object to_numpy(Array<T>&& array, std::initializer_list<size_t> shape) {
+    T* data = array.data.release();
+    nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+    return nb::cast(nb::ndarray<nb::numpy, T>(data, shape, owner));
+}
+
+template <class T, class Row>
+nb::object to_numpy(const std::vector<Row>& rows) {
+    constexpr size_t columns = sizeof(Row) / sizeof(T);
+    Array<T> array(rows.size(), columns);
+    std::memcpy(array.data.get(), rows.data(), rows.size() * sizeof(Row));
+    return to_numpy(std::move(array), {rows.size(), columns});
+}
+
+void bind_grid(nb::module_& module);
+
+}  // namespace fracslice
