@@ -56,7 +56,7 @@ def contours(tiles: Tiles, k: int, z: float, stack: Stack, exact: CpuKernel | No
 
     exact: the float64 kernel that the crossings are refined with; None for linear interpolation.
     """
-    words = tiles.arrays[0], *tiles.arrays[2:]
+    words = tiles.where, tiles.inside, tiles.values
     ids = np.full((tiles.count, 128), -1, np.int32)
     size = marching.number_edges(*words, k, ids, np.empty((0, 3), np.int32), np.empty((0, 2)))
     edges, ends = np.empty((size, 3), np.int32), np.empty((size, 2))

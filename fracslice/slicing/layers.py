@@ -48,13 +48,14 @@ class Layer:
 
     @cached_property
     def _painted(self) -> tuple[np.ndarray, float, int]:
-        image = np.zeros(self.stack.shape, np.uint8)
-        area, partly = marching.paint(*self._words, self.place, image)
-        return image, area, partly
+        ny, nx = self.stack.shape
+        words = np.zeros((ny, -(-nx // 8)), np.uint64)
+        area, partly = marching.paint(*self._words, self.place, words)
+        return words.view(np.uint8)[:, :nx], area, partly
 
     @property
     def _words(self) -> tuple[np.ndarray, ...]:
-        return self.tiles.where, *self.tiles.arrays[2:]
+        return self.tiles.where, self.tiles.inside, self.tiles.values
 
     @property
     def coverage(self) -> np.ndarray:

@@ -81,7 +81,7 @@ class Sampler:
         tiles.where[layer, blocks[:, 0], blocks[:, 1]] = np.where(f < 0, INSIDE, OUTSIDE)
         kept = np.flatnonzero(~(np.abs(f) > self.facts.lipschitz * self._diagonal(TILE)))
         n = len(kept)
-        tiles.reserve(n)
+        tiles.reserve(4 * n)
         tiles.count = n
         tiles.place[:n] = np.column_stack([layer, blocks])[kept]
         tiles.where[tuple(tiles.place[:n].T)] = np.arange(n)

@@ -27,6 +27,18 @@ FIRST_ROW = np.uint64(0xFF)
 LAST_ROW = np.uint64(0xFF00000000000000)
 _1, _7, _8, _56 = (np.uint64(n) for n in (1, 7, 8, 56))
 
+_DE_BRUIJN, _58 = np.uint64(0x03F79D71B4CB0A89), np.uint64(58)
+_PLACES = np.empty(64, np.int64)
+for _n in range(64):
+    _PLACES[(int(_DE_BRUIJN) << _n) % (1 << 64) >> 58] = _n
+
+PROBES = np.zeros(9, np.uint64)
+"""The middles of the blocks of 8, 4 and 2 samples of a tile, as a word each."""
+for _n in (8, 4, 2):
+    for _y in range(_n // 2, 8, _n):
+        for _x in range(_n // 2, 8, _n):
+            PROBES[_n] |= np.uint64(1 << (8 * _y + _x))
+
 
 @dataclass(eq=False)
 class Tiles:
@@ -62,6 +74,22 @@ class Tiles:
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
         return self.where, self.place, self.inside, self.known, self.values
+
+
+@njit(cache=True, nogil=True)
+def lowest(word):  # type: ignore[no-untyped-def]
+    """The number of the lowest bit that is set (Leiserson, Prokop and Randall 1998, "Using de Bruijn sequences")."""
+    return _PLACES[((word & (~word + ONE)) * _DE_BRUIJN) >> _58]
+
+
+@njit(cache=True, nogil=True)
+def bits(word):  # type: ignore[no-untyped-def]
+    """How many bits are set."""
+    n = 0
+    while word:
+        word &= word - ONE
+        n += 1
+    return n
 
 
 @njit(cache=True, nogil=True)
@@ -125,20 +153,18 @@ def undecided(size, limit, stop_inside, stop_outside, inside, known, values, cou
     """
     n, half, quarter = 0, size // 2, size // 4
     for t in range(count):
-        for y in range(0, 8, size):
-            for x in range(0, 8, size):
-                bit = 8 * (y + half) + x + half
-                if not (known[t] >> np.uint64(bit)) & ONE:
-                    continue
-                v = values[t, bit]
-                if abs(v) > limit or size <= (stop_inside if v < 0 else stop_outside):
-                    continue
-                for dy in range(0, size, half):
-                    for dx in range(0, size, half):
-                        p = 8 * (y + dy + quarter) + x + dx + quarter
-                        if not (known[t] >> np.uint64(p)) & ONE:
-                            points[n] = 64 * t + p
-                            n += 1
+        probes = known[t] & PROBES[size]
+        while probes:
+            bit = lowest(probes)
+            probes &= probes - ONE
+            v = values[t, bit]
+            if abs(v) > limit or size <= (stop_inside if v < 0 else stop_outside):
+                continue
+            first = bit - 9 * (half - quarter)
+            for p in (first, first + half, first + 8 * half, first + 9 * half):
+                if not (known[t] >> np.uint64(p)) & ONE:
+                    points[n] = 64 * t + p
+                    n += 1
     return n
 
 
@@ -197,10 +223,10 @@ def asked(where, place, inside, known, active, n_active, count, marks, points): 
                 n_active += 1
                 count = allocate(where, place, inside, known, count, k, ny, nx)
         need = differing & ~known[t]
-        for bit in range(64):
-            if (need >> np.uint64(bit)) & ONE:
-                points[n] = 64 * t + bit
-                n += 1
+        while need:
+            points[n] = 64 * t + lowest(need)
+            need &= need - ONE
+            n += 1
     return n_active, count, n, False
 
 

@@ -1,0 +1,121 @@
+"""From coverage to the picture on a printer's screen: compensation, gamma, place, mirror."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+
+from ..errors import SliceError
+from .layers import Layer
+from .printers import Printer
+from .stack import Stack
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """How layers become pictures.
+
+    printer: whose screen; None shows the object alone. compensation: mm by which every outline moves outwards (negative:
+    inwards), for resin that cures beyond its pixels or shrinks. gamma: of the grey levels. mirror: overrides the printer's.
+    """
+
+    stack: Stack
+    printer: Printer | None = None
+    compensation: float = 0.0
+    gamma: float = 1.0
+    mirror: bool | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.gamma <= 10:
+            raise SliceError(f"gamma {self.gamma:g}: expected more than 0, at most 10")
+        if not abs(self.compensation) <= 1:
+            raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
+        if self.printer:
+            check_fits(self.stack, self.printer)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of a picture."""
+        if not self.printer:
+            return self.stack.shape
+        across, along = self.printer.pixels
+        return (across, along) if self.printer.portrait else (along, across)
+
+    def picture(self, layer: Layer) -> np.ndarray:
+        """uint8 [rows, columns], as the file wants it: the first row at the top."""
+        image = layer.coverage
+        if self.compensation:
+            image = compensated(image, self.compensation, self.stack.pixel)
+        if self.gamma != 1:
+            image = self._levels[image]
+        return self._oriented(self._placed(image) if self.printer else image)
+
+    @cached_property
+    def _levels(self) -> np.ndarray:
+        return np.rint(255 * (np.arange(256) / 255) ** self.gamma).astype(np.uint8)
+
+    def _placed(self, image: np.ndarray) -> np.ndarray:
+        """The object in the middle of the bed; the window may be a few empty pixels larger than the bed."""
+        assert self.printer
+        whole = np.zeros(self.printer.pixels[::-1], np.uint8)
+        inner, outer = [], []
+        for mine, bed in zip(image.shape, whole.shape, strict=True):
+            first = (bed - mine) // 2
+            inner.append(slice(max(-first, 0), max(-first, 0) + min(mine, bed)))
+            outer.append(slice(max(first, 0), max(first, 0) + min(mine, bed)))
+        whole[tuple(outer)] = image[tuple(inner)]
+        return whole
+
+    def _oriented(self, image: np.ndarray) -> np.ndarray:
+        portrait = bool(self.printer and self.printer.portrait)
+        mirror = self.mirror if self.mirror is not None else bool(self.printer and self.printer.mirror)
+        if portrait:
+            turned = image.T[::-1]
+            return np.ascontiguousarray(turned if mirror else turned[:, ::-1])
+        return np.ascontiguousarray(image[::-1, ::-1] if mirror else image[::-1])
+
+
+def check_fits(stack: Stack, printer: Printer) -> None:
+    """Raises `SliceError` if the object is larger than the printer's room."""
+    for axis, mine, room in zip("xyz", stack.size, printer.room, strict=True):
+        if mine > room:
+            raise SliceError(f"the object is {mine:.4g} mm along {axis}, the {printer.title} has {room:.4g} mm")
+
+
+def compensated(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.ndarray:
+    """Coverage with its outlines moved outwards by `by` mm, uint8.
+
+    A pixel's coverage is taken as its distance to the outline, in pixels, and grows as the distance does: grey dilation
+    with a cone. Exact for outlines along an axis; within 7 % of a pixel for all others.
+    """
+    unit = math.sqrt(pixel[0] * pixel[1])
+    amount, reach = abs(by) / unit, math.ceil(abs(by) / min(pixel)) + 1
+    dy, dx = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    cone = 255 * (amount - np.hypot(dy * pixel[1], dx * pixel[0]) / unit)
+    grown = np.empty_like(image)
+    _dilate(image if by > 0 else 255 - image, cone, grown)
+    return grown if by > 0 else 255 - grown
+
+
+@njit(cache=True, nogil=True)
+def _dilate(image, cone, out):  # type: ignore[no-untyped-def]
+    ny, nx = image.shape
+    reach = cone.shape[0] // 2
+    out[:] = image
+    for y in range(ny):
+        for x in range(nx):
+            a = image[y, x]
+            if a == 0:
+                continue
+            if 0 < y < ny - 1 and 0 < x < nx - 1:
+                if min(image[y - 1, x], image[y + 1, x], image[y, x - 1], image[y, x + 1]) == 255:
+                    continue
+            for v in range(max(y - reach, 0), min(y + reach + 1, ny)):
+                for u in range(max(x - reach, 0), min(x + reach + 1, nx)):
+                    new = min(a + cone[v - y + reach, u - x + reach], 255.0)
+                    if new > out[v, u]:
+                        out[v, u] = np.uint8(new + 0.5)
