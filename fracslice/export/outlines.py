@@ -1,0 +1,167 @@
+"""Layers as outlines: SVG, the Common Layer Interface, and JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from fracslice.errors import ExportError
+from fracslice.export.files import replacing
+from fracslice.export.jobs import SliceRun
+from fracslice.slicing import Contours, Layer
+
+MICRON = 0.001
+"""The unit of the Common Layer Interface files, mm."""
+
+
+def _streamed(path: str | Path, head: bytes, parts: Iterator[bytes], tail: bytes) -> Path:
+    with replacing(path) as file:
+        file.write(head)
+        for part in parts:
+            file.write(part)
+        file.write(tail)
+    return Path(path)
+
+
+def _pairs(points: np.ndarray, template: str, between: str) -> str:
+    """Points [n, 2] as text, each by a %-template."""
+    return between.join([template] * len(points)) % tuple(points.ravel().tolist())
+
+
+def _holes(found: Contours) -> np.ndarray:
+    """Which contours are holes, bool [m]: those at an odd depth."""
+    depth = np.zeros(len(found), np.int32)
+    for i, parent in enumerate(found.parent):
+        depth[i] = depth[parent] + 1 if parent >= 0 else 0
+    return depth % 2 == 1
+
+
+# --- SVG ---------------------------------------------------------------------------------------------------------------
+def _size(run: SliceRun) -> tuple[float, float]:
+    """Width and height of the layers' window in mm."""
+    ny, nx = run.stack.shape
+    return nx * run.stack.pixel[0], ny * run.stack.pixel[1]
+
+
+def _down(run: SliceRun, points: np.ndarray) -> np.ndarray:
+    """Points as SVG counts them: mm from the upper left corner."""
+    return np.array(_size(run)) / 2 + points * (1, -1)
+
+
+def _head(run: SliceRun, namespaces: str = "") -> str:
+    width, height = (f"{s:.6g}" for s in _size(run))
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<svg xmlns="http://www.w3.org/2000/svg"{namespaces} '
+        f'width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}">\n'
+    )
+
+
+def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
+    """A folder with an SVG file for each layer, one path with all contours, in mm. The folder must be new or empty."""
+    folder = Path(path)
+    try:
+        folder.mkdir(exist_ok=True)
+        if os.listdir(folder):
+            raise ExportError(f"{folder}: the folder is not empty")
+    except OSError as error:
+        raise ExportError(f"{folder}: {error.strerror}") from error
+
+    def make(layer: Layer) -> bytes:
+        found = layer.contours
+        d = " ".join("M" + _pairs(_down(run, found[i]), "%.4f,%.4f", " ") + "z" for i in range(len(found)))
+        return f'{_head(run)}<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
+
+    for index, data in enumerate(run.slicer.map(make)):
+        with replacing(folder / f"{index:05d}.svg") as file:
+            file.write(data)
+    return folder
+
+
+def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
+    """One SVG file with a group for each layer, as Slic3r writes it and DLP software reads it."""
+
+    def make(layer: Layer) -> bytes:
+        found = layer.contours
+        lines = [f'<g id="layer{layer.index}" slic3r:z="{layer.top:.6g}">']
+        for i, hole in enumerate(_holes(found)):
+            kind, fill = ("hole", "black") if hole else ("contour", "white")
+            points = _pairs(_down(run, found[i]), "%.4f,%.4f", " ")
+            lines.append(f'<polygon slic3r:type="{kind}" points="{points}" style="fill: {fill}"/>')
+        return ("\n".join([*lines, "</g>"]) + "\n").encode()
+
+    head = _head(run, ' xmlns:slic3r="http://slic3r.org/namespaces/slic3r"')
+    return _streamed(path, head.encode(), run.slicer.map(make), b"</svg>\n")
+
+
+# --- Common Layer Interface, version 2.0 (1994) --------------------------------------------------------------------
+def write_cli(run: SliceRun, path: str | Path) -> Path:
+    """The Common Layer Interface as text."""
+    return _streamed(path, _cli_head(run, "ASCII") + b"$$GEOMETRYSTART\n", run.slicer.map(_cli_text), b"$$GEOMETRYEND\n")
+
+
+def write_cli_binary(run: SliceRun, path: str | Path) -> Path:
+    """The Common Layer Interface in binary: long layer and polyline commands."""
+    return _streamed(path, _cli_head(run, "BINARY").rstrip(b"\n"), run.slicer.map(_cli_bytes), b"")
+
+
+def _cli_head(run: SliceRun, kind: str) -> bytes:
+    x, y = (s / 2 for s in run.stack.size[:2])
+    box = ",".join(f"{v:.6f}" for v in (-x, -y, 0.0, x, y, float(run.stack.tops[-1])))
+    lines = [f"$${kind}", f"$$UNITS/{MICRON:015.6f}", "$$VERSION/200", "$$LABEL/1,fracslice", f"$$DIMENSION/{box}"]
+    lines.append(f"$$LAYERS/{run.layers:06d}")
+    return "\n".join(["$$HEADERSTART", *lines, "$$HEADEREND\n"]).encode()
+
+
+def _closed(points: np.ndarray) -> np.ndarray:
+    return np.concatenate([points, points[:1]]) / MICRON
+
+
+def _cli_text(layer: Layer) -> bytes:
+    found = layer.contours
+    lines = [f"$$LAYER/{layer.top / MICRON:.3f}"]
+    for i, hole in enumerate(_holes(found)):
+        points = _closed(found[i])
+        lines.append(f"$$POLYLINE/1,{0 if hole else 1},{len(points)}," + _pairs(points, "%.3f,%.3f", ","))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _cli_bytes(layer: Layer) -> bytes:
+    found = layer.contours
+    parts = [struct.pack("<Hf", 127, layer.top / MICRON)]
+    for i, hole in enumerate(_holes(found)):
+        points = _closed(found[i])
+        parts += [struct.pack("<Hiii", 130, 1, 0 if hole else 1, len(points)), points.astype("<f4").tobytes()]
+    return b"".join(parts)
+
+
+# --- JSON ------------------------------------------------------------------------------------------------------------
+def write_json(run: SliceRun, path: str | Path) -> Path:
+    """Contours as JSON: for each layer its top and height, and its polygons with their parents, in mm."""
+    head = json.loads(run.describe())
+    del head["layers"]
+    opening = json.dumps(head)[:-1] + ', "unit": "mm", "layers": ['
+
+    def make(layer: Layer) -> bytes:
+        found = layer.contours
+        rings = ", ".join(
+            f'{{"parent": {parent}, "points": [{_pairs(found[i], "[%.6g,%.6g]", ",")}]}}'
+            for i, parent in enumerate(found.parent)
+        )
+        comma = "," if layer.index else ""
+        return f'{comma}\n{{"top": {layer.top:.6g}, "height": {layer.height:.6g}, "contours": [{rings}]}}'.encode()
+
+    return _streamed(path, opening.encode(), run.slicer.map(make), b"\n]}\n")
+
+
+WRITERS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
+    "svg": write_svg_folder,
+    "slic3r": write_svg_layers,
+    "cli": write_cli,
+    "cli-binary": write_cli_binary,
+    "json": write_json,
+}

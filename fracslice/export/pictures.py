@@ -1,0 +1,143 @@
+"""Layers as pictures: a folder of PNG files with a manifest, and the archives of Prusa's SL1 and SL1S."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from fracslice.errors import ExportError
+from fracslice.export import png
+from fracslice.export.files import replacing
+from fracslice.export.jobs import SliceRun, add, resumable_zip
+
+MOST_MEMBERS = 65_535
+
+
+def write_folder(run: SliceRun, path: str | Path) -> Path:
+    """00000.png, ... and, when all are there, manifest.json that says what they are.
+
+    A folder that an interrupted job left is gone on with, after its last whole picture; its job.json tells that it was the
+    same job. Raises ExportError for a folder with anything else in it.
+    """
+    folder = Path(path)
+    said = run.describe()
+    start = _prepared(folder, said)
+    for index, data in enumerate(_pictures(run, start), start):
+        with replacing(folder / f"{index:05d}.png") as file:
+            file.write(data)
+    with replacing(folder / "manifest.json") as file:
+        file.write(said)
+    (folder / "job.json").unlink()
+    return folder
+
+
+def _prepared(folder: Path, said: bytes) -> int:
+    """Makes the folder, or finds how many layers of this job it has."""
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise ExportError(f"{folder}: {error.strerror}") from error
+    names = set(os.listdir(folder))
+    if not names:
+        with replacing(folder / "job.json") as file:
+            file.write(said)
+        return 0
+    if "job.json" not in names or (folder / "job.json").read_bytes() != said:
+        raise ExportError(f"{folder}: the folder is not empty, and what is in it is not this job interrupted")
+    index = 0
+    while f"{index:05d}.png" in names and png.is_whole((folder / f"{index:05d}.png").read_bytes()):
+        index += 1
+    return index
+
+
+def _pictures(run: SliceRun, start: int) -> Iterator[bytes]:
+    return run.slicer.map(lambda layer: png.encode(run.screen.picture(layer)), start)
+
+
+def write_sl1(run: SliceRun, path: str | Path) -> Path:
+    """An archive for the SL1 family: config.ini, prusaslicer.ini and a PNG for each layer; opens in PrusaSlicer.
+
+    Interrupted, it goes on from what it had. Raises ExportError without a printer, or for layers of unequal heights, which
+    the format cannot say.
+    """
+    target = Path(path)
+    if not run.screen.printer:
+        raise ExportError(f"{path}: an SL1 archive needs a printer")
+    heights = run.stack.heights
+    if heights.max() - heights.min() > 1e-9:
+        raise ExportError(f"{path}: an SL1 archive has layers of one height")
+    if run.layers >= MOST_MEMBERS:
+        raise ExportError(f"{path}: {run.layers} layers are too many for an archive")
+    name = target.stem
+    with resumable_zip(target, ("config.ini", _ini(_config(run, name)))) as (archive, done):
+        if "fracslice.json" not in done:
+            add(archive, "fracslice.json", run.describe())
+            add(archive, "prusaslicer.ini", _ini(_settings(run)))
+        start = sum(1 for n in done if n.endswith(".png"))
+        for index, data in enumerate(_pictures(run, start), start):
+            add(archive, f"{name}{index:05d}.png", data)
+    return target
+
+
+def _ini(values: dict[str, object]) -> bytes:
+    return "".join(f"{key} = {value}\n" for key, value in values.items()).encode()
+
+
+def _config(run: SliceRun, name: str) -> dict[str, object]:
+    """What the printer reads; the keys of PrusaSlicer 2.5."""
+    exposure, first = run.exposure
+    printer = run.screen.printer
+    assert printer
+    fade = min(10, run.layers)
+    seconds = run.layers * (exposure + 5) + fade * (first - exposure) / 2
+    return {
+        "action": "print",
+        "expTime": f"{exposure:g}",
+        "expTimeFirst": f"{first:g}",
+        "expUserProfile": 0,
+        "fileCreationTimestamp": "1980-01-01 at 00:00:00 UTC",
+        "hollow": 0,
+        "jobDir": name,
+        "layerHeight": f"{run.stack.heights[0]:g}",
+        "materialName": "unknown",
+        "numFade": fade,
+        "numFast": run.layers,
+        "numSlow": 0,
+        "printProfile": "fracslice",
+        "printTime": f"{seconds:.1f}",
+        "printerModel": printer.name.upper() if printer.portrait else "SL1",
+        "printerProfile": printer.title,
+        "printerVariant": "default",
+        "prusaSlicerVersion": "fracslice",
+        "usedMaterial": 0,
+    }
+
+
+def _settings(run: SliceRun) -> dict[str, object]:
+    """What PrusaSlicer needs to read the layers back."""
+    printer = run.screen.printer
+    assert printer
+    (width, depth), (across, along) = printer.screen, printer.pixels
+    mirror = run.screen.mirror if run.screen.mirror is not None else printer.mirror
+    layer = f"{run.stack.heights[0]:g}"
+    return {
+        "bed_shape": f"0x0,{width:g}x0,{width:g}x{depth:g},0x{depth:g}",
+        "display_height": f"{depth:g}",
+        "display_mirror_x": int(mirror),
+        "display_mirror_y": 0,
+        "display_orientation": "portrait" if printer.portrait else "landscape",
+        "display_pixels_x": across,
+        "display_pixels_y": along,
+        "display_width": f"{width:g}",
+        "exposure_time": f"{run.exposure[0]:g}",
+        "faded_layers": min(10, run.layers),
+        "gamma_correction": f"{run.screen.gamma:g}",
+        "initial_exposure_time": f"{run.exposure[1]:g}",
+        "initial_layer_height": layer,
+        "layer_height": layer,
+        "max_print_height": f"{math.ceil(printer.height)}",
+        "printer_technology": "SLA",
+        "relative_correction": "1,1",
+    }

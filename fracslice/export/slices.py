@@ -1,0 +1,44 @@
+"""Layers out: the formats by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from fracslice.errors import ExportError
+from fracslice.export import outlines, pictures, slices3mf
+from fracslice.export.files import check_target
+from fracslice.export.jobs import SliceRun
+
+FORMATS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
+    "png": pictures.write_folder,
+    "sl1": pictures.write_sl1,
+    "3mf": slices3mf.write_3mf,
+    **outlines.WRITERS,
+}
+FOLDERS = {"png", "svg"}
+ENDINGS = {".sl1": "sl1", ".sl1s": "sl1", ".3mf": "3mf", ".svg": "slic3r", ".cli": "cli", ".json": "json", "": "png"}
+
+
+def slice_format(path: str | Path, name: str | None = None) -> str:
+    """The format called `name`, or the one that the path's ending says; checks that it can be written there.
+
+    Raises ExportError.
+    """
+    ending = Path(path).suffix.lower()
+    if name is None:
+        name = ENDINGS.get(ending)
+        if name is None:
+            raise ExportError(f"{path}: unknown kind of file; known are {', '.join(e for e in ENDINGS if e)}, or a folder")
+    elif name not in FORMATS:
+        raise ExportError(f"format {name!r}: known are {', '.join(FORMATS)}")
+    check_target(Path(path) / "layer" if name in FOLDERS and Path(path).is_dir() else path)
+    return name
+
+
+def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Path:
+    """Cuts a planned stack into a file or folder; returns its path.
+
+    name: of the format, if the path's ending does not say it. Raises ExportError, SliceError, Cancelled.
+    """
+    return FORMATS[slice_format(path, name)](run, path)
