@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from ..formulas.box import Box
 from ..formulas.registry import Node
 from ..kernel import compile_scene
+from ..kernel.depth import resolve_depths
 from ..work import Work
 from .bricks import Bricks
-from .depth import resolve_depths
 from .extent import Extent, extent
 from .lattice import Lattice
 from .sampler import sample

@@ -7,7 +7,7 @@ import numpy as np
 from ..formulas.parameters import AUTO
 from ..formulas.registry import Node
 from ..formulas.transforms import affine
-from ..kernel import compile_scene
+from .cpu import compile_scene
 
 DEEPEST = 60
 PROBES = 4000
