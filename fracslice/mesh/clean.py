@@ -1,4 +1,4 @@
-"""Triangles that lose their area when coordinates are rounded to float32: out, with the surface closed."""
+"""Triangles that rounding to float32 flattens or turns over: taken out, with the surface kept closed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PASSES = 8
 
 
 def clean(mesh: Mesh) -> Mesh:
-    """Round a closed, oriented manifold to float32 and take out the triangles without area that this makes.
+    """Round a closed, oriented manifold to float32 and take out the triangles this flattens or turns over.
 
     A triangle whose corners lie on a line gives its middle corner to the neighbour across its longest edge (a
     flip, which changes no shape); one with two corners in the same place, or where no flip is possible, is
@@ -22,26 +22,25 @@ def clean(mesh: Mesh) -> Mesh:
     MeshError as `rounded` does.
     """
     points = float32_points(mesh).astype(np.float64)
-    flat = np.flatnonzero(~Mesh(points, mesh.triangles).normals.any(axis=1))
-    if not len(flat):
+    agreement = np.einsum("ij,ij->i", Mesh(points, mesh.triangles).normals, mesh.normals)
+    bad = set(np.flatnonzero(agreement <= 0).tolist())
+    if not bad:
         return rounded(mesh)
-    surface = _Surface(points, mesh.triangles)
-    todo = flat.tolist()
+    surface = _Surface(points, mesh.triangles, bad)
     for _ in range(PASSES):
-        left = [triangle for triangle in todo if not surface.mend(triangle)]
-        if not left or len(left) == len(todo):
-            break
-        todo = left
+        for triangle in sorted(bad):
+            surface.mend(triangle)
     return rounded(Mesh(points, surface.triangles[surface.alive]))
 
 
 class _Surface:
     """A mesh edited in few places: the triangles around a vertex are looked up when first asked for."""
 
-    def __init__(self, points: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
+    def __init__(self, points: NDArray[np.float64], triangles: NDArray[np.int32], bad: set[int]) -> None:
         from fracslice.mesh.links import corners_by_vertex
 
         self.points = points
+        self.bad = bad
         self.triangles = triangles.copy()
         self.alive = np.ones(len(triangles), dtype=bool)
         self.start, self.corner = corners_by_vertex(triangles, len(points))
@@ -63,15 +62,15 @@ class _Surface:
         a, b, c = self.points[corners]
         return np.cross(b - a, c - a)
 
-    def mend(self, triangle: int) -> bool:
-        """Take out a triangle without area; false if that is not possible yet."""
-        if not self.alive[triangle] or self.normal(self.triangles[triangle]).any():
-            return True
+    def mend(self, triangle: int) -> None:
+        """Take out a bad triangle, if it still is bad and that is possible now."""
+        if triangle not in self.bad:
+            return
         a, b, c = (int(v) for v in self.triangles[triangle])
         by_length = sorted(((a, b), (b, c), (c, a)), key=lambda edge: self.length(*edge))
         if self.length(*by_length[0]) > 0 and self.flip(triangle, *by_length[2]):
-            return True
-        return any(self.collapse(*edge) or self.collapse(*edge[::-1]) for edge in by_length)
+            return
+        any(self.collapse(*edge) or self.collapse(*edge[::-1]) for edge in by_length)
 
     def length(self, a: int, b: int) -> float:
         return float(np.linalg.norm(self.points[a] - self.points[b]))
@@ -92,6 +91,7 @@ class _Surface:
         if min(self.normal(first) @ old, self.normal(second) @ old) <= 0:
             return False
         self.triangles[triangle], self.triangles[other] = first, second
+        self.bad -= {triangle, other}
         self.star(c).discard(triangle)
         self.star(a).discard(other)
         self.star(b).add(other)
@@ -108,10 +108,14 @@ class _Surface:
         new = {triangle: _with(self.triangles[triangle], gone, kept) for triangle in moved}
         if any(common <= set(corners.tolist()) for corners in new.values()):
             return False  # they are the last of a tetrahedron
+        opened = set()
         for triangle, corners in new.items():
             normal, old = self.normal(corners), self.normal(self.triangles[triangle])
             if old.any() and normal @ old <= 0:
                 return False
+            if normal.any() and not old.any():
+                opened.add(triangle)
+        self.bad -= shared | opened
         for triangle, corners in new.items():
             self.triangles[triangle] = corners
         for vertex in common:

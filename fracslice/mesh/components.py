@@ -26,13 +26,18 @@ class Removed:
 class Shells:
     """The connected closed surfaces of a mesh.
 
-    labels: int32 [m], the shell of each triangle; volumes: float64 [s], signed, negative for a cavity; body:
-    int64 [s], the outer shell that each belongs to (itself, or for a cavity the smallest body around it).
+    labels: int32 [m], the shell of each triangle; volumes: float64 [s], signed, negative for a cavity;
+    parent: int64 [s], the smallest shell around each: a body for a cavity, a cavity for a body, -1 for none.
     """
 
     labels: NDArray[np.int32]
     volumes: NDArray[np.float64]
-    body: NDArray[np.int64]
+    parent: NDArray[np.int64]
+
+    @property
+    def body(self) -> NDArray[np.int64]:
+        """The outer shell that each belongs to: itself, or for a cavity the body around it. int64 [s]."""
+        return np.where(self.volumes < 0, self.parent, np.arange(len(self.volumes)))
 
     @property
     def solid_volumes(self) -> NDArray[np.float64]:
@@ -48,16 +53,15 @@ def shells(mesh: Mesh) -> Shells:
 
     labels, count = parts(mesh.triangles, len(mesh.vertices))
     volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
-    body = np.arange(count)
-    cavities = np.flatnonzero(volumes < 0)
-    if len(cavities):
+    hollow = volumes < 0
+    parent = np.full(count, -1, dtype=np.int64)
+    if hollow.any():
         from fracslice.mesh.nesting import nesting
 
-        parent = nesting(mesh, labels, volumes).parent[cavities]
-        if (parent < 0).any() or (volumes[parent] < 0).any():
+        parent = nesting(mesh, labels, volumes).parent
+        if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
-        body[cavities] = parent
-    return Shells(labels, volumes, body)
+    return Shells(labels, volumes, parent)
 
 
 def select(
@@ -69,8 +73,8 @@ def select(
 ) -> tuple[Mesh, Removed]:
     """Keep all bodies or the largest, drop dust of less than `dust_mm3`, keep or fill sealed cavities.
 
-    A cavity goes with its body. Raises MeshError when nothing would be left, or the mesh has a shell that is
-    inside out.
+    A cavity goes with its body, and a body in a cavity with the filling. Raises MeshError when nothing would
+    be left, or the mesh has a shell that is inside out.
     """
     if keep not in ("all", "largest") or cavities not in ("keep", "fill"):
         raise ValueError(f"no such choice: keep={keep!r}, cavities={cavities!r}")
@@ -78,6 +82,8 @@ def select(
     hollow = found.volumes < 0
     material = found.volumes if cavities == "fill" else found.solid_volumes
     stays = ~hollow & (material >= dust_mm3)
+    if cavities == "fill":  # what floats in a cavity is swallowed
+        stays &= found.parent < 0
     if not stays.any():
         raise MeshError(f"nothing would be left: every body is smaller than {dust_mm3:g} mm3")
     if keep == "largest":

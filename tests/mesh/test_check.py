@@ -1,0 +1,125 @@
+"""The verdict on meshes whose state is known, and the numbers in the report."""
+
+from __future__ import annotations
+
+import json
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fracslice.errors import MeshError
+from fracslice.mesh import Mesh
+from fracslice.mesh.check import check
+from fracslice.mesh.predicates import side_of_line, side_of_plane
+from fracslice.mesh.reading import joined
+
+from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_good_meshes_are_accepted(name: str) -> None:
+    report = check(GOOD[name]())
+    assert report.problems == ()
+    assert report.printable
+    assert report.watertight
+    assert report.manifold
+    assert report.oriented
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_meshes_are_refused_for_the_right_reason(name: str) -> None:
+    make, reason = BAD[name]
+    report = check(make())
+    assert not report.printable
+    assert any(reason in problem for problem in report.problems), report.problems
+
+
+def test_numbers_of_a_cube() -> None:
+    report = check(cube(10, at=(1, 2, 3)))
+    assert (report.triangles, report.vertices, report.components, report.cavities, report.genus) == (
+        12,
+        8,
+        1,
+        0,
+        0,
+    )
+    assert report.volume_mm3 == pytest.approx(1000, rel=1e-12)
+    assert report.area_mm2 == pytest.approx(600, rel=1e-12)
+    assert report.bbox_mm == ((1, 2, 3), (11, 12, 13))
+
+
+def test_bodies_cavities_and_handles_are_counted() -> None:
+    report = check(
+        joined([sphere(), inverted(sphere(8)), sphere(3), torus(at=(40, 0, 0)), torus(at=(80, 0, 0))])
+    )
+    assert (report.components, report.cavities, report.genus) == (4, 1, 2)
+
+
+def test_report_is_json_with_the_verdict() -> None:
+    text = json.loads(json.dumps(check(cube()).as_dict()))
+    assert text["printable"] is True
+    assert text["problems"] == []
+    assert text["bbox_mm"] == [[0, 0, 0], [10, 10, 10]]
+
+
+def test_unwelded_copies_are_seen_as_a_slicer_sees_them() -> None:
+    apart = cube().corners.reshape(-1, 3)
+    report = check(Mesh(apart, np.arange(len(apart), dtype=np.int32).reshape(-1, 3)))
+    assert report.printable
+    assert report.vertices == 8
+
+
+def test_thread_count_does_not_matter() -> None:
+    crossed = joined([sphere(level=5), sphere(at=(8, 0, 0), level=5)])
+    assert check(crossed, threads=1) == check(crossed, threads=4)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e300])
+def test_coordinates_that_no_file_can_hold(value: float) -> None:
+    with pytest.raises(MeshError, match="not a finite number"):
+        check(with_moved(cube(), 0, (value, 0, 0)))
+
+
+def test_empty_and_nonsense_meshes() -> None:
+    with pytest.raises(MeshError, match="no triangles"):
+        check(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)))
+    with pytest.raises(MeshError, match="does not exist"):
+        check(Mesh(cube().vertices, np.array([[0, 1, 8]], np.int32)))
+    with pytest.raises(MeshError, match="without area"):
+        check(Mesh(cube().vertices, np.array([[0, 1, 1]], np.int32)))
+
+
+def test_self_intersections_agree_with_meshlab() -> None:
+    """On surfaces in general position, where MeshLab's test is not blind."""
+    import pymeshlab
+
+    rough = sphere(level=4)
+    noise = np.random.default_rng(3).normal(0, 0.25, rough.vertices.shape)
+    mesh = Mesh((rough.vertices + noise).astype(np.float32).astype(np.float64), rough.triangles)
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.triangles))
+    meshes.compute_selection_by_self_intersections_per_face()
+    expected = meshes.current_mesh().selected_face_number()
+    assert expected > 100
+    assert check(mesh).self_intersections == expected
+
+
+GRID = st.integers(-3, 3).map(
+    lambda n: 0.1 * n
+)  # rounded steps: many points almost, and some exactly, in a plane
+POINT = st.tuples(GRID, GRID, GRID)
+
+
+@settings(deadline=None, max_examples=300)
+@given(POINT, POINT, POINT, POINT)
+def test_predicates_have_the_exact_sign(a, b, c, d) -> None:  # type: ignore[no-untyped-def]
+    rows = [[Fraction(x) - Fraction(y) for x, y in zip(p, d, strict=True)] for p in (a, b, c)]
+    (p, q, r), (s, t, u), (v, w, x) = rows
+    volume = p * (t * x - u * w) - q * (s * x - u * v) + r * (s * w - t * v)
+    assert side_of_plane(a, b, c, d) == (volume > 0) - (volume < 0)
+    area = p * t - q * s
+    assert side_of_line(a[0], a[1], b[0], b[1], d[0], d[1]) == (area > 0) - (area < 0)

@@ -1,0 +1,92 @@
+"""Bodies and cavities: found, kept, dropped, filled, and told of."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from fracslice.errors import MeshError
+from fracslice.mesh import Mesh
+from fracslice.mesh.check import check
+from fracslice.mesh.components import Removed, select, shells
+from fracslice.mesh.reading import joined
+
+from .shapes import cube, inverted, sphere
+
+
+def hollow_and_dust() -> Mesh:
+    """A hollow cube of 1000 - 8 mm3, a hollow one of 125 - 1 mm3 in the way of its rays, and two grains."""
+    return joined(
+        [
+            inverted(cube(2, at=(3, 3, 3))),
+            cube(10),
+            cube(5, at=(0, 0, 20)),
+            inverted(cube(1, at=(1, 1, 21))),
+            cube(0.5, at=(30, 0, 0)),
+            cube(0.1, at=(3.9, 3.9, 3.9)),
+        ]
+    )
+
+
+def test_everything_stays_by_default() -> None:
+    mesh = hollow_and_dust()
+    kept, removed = select(mesh)
+    assert kept is mesh
+    assert removed == Removed()
+
+
+def test_cavities_belong_to_the_smallest_body_around_them() -> None:
+    found = shells(hollow_and_dust())
+    assert found.body.tolist() == [1, 1, 2, 2, 4, 5]
+    assert found.solid_volumes == pytest.approx([0, 992, 124, 0, 0.125, 0.001])
+
+
+def test_the_largest_keeps_its_cavity() -> None:
+    kept, removed = select(hollow_and_dust(), keep="largest")
+    assert kept.volume == pytest.approx(992)
+    assert removed.bodies == 3
+    assert removed.bodies_mm3 == pytest.approx(124 + 0.125 + 0.001)
+    assert (removed.cavities, removed.filled_mm3) == (1, 0)
+    assert check(kept).printable
+
+
+def test_filling_drops_the_inner_shells() -> None:
+    kept, removed = select(hollow_and_dust(), keep="largest", cavities="fill")
+    assert kept.volume == pytest.approx(1000)
+    assert removed.filled_mm3 == pytest.approx(8)
+    assert len(kept.vertices) == 8
+
+
+def test_filling_swallows_the_bodies_in_a_cavity() -> None:
+    kept, removed = select(hollow_and_dust(), cavities="fill")
+    assert check(kept).printable
+    assert kept.volume == pytest.approx(1000 + 125 + 0.125)
+    assert removed.bodies == 1
+
+
+def test_dust() -> None:
+    kept, removed = select(hollow_and_dust(), dust_mm3=0.01)
+    assert removed.bodies == 1
+    assert kept.volume == pytest.approx(992 + 124 + 0.125)
+    with pytest.raises(MeshError, match="nothing would be left"):
+        select(hollow_and_dust(), dust_mm3=2000)
+
+
+def test_a_shell_inside_out_is_refused() -> None:
+    with pytest.raises(MeshError, match="inside out"):
+        shells(joined([cube(), inverted(cube(at=(20, 0, 0)))]))
+
+
+def test_thousands_of_parts_take_no_time() -> None:
+    grains = [sphere(0.2, at=(x, y, z), level=1) for x in range(20) for y in range(20) for z in range(10)]
+    mesh = joined(
+        [sphere(50, level=6), *[g.translated((-10, -10, 60)) for g in grains], inverted(sphere(40, level=6))]
+    )
+    shells(hollow_and_dust())  # compiled by now
+    begin = time.perf_counter()
+    kept, removed = select(mesh, keep="largest")
+    assert time.perf_counter() - begin < 3
+    assert removed.bodies == 4000
+    assert np.isclose(kept.volume, sphere(50, level=6).volume - sphere(40, level=6).volume)

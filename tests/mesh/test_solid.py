@@ -1,0 +1,91 @@
+"""Meshes as solids: manifold3d's word, the flat base, the place on the bed, rounding and cleaning."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fracslice.errors import MeshError
+from fracslice.mesh import Mesh
+from fracslice.mesh.check import check
+from fracslice.mesh.clean import clean
+from fracslice.mesh.rounding import rounded
+from fracslice.mesh.solid import cut_base, from_manifold, place_on_bed, to_manifold
+
+from .shapes import GOOD, cube, sphere, with_flipped, without
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_manifold3d_takes_good_meshes_as_they_are(name: str) -> None:
+    mesh = GOOD[name]()
+    solid = to_manifold(mesh)
+    assert solid.num_tri() == len(mesh.triangles)
+    assert from_manifold(solid).volume == pytest.approx(mesh.volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("spoil", [without, with_flipped])
+def test_manifold3d_refuses_in_plain_words(spoil) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(MeshError, match="not closed"):
+        to_manifold(spoil(sphere(), 7))
+
+
+def test_base_cut_stands_flat_on_the_bed() -> None:
+    ball = sphere(10, at=(5, 6, 7), level=5)
+    cut = place_on_bed(cut_base(ball, 4))
+    report = check(clean(cut))
+    assert report.printable
+    (x0, y0, z0), (x1, y1, z1) = report.bbox_mm
+    assert z0 == 0
+    assert z1 == pytest.approx(16, abs=1e-3)
+    assert (x0 + x1, y0 + y1) == pytest.approx((0, 0), abs=1e-5)
+    flat = cut.corners[(cut.corners[:, :, 2] == 0).all(axis=1)]
+    area = np.linalg.norm(np.cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]), axis=1).sum() / 2
+    assert area == pytest.approx(math.pi * (10**2 - 6**2), rel=0.01)
+    assert report.volume_mm3 == pytest.approx(ball.volume - math.pi * 4**2 * (10 - 4 / 3), rel=2e-3)
+
+
+@pytest.mark.parametrize("height", [-1, 20, math.nan])
+def test_base_cut_that_makes_no_sense(height: float) -> None:
+    with pytest.raises(MeshError, match="base cut"):
+        cut_base(sphere(10), height)
+
+
+def test_rounding_is_done_once() -> None:
+    mesh = sphere(level=4)
+    once = rounded(mesh.translated((0.1, 0.2, 0.3)))
+    twice = rounded(once)
+    assert np.array_equal(once.vertices, once.vertices.astype(np.float32))
+    assert np.array_equal(once.vertices, twice.vertices)
+    assert np.array_equal(once.triangles, twice.triangles)
+
+
+def slivered(mesh: Mesh, seed: int) -> Mesh:
+    """The mesh with vertices put almost on vertices, and almost on edges, by splitting triangles."""
+    rng = np.random.default_rng(seed)
+    vertices, triangles = list(mesh.vertices), [tuple(t) for t in mesh.triangles.tolist()]
+    for _ in range(60):
+        a, b, c = triangles.pop(int(rng.integers(len(triangles))))
+        toward = rng.choice([1e-9, 0.4])
+        near = vertices[a] + toward * (vertices[b] - vertices[a]) + 1e-10 * (vertices[c] - vertices[a])
+        vertices.append(near)
+        n = len(vertices) - 1
+        triangles += [(a, b, n), (b, c, n), (c, a, n)]
+    return Mesh(np.array(vertices), np.array(triangles, np.int32))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_cleaning_takes_out_what_rounding_flattens(seed: int) -> None:
+    mesh = slivered(sphere(20, at=(50, 50, 50)), seed)
+    assert check(mesh).degenerate_triangles > 20
+    cleaned = clean(mesh)
+    report = check(cleaned)
+    assert report.problems == ()
+    assert report.volume_mm3 == pytest.approx(mesh.volume, rel=1e-3)
+    assert report.vertices >= 600
+
+
+def test_cleaning_leaves_good_meshes_alone() -> None:
+    mesh = rounded(cube())
+    assert np.array_equal(clean(mesh).corners, mesh.corners)
