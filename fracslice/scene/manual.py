@@ -6,9 +6,10 @@ import inspect
 from collections.abc import Iterator
 from typing import Any
 
+from ..errors import SceneError
 from ..formulas.parameters import REQUIRED
-from ..formulas.registry import Formula
 from .layout import SCENE, SECTIONS, Element, formulas
+from .nearest import hint
 
 _GROUPS = {
     "shape": ("Shapes", "Solids of their own; they take no elements inside them."),
@@ -88,6 +89,24 @@ def prose(doc: str) -> str:
     return inspect.cleandoc(doc)
 
 
-def summary(formula: Formula) -> str:
-    """The first line of its documentation."""
-    return formula.doc.partition("\n")[0].strip()
+def overview() -> str:
+    """Every formula with the first line of its documentation, as plain text."""
+    lines = []
+    for kind, (title, _) in _GROUPS.items():
+        members = [formula for formula in formulas() if formula.kind == kind]
+        lines += [f"{title}:", *(f"  {f.name:<13} {prose(f.doc).splitlines()[0]}" for f in members), ""]
+    return "\n".join(lines[:-1])
+
+
+def page(name: str) -> str:
+    """All that is known of one element, as plain text. Raises `SceneError` with the nearest right name."""
+    known: dict[str, Element] = {SCENE.name: SCENE, **SECTIONS, **{f.name: f for f in formulas()}}
+    if name not in known:
+        raise SceneError(f"{name}: no such formula; {hint(name, known)}")
+    element = known[name]
+    lines = [f"<{name}>", "", prose(element.doc)]
+    for attribute, kind in element.parameters.items():
+        usual = default(kind)
+        value = usual if usual == "required" else f"default {usual}" if usual else "optional"
+        lines += ["", f"{attribute}  ({value})", f"    {kind.doc}", f"    expected: {kind.expects}"]
+    return "\n".join(lines)

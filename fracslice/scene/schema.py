@@ -81,12 +81,21 @@ def _count(parent: Tree.Element, kind: Count) -> None:
 
 
 def _vector(parent: Tree.Element, kind: Vector) -> None:
+    first = kind.sizes[0]
+    if len(kind.sizes) > 2 and all(size % first == 0 for size in kind.sizes):
+        # So many times the first size; how many at most is left to the reader, for brevity.
+        group = Tree.SubElement(Tree.SubElement(parent, "list"), "oneOrMore")
+        _items(Tree.SubElement(group, "group"), kind, first)
+        return
     if len(kind.sizes) > 1:
         parent = Tree.SubElement(parent, "choice")
     for size in kind.sizes:
-        items = Tree.SubElement(parent, "list")
-        for _ in range(size):
-            _data(items, "integer" if kind.whole else "double", kind)
+        _items(Tree.SubElement(parent, "list"), kind, size)
+
+
+def _items(parent: Tree.Element, kind: Vector, count: int) -> None:
+    for _ in range(count):
+        _data(parent, "integer" if kind.whole else "double", kind)
 
 
 def _axis(parent: Tree.Element, kind: Axis) -> None:

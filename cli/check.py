@@ -1,0 +1,59 @@
+"""fracslice check: would it print?"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import click
+
+from .inputs import is_model, load_model, load_scene
+from .options import job_of, job_options, quiet_option, set_option, threads_option
+from .summary import found, summary
+from .working import working
+
+
+@click.command()
+@click.argument("source", metavar="MODEL|SCENE")
+@click.option("--json", "as_json", is_flag=True, help="All numbers, as JSON.")
+@job_options
+@set_option
+@threads_option
+@quiet_option
+@click.pass_context
+def check(
+    context: click.Context,
+    /,
+    source: str,
+    as_json: bool,
+    settings: tuple[str, ...],
+    threads: int,
+    quiet: bool,
+    **options: Any,
+) -> int:
+    """Say whether a model file, or the mesh of a scene, would print as it is.
+
+    The options after --json are for scenes, as for "fracslice mesh". Exits with 1 if it would not print.
+    """
+    from fracslice.job import make_mesh
+    from fracslice.mesh.check import check as examined
+
+    if is_model(source):
+        refuse_scene_options(context)
+        checked = examined(load_model(source), threads=threads)
+        numbers, line, problems = checked.as_dict(), f"{source}: {found(checked)}", checked.problems
+    else:
+        scene = load_scene(source, settings)
+        with working(threads, quiet) as work:
+            report = make_mesh(scene, job_of(**options), work).report
+        numbers, line, problems = report.as_dict(), summary(source, report), report.problems
+    click.echo(json.dumps(numbers, indent=2) if as_json else line)
+    return 1 if problems else 0
+
+
+def refuse_scene_options(context: click.Context) -> None:
+    """Options that would say something about a scene say nothing about a model."""
+    for name in context.params:
+        given = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
+        if given and name not in ("source", "as_json", "threads", "quiet"):
+            raise click.UsageError(f"--{name.removesuffix('tings')}: only for scenes, and a model was given")

@@ -1,0 +1,14 @@
+"""fracslice formulas: what scenes are made of."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command()
+@click.argument("name", required=False)
+def formulas(name: str | None) -> None:
+    """List the elements of scenes, or describe the one called NAME."""
+    from fracslice.scene import manual
+
+    click.echo(manual.overview() if name is None else manual.page(name))

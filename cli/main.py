@@ -1,0 +1,78 @@
+"""The entry point: commands in, an exit status out, and one line for everything that goes wrong.
+
+Status: 0 done; 1 failed; 2 bad input or usage; 128 + the signal's number when stopped by one (Ctrl-C: 130).
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+import click
+
+from fracslice.errors import ExportError, FracsliceError, SceneError, SliceError, VolumeError
+
+from .check import check
+from .formulas import formulas
+from .mesh import mesh
+from .scenes import scenes
+from .show import show
+from .working import StoppedError
+
+BAD_INPUT = (SceneError, VolumeError, ExportError, SliceError)
+FAILED, USAGE, INTERRUPTED = 1, 2, 130
+
+
+@click.group(
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(package_name="fracslice", message="%(prog)s %(version)s")
+@click.pass_context
+def commands(context: click.Context) -> None:
+    """Fractals as signed distance fields, made into printable meshes.
+
+    SCENE is a scene file, or the name of a scene that ships with fracslice.
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+        context.exit(USAGE)
+
+
+for command in (mesh, check, show, formulas, scenes):
+    commands.add_command(command)
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Runs one command and exits."""
+    sys.exit(run(arguments))
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; returns the exit status."""
+    try:
+        return commands.main(arguments, prog_name="fracslice", standalone_mode=False) or 0
+    except click.UsageError as error:
+        hint = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
+        return say(error.format_message() + hint, error.exit_code)
+    except click.ClickException as error:
+        return say(error.format_message(), error.exit_code)
+    except StoppedError as error:
+        return say(str(error), error.status)
+    except FracsliceError as error:
+        return say(str(error), USAGE if isinstance(error, BAD_INPUT) else FAILED)
+    except (KeyboardInterrupt, click.Abort):
+        return say("interrupted", INTERRUPTED)
+    except MemoryError:
+        return say("out of memory: a coarser voxel needs less", FAILED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush at exit
+        return FAILED
+
+
+def say(message: str, status: int) -> int:
+    """One line on stderr."""
+    click.echo(f"fracslice: {' '.join(message.split())}", err=True)
+    return status

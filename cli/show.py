@@ -1,0 +1,32 @@
+"""fracslice show: a window to turn a mesh in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from .inputs import is_model, load_model, load_scene
+from .options import job_of, job_options, quiet_option, set_option, threads_option
+from .working import working
+
+
+@click.command()
+@click.argument("source", metavar="MODEL|SCENE")
+@job_options
+@set_option
+@threads_option
+@quiet_option
+def show(source: str, settings: tuple[str, ...], threads: int, quiet: bool, **options: Any) -> None:
+    """Open a window on a model file, or on the mesh of a scene."""
+    from fracslice import viewer
+
+    if is_model(source):
+        viewer.show(load_model(source))
+        return
+    from fracslice.job import make_mesh
+
+    scene = load_scene(source, settings)
+    with working(threads, quiet) as work:
+        mesh = make_mesh(scene, job_of(**options), work).mesh
+    viewer.show(mesh)

@@ -1,0 +1,29 @@
+"""What was made or found, in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fracslice.mesh.check import MeshReport
+    from fracslice.report import Report
+
+
+def summary(path: str, report: Report) -> str:
+    """What was made, in a line or two."""
+    error = report.surface_error_mm
+    return (
+        f"{path}: {found(report.mesh)}\n"
+        f"vertices {error.mean * 1000:.2g} um from the surface (99 %: {error.p99 * 1000:.2g} um), "
+        f"voxel {report.voxel_mm:.3g} mm, {report.seconds['total']:.1f} s, {report.peak_rss_mb:.0f} MB"
+    )
+
+
+def found(mesh: MeshReport) -> str:
+    """A mesh and whether it prints, in one line."""
+    (x0, y0, z0), (x1, y1, z1) = mesh.bbox_mm
+    size = f"{x1 - x0:.2f} x {y1 - y0:.2f} x {z1 - z0:.2f} mm"
+    bodies = f"{mesh.components} {'body' if mesh.components == 1 else 'bodies'}"
+    verdict = f"would not print: {', '.join(mesh.problems)}" if mesh.problems else "watertight, manifold"
+    volume = f"{mesh.volume_mm3 / 1000:.2f} cm3" if mesh.volume_mm3 >= 1000 else f"{mesh.volume_mm3:.2f} mm3"
+    return f"{mesh.triangles:,} triangles, {size}, {volume}, {bodies}, {verdict}"

@@ -1,0 +1,244 @@
+"""The main job, from a scene to a printable mesh with the numbers that prove it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from .errors import MeshError, SceneError, VolumeError
+from .memory import available_bytes, peak_rss_mb
+from .report import Report, SurfaceError, version
+from .scene import Scene, parse_length
+from .work import Work
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
+    from .mesh.components import Removed
+    from .volume import Bricks, Plan
+
+RESOLUTION = 256.0
+COARSEST, FINEST = 8, 16384
+"""Voxels along the longest side."""
+
+ALWAYS_FITS = 256
+BYTES_A_BRICK = 40_000
+"""Peak memory for each brick of samples, its triangles in all their stages included; measured."""
+
+NOISE = 8.0
+"""Bodies with fewer voxels are noise of the sampling."""
+
+
+@dataclass(frozen=True)
+class MeshJob:
+    """What to make of a scene.
+
+    size_mm: the longest side, if not what the scene says. voxel_mm or resolution (voxels along the longest
+    side): how fine; 256 along the longest side if neither is given. keep: every body, or the largest alone.
+    dust_mm3: bodies with less material are dropped; if not given, those under 8 voxels, which are noise.
+    cavities: sealed hollows stay or are filled. base_mm: so much is cut off at the bottom, for the object to
+    stand on. Raises `SceneError` for values that cannot be.
+    """
+
+    size_mm: float | None = None
+    voxel_mm: float | None = None
+    resolution: float | None = None
+    keep: Literal["all", "largest"] = "all"
+    dust_mm3: float | None = None
+    cavities: Literal["keep", "fill"] = "keep"
+    base_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.voxel_mm is not None and self.resolution is not None:
+            raise SceneError("voxel and resolution: expected one of them")
+        for name, length in (("size", self.size_mm), ("voxel", self.voxel_mm)):
+            if length is not None:
+                parse_length(length, name)
+        if self.resolution is not None and not COARSEST <= self.resolution <= FINEST:
+            raise SceneError(f"resolution {self.resolution:g}: expected {COARSEST} to {FINEST}")
+        for name, value in (("dust", self.dust_mm3 or 0.0), ("base", self.base_mm)):
+            if not 0 <= value < float("inf"):
+                raise SceneError(f"{name} {value:g}: expected a finite number >= 0")
+
+    def size(self, scene: Scene) -> float:
+        """The longest side in mm."""
+        return scene.size_mm if self.size_mm is None else self.size_mm
+
+    def voxels(self, scene: Scene) -> float:
+        """How many voxels the longest side has."""
+        if self.voxel_mm is None:
+            return RESOLUTION if self.resolution is None else self.resolution
+        size = self.size(scene)
+        if not COARSEST <= size / self.voxel_mm <= FINEST:
+            low, high = size / FINEST, size / COARSEST
+            raise SceneError(
+                f"voxel {self.voxel_mm:g}mm: expected {low:.4g}mm to {high:.4g}mm for an object of {size:g}mm"
+            )
+        return size / self.voxel_mm
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the scene is in print space: ``mm = scale * scene units + offset``."""
+
+    scale: float
+    offset: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """mesh: in mm, standing on z = 0, coordinates as a file holds them. bricks: the samples it was made of, in
+    scene units. place: what leads from there to the mesh."""
+
+    mesh: Mesh
+    report: Report
+    bricks: Bricks
+    place: Placement
+
+    @property
+    def bricks_mm(self) -> Bricks:
+        """The samples in the mesh's space: position and values in mm."""
+        scale, (x, y, z) = self.place.scale, self.bricks.origin
+        dx, dy, dz = self.place.offset
+        return replace(
+            self.bricks,
+            origin=(scale * x + dx, scale * y + dy, scale * z + dz),
+            voxel=scale * self.bricks.voxel,
+            values=self.bricks.values * np.float32(scale),
+        )
+
+
+def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = None) -> Result:
+    """Samples, meshes, cleans, scales and checks a scene.
+
+    Raises `SceneError`, `VolumeError`, `MeshError` or `Cancelled`. A mesh that would not print as it is is
+    returned all the same; its report says what is wrong.
+    """
+    what, work = what or MeshJob(), work or Work()
+    voxels, clock = what.voxels(scene), Clock(work)
+    from .mesh.check import check
+    from .mesh.extract import extract
+    from .volume import plan, sample_scene
+
+    with clock("planning"):
+        refuse_what_does_not_fit(scene, voxels, what.size(scene), work)
+        planned = plan(scene.root, voxels, work)
+    with clock("sampling"):
+        bricks = sample_scene(planned, work)
+    with clock("meshing"):
+        raw = extract(bricks, work.threads)
+    with clock("finishing"):
+        mesh, removed, place = _finished(raw, what, what.size(scene), bricks.voxel)
+    with clock("checking"):
+        checked = check(mesh, threads=work.threads)
+        error = _surface_error(planned, mesh, place, what.base_mm > 0, work)
+    report = Report(
+        scene=scene.name,
+        scene_hash=scene.hash,
+        version=version(),
+        size_mm=what.size(scene),
+        voxel_mm=bricks.voxel * place.scale,
+        mesh=checked,
+        removed=removed,
+        surface_error_mm=error,
+        evaluations=bricks.evaluations,
+        bricks=len(bricks),
+        seconds=clock.seconds,
+        peak_rss_mb=peak_rss_mb(),
+    )
+    return Result(mesh, report, bricks, place)
+
+
+def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Work) -> None:
+    """Raises `VolumeError`, naming a voxel that fits, if the mesh would take more memory than there is.
+
+    The number of bricks grows like a power of the resolution, about the surface's dimension; two coarse
+    samplings show it. Coarse jobs are not looked at: they always fit.
+    """
+    from .volume import plan, sample_scene
+
+    if voxels <= ALWAYS_FITS:
+        return
+    few, many = (
+        len(sample_scene(plan(scene.root, n, work), work)) for n in (ALWAYS_FITS / 4, ALWAYS_FITS / 2)
+    )
+    dimension = min(max(math.log2(many / few), 2.0), 3.0)
+    needed = many * (2 * voxels / ALWAYS_FITS) ** dimension * BYTES_A_BRICK
+    free = available_bytes()
+    if needed > free:
+        fits = size / voxels * (needed / free) ** (1 / dimension)
+        raise VolumeError(
+            f"a voxel of {size / voxels:.3g}mm needs about {needed / 1e9:.1f} GB of memory, "
+            f"and {free / 1e9:.1f} GB are free; a voxel of {fits * 1.02:.3g}mm fits"
+        )
+
+
+def _finished(raw: Mesh, what: MeshJob, size: float, voxel: float) -> tuple[Mesh, Removed, Placement]:
+    """The mesh that is wanted, in mm on the bed, as a file will hold it."""
+    from .mesh.clean import clean
+    from .mesh.components import select
+    from .mesh.solid import cut_base, place_on_bed
+
+    scale = size / float(raw.size.max())
+    dust = NOISE * (voxel * scale) ** 3 if what.dust_mm3 is None else what.dust_mm3
+    kept, removed = select(raw.scaled(scale), keep=what.keep, dust_mm3=dust, cavities=what.cavities)
+    scale *= _growth(kept, what.base_mm, size)
+    mesh = kept.scaled(scale * float(raw.size.max()) / size)
+    if what.base_mm > 0:
+        mesh = cut_base(mesh, what.base_mm)
+    exact = size / float(mesh.size.max())
+    mesh = mesh.scaled(exact)
+    placed = place_on_bed(mesh)
+    x, y, z = (placed.bounds[0] - mesh.bounds[0]).tolist()
+    return clean(placed), removed, Placement(scale * exact, (x, y, z))
+
+
+def _growth(mesh: Mesh, base: float, size: float) -> float:
+    """The factor that makes the longest side `size` once `base` mm have been cut off the bottom.
+
+    What is cut shrinks the object, so that it has to be larger to begin with, so that less of it is cut:
+    repeated, it settles within a few rounds.
+    """
+    points, (low, high) = mesh.vertices, mesh.bounds
+    factor = size / float((high - low).max())
+    for _ in range(8 if base > 0 else 0):
+        floor = low[2] + base / factor
+        left = points[points[:, 2] >= floor]
+        if not len(left):
+            raise MeshError(f"a base cut of {base:g} mm leaves nothing of the object")
+        width = left[:, :2].max(axis=0) - left[:, :2].min(axis=0)
+        factor = size / max(*width.tolist(), float(high[2] - floor))
+    return factor
+
+
+def _surface_error(planned: Plan, mesh: Mesh, place: Placement, cut: bool, work: Work) -> SurfaceError:
+    """Measured at the vertices of the finished mesh; those of a cut base are left out."""
+    from .volume.accuracy import surface_error
+
+    points = mesh.vertices[mesh.vertices[:, 2] > 0] if cut else mesh.vertices
+    points = (points - np.array(place.offset)) / place.scale
+    mm = place.scale * surface_error(planned.root, points, planned.voxel, work)
+    return SurfaceError(float(mm.mean()), float(np.quantile(mm, 0.99)), float(mm.max()))
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The stages of a job: tells of each as it begins, stops between them when asked to, takes the time."""
+
+    work: Work
+    seconds: dict[str, float] = field(default_factory=lambda: {"total": 0.0})
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        self.work.check()
+        self.work.progress(stage, 0.0)
+        started = time.perf_counter()
+        yield
+        self.seconds[stage] = time.perf_counter() - started
+        self.seconds["total"] += self.seconds[stage]
+        self.work.progress(stage, 1.0)

@@ -1,0 +1,58 @@
+"""What a job tells about its result."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .mesh.check import MeshReport
+    from .mesh.components import Removed
+
+
+@dataclass(frozen=True)
+class SurfaceError:
+    """How far the mesh's vertices are from the true surface, in mm."""
+
+    mean: float
+    p99: float
+    max: float
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was made, how good it is and what it took. seconds: of each stage, and in total."""
+
+    scene: str
+    scene_hash: str
+    version: str
+    size_mm: float
+    voxel_mm: float
+    mesh: MeshReport
+    removed: Removed
+    surface_error_mm: SurfaceError
+    evaluations: int
+    bricks: int
+    seconds: dict[str, float]
+    peak_rss_mb: float
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why the mesh would not print as it is; empty if it would."""
+        return self.mesh.problems
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON, the mesh's numbers beside the others."""
+        own = {name: value for name, value in asdict(self).items() if name != "mesh"}
+        return {**own, **self.mesh.as_dict()}
+
+
+def version() -> str:
+    """The installed version of fracslice."""
+    from importlib.metadata import PackageNotFoundError
+    from importlib.metadata import version as installed
+
+    try:
+        return installed("fracslice")
+    except PackageNotFoundError:
+        return "not installed"

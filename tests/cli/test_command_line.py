@@ -1,0 +1,162 @@
+"""The commands as a person meets them: what they print, the files they leave, how they exit."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from fracslice_cli.main import run
+
+from fracslice.scene import library
+
+BALL = '<scene version="1"><solid size="20mm"><sphere/></solid></scene>'
+COMMAND = [sys.executable, "-c", "from fracslice_cli import main; main()"]
+
+
+@pytest.fixture
+def ball(tmp_path: Path) -> Path:
+    path = tmp_path / "ball.xml"
+    path.write_text(BALL)
+    return path
+
+
+def fracslice(*arguments: object) -> int:
+    return run([str(argument) for argument in arguments])
+
+
+def test_mesh_writes_the_model_and_its_report(ball, tmp_path, capfd):
+    model, report = tmp_path / "ball.stl", tmp_path / "ball.json"
+    assert fracslice("mesh", ball, "-o", model, "--resolution", 32, "--report", report) == 0
+    told = json.loads(report.read_text())
+    assert told["watertight"]
+    assert told["bbox_mm"][1][2] == 20
+    assert model.stat().st_size == 84 + 50 * told["triangles"]
+    out, err = capfd.readouterr()
+    assert "watertight, manifold" in out
+    assert err == "", "no progress where nobody looks"
+
+
+def test_quiet_says_nothing(ball, tmp_path, capfd):
+    assert fracslice("mesh", ball, "-o", tmp_path / "b.3mf", "--resolution", 16, "--quiet") == 0
+    assert capfd.readouterr() == ("", "")
+
+
+def test_size_set_and_base_change_what_is_made(ball, tmp_path, capfd):
+    model = tmp_path / "b.stl"
+    options = ("--size", "3cm", "--voxel", "1mm", "--set", "sphere.radius=2", "--base", "3mm")
+    assert fracslice("mesh", ball, "-o", model, *options) == 0
+    assert fracslice("check", model, "--json") == 0
+    told = json.loads(capfd.readouterr().out.partition("\n{")[2].join(["{", ""]))
+    low, high = told["bbox_mm"]
+    assert high[0] - low[0] == pytest.approx(30, rel=1e-6)
+    assert high[2] == pytest.approx(27, abs=0.2)
+
+
+def test_a_shipped_scene_is_known_by_its_name(tmp_path, capfd):
+    assert (
+        fracslice(
+            "mesh", "menger-sponge", "-o", tmp_path / "m.ply", "--resolution", 27, "--set", "menger.level=1"
+        )
+        == 0
+    )
+    assert (tmp_path / "m.ply").exists()
+
+
+def test_a_file_of_that_name_goes_before_a_shipped_scene(ball, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ball.rename(tmp_path / "mandelbulb")
+    assert fracslice("mesh", "mandelbulb", "-o", "m.stl", "--resolution", 16) == 0
+
+
+def test_check_says_whether_a_scene_would_print(ball, capfd):
+    assert fracslice("check", ball, "--resolution", 16, "--json") == 0
+    told = json.loads(capfd.readouterr().out)
+    assert (told["printable"], told["components"], told["genus"]) == (True, 1, 0)
+
+
+def test_check_exits_1_for_a_model_with_a_hole(ball, tmp_path, capfd):
+    model = tmp_path / "b.stl"
+    assert fracslice("mesh", ball, "-o", model, "--resolution", 16, "-q") == 0
+    data = bytearray(model.read_bytes()[:-50])
+    data[80:84] = ((len(data) - 84) // 50).to_bytes(4, "little")
+    model.write_bytes(data)
+    assert fracslice("check", model) == 1
+    assert "would not print: 3 open edges" in capfd.readouterr().out
+
+
+def test_formulas_lists_and_describes(capfd):
+    assert fracslice("formulas") == 0
+    assert "mandelbulb" in capfd.readouterr().out
+    assert fracslice("formulas", "box") == 0
+    assert "expected: 3 numbers > 0" in capfd.readouterr().out
+
+
+def test_scenes_lists_what_ships(capfd):
+    assert fracslice("scenes") == 0
+    lines = capfd.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == library.names()
+    assert all(len(line.split()) > 4 for line in lines)
+
+
+def test_version_and_help(capfd):
+    assert fracslice("--help") == 0
+    assert fracslice("mesh", "--help") == 0
+    assert "--resolution" in capfd.readouterr().out
+    assert fracslice() == 2
+
+
+def test_help_is_quick():
+    subprocess.run([*COMMAND, "--help"], check=True, capture_output=True)
+    times = []
+    for _ in range(5):
+        started = time.perf_counter()
+        subprocess.run([*COMMAND, "--help"], check=True, capture_output=True)
+        times.append(time.perf_counter() - started)
+    assert min(times) < 0.3
+
+
+def test_heavy_packages_are_not_loaded_for_help():
+    code = "import sys; from fracslice_cli.main import run; run(['--help']); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    loaded = set(done.stdout.splitlines()[-1].split())
+    heavy = "numpy numba trimesh manifold3d pymeshlab pyvista lxml rich fracslice.scene fracslice.volume"
+    assert loaded & set(heavy.split()) == set()
+
+
+def test_progress_is_shown_on_a_terminal_only(ball, tmp_path):
+    reader, writer = os.openpty()
+    arguments = ["mesh", str(ball), "-o", str(tmp_path / "b.stl"), "--resolution", "24"]
+    with subprocess.Popen([*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=writer) as running:
+        os.close(writer)
+        shown = b"".join(iter(lambda: read(reader), b""))
+        assert b"sampling" not in running.stdout.read()
+    os.close(reader)
+    assert running.returncode == 0
+    assert b"sampling" in shown
+
+
+def read(terminal: int) -> bytes:
+    """What was written to a terminal; nothing once its other side is closed."""
+    try:
+        return os.read(terminal, 1 << 16)
+    except OSError:
+        return b""
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_stops_it_and_leaves_no_file(tmp_path, number, status):
+    target = tmp_path / "out"
+    target.mkdir()
+    arguments = ["mesh", "mandelbulb", "-o", str(target / "m.stl"), "--resolution", "768"]
+    running = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
+    time.sleep(1.5)
+    running.send_signal(number)
+    assert running.communicate(timeout=60)[1] == "fracslice: stopped; nothing was written\n"
+    assert running.returncode == status
+    assert list(target.iterdir()) == []

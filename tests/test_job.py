@@ -1,0 +1,185 @@
+"""From a scene to a mesh: sizes, what is kept, the report, cancelling, and what does not fit."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+
+import numpy as np
+import pytest
+
+from fracslice import MeshJob, Work, make_mesh, memory
+from fracslice.errors import Cancelled, MeshError, SceneError, VolumeError
+from fracslice.formulas import box, cone, difference, intersection, plane, sphere, torus, transform, union
+from fracslice.scene import scene
+
+BALL = scene(sphere(radius=3), size="40mm", name="ball")
+
+
+def moved(node, *by):
+    return transform(node, translate=by)
+
+
+def test_the_longest_side_is_the_size_and_it_stands_on_the_bed():
+    mesh = make_mesh(scene(moved(box(size=(1, 2, 3)), 5, 5, 5), size="45mm"), MeshJob(resolution=48)).mesh
+    low, high = mesh.bounds
+    assert high[2] - low[2] == np.float32(45)
+    assert low[2] == 0
+    assert np.allclose((low + high)[:2], 0, atol=1e-5)
+    assert np.allclose(mesh.size, (15, 30, 45), atol=0.1)
+
+
+def test_the_job_may_ask_for_another_size():
+    result = make_mesh(BALL, MeshJob(size_mm=10, resolution=32))
+    assert result.mesh.size.max() == 10
+    assert result.report.size_mm == 10
+    assert result.report.scene_hash == BALL.hash
+
+
+def test_a_voxel_in_mm_is_that_of_the_finished_object():
+    report = make_mesh(BALL, MeshJob(voxel_mm=1)).report
+    assert math.isclose(report.voxel_mm, 1, rel_tol=0.01)
+
+
+def test_a_ball_has_the_volume_of_a_ball():
+    report = make_mesh(BALL, MeshJob(resolution=96)).report
+    assert math.isclose(report.mesh.volume_mm3, 4 / 3 * math.pi * 20**3, rel_tol=0.005)
+
+
+def test_the_report_is_json_with_all_it_has_to_say():
+    result = make_mesh(BALL, MeshJob(resolution=32))
+    told = json.loads(json.dumps(result.report.as_dict()))
+    wanted = """triangles vertices watertight manifold self_intersections components genus volume_mm3
+        area_mm2 bbox_mm surface_error_mm evaluations bricks seconds peak_rss_mb scene_hash version"""
+    assert set(wanted.split()) <= set(told)
+    assert told["surface_error_mm"].keys() == {"mean", "p99", "max"}
+    assert told["triangles"] == len(result.mesh.triangles)
+    assert (told["genus"], told["components"], told["watertight"]) == (0, 1, True)
+    assert told["scene_hash"] == BALL.hash
+    total = told["seconds"].pop("total")
+    assert total == pytest.approx(sum(told["seconds"].values()))
+    assert told["evaluations"] > 1000
+    assert told["peak_rss_mb"] > 10
+
+
+def test_the_surface_error_is_measured_and_small():
+    error = make_mesh(BALL, MeshJob(resolution=64)).report.surface_error_mm
+    assert 0 < error.mean <= error.p99 <= error.max < 40 / 64 / 4
+
+
+def test_the_placement_leads_back_to_the_scene():
+    result = make_mesh(scene(moved(sphere(radius=3), 1, 2, 3), size="40mm"), MeshJob(resolution=64))
+    back = (result.mesh.vertices - result.place.offset) / result.place.scale
+    assert np.allclose(np.linalg.norm(back - (1, 2, 3), axis=1), 3, atol=0.02)
+
+
+TWO = scene(union(sphere(radius=1), moved(sphere(radius=0.3), 2, 0, 0)), size="40mm")
+
+
+def test_all_bodies_are_kept_or_the_largest_which_then_has_the_size():
+    both = make_mesh(TWO, MeshJob(resolution=64))
+    largest = make_mesh(TWO, MeshJob(resolution=64, keep="largest"))
+    assert both.report.mesh.components == 2
+    assert largest.report.mesh.components == 1
+    assert largest.report.removed.bodies == 1
+    assert largest.mesh.size.max() == pytest.approx(40)
+
+
+def test_dust_is_dropped():
+    small = 4 / 3 * math.pi * (0.3 * 40 / 3.3) ** 3
+    assert make_mesh(TWO, MeshJob(resolution=64, dust_mm3=small * 0.9)).report.mesh.components == 2
+    assert make_mesh(TWO, MeshJob(resolution=64, dust_mm3=small * 1.1)).report.mesh.components == 1
+    with pytest.raises(MeshError, match="nothing would be left"):
+        make_mesh(TWO, MeshJob(resolution=64, dust_mm3=1e9))
+
+
+def test_cavities_are_kept_or_filled():
+    hollow = scene(difference(sphere(radius=1), sphere(radius=0.5)), size="40mm")
+    kept = make_mesh(hollow, MeshJob(resolution=48)).report
+    filled = make_mesh(hollow, MeshJob(resolution=48, cavities="fill")).report
+    assert (kept.mesh.cavities, filled.mesh.cavities) == (1, 0)
+    assert filled.mesh.volume_mm3 == pytest.approx(kept.mesh.volume_mm3 * 8 / 7, rel=0.02)
+
+
+@pytest.mark.parametrize("node", [sphere(), cone(radius=0.2, height=2), cone(radius=2, height=1)])
+def test_a_base_is_cut_and_the_size_still_holds(node):
+    result = make_mesh(scene(node, size="40mm"), MeshJob(resolution=64, base_mm=4))
+    assert result.mesh.size.max() == pytest.approx(40, rel=1e-6)
+    assert result.report.problems == ()
+    flat = result.mesh.vertices[:, 2] == 0
+    assert flat.sum() > 10
+    whole = make_mesh(scene(node, size="40mm"), MeshJob(resolution=64))
+    lost = whole.mesh.size[2] / whole.place.scale - result.mesh.size[2] / result.place.scale
+    assert lost * result.place.scale == pytest.approx(4, abs=result.report.voxel_mm / 2)
+
+
+def test_a_base_higher_than_the_object_is_refused():
+    with pytest.raises(MeshError, match="base cut"):
+        make_mesh(scene(torus(radius=1, tube=0.2), size="40mm"), MeshJob(resolution=48, base_mm=30))
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"voxel_mm": 1, "resolution": 64}, "expected one of them"),
+        ({"resolution": 4}, "resolution 4: expected 8 to 16384"),
+        ({"resolution": math.nan}, "expected 8 to 16384"),
+        ({"voxel_mm": 0}, "voxel '0': expected a length above zero"),
+        ({"size_mm": -1}, "size '-1': expected a length"),
+        ({"dust_mm3": -1}, "dust -1: expected a finite number >= 0"),
+        ({"base_mm": math.nan}, "base nan: expected a finite number >= 0"),
+        ({"voxel_mm": 30}, "voxel 30mm: expected 0.002441mm to 5mm for an object of 40mm"),
+    ],
+)
+def test_impossible_jobs_are_refused(values, message):
+    with pytest.raises(SceneError, match=message):
+        make_mesh(BALL, MeshJob(**values))
+
+
+@pytest.mark.parametrize(
+    ("node", "message"),
+    [
+        (plane(), "no end along x and y and z|no end along"),
+        (intersection(sphere(), moved(sphere(), 5, 0, 0)), "empty"),
+        (difference(sphere(), sphere(radius=2)), "no surface"),
+    ],
+)
+def test_scenes_without_a_finite_surface_are_refused(node, message):
+    with pytest.raises(VolumeError, match=message):
+        make_mesh(scene(node, size="40mm"), MeshJob(resolution=32))
+
+
+def test_what_does_not_fit_in_memory_is_refused_before_it_starts(monkeypatch):
+    monkeypatch.setattr("fracslice.job.available_bytes", lambda: 1 << 30)
+    with pytest.raises(
+        VolumeError, match=r"a voxel of .*mm needs about .* GB .* a voxel of ([0-9.]+)mm fits"
+    ) as caught:
+        make_mesh(BALL, MeshJob(resolution=16000))
+    fits = float(str(caught.value).split("a voxel of ")[2].split("mm")[0])
+    assert 40 / 16000 < fits < 1
+
+
+def test_there_is_memory():
+    assert 1 << 20 < memory.available_bytes() < 1 << 60
+
+
+def test_cancelling_stops_it():
+    cancel = threading.Event()
+    stages = []
+
+    def progress(stage, done):
+        stages.append(stage)
+        if stage == "sampling":
+            cancel.set()
+
+    with pytest.raises(Cancelled):
+        make_mesh(BALL, MeshJob(resolution=64), Work(progress=progress, cancel=cancel))
+    assert "checking" not in stages
+
+
+def test_the_result_does_not_depend_on_threads_or_run():
+    scene_ = scene(union(sphere(), box(), smooth=0.1), size="40mm")
+    one, two = (make_mesh(scene_, MeshJob(resolution=64), Work(threads=n)).mesh for n in (1, 3))
+    assert (one.vertices == two.vertices).all()
+    assert (one.triangles == two.triangles).all()

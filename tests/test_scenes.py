@@ -1,0 +1,46 @@
+"""The gallery: every shipped scene reads, fits the schema, says what it is, and becomes a printable solid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from fracslice import MeshJob, make_mesh
+from fracslice.formulas import names as formula_names
+from fracslice.mesh.solid import to_manifold
+from fracslice.scene import library, read, reads, to_xml
+from fracslice.scene.schema import PATH
+
+NAMES = library.names()
+
+
+def test_there_are_at_least_ten_and_they_show_what_there_is():
+    used = {node.formula.name for name in NAMES for node in read(library.path(name)).root.walk()}
+    assert len(NAMES) >= 10
+    assert set(formula_names()) - used <= {"octahedron", "mirror", "offset"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_fits_the_schema_and_survives_writing(name):
+    schema = etree.RelaxNG(etree.parse(PATH))
+    assert schema.validate(etree.parse(library.path(name))), schema.error_log
+    scene = read(library.path(name))
+    assert reads(to_xml(scene)) == scene
+    assert len(library.about(name)) > 20
+
+
+@pytest.mark.parametrize("resolution", [128, 256])
+@pytest.mark.parametrize("name", NAMES)
+def test_it_becomes_a_solid_that_prints(name, resolution):
+    scene = read(library.path(name))
+    result = make_mesh(scene, MeshJob(resolution=resolution))
+    report = result.report
+    assert report.problems == ()
+    assert report.mesh.watertight
+    assert report.mesh.manifold
+    assert report.mesh.oriented
+    assert to_manifold(result.mesh).status().name == "NoError"
+    assert np.isclose(result.mesh.size.max(), scene.size_mm, rtol=1e-6)
+    assert report.mesh.components == 1, "one piece, to hold in a hand"
+    assert report.surface_error_mm.mean < report.voxel_mm / 2
