@@ -1,0 +1,84 @@
+"""Tiles of pixels on the CPU's lanes."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from ..kernel.cpu import lane_count, load_functions
+from ..work import Work
+from .linking import Frame
+from .sobol import point
+from .waves import loops, workspace
+
+TILE = 2048
+"""Rays that are in the works at once: their rows stay in the cache."""
+BLOCK = 8
+"""Pixels along the side of a block that the cone prepass looks at as one."""
+
+
+class CpuTracer:
+    """Adds samples to pixels, tile by tile, on as many threads as the work has."""
+
+    def __init__(self, frame: Frame, dtype: np.dtype, width: int, height: int) -> None:
+        self.dtype, self.width, self.height = dtype, width, height
+        bits = dtype.itemsize * 8
+        self.lanes = lane_count(bits)
+        linked, entries = loops(frame, BLOCK)
+        functions = load_functions(linked, bits, self.lanes, entries)
+        self._tile, self._cones = functions["tile"], functions.get("cones")
+        self._own = threading.local()
+        self.aim(frame)
+
+    def aim(self, frame: Frame) -> None:
+        """Takes the numbers of another frame of the same source: another camera, another depth."""
+        self.frame = frame
+        self._parameters = frame.linked.parameters.astype(self.dtype)
+        self.blocks = -(-self.width // BLOCK)
+        self._starts = np.zeros(self.blocks * -(-self.height // BLOCK), self.dtype)
+
+    def look_ahead(self, limit: int, work: Work) -> None:
+        """Finds, for every block of pixels, up to where all its rays are free."""
+        if self._cones is None:
+            return
+        ids = np.arange(len(self._starts), dtype=np.int32)
+
+        def task(part: np.ndarray) -> None:
+            m, space, who = self._room(part)
+            self._cones(*_addresses(self._parameters, self._starts, who, space), len(part), m, self.blocks, limit)
+
+        work.map(task, np.array_split(ids, max(1, len(ids) // 512)))
+
+    def add(self, sums: np.ndarray, pixels: np.ndarray, index: int, limit: int, work: Work) -> None:
+        """Adds sample `index` to each of the pixels.
+
+        sums: [height * width, 6], changed in place. pixels: int32 ``y << 16 | x``, each once, in the order of `ordered`.
+        """
+        q = point(index, self.frame.samples)
+
+        def task(part: np.ndarray) -> None:
+            m, space, who = self._room(part)
+            places = _addresses(self._parameters, q, self._starts, space, who, sums)
+            self._tile(*places, len(part), m, self.width, limit, self.blocks)
+
+        work.map(task, [pixels[i : i + TILE] for i in range(0, len(pixels), TILE)])
+
+    def _room(self, part: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
+        """The row length for so many rays, and the thread's own workspace and list of pixels, filled in."""
+        m = -(-len(part) // self.lanes) * self.lanes
+        if not hasattr(self._own, "space"):
+            self._own.space = np.zeros(workspace(self.frame, TILE, self.lanes), self.dtype)
+            self._own.who = np.zeros(self.lanes + TILE, np.int32)
+        self._own.who[self.lanes : self.lanes + len(part)] = part
+        return m, self._own.space, self._own.who
+
+
+def ordered(width: int, height: int) -> np.ndarray:
+    """All pixels, int32 ``y << 16 | x``, so that a packet's are neighbours: rows of blocks, in a block 8 x 4 pixels."""
+    y, x = np.divmod(np.arange(width * height, dtype=np.int32), np.int32(width))
+    return (y << 16 | x)[np.lexsort((x, y, x // 8, y // 4, x // 64, y // 32))]
+
+
+def _addresses(*arrays: np.ndarray) -> list[int]:
+    return [a.ctypes.data for a in arrays]

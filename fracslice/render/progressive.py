@@ -1,0 +1,124 @@
+"""A picture that sharpens while one looks: passes over the film, each adding a sample where one is still needed."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..formulas.registry import Node
+from ..scene.view import View
+from ..work import Work
+from .accumulator import Accumulator
+from .cpu import BLOCK, CpuTracer, ordered
+from .linking import link_frame
+from .setting import Setting, settle
+
+COARSE = 4
+"""The first pass looks at every fourth pixel of every fourth row."""
+STEPS, GROWTH, GROWN = 160, 10, 16
+"""Steps of a ray in the first pass; how often as many after GROWN passes, in equal steps between."""
+TOLERANCE = 0.002
+"""A pixel has converged when its brightness, as shown, is known to half a level of 256."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """The picture after one more pass.
+
+    image: float32 [height, width, 3], linear light. number: of the pass, from 1. samples: per pixel, on average. error:
+    the root mean square of the pixels' standard errors, as shown. active: the part of the pixels that is not yet clean.
+    """
+
+    image: np.ndarray
+    number: int
+    samples: float
+    error: float
+    active: float
+
+
+class Renderer:
+    """Renders one view of one scene. `passes` may be left at any time and asked for again: it goes on where it was.
+
+    root: the tree of formulas, depths may be "auto". size: pixels across and down; the film's if not given. Raises
+    `SceneError` for a view that cannot be rendered.
+    """
+
+    def __init__(self, root: Node, view: View, size: tuple[int, int] | None = None, work: Work | None = None) -> None:
+        self.width, self.height = size or (view.film.width, view.film.height)
+        self.work = work or Work()
+        self.setting = settle(root, view, (self.width, self.height))
+        dtype = np.dtype(self.setting.precision)
+        self.tracer = CpuTracer(self._frame(0), dtype, self.width, self.height)
+        self.accumulator = Accumulator.empty(self.width, self.height, dtype, self.key)
+        self._order = ordered(self.width, self.height)
+        self._aimed: Node | None = None
+
+    @property
+    def key(self) -> str:
+        """Equal for pictures that the same samples make."""
+        what: Setting = self.setting
+        numbers = [self._frame(k).linked for k in range(len(what.roots))]
+        text = "".join(n.source + repr(n.parameters.tolist()) for n in numbers)
+        return hashlib.sha256(f"{self.width} {self.height} {what.precision} {text}".encode()).hexdigest()[:20]
+
+    def resume(self, accumulator: Accumulator) -> None:
+        """Goes on with what was accumulated earlier: `Accumulator.load(path, renderer.key)`."""
+        self.accumulator = accumulator
+
+    def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
+        """Yields the picture after every pass, until all pixels have so many samples or are within the tolerance.
+
+        The first pass has one sample in 16 pixels, the second one in every pixel. Raises `Cancelled`; what was complete
+        before stays valid.
+        """
+        most = self.setting.view.film.samples if samples is None else samples
+        while self.accumulator.passes < most + 1:
+            pixels = self._wanted(tolerance)
+            if not len(pixels):
+                return
+            yield self._pass(pixels)
+
+    def _wanted(self, tolerance: float) -> np.ndarray:
+        """The pixels of the next pass, in order."""
+        number, x, y = self.accumulator.passes, self._order & 65535, self._order >> 16
+        coarse = (x % COARSE == 0) & (y % COARSE == 0)
+        if number == 0:
+            return self._order[coarse]
+        if number == 1:
+            return self._order[~coarse]
+        return self._order[self.accumulator.unfinished(tolerance)[y, x]]
+
+    def _pass(self, pixels: np.ndarray) -> Pass:
+        number = self.accumulator.passes
+        limit = STEPS + STEPS * (GROWTH - 1) * min(number, GROWN) // GROWN
+        self._aim(number, limit)
+        sums = self.accumulator.sums.copy()
+        self.tracer.add(sums, pixels, max(number - 1, 0), limit, self.work)
+        self.accumulator.sums = sums
+        self.accumulator.passes += 1
+        return self._seen(len(pixels))
+
+    def _aim(self, number: int, limit: int) -> None:
+        """Points the tracer at the tree of this pass, and looks ahead once for each."""
+        root = self.setting.root(number)
+        if root is not self._aimed:
+            self.tracer.aim(self._frame(number))
+            self.tracer.look_ahead(limit, self.work)
+            self._aimed = root
+
+    def _frame(self, number: int):  # type: ignore[no-untyped-def]
+        what = self.setting
+        return link_frame(what.root(number), what.view, what.camera, what.optics, BLOCK)
+
+    def _seen(self, traced: int) -> Pass:
+        found, image = self.accumulator, self.accumulator.mean()
+        if found.passes == 1:
+            y, x = np.mgrid[: self.height, : self.width] // COARSE * COARSE
+            image = image[y, x]
+        errors = found.errors()
+        known = errors[np.isfinite(errors)]
+        error = float(np.sqrt(np.mean(known.astype(np.float64) ** 2))) if known.size else float("inf")
+        return Pass(image, found.passes, float(found.counts.mean()), error, traced / errors.size)
