@@ -1,0 +1,202 @@
+"""Would it print? Islands, overhangs, cups, traps, cavities, loose bodies, thin walls and gaps, fit, volume and weight."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import SliceError
+from ..work import Work
+from .graph import Found, Graph, Nodes
+from .layers import Layer, Slicer
+from .printers import Printer
+from .raster import check_fits
+from .runs import Parts, parts_of, unsupported
+from .stack import Stack
+from .thickness import BINS, histogram, widths
+
+THICKNESS_LAYERS = 24
+"""Layers that walls and gaps are measured in, spread over the height."""
+
+WORST = 6
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What counts. speck: parts with less area (mm^2) in every layer are dust that is counted but no reason to stop. cup: the
+    least area of a suction cup, mm^2. wall: the thinnest wall, mm; it is judged by the thinnest hundredth. density: of the
+    resin, g/cm^3."""
+
+    speck: float = 0.02
+    cup: float = 1.0
+    wall: float = 0.1
+    density: float = 1.1
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Of walls or gaps in mm: the smallest, the thinnest hundredth, the median; and how many pixels of middle lines are in
+    each bin, whose edges `edges` are."""
+
+    smallest: float
+    thinnest_hundredth: float
+    median: float
+    counts: tuple[int, ...]
+    edges: tuple[float, ...] = tuple(round(float(b), 3) for b in BINS)
+
+
+@dataclass(frozen=True)
+class PrintReport:
+    """What the layers told. Lengths in mm, areas in mm^2, volumes in mm^3; lists have the largest first.
+
+    specks: islands and bodies below the limit. worst: layers with most overhang or the largest islands.
+    """
+
+    layers: int
+    pixels: tuple[int, int]
+    size: tuple[float, float, float]
+    fits: bool | None
+    volume: float
+    weight_g: float
+    bodies: list[Found]
+    islands: list[Found]
+    specks: int
+    overhang_area: float
+    largest_overhang: float
+    cups: list[Found]
+    traps: list[Found]
+    cavities: list[Found]
+    walls: Widths | None
+    gaps: Widths | None
+    worst: list[int]
+    problems: list[str] = field(default_factory=list)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """What a worker tells of one layer."""
+
+    solid: Parts
+    empty: Parts
+    area: float
+    walls: np.ndarray | None
+    gaps: np.ndarray | None
+
+
+def check_layers(stack: Stack, limits: Limits | None = None, printer: Printer | None = None, work: Work | None = None) -> PrintReport:
+    """Checks a planned stack, layer by layer; memory grows with the number of parts only. Raises `SliceError`, `Cancelled`."""
+    chosen = set(np.linspace(0, len(stack.z) - 1, THICKNESS_LAYERS).astype(int).tolist())
+
+    def make(layer: Layer) -> _Told:
+        image = layer.coverage
+        measured = widths(image, stack.pixel) if layer.index in chosen else (None, None)
+        return _Told(*parts_of(image), layer.area, *measured)
+
+    return _Collector(stack, limits or Limits(), printer).report(Slicer(stack, work or Work()).map(make))
+
+
+@dataclass(eq=False)
+class _Collector:
+    stack: Stack
+    limits: Limits
+    printer: Printer | None
+
+    def report(self, told: Iterator[_Told]) -> PrintReport:
+        stack, solid, empty = self.stack, Graph(), Graph()
+        square = stack.pixel[0] * stack.pixel[1]
+        volume, overhangs, walls, gaps = 0.0, [], [np.empty(0)], [np.empty(0)]
+        for k, now in enumerate(told):
+            below = solid.last
+            reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
+            overhangs.append(0.0 if below is None else square * unsupported(below, now.solid, reach, stack.shape[1]))
+            solid.add(now.solid)
+            empty.add(now.empty)
+            volume += now.area * float(stack.heights[k])
+            if now.walls is not None and now.gaps is not None:
+                walls.append(now.walls)
+                gaps.append(now.gaps)
+        parts, hollows, overhang = solid.nodes(), empty.nodes(), np.array(overhangs)
+        islands = self.found(parts, parts.islands())
+        bodies = self.bodies(parts)
+        cups = [c for c in self.found(hollows, hollows.shut(False)) if c.area >= self.limits.cup]
+        traps = [t for t in self.found(hollows, hollows.shut(True)) if t.area >= self.limits.cup]
+        real = [i for i in islands if i.area >= self.limits.speck]
+        kept = [b for b in bodies if b.area >= self.limits.speck]
+        report = PrintReport(
+            layers=len(stack.z),
+            pixels=stack.shape[::-1],
+            size=stack.size,
+            fits=self.fits(),
+            volume=volume,
+            weight_g=volume * self.limits.density / 1000,
+            bodies=kept,
+            islands=real,
+            specks=len(islands) - len(real) + len(bodies) - len(kept),
+            overhang_area=float(overhang.sum()),
+            largest_overhang=float(overhang.max(initial=0)),
+            cups=cups,
+            traps=traps,
+            cavities=[c for c in self.found(hollows, hollows.sealed()) if c.area >= self.limits.speck],
+            walls=_widths(np.concatenate(walls)),
+            gaps=_widths(np.concatenate(gaps)),
+            worst=_worst(overhang, real),
+        )
+        report.problems.extend(_problems(report, self.limits, self.printer))
+        return report
+
+    def found(self, nodes: Nodes, chosen: np.ndarray) -> list[Found]:
+        return nodes.grouped(chosen, self.stack.heights, self.stack.pixel, self.stack.shape)
+
+    def bodies(self, nodes: Nodes) -> list[Found]:
+        return self.found(nodes, np.ones(len(nodes.layer), bool))
+
+    def fits(self) -> bool | None:
+        if not self.printer:
+            return None
+        try:
+            check_fits(self.stack, self.printer)
+        except SliceError:
+            return False
+        return True
+
+
+def _widths(values: np.ndarray) -> Widths | None:
+    if not len(values):
+        return None
+    low, hundredth, middle = (float(v) for v in np.quantile(values, (0, 0.01, 0.5)))
+    return Widths(low, hundredth, middle, tuple(histogram(values).tolist()))
+
+
+def _worst(overhang: np.ndarray, islands: list[Found]) -> list[int]:
+    """The layers to look at: where the largest islands begin, then those with most overhang."""
+    first = [i.layers[0] for i in sorted(islands, key=lambda i: -i.area)[: WORST // 2]]
+    most = [int(k) for k in np.argsort(-overhang, kind="stable")[:WORST] if overhang[k] > 0]
+    return sorted(list(dict.fromkeys([*first, *most]))[:WORST])
+
+
+def _problems(r: PrintReport, limits: Limits, printer: Printer | None) -> list[str]:
+    """Why it would not print, one line each."""
+    found = []
+    if r.fits is False and printer:
+        found.append(f"does not fit the {printer.title}: {' x '.join(f'{s:.4g}' for s in r.size)} mm")
+    if len(r.bodies) > 1:
+        found.append(f"{len(r.bodies)} loose bodies")
+    if r.islands:
+        found.append(f"{len(r.islands)} islands begin in the air, the first in layer {min(i.layers[0] for i in r.islands)}")
+    if r.cavities:
+        found.append(f"{len(r.cavities)} sealed cavities keep {sum(c.volume for c in r.cavities):.3g} mm3 of resin")
+    cups = [c for c in r.cups if c not in r.cavities]
+    if cups:
+        found.append(f"{len(cups)} suction cups, the largest {max(c.area for c in cups):.3g} mm2")
+    if r.traps:
+        found.append(f"{len(r.traps)} resin traps hold {sum(t.volume for t in r.traps):.3g} mm3")
+    if r.walls and r.walls.thinnest_hundredth < limits.wall:
+        found.append(f"walls of {r.walls.thinnest_hundredth:.3g} mm: the limit is {limits.wall:g} mm")
+    return found
