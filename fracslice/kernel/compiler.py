@@ -38,7 +38,7 @@ def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> byt
     exec(compile(linked.source, SOURCE, "exec"), scope)
     for name, value in list(scope.items()):
         if isinstance(value, FunctionType) and value.__code__.co_filename == SOURCE:
-            scope[name] = njit(forceinline=True, error_model="numpy")(value)
+            scope[name] = njit(forceinline=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(value)
     letters = {
         "r": types.CPointer(types.float32 if target.bits == 32 else types.float64),
         "i": types.CPointer(types.int32),
