@@ -113,18 +113,20 @@ class CudaKernel:
     def points_on_device(self, x: Any, y: Any, z: Any, out: Any) -> None:
         """`points` on arrays of the GPU (Numba's, CuPy's, PyTorch's, ...), 1-D and of the kernel's dtype.
         Copies nothing and does not wait for the GPU."""
-        with _LAUNCH:
-            self._loops.points[-(-math.prod(out.shape) // BLOCK), BLOCK](self._parameters, x, y, z, out)
+        launched(self._loops.points, math.prod(out.shape), self._parameters, x, y, z, out)
 
     def bricks_on_device(
         self, corners: Any, origin: tuple[float, float, float], voxel: float, out: Any
     ) -> None:
         """`bricks` on arrays of the GPU. Copies nothing and does not wait for the GPU."""
         frame = [self.dtype.type(v) for v in (*origin, voxel)]
-        with _LAUNCH:
-            self._loops.bricks[-(-math.prod(out.shape) // BLOCK), BLOCK](
-                self._parameters, *frame, corners, out
-            )
+        launched(self._loops.bricks, math.prod(out.shape), self._parameters, *frame, corners, out)
+
+
+def launched(loop: Any, threads: int, *arguments: Any) -> None:
+    """Starts a loop on at least so many threads; does not wait for them."""
+    with _LAUNCH:
+        loop[-(-threads // BLOCK), BLOCK](*arguments)
 
 
 @lru_cache(maxsize=32)

@@ -7,6 +7,7 @@ does up to 64 times slower. So the module that it compiles says ``real(2.0)`` wh
 from __future__ import annotations
 
 import ast
+from typing import Any
 
 from ..formulas.vocabulary import NAMES
 from .linker import Linked
@@ -55,53 +56,107 @@ def module(linked: Linked, bits: int, loops: str) -> str:
 def typed(source: str) -> str:
     """Functions in the words of the formulas, as device functions whose every number is ``real`` or
     ``whole``."""
-    return ast.unparse(ast.fix_missing_locations(_Typed().visit(ast.parse(source)))) + "\n"
+    tree = ast.parse(source)
+    return ast.unparse(ast.fix_missing_locations(_Typed(tree).visit(tree))) + "\n"
 
 
 class _Typed(ast.NodeTransformer):
-    """Literals and loop counters in arithmetic become ``real``, ends of ranges ``whole``, divisions
-    ``divide``.
+    """Wherever a whole number meets a real it becomes ``real``; among themselves, and in subscripts, they stay.
 
-    Subscripts stay as they are.
+    Whole are literals without a point, the counters of loops, and all names of a function that shifts bits. Zero
+    times something, by which a formula makes a number as wide as its points, is zero: a thread has one point.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, tree: ast.Module) -> None:
+        functions = [f for f in tree.body if isinstance(f, ast.FunctionDef)]
+        self.shifting = {f.name for f in functions if any(isinstance(n, _SHIFTS) for n in ast.walk(f))}
         self.counters: set[str] = set()
+        self.shifts = False
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
-        self.counters = {
-            loop.target.id
-            for loop in ast.walk(node)
-            if isinstance(loop, ast.For) and isinstance(loop.target, ast.Name)
-        }
+        loops = [n for n in ast.walk(node) if isinstance(n, ast.For)]
+        self.counters = {loop.target.id for loop in loops if isinstance(loop.target, ast.Name)}
+        self.shifts = node.name in self.shifting
         self.generic_visit(node)
         node.decorator_list = [ast.Name("device", ast.Load())]
         return node
 
-    def visit_Constant(self, node: ast.Constant) -> ast.AST:
-        number = isinstance(node.value, (int, float)) and not isinstance(node.value, bool)
-        return _call("real", node) if number else node
+    def whole(self, node: ast.expr) -> bool:
+        match node:
+            case ast.Constant(value):
+                return isinstance(value, int) and not isinstance(value, bool)
+            case ast.Name(name):
+                return self.shifts or name in self.counters
+            case ast.UnaryOp(ast.USub(), value):
+                return self.whole(value)
+            case ast.BinOp(left, op, right):
+                return self.whole(left) and self.whole(right) and not isinstance(op, ast.Div)
+            case ast.Call(ast.Name(name)):
+                return name in self.shifting
+        return False
 
-    def visit_Name(self, node: ast.Name) -> ast.AST:
-        return _call("real", node) if node.id in self.counters and isinstance(node.ctx, ast.Load) else node
+    def real(self, node: ast.expr) -> Any:
+        """An expression where a real is expected."""
+        return _call("real", node) if self.whole(node) else self.visit(node)
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        return _call("real", node) if isinstance(node.value, float) else node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         return node
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        self.generic_visit(node)
+        if self.whole(node):
+            return node
+        if isinstance(node.op, ast.Mult) and isinstance(node.left, ast.Constant) and node.left.value == 0.0:
+            return self.real(node.left)
+        node.left, node.right = self.real(node.left), self.real(node.right)
         return _call("divide", node.left, node.right) if isinstance(node.op, ast.Div) else node
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        if not all(map(self.whole, [node.left, *node.comparators])):
+            node.left, node.comparators = self.real(node.left), [self.real(c) for c in node.comparators]
+        return node
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         called = node.func.id if isinstance(node.func, ast.Name) else ""
+        if called in self.shifting:
+            return node
+        if called == "int":
+            return _call("whole", *node.args)
         if called == "range":
             node.args = [
                 self.visit(end) if isinstance(end, ast.Call) else _call("whole", end) for end in node.args
             ]
+        else:
+            node.args = [self.real(a) for a in node.args]
+        return node
+
+    def visit_Assign(self, node: ast.Assign) -> ast.AST:
+        node.value = self.given(node.value)
+        return node
+
+    def visit_Return(self, node: ast.Return) -> ast.AST:
+        node.value = self.given(node.value) if node.value else None
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        node.test, node.body, node.orelse = (
+            self.visit(node.test),
+            self.given(node.body),
+            self.given(node.orelse),
+        )
+        return node
+
+    def given(self, node: ast.expr) -> ast.expr:
+        """An expression that becomes the value of a name or a function."""
+        if isinstance(node, ast.Tuple):
+            node.elts = [self.given(e) for e in node.elts]
             return node
-        if called == "int":
-            return _call("whole", *node.args)
-        return self.generic_visit(node)
+        return self.visit(node) if self.shifts else self.real(node)
+
+
+_SHIFTS = (ast.LShift, ast.RShift, ast.BitXor)
 
 
 def _call(name: str, *args: ast.expr) -> ast.Call:

@@ -29,7 +29,7 @@ cuda: Any = import_module("numba.cuda")
 cuda.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # a few points are few on purpose
 SIMULATED = bool(cuda.config.ENABLE_CUDASIM)
 _types: Any = np if SIMULATED else import_module("numba.cuda.types")
-float32, float64, int32 = _types.float32, _types.float64, _types.int32
+float32, float64, int32 = _types.float32, _types.float64, int if SIMULATED else _types.int32
 device = cuda.jit(device=True) if SIMULATED else cuda.jit(device=True, forceinline=True)
 kernel = cuda.jit(cache=True)
 
@@ -101,6 +101,17 @@ else:
     def _cos(x):  # type: ignore[no-untyped-def]
         return _sine(x, int32(1))
 
+    # Plain min.f32 and max.f32 lose a NaN: a point at infinity would be inside.
+    def _minimum(a, b):  # type: ignore[no-untyped-def]
+        return a if a < b else b
+
+    def _maximum(a, b):  # type: ignore[no-untyped-def]
+        return a if a > b else b
+
+    def _ampere() -> bool:
+        """Whether the GPU is new enough for min.NaN; also where there is none, and code is only looked at."""
+        return not cuda.is_available() or cuda.get_current_device().compute_capability >= (8, 0)
+
     sqrt = _word(1, "sqrt.approx.ftz.f32", "sqrt.rn.f64")
     rsqrt = _word(1, "rsqrt.approx.ftz.f32", "__nv_rsqrt")
     inverse = _word(1, "rcp.approx.ftz.f32", "rcp.rn.f64")
@@ -111,16 +122,9 @@ else:
     cos = _word(1, _cos, "__nv_cos")
     atan2 = _word(2, "__nv_atan2f", "__nv_atan2")
     floor = _word(1, "__nv_floorf", "__nv_floor")
+    minimum = _word(2, "min.NaN.f32" if _ampere() else _minimum, _minimum)
+    maximum = _word(2, "max.NaN.f32" if _ampere() else _maximum, _maximum)
     absolute = _word(1, "__nv_fabsf", "__nv_fabs")
-
-    # Not min.f32 and max.f32: they lose a NaN, and a point at infinity would be inside.
-    @device
-    def minimum(a, b):  # type: ignore[no-untyped-def]
-        return a if a < b else b
-
-    @device
-    def maximum(a, b):  # type: ignore[no-untyped-def]
-        return a if a > b else b
 
     @device
     def where(mask, a, b):  # type: ignore[no-untyped-def]

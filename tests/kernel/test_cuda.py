@@ -103,17 +103,24 @@ def test_asking_for_nothing_imports_nothing() -> None:
 
 
 class TestTyping:
-    def test_numbers_counters_and_divisions(self) -> None:
-        text = cuda_source.typed(
-            "def f(x, P):\n    for i in range(int(P[1])):\n        x = x / 2 + (i - 1) * P[0]\n    return -x"
-        )
-        assert text == (
-            "@device\ndef f(x, P):\n    for i in range(whole(P[1])):\n"
-            "        x = divide(x, real(2)) + (real(i) - real(1)) * P[0]\n    return -x\n"
-        )
+    """Numbers of the formulas' text as the CUDA module says them."""
 
-    def test_truth_values_stay(self) -> None:
-        assert "return True" in cuda_source.typed("def f(x):\n    return True")
+    @pytest.mark.parametrize(
+        ("formula", "thread"),
+        [
+            ("return x / 2 - 1", "return divide(x, real(2)) - real(1)"),
+            ("return where(x < 1, P[3], -2)", "return where(x < real(1), P[3], real(-2))"),
+            ("return 0.0 * x + 1.5", "return real(0.0) + real(1.5)"),
+            ("return True", "return True"),
+            ("for i in range(int(P[1])):\n        x = x + (i - 1)", "for i in range(whole(P[1])):\n        x = x + real(i - 1)"),
+            ("for i in range(4):\n        x = 1.0 if i % 2 == 1 else x", "for i in range(whole(4)):\n        x = real(1.0) if i % 2 == 1 else x"),
+            ("return (x >> 8 & 255) * 0.5", "return real(x >> 8 & 255) * real(0.5)"),
+            ("x, y = 0, x\n    return y", "x, y = (real(0), x)\n    return y"),
+        ],
+    )  # fmt: skip
+    def test_of_numbers(self, formula: str, thread: str) -> None:
+        text = cuda_source.typed(f"def f(x, P):\n    {formula}")
+        assert text == f"@device\ndef f(x, P):\n    {thread}\n"
 
 
 def run_simulated(module: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
+from typing import Any
 
 WORDS = {
     "where": "({} ? {} : {})",
@@ -50,13 +51,13 @@ using Parameters = Tuple<{count}>;
 
 
 def translated(source: str, parameters: Sequence[float]) -> str:
-    """The functions of a linked scene, each name with a ``_`` behind it, and its parameters GIVEN. C++20."""
+    """The functions of a linked scene, each name with a ``_`` behind it, and its parameters GIVEN."""
     functions = [_function(f) for f in ast.parse(source).body if isinstance(f, ast.FunctionDef)]
     given = f"const Parameters GIVEN = {{{{{', '.join(_number(p) for p in parameters)}}}}};"
     return "\n".join([PRELUDE.format(count=len(parameters)), *functions, given, ""])
 
 
-def _number(value: float) -> str:
+def _number(value: Any) -> str:
     return "INFINITY" if value == float("inf") else f"{float(value)!r}f"
 
 
@@ -65,7 +66,9 @@ def _function(node: ast.FunctionDef) -> str:
     declared = {**_assigned(node), **dict.fromkeys(arguments, "")}
     lines = [f"{kind} {name};" for name, kind in declared.items() if kind]
     body = [line for statement in node.body for line in _statement(statement)]
-    head = f"__device__ __forceinline__ auto {node.name}_({', '.join(f'auto {a}' for a in arguments)})"
+    kinds = ", ".join(f"class T_{a}" for a in arguments)
+    taken = ", ".join(f"T_{a} {a}" for a in arguments)
+    head = f"template <{kinds}> __device__ __forceinline__ auto {node.name}_({taken})"
     return "\n    ".join([f"{head} {{", *lines, *body]) + "\n}"
 
 
@@ -131,7 +134,7 @@ def _expression(node: ast.expr) -> str:
             return str(value).lower()
         case ast.Constant(value):
             return _number(value)
-        case ast.Subscript(value, ast.Constant(index)):
+        case ast.Subscript(value, ast.Constant(int(index))):
             return f"{_expression(value)}[{index}]"
         case ast.Tuple(values):
             return f"Tuple<{len(values)}>{{{{{', '.join(map(_expression, values))}}}}}"

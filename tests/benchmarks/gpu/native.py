@@ -20,7 +20,7 @@ def run(linked: Linked, program: str, flags: list[str], *arguments: str) -> list
     with tempfile.TemporaryDirectory() as folder:
         source, binary = Path(folder) / "program.cu", Path(folder) / "program"
         source.write_text(translated(linked.source, linked.parameters.tolist()) + program)
-        command = ["nvcc", "-O3", "-std=c++20", "-arch=native", "-w", *flags, str(source), "-o", str(binary)]
+        command = ["nvcc", "-O3", "-std=c++17", "-arch=native", "-w", *flags, str(source), "-o", str(binary)]
         subprocess.run(command, check=True)
         done = subprocess.run([str(binary), *arguments], check=True, capture_output=True, text=True)
     return [float(word) for word in done.stdout.split()]

@@ -55,7 +55,7 @@ def poles(precision: str) -> np.ndarray:
 
 
 def bricks(kernel: cuda.CudaKernel) -> float:
-    """Samples of bricks against the values at their points; the two fuse multiplications and sums differently."""
+    """Samples of bricks against the values at their points; the two need not fuse the same products."""
     corners = np.array([(0, 0, 0), (8, 0, 16), (16, 8, 8)], np.int32)
     out = np.empty((3, 512), kernel.dtype)
     kernel.bricks(corners, ORIGIN, VOXEL, out)

@@ -22,6 +22,7 @@ from . import native
 SCENES: dict[str, Node] = {"mandelbulb": mandelbulb(iterations=8), "menger": menger(level=5)}
 SIZE, HALF = 512, 1.2
 ORIGIN, VOXEL = (-HALF, -HALF, -HALF), 2 * HALF / SIZE
+LATTICE = Lattice(ORIGIN, VOXEL, (SIZE // 8,) * 3)
 
 
 def dense() -> np.ndarray:
@@ -31,7 +32,7 @@ def dense() -> np.ndarray:
 
 def surface(root: Node) -> np.ndarray:
     """The corners of the bricks that the surface passes through, in that cube."""
-    return sample(cuda.compile_scene(root), root.facts, Lattice(ORIGIN, VOXEL, (SIZE // 8,) * 3)).ijk
+    return sample(cuda.compile_scene(root), root.facts, LATTICE).ijk  # type: ignore[arg-type]
 
 
 def best(run: Callable[[], None], rounds: int = 10) -> float:
@@ -72,11 +73,10 @@ def main() -> None:
         for part, corners in {"dense": dense(), "surface": surface(root)}.items():
             for back_end, (rate, inside) in rates(root, corners).items():
                 print(f"{name} {part:<8} {back_end:<20} {rate:8.2f} G evaluations/s, {inside} inside")
-        lattice = Lattice(ORIGIN, VOXEL, (SIZE // 8,) * 3)
         for back_end, kernel in {"CPU": cpu.compile_scene(root), "CUDA": cuda.compile_scene(root)}.items():
-            sample(kernel, root.facts, lattice)  # type: ignore[arg-type]
+            sample(kernel, root.facts, LATTICE)  # type: ignore[arg-type]
             start = time.perf_counter()
-            bricks = sample(kernel, root.facts, lattice)  # type: ignore[arg-type]
+            bricks = sample(kernel, root.facts, LATTICE)  # type: ignore[arg-type]
             took = time.perf_counter() - start
             counts = f"{len(bricks)} bricks, {bricks.evaluations} evaluations"
             print(f"{name} sampler on {back_end}: {took:.3f} s, {counts}")
