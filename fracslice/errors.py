@@ -33,5 +33,5 @@ class SliceError(FracsliceError):
     """Layers cannot be cut or written."""
 
 
-class Cancelled(FracsliceError):
+class Cancelled(FracsliceError):  # noqa: N818  it is no fault
     """The caller asked to stop."""

@@ -1,0 +1,129 @@
+"""Files are whole or not there, whatever happens on the way."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from fracslice.errors import ExportError
+from fracslice.export import check_target, replacing, write
+from tests.mesh.shapes import cube
+
+
+def test_replaces_what_was_there_and_keeps_its_permissions(tmp_path: Path) -> None:
+    path = tmp_path / "cube.stl"
+    path.write_text("old")
+    path.chmod(0o640)
+    write(cube(), path)
+    assert path.stat().st_size == 84 + 12 * 50
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_new_files_get_the_usual_permissions(tmp_path: Path) -> None:
+    (tmp_path / "plain").write_text("")
+    path = write(cube(), tmp_path / "cube.stl")
+    assert path.stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_links_stay_links(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    link = tmp_path / "link.stl"
+    link.symlink_to(tmp_path / "there" / "real.stl")
+    write(cube(), link)
+    assert link.is_symlink()
+    assert (tmp_path / "there" / "real.stl").stat().st_size == 84 + 12 * 50
+
+
+def fail_half_way(path: Path, stop: type[BaseException]) -> None:
+    with replacing(path) as file:
+        file.write(b"half")
+        raise stop
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, ValueError, MemoryError])
+def test_any_error_leaves_the_old_file_alone(tmp_path: Path, stop: type[BaseException]) -> None:
+    path = tmp_path / "kept"
+    path.write_text("old")
+    with pytest.raises(stop):
+        fail_half_way(path, stop)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (errno.ENOSPC, "disk is full"),
+        (errno.EDQUOT, "disk is full"),
+        (errno.EROFS, "not allowed"),
+        (errno.EIO, "error"),
+    ],
+)
+def test_what_the_file_system_refuses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, words: str
+) -> None:
+    def refuse(_: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    with pytest.raises(ExportError, match=words) as failure:
+        write(cube(), tmp_path / "cube.stl")
+    assert "\n" not in str(failure.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def write_to_full_disk(path: Path) -> None:
+    with replacing(path), open("/dev/full", "wb", buffering=0) as full:
+        full.write(b"x")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full here")
+def test_an_error_of_the_device_itself(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match="disk is full"):
+        write_to_full_disk(tmp_path / "model.stl")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folders_that_cannot_be_written_to(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match="does not exist"):
+        write(cube(), tmp_path / "missing" / "cube.stl")
+    (tmp_path / "folder.stl").mkdir()
+    with pytest.raises(ExportError, match="is a folder"):
+        write(cube(), tmp_path / "folder.stl")
+    with pytest.raises(ExportError, match="does not exist"):
+        check_target(tmp_path / "missing" / "cube.stl")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_is_not_writable(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(ExportError, match="not writable"):
+        write(cube(), tmp_path / "cube.stl")
+
+
+def test_kill_in_mid_write_leaves_no_broken_file(tmp_path: Path) -> None:
+    path = tmp_path / "model.stl"
+    path.write_text("old")
+    code = (
+        "import sys, time; from fracslice.export import replacing\n"
+        "with replacing(sys.argv[1]) as file:\n"
+        "    file.write(b'half' * 100000); file.flush(); print('writing', flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code, path], stdout=subprocess.PIPE) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == b"writing\n"
+        time.sleep(0.1)
+        child.send_signal(signal.SIGKILL)
+    assert path.read_text() == "old"
+    assert [name for name in os.listdir(tmp_path) if not name.endswith(".part")] == ["model.stl"]
+    write(cube(), path)
+    assert path.stat().st_size == 84 + 12 * 50

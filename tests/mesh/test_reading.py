@@ -1,0 +1,141 @@
+"""Model files from elsewhere, good and broken."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fracslice.errors import MeshError
+from fracslice.mesh.check import check
+from fracslice.mesh.reading import read_mesh
+
+from .shapes import cube
+
+TYPES = '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"/>'
+RELATIONS = (
+    '<Relationships><Relationship Target="/3D/box.model" Id="r" '
+    'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>'
+)
+
+
+def box(
+    path: Path, unit: str = "millimeter", build: str = '<item objectid="1"/>', more: str = "", head: str = ""
+) -> Path:
+    """A 3MF of a cube of 10 units."""
+    mesh = cube()
+    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in mesh.vertices)
+    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.triangles)
+    model = (
+        f'{head}<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+        f'<object id="1" type="model"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles>'
+        f"</mesh></object>{more}</resources><build>{build}</build></model>"
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("[Content_Types].xml", TYPES)
+        archive.writestr("_rels/.rels", RELATIONS)
+        archive.writestr("3D/box.model", model)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("unit", "side"), [("millimeter", 10), ("inch", 254), ("micron", 0.01), ("meter", 10000)]
+)
+def test_3mf_units(tmp_path: Path, unit: str, side: float) -> None:
+    assert read_mesh(box(tmp_path / "box.3mf", unit)).size == pytest.approx([side] * 3, rel=1e-6)
+
+
+def test_3mf_transforms_and_components(tmp_path: Path) -> None:
+    pair = (
+        '<object id="2"><components><component objectid="1"/>'
+        '<component objectid="1" transform="1 0 0 0 1 0 0 0 1 20 0 0"/></components></object>'
+    )
+    item = '<item objectid="2" transform="0 1 0 -1 0 0 0 0 2 5 6 7"/>'
+    mesh = read_mesh(box(tmp_path / "pair.3mf", build=item, more=pair))
+    assert mesh.bounds.tolist() == [[-5, 6, 7], [5, 36, 27]]
+    report = check(mesh)
+    assert report.printable
+    assert (report.components, report.volume_mm3) == (2, pytest.approx(4000))
+
+
+def test_3mf_mirror_images_are_not_inside_out(tmp_path: Path) -> None:
+    item = '<item objectid="1" transform="-1 0 0 0 1 0 0 0 1 0 0 0"/>'
+    assert check(read_mesh(box(tmp_path / "mirror.3mf", build=item))).printable
+
+
+def second(content: str) -> dict[str, str]:
+    return {"more": f'<object id="2">{content}</object>', "build": '<item objectid="2"/>'}
+
+
+NO_VERTICES = '<mesh><vertices/><triangles><triangle v1="0" v2="1" v3="2"/></triangles></mesh>'
+NO_NUMBER = '<mesh><vertices><vertex x="1" y="b" z="0"/></vertices></mesh>'
+TWICE = (
+    '<mesh><vertices><vertex x="1" y="2" z="0"/><vertex x="1" y="3" z="0"/></vertices>'
+    '<triangles><triangle v1="0" v2="0" v3="1"/></triangles></mesh>'
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"unit": "parsec"}, "no such unit: parsec"),
+        ({"build": ""}, "asks to build nothing"),
+        ({"build": '<item objectid="9"/>'}, "no such object: 9"),
+        ({"build": '<item objectid="1" transform="1 2 3"/>'}, "not a valid 3MF"),
+        (second('<components><component objectid="2"/></components>'), "no such object"),
+        (second(NO_VERTICES), "does not exist"),
+        (second(TWICE), "names a vertex twice"),
+        (second(NO_NUMBER), "not a valid 3MF"),
+        ({"more": "<object>"}, "not a .*3MF"),
+        ({"head": '<!DOCTYPE m [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]>'}, "document type"),
+    ],
+)
+def test_3mf_that_is_wrong(tmp_path: Path, change: dict[str, str], words: str) -> None:
+    with pytest.raises(MeshError, match=words) as failure:
+        read_mesh(box(tmp_path / "wrong.3mf", **change))
+    assert "\n" not in str(failure.value)
+
+
+def ascii_stl(path: Path) -> Path:
+    lines = ["solid box"]
+    for corners in cube().corners:
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += [f"vertex {x:.6e} {y:.6e} {z:.6e}" for x, y, z in corners]
+        lines += ["endloop", "endfacet"]
+    path.write_text("\n".join([*lines, "endsolid box", ""]))
+    return path
+
+
+def test_ascii_stl(tmp_path: Path) -> None:
+    mesh = read_mesh(ascii_stl(tmp_path / "box.stl"))
+    assert np.array_equal(mesh.corners, cube().corners)
+    assert len(mesh.vertices) == 8
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [lambda text: text[: len(text) // 2], lambda text: text.replace("vertex 0.000000e+00", "vertex zero", 1)],
+)
+def test_ascii_stl_that_is_wrong(tmp_path: Path, spoil) -> None:  # type: ignore[no-untyped-def]
+    path = ascii_stl(tmp_path / "box.stl")
+    path.write_text(spoil(path.read_text()))
+    with pytest.raises(MeshError, match="STL"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize("name", ["model.stl", "model.3mf", "model.ply", "model.obj", "model.glb"])
+def test_nonsense_and_missing_files(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    with pytest.raises(MeshError, match="no such file"):
+        read_mesh(path)
+    path.write_bytes(b"\x00\xff nonsense " * 40)
+    with pytest.raises(MeshError) as failure:
+        read_mesh(path)
+    assert "\n" not in str(failure.value)
+
+
+def test_unknown_kind(tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match=r"known are \.3mf"):
+        read_mesh(tmp_path / "part.step")
