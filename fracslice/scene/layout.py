@@ -11,16 +11,22 @@ from ..formulas import get, names
 from ..formulas.parameters import REQUIRED, Parameter
 from ..formulas.registry import Formula
 from .lengths import Length
+from .view import PARTS, Part
 
 
 @dataclass(frozen=True)
 class Section:
-    """`<scene>` or an element directly under it; described like a `Formula`, so that it reads like one."""
+    """`<scene>` or an element directly under it; described like a `Formula`, so that it reads like one.
+
+    part: the record it becomes, if it is about pictures. many: whether there may be several.
+    """
 
     name: str
     doc: str
     parameters: Mapping[str, Parameter | Length | Version]
     children: tuple[int, int | None] = (0, 0)
+    part: type[Part] | None = None
+    many: bool = False
 
 
 Element = Formula | Section
@@ -56,7 +62,10 @@ SOLID = Section(
     MappingProxyType({"size": Length(REQUIRED, "the longest side of the finished object")}),
     (1, None),
 )
-SECTIONS = {section.name: section for section in (SOLID,)}
+PICTURE = [
+    Section(part.element, part.__doc__ or "", MappingProxyType(part.kinds()), part=part, many=part.many) for part in PARTS
+]
+SECTIONS = {section.name: section for section in (SOLID, *PICTURE)}
 
 
 def formulas() -> list[Formula]:

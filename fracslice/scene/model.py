@@ -13,6 +13,7 @@ from ..errors import SceneError
 from ..formulas import Node, get
 from ..formulas.parameters import AUTO
 from .lengths import parse_length
+from .view import View
 
 DEEPEST = 100
 """How deep elements may be nested: far above any use, far below Python's limit on recursion."""
@@ -21,15 +22,17 @@ TOO_DEEP = f"is nested too deeply: expected at most {DEEPEST} elements inside ea
 
 @dataclass(frozen=True)
 class Scene:
-    """One solid and how large to make it.
+    """One solid, how large to make it, and how to look at it.
 
-    root: the tree of formulas. size_mm: the longest side of the finished object. name: a label, not content.
+    root: the tree of formulas. size_mm: the longest side of the finished object. name: a label, not content. view: for
+    pictures; meshes do not depend on it.
     Raises `SceneError` for a tree that makes no sense as a whole: a twist of something unbounded, say.
     """
 
     root: Node
     size_mm: float
     name: str = field(default="scene", compare=False)
+    view: View = View()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size_mm", parse_length(self.size_mm, "size"))
@@ -54,7 +57,7 @@ class Scene:
         return changed(self, settings)
 
 
-def scene(*elements: Node, size: str | float, name: str = "scene") -> Scene:
+def scene(*elements: Node, size: str | float, name: str = "scene", view: View | None = None) -> Scene:
     """A scene of one or more elements; several are a union.
 
     >>> from fracslice.formulas import sphere, transform
@@ -65,7 +68,7 @@ def scene(*elements: Node, size: str | float, name: str = "scene") -> Scene:
     if not elements:
         raise SceneError("a scene needs at least one element")
     root = elements[0] if len(elements) == 1 else get("union")(*elements)
-    return Scene(root, parse_length(size, "size"), name)
+    return Scene(root, parse_length(size, "size"), name, view or View())
 
 
 def _refuse_too_deep(root: Node) -> None:

@@ -19,6 +19,7 @@ from ..formulas.parameters import REQUIRED
 from .layout import SCENE, SECTIONS, SOLID, Element, Section, formulas
 from .model import DEEPEST, TOO_DEEP, Scene, computing, scene
 from .nearest import hint
+from .view import Part, View
 
 LARGEST_FILE = 16 << 20
 
@@ -44,9 +45,9 @@ def _scene(data: bytes, source: str, name: str) -> Scene:
         raise SceneError(f"{source}: expected a scene file of at most {LARGEST_FILE >> 20} MB")
     if not data.strip():
         raise SceneError(f"{source}: expected a scene, the file is empty")
-    sections = _Builder(source).sections(data)
-    solid = sections[SOLID.name]
-    return scene(*solid.children, size=solid.values["size"], name=name)
+    builder = _Builder(source)
+    solid = builder.sections(data)[SOLID.name]
+    return scene(*solid.children, size=solid.values["size"], name=name, view=View.of(builder.parts))
 
 
 @dataclass
@@ -69,6 +70,7 @@ class _Builder:
         self.source = source
         self.open: list[_Open] = []
         self.done: dict[str, _Open] = {}
+        self.parts: list[Part] = []
         self.formulas = {formula.name: formula for formula in formulas()}
         self.parser = expat.ParserCreate()
         self.parser.buffer_text = True
@@ -138,7 +140,12 @@ class _Builder:
         self.open[-1].children.append(node)
 
     def close_section(self, closed: _Open) -> None:
-        if closed.element is not SCENE:
+        section = closed.element
+        if isinstance(section, Section) and section.part:
+            self.parts.append(section.part(place=closed.place, **closed.values))
+            if not section.many:
+                self.done[section.name] = closed
+        elif section is not SCENE:
             if len(closed.children) < closed.element.children[0]:
                 raise closed.fail("expected at least one element inside it")
             self.done[closed.element.name] = closed

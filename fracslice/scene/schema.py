@@ -54,7 +54,10 @@ def _define(grammar: Tree.Element, element: Element) -> None:
     if element is SCENE:
         inside = Tree.SubElement(body, "interleave")
         for section in SECTIONS.values():
-            Tree.SubElement(inside, "ref", name=section.name)
+            often = inside
+            if section.part:
+                often = Tree.SubElement(inside, "zeroOrMore" if section.many else "optional")
+            Tree.SubElement(often, "ref", name=section.name)
     elif element.children[1] != 0:
         Tree.SubElement(Tree.SubElement(body, "oneOrMore"), "ref", name="formula")
 

@@ -10,9 +10,10 @@ from typing import Any
 
 from ..errors import SceneError
 from ..formulas import Node
-from .layout import SECTIONS, SOLID, Element
+from .layout import PICTURE, SECTIONS, SOLID, Element
 from .model import Scene
 from .nearest import hint
+from .view import View
 
 FORM = "ELEMENT.ATTRIBUTE=VALUE, such as mandelbulb.power=6 or box[2].round=0.1"
 _FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*(\d+)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL)
@@ -61,13 +62,29 @@ def _parsed(source: str) -> Setting:
 def _changed(scene: Scene, setting: Setting) -> Scene:
     if setting.element == SOLID.name:
         return replace(scene, size_mm=setting.value(SOLID))
+    if setting.element in (section.name for section in PICTURE):
+        return replace(scene, view=_relit(scene.view, setting))
     present = Counter(node.formula.name for node in scene.root.walk())
     if setting.element not in present:
-        known = hint(setting.element, present | dict.fromkeys(SECTIONS, 1), "<{}>")
+        known = hint(setting.element, present | {SOLID.name: 1}, "<{}>")
         raise setting.fail(f"the scene has no <{setting.element}>; {known}")
     if setting.number is not None and not 1 <= setting.number <= present[setting.element]:
         raise setting.fail(f"the scene has {present[setting.element]} <{setting.element}>, counted from 1")
     return replace(scene, root=_rebuilt(scene.root, setting, Counter()))
+
+
+def _relit(view: View, setting: Setting) -> View:
+    """The view with one value of its elements changed; film and shading are always there."""
+    section = SECTIONS[setting.element]
+    always = [part for part in (view.film, view.shading) if part not in view.parts]
+    found, counted = [], 0
+    for part in (*view.parts, *always):
+        counted += part.element == section.name
+        meant = part.element == section.name and setting.number in (None, counted)
+        found.append(replace(part, **{setting.attribute: setting.value(section)}) if meant else part)
+    if not counted or not 1 <= (setting.number or 1) <= counted:
+        raise setting.fail(f"the scene has {counted or 'no'} <{section.name}>{', counted from 1' if counted else ''}")
+    return View.of(found)
 
 
 def _rebuilt(node: Node, setting: Setting, seen: Counter[str]) -> Node:

@@ -6,6 +6,7 @@ Every field carries the kind that reads, checks, writes and describes it, as the
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar
 
@@ -27,6 +28,7 @@ class Part:
     """What the records have in common. Raises `SceneError` for a value that its kind refuses."""
 
     element: ClassVar[str]
+    many: ClassVar[bool] = False
     place: str | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -61,9 +63,17 @@ class Camera(Part):
     eye: Triple = described(Vector((2.2, -2.0, 1.4), "where the camera is, in scene units"))
     target: Triple = described(Vector((0.0, 0.0, 0.0), "the point in the middle of the picture"))
     up: Triple = described(Vector((0.0, 0.0, 1.0), "the direction that is up in the picture", nonzero=True))
-    fov: float = described(Number(40.0, "the angle between the picture's upper and lower edge, in degrees", above=0, below=179))
-    aperture: float = described(Number(0.0, "radius of the lens, in scene units: what is out of focus blurs; 0: all is sharp", least=0))
-    focus: float | None = described(Number(None, "distance of what is sharp; without it, that of the target", above=0))
+    fov: float = described(
+        Number(40.0, "the angle between the picture's upper and lower edge, in degrees", above=0, below=179)
+    )
+    aperture: float = described(
+        Number(
+            0.0, "radius of the lens, in scene units: what is out of focus blurs; 0: all is sharp", least=0
+        )
+    )
+    focus: float | None = described(
+        Number(None, "distance of what is sharp; without it, that of the target", above=0)
+    )
 
     def validate(self) -> None:
         if not 0 < math.dist(self.eye, self.target) < math.inf:
@@ -94,7 +104,8 @@ class Camera(Part):
     def moved(self, forward: float = 0.0, right: float = 0.0, up: float = 0.0) -> Camera:
         """Flown by so much, in scene units, looking in the same direction."""
         shift = tuple(
-            forward * f + right * r + up * u for f, r, u in zip(self.forward, self.right, self.above, strict=True)
+            forward * f + right * r + up * u
+            for f, r, u in zip(self.forward, self.right, self.above, strict=True)
         )
         return replace(self, eye=_plus(self.eye, shift), target=_plus(self.target, shift))
 
@@ -120,10 +131,16 @@ class Film(Part):
     width: int = described(Count(1280, "pixels across", least=1, most=32768))
     height: int = described(Count(720, "pixels down", least=1, most=32768))
     samples: int = described(Count(64, "the most samples that a pixel gets", least=1, most=1_000_000))
-    tone: str = described(Choice("filmic", "how bright light is brought into range", ("filmic", "reinhard", "none")))
+    tone: str = described(
+        Choice("filmic", "how bright light is brought into range", ("filmic", "reinhard", "none"))
+    )
     exposure: float = described(Number(0.0, "brighter by so many stops", least=-20, most=20))
-    bloom: float = described(Number(0.0, "the part of bright light that spreads in the lens", least=0, most=1))
-    background: Triple = described(Vector((0.08, 0.08, 0.12), "colour where nothing is, without a sky", least=0, most=1))
+    bloom: float = described(
+        Number(0.0, "the part of bright light that spreads in the lens", least=0, most=1)
+    )
+    background: Triple = described(
+        Vector((0.08, 0.08, 0.12), "colour where nothing is, without a sky", least=0, most=1)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +148,7 @@ class Light(Part):
     """A source of light; there may be several. Without any, a sun and a sky."""
 
     element = "light"
+    many = True
     kind: str = described(Choice("sun", "far away, near, or all around", ("sun", "lamp", "sky")))
     position: Triple = described(
         Vector((-1.0, -2.0, 3.0), "where a lamp is, or the direction in which the sun stands", nonzero=True)
@@ -138,9 +156,16 @@ class Light(Part):
     colour: Triple = described(Vector(WHITE, "red, green and blue; of a sky, at its zenith", least=0, most=1))
     horizon: Triple = described(Vector(WHITE, "of a sky, its colour at the horizon", least=0, most=1))
     ground: Triple = described(Vector((0.3, 0.28, 0.26), "of a sky, its colour from below", least=0, most=1))
-    strength: float = described(Number(1.0, "multiplies the colour; of a lamp, at distance 1", least=0, most=1e6))
+    strength: float = described(
+        Number(1.0, "multiplies the colour; of a lamp, at distance 1", least=0, most=1e6)
+    )
     size: float = described(
-        Number(0.0, "of a lamp its radius, of a sun the angle in degrees it fills: above zero, shadows are soft", least=0, most=90)
+        Number(
+            0.0,
+            "of a lamp its radius, of a sun the angle in degrees it fills: above zero, shadows are soft",
+            least=0,
+            most=90,
+        )
     )
     shadows: str = described(Choice("yes", "whether it is blocked by what is in its way", ("yes", "no")))
 
@@ -151,7 +176,9 @@ class Fog(Part):
 
     element = "fog"
     colour: Triple = described(Vector((0.7, 0.75, 0.8), "red, green and blue", least=0, most=1))
-    density: float = described(Number(0.1, "of light, exp(-density distance) comes through", least=0, most=1e6))
+    density: float = described(
+        Number(0.1, "of light, exp(-density distance) comes through", least=0, most=1e6)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,6 +209,27 @@ class View:
     lights: tuple[Light, ...] = ()
     fog: Fog | None = None
     shading: Shading = Shading()
+
+
+    @classmethod
+    def of(cls, parts: Iterable[Part]) -> View:
+        """The view that so many elements make. Raises `SceneError` if one of a kind stands there twice."""
+        found: dict[str, Any] = {}
+        for part in parts:
+            name = "lights" if isinstance(part, Light) else part.element
+            if not part.many and name in found:
+                raise part.fail("may only stand once in a scene")
+            found[name] = (*found.get(name, ()), part) if part.many else part
+        return cls(**found)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The elements again, without those that say nothing."""
+        single = [part for part in (self.camera, self.film, self.fog, self.shading) if part not in (None, Film(), Shading())]
+        return (*single, *self.lights)  # type: ignore[arg-type]
+
+
+PARTS: tuple[type[Part], ...] = (Camera, Film, Light, Fog, Shading)
 
 
 def _minus(a: Triple, b: Triple) -> Triple:

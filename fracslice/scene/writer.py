@@ -7,7 +7,7 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from ..formulas import Node
-from .layout import SCENE, SOLID, VERSION, Element
+from .layout import SCENE, SECTIONS, SOLID, VERSION, Element
 from .model import Scene
 
 
@@ -21,6 +21,9 @@ def _lines(scene: Scene) -> Iterator[str]:
     yield f"  <{SOLID.name}{_attributes(SOLID, {'size': scene.size_mm})}>"
     yield from _element(scene.root, "    ")
     yield f"  </{SOLID.name}>"
+    for part in scene.view.parts:
+        section = SECTIONS[part.element]
+        yield f"  <{section.name}{_attributes(section, {name: getattr(part, name) for name in section.parameters})}/>"
     yield f"</{SCENE.name}>"
 
 

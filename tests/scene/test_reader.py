@@ -116,7 +116,7 @@ def test_wrong_sizes(size):
         ),
         ("<scene version='2'/>", 'f.xml:1: <scene> version="2": expected 1'),
         ("<scene version='1'/>", "f.xml:1: <scene> expected <solid> inside it"),
-        ("<scene version='1'><box/></scene>", "f.xml:1: <box> cannot stand here; expected <solid>"),
+        ("<scene version='1'><box/></scene>", "f.xml:1: <box> cannot stand here; expected <camera>, <film>, <fog>, <light>, <shading> or <solid>"),
         (
             "<scene version='1'><solid><box/></solid></scene>",
             'f.xml:1: <solid> needs the attribute size="..."',
