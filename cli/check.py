@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from .inputs import is_model, load_model, load_scene
-from .options import job_of, job_options, quiet_option, set_option, threads_option
+from .options import job_of, job_options, length, quiet_option, set_option, threads_option
+from .slice import check_print
 from .summary import found, summary
 from .working import working
 
@@ -16,6 +17,10 @@ from .working import working
 @click.command()
 @click.argument("source", metavar="MODEL|SCENE")
 @click.option("--json", "as_json", is_flag=True, help="All numbers, as JSON.")
+@click.option("--layer", callback=length, metavar="LENGTH", help="Check the layers of a resin print of this layer height.")
+@click.option("--pixel", callback=length, metavar="LENGTH", help="With --layer: pixel size; the printer's, or 0.05mm.")
+@click.option("--printer", "machine", metavar="NAME", help="With --layer: whose bed it has to fit.")
+@click.option("--picture", metavar="FILE.png", help="With --layer: draw the worst layers.")
 @job_options
 @set_option
 @threads_option
@@ -31,13 +36,15 @@ def check(
     quiet: bool,
     **options: Any,
 ) -> int:
-    """Say whether a model file, or the mesh of a scene, would print as it is.
+    """Say whether a model file, or the mesh or the layers of a scene, would print as it is.
 
     The options after --json are for scenes, as for "fracslice mesh". Exits with 1 if it would not print.
     """
     from fracslice.job import make_mesh
     from fracslice.mesh.check import check as examined
 
+    if options["layer"] is not None and not is_model(source):
+        return check_print(source, settings, as_json, threads, quiet, **options)
     if is_model(source):
         refuse_scene_options(context)
         checked = examined(load_model(source), threads=threads)

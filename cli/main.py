@@ -19,6 +19,7 @@ from .formulas import formulas
 from .mesh import mesh
 from .scenes import scenes
 from .show import show
+from .slice import slice_
 from .working import StoppedError
 
 BAD_INPUT = (SceneError, VolumeError, ExportError, SliceError)
@@ -41,7 +42,7 @@ def commands(context: click.Context) -> None:
         context.exit(USAGE)
 
 
-for command in (mesh, check, show, formulas, scenes):
+for command in (mesh, slice_, check, show, formulas, scenes):
     commands.add_command(command)
 
 

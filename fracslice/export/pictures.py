@@ -53,7 +53,7 @@ def _prepared(folder: Path, said: bytes) -> int:
 
 
 def _pictures(run: SliceRun, start: int) -> Iterator[bytes]:
-    return run.slicer.map(lambda layer: png.encode(run.screen.picture(layer)), start)
+    return run.slicer.map(lambda layer: png.encode(run.screen.picture(layer)), range(start, run.layers))
 
 
 def write_sl1(run: SliceRun, path: str | Path) -> Path:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
 from typing import TypeVar
 
 import numpy as np
@@ -88,8 +89,8 @@ class Slicer:
     stack: Stack
     work: Work = field(default_factory=Work)
 
-    def map(self, make: Callable[[Layer], T], start: int = 0) -> Iterator[T]:
-        """``make(layer)`` of every layer from `start` on, in order.
+    def map(self, make: Callable[[Layer], T], layers: Sequence[int] | None = None) -> Iterator[T]:
+        """``make(layer)`` of every layer, or of the chosen ones, which ascend.
 
         `make` runs in worker threads; results do not depend on their number. At most a few slabs are held at a time.
         Raises `SliceError`, `Cancelled`, or what `make` raises.
@@ -97,34 +98,30 @@ class Slicer:
         root, shape = self.stack.root, self.stack.shape
         exact = compile_scene(root, "float64")
         sampler = Sampler(compile_scene(root), root.facts, self.stack.frame, (shape[0] + 1, shape[1] + 1))
-        total = len(self.stack.z)
+        chosen = range(len(self.stack.z)) if layers is None else layers
 
-        def slab(first: int) -> list[T]:
+        def slab(group: list[int]) -> list[T]:
             self.work.check()
-            z = self.stack.z[first : first + SLAB]
-            tiles, spent = sampler.sample(z)
+            tiles, spent = sampler.sample(self.stack.z[group])
             made = []
-            for k in range(max(start - first, 0), len(z)):
+            for place, index in enumerate(group):
                 self.work.check()
-                made.append(make(Layer(self.stack, first + k, spent / len(z), tiles, k, exact)))
+                made.append(make(Layer(self.stack, index, spent / len(group), tiles, place, exact)))
             return made
 
+        groups = [list(g) for _, g in groupby(chosen, lambda index: index // SLAB)]
+        return self._in_order(slab, groups)
+
+    def _in_order(self, slab: Callable[[list[int]], list[T]], groups: list[list[int]]) -> Iterator[T]:
         ahead: deque[Future[list[T]]] = deque()
-        firsts = iter(range(start - start % SLAB, total, SLAB))
-        done = start
+        waiting = iter(groups)
         with ThreadPoolExecutor(self.work.threads) as pool:
             try:
-                for first in firsts:
-                    ahead.append(pool.submit(slab, first))
-                    if len(ahead) <= self.work.threads + 1:
-                        continue
-                    for result in ahead.popleft().result():
-                        yield result
-                        done += 1
-                    self.work.progress("slicing", done / total)
-                while ahead:
+                for done in range(len(groups)):
+                    while len(ahead) <= self.work.threads and (group := next(waiting, None)):
+                        ahead.append(pool.submit(slab, group))
                     yield from ahead.popleft().result()
-                self.work.progress("slicing", 1.0)
+                    self.work.progress("slicing", (done + 1) / len(groups))
             except BaseException:
                 for future in ahead:
                     future.cancel()

@@ -1,0 +1,146 @@
+"""fracslice slice: a scene becomes the layers of a print. And what "fracslice check --layer" does."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .inputs import load_scene
+from .options import length, quiet_option, set_option, threads_option
+from .working import working
+
+if TYPE_CHECKING:
+    from fracslice.scene import Scene
+    from fracslice.slicing import SliceJob
+    from fracslice.slicing.checks import PrintReport
+    from fracslice.slicing.printers import Printer
+
+LAYER, PIXEL_MM = "0.05mm", 0.05
+
+
+def signed_length(context: click.Context, option: click.Parameter, text: str) -> float:
+    """The option's value in mm; it may be negative, or 0."""
+    if text.strip() == "0":
+        return 0.0
+    size = length(context, option, text.strip().removeprefix("-"))
+    assert size is not None
+    return -size if text.strip().startswith("-") else size
+
+
+@click.command("slice")
+@click.argument("source", metavar="SCENE")
+@click.option("-o", "--output", required=True, metavar="OUT", help="A file or folder; its ending names the format.")
+@click.option("--format", "form", metavar="NAME", help="png, sl1, 3mf, svg, slic3r, cli, cli-binary or json.")
+@click.option("--size", callback=length, metavar="LENGTH", help="The longest side, such as 80mm.")
+@click.option("--layer", callback=length, default=LAYER, metavar="LENGTH", help="Layer height; 0.05mm by default.")
+@click.option("--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's, or 0.05mm.")
+@click.option("--printer", "machine", metavar="NAME", help='Whose screen the layers are for; "list" shows them.')
+@click.option("--up", nargs=3, type=float, metavar="X Y Z", help="The scene's direction that is up; 0 0 1 by default.")
+@click.option("--compensation", callback=signed_length, default="0", metavar="LENGTH", help="Move all outlines outwards.")
+@click.option("--gamma", type=float, default=1.0, help="Of the grey levels.")
+@click.option("--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default.")
+@click.option("--exposure", nargs=2, type=float, default=(8.0, 35.0), metavar="S S", help="Seconds: each, the first.")
+@click.option("--preview", metavar="FILE", help="A contact sheet (.png) or an animation (.webp) of the layers.")
+@set_option
+@threads_option
+@quiet_option
+def slice_(source: str, output: str, form: str | None, settings: tuple[str, ...], threads: int, quiet: bool, **options: Any) -> int:
+    """Cut SCENE into the layers of a print, straight from its field.
+
+    An interrupted job goes on when it is started again (PNG folders and SL1 archives).
+    """
+    from fracslice.export import check_target
+    from fracslice.export.jobs import SliceRun
+    from fracslice.export.slices import slice_format, write_slices
+    from fracslice.slicing import plan_stack
+    from fracslice.slicing.raster import Screen
+
+    if options["machine"] == "list":
+        return list_printers()
+    slice_format(output, form)
+    preview = options["preview"]
+    if preview:
+        if Path(preview).suffix.lower() not in (".png", ".webp"):
+            raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
+        check_target(preview)
+    scene = load_scene(source, settings)
+    machine = chosen_printer(options["machine"])
+    with working(threads, quiet) as work:
+        stack = plan_stack(scene.root, job(scene, machine, options), work)
+        screen = Screen(stack, machine, options["compensation"], options["gamma"], options["mirror"])
+        about = {"Title": scene.name, "scene_hash": scene.hash}
+        write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about), output, form)
+        if preview:
+            write_preview(stack, preview, work)
+    if not quiet:
+        size = " x ".join(f"{s:.2f}" for s in stack.size)
+        rows, columns = screen.shape
+        click.echo(f"{output}: {len(stack.z)} layers of {columns} x {rows} pixels, {size} mm")
+    return 0
+
+
+def list_printers() -> int:
+    from fracslice.slicing.printers import PRINTERS
+
+    for p in PRINTERS.values():
+        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {' x '.join(f'{r:g}' for r in p.room)} mm")
+    return 0
+
+
+def chosen_printer(name: str | None) -> Printer | None:
+    from fracslice.slicing.printers import printer
+
+    return None if name is None else printer(name)
+
+
+def job(scene: Scene, machine: Printer | None, options: dict[str, Any]) -> SliceJob:
+    """What the options ask for."""
+    from fracslice.slicing import SliceJob
+
+    pixel = options.get("pixel")
+    if pixel is not None and machine is not None:
+        raise click.UsageError("--pixel and --printer: expected one of them")
+    given = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
+    return SliceJob(options["size"] or scene.size_mm, options["layer"], given, tuple(options.get("up") or (0.0, 0.0, 1.0)))
+
+
+def write_preview(stack: Any, path: str, work: Any) -> None:
+    from fracslice.export import replacing
+    from fracslice.slicing.preview import animation, contact_sheet
+
+    with replacing(path) as file:
+        (contact_sheet if path.lower().endswith(".png") else animation)(stack, file, work)
+
+
+def check_print(source: str, settings: tuple[str, ...], as_json: bool, threads: int, quiet: bool, **options: Any) -> int:
+    """Says whether the layers of a scene would print; the exit status."""
+    from fracslice.export import check_target, replacing
+    from fracslice.slicing import plan_stack
+    from fracslice.slicing.checks import check_layers
+    from fracslice.slicing.preview import worst_layers
+
+    if options["picture"]:
+        check_target(options["picture"])
+    scene = load_scene(source, settings)
+    machine = chosen_printer(options["machine"])
+    with working(threads, quiet) as work:
+        stack = plan_stack(scene.root, job(scene, machine, options), work)
+        report = check_layers(stack, printer=machine, work=work)
+        if options["picture"]:
+            with replacing(options["picture"]) as file:
+                worst_layers(stack, report.worst, file, work)
+    click.echo(json.dumps(report.as_dict(), indent=2) if as_json else told(source, report))
+    return 1 if report.problems else 0
+
+
+def told(source: str, report: PrintReport) -> str:
+    """A line of numbers, then one for each reason not to print."""
+    size = " x ".join(f"{s:.2f}" for s in report.size)
+    first = f"{source}: {report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
+    if not report.problems:
+        return f"{first}, would print"
+    return os.linesep.join([f"{first}, would not print:", *(f"  {p}" for p in report.problems)])
