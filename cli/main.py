@@ -12,17 +12,18 @@ from typing import NoReturn
 
 import click
 
-from fracslice.errors import ExportError, FracsliceError, SceneError, SliceError, VolumeError
+from fracslice.errors import ExportError, FracsliceError, RenderError, SceneError, SliceError, VolumeError
 
 from .check import check
 from .formulas import formulas
 from .mesh import mesh
+from .render import render
 from .scenes import scenes
 from .show import show
 from .slice import slice_
 from .working import StoppedError
 
-BAD_INPUT = (SceneError, VolumeError, ExportError, SliceError)
+BAD_INPUT = (SceneError, RenderError, VolumeError, ExportError, SliceError)
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 
 
@@ -42,7 +43,7 @@ def commands(context: click.Context) -> None:
         context.exit(USAGE)
 
 
-for command in (mesh, slice_, check, show, formulas, scenes):
+for command in (mesh, render, slice_, check, show, formulas, scenes):
     commands.add_command(command)
 
 

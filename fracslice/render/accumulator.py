@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -56,13 +57,10 @@ class Accumulator:
         worst = np.max([padded[j : j + self.height, i : i + self.width] for j in range(3) for i in range(3)], 0)
         return np.asarray(worst > tolerance)
 
-    def save(self, path: str | Path) -> None:
-        """Writes it to an .npz file, from which rendering goes on as if it had not stopped."""
-        from ..export.files import replacing
-
-        with replacing(path) as file:
-            shape = np.array([self.width, self.height, self.passes])
-            np.savez(file, sums=self.sums, shape=shape, key=np.array(self.key))
+    def save(self, file: BinaryIO) -> None:
+        """Writes it as an .npz file, from which rendering goes on as if it had not stopped."""
+        shape = np.array([self.width, self.height, self.passes])
+        np.savez(file, sums=self.sums, shape=shape, key=np.array(self.key))
 
     @classmethod
     def load(cls, path: str | Path, key: str) -> Accumulator:

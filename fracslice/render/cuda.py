@@ -50,5 +50,14 @@ class CudaTracer:
     def add_on_device(self, sums: Any, pixels: Any, index: int, limit: int) -> None:
         """`add` on arrays of the GPU. Copies neither and does not wait for the GPU."""
         q = self._cuda.to_device(np.asarray(point(index, self.frame.samples), np.int32))
-        given = (self._parameters, q, self._starts, pixels, sums, self.width, self.dtype.type(limit), self.blocks)
+        given = (
+            self._parameters,
+            q,
+            self._starts,
+            pixels,
+            sums,
+            self.width,
+            self.dtype.type(limit),
+            self.blocks,
+        )
         launched(self._loops.tile, pixels.size, *given)

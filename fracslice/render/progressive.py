@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from ..errors import RenderError
 from ..formulas.registry import Node
 from ..scene.view import View
 from ..work import Work
@@ -29,7 +32,8 @@ class Pass:
     """The picture after one more pass.
 
     image: float32 [height, width, 3], linear light. number: of the pass, from 1. samples: per pixel, on average. error:
-    the root mean square of the pixels' standard errors, as shown. active: the part of the pixels that is not yet clean.
+    the root mean square of the pixels' standard errors, as shown. active: the part of the pixels that this pass was about.
+    rate: samples a second.
     """
 
     image: np.ndarray
@@ -37,6 +41,14 @@ class Pass:
     samples: float
     error: float
     active: float
+    rate: float
+
+
+def chosen(device: str) -> str:
+    """The device to use: "cpu". Raises `RenderError` where another is asked for."""
+    if device == "cuda":
+        raise RenderError("device cuda: pictures are rendered on the CPU only; leave --device out")
+    return "cpu"
 
 
 class Renderer:
@@ -46,9 +58,17 @@ class Renderer:
     `SceneError` for a view that cannot be rendered.
     """
 
-    def __init__(self, root: Node, view: View, size: tuple[int, int] | None = None, work: Work | None = None) -> None:
+    def __init__(
+        self,
+        root: Node,
+        view: View,
+        size: tuple[int, int] | None = None,
+        work: Work | None = None,
+        device: str = "auto",
+    ) -> None:
         self.width, self.height = size or (view.film.width, view.film.height)
         self.work = work or Work()
+        self.device = chosen(device)
         self.setting = settle(root, view, (self.width, self.height))
         dtype = np.dtype(self.setting.precision)
         self.tracer = CpuTracer(self._frame(0), dtype, self.width, self.height)
@@ -64,9 +84,9 @@ class Renderer:
         text = "".join(n.source + repr(n.parameters.tolist()) for n in numbers)
         return hashlib.sha256(f"{self.width} {self.height} {what.precision} {text}".encode()).hexdigest()[:20]
 
-    def resume(self, accumulator: Accumulator) -> None:
-        """Goes on with what was accumulated earlier: `Accumulator.load(path, renderer.key)`."""
-        self.accumulator = accumulator
+    def resume(self, path: str | Path) -> None:
+        """Goes on with a file that `accumulator.save` wrote. Raises `RenderError` if it is of another picture."""
+        self.accumulator = Accumulator.load(path, self.key)
 
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
         """Yields the picture after every pass, until all pixels have so many samples or are within the tolerance.
@@ -95,11 +115,12 @@ class Renderer:
         number = self.accumulator.passes
         limit = STEPS + STEPS * (GROWTH - 1) * min(number, GROWN) // GROWN
         self._aim(number, limit)
+        start = time.perf_counter()
         sums = self.accumulator.sums.copy()
         self.tracer.add(sums, pixels, max(number - 1, 0), limit, self.work)
         self.accumulator.sums = sums
         self.accumulator.passes += 1
-        return self._seen(len(pixels))
+        return self.seen(len(pixels), len(pixels) / (time.perf_counter() - start))
 
     def _aim(self, number: int, limit: int) -> None:
         """Points the tracer at the tree of this pass, and looks ahead once for each."""
@@ -113,7 +134,8 @@ class Renderer:
         what = self.setting
         return link_frame(what.root(number), what.view, what.camera, what.optics, BLOCK)
 
-    def _seen(self, traced: int) -> Pass:
+    def seen(self, traced: int = 0, rate: float = 0.0) -> Pass:
+        """The picture as it is, after a pass over so many pixels."""
         found, image = self.accumulator, self.accumulator.mean()
         if found.passes == 1:
             y, x = np.mgrid[: self.height, : self.width] // COARSE * COARSE
@@ -121,4 +143,4 @@ class Renderer:
         errors = found.errors()
         known = errors[np.isfinite(errors)]
         error = float(np.sqrt(np.mean(known.astype(np.float64) ** 2))) if known.size else float("inf")
-        return Pass(image, found.passes, float(found.counts.mean()), error, traced / errors.size)
+        return Pass(image, found.passes, float(found.counts.mean()), error, traced / errors.size, rate)

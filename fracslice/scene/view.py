@@ -85,7 +85,7 @@ class Camera(Part):
     def around(cls, box: Box) -> Camera:
         """A camera that has the whole of a finite box in view."""
         reach = math.hypot(*box.size) / 2
-        eye = _along(box.centre, _unit((2.2, -2.0, 1.4)), reach / math.sin(math.radians(20)) * 0.9)
+        eye = _along(box.centre, _unit((2.2, -2.0, 1.4)), reach / math.sin(math.radians(20)) * 0.66)
         return cls(eye=eye, target=box.centre)
 
     @property

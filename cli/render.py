@@ -1,0 +1,137 @@
+"""fracslice render: a scene becomes a picture."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .inputs import load_scene
+from .options import quiet_option, set_option, threads_option
+from .working import working
+
+if TYPE_CHECKING:
+    from fracslice.render import Pass, Renderer
+    from fracslice.scene import Scene
+
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def pixels(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int] | None:
+    """A size such as 1280x720."""
+    if value is None:
+        return None
+    match = re.fullmatch(r"\s*(\d{1,5})\s*x\s*(\d{1,5})\s*", value)
+    if not match or not all(1 <= int(n) <= 32767 for n in match.groups()):
+        raise click.BadParameter(f"{value!r}: expected pixels across and down, such as 1280x720, from 1 to 32767")
+    return int(match[1]), int(match[2])
+
+
+def duration(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
+    """A time such as 10s, in seconds."""
+    if value is None:
+        return None
+    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", value)
+    if not match or not 0 < float(match[1]) < 1e6:
+        raise click.BadParameter(f"{value!r}: expected a time above zero, such as 10s, 2min or 1h")
+    return float(match[1]) * SECONDS[match[2] or "s"]
+
+
+@click.command()
+@click.argument("source", metavar="SCENE")
+@click.option("-o", "--output", required=True, metavar="FILE", help="A .png file, or .tif for linear 32-bit floats.")
+@click.option("--samples", type=click.IntRange(1, 1_000_000), metavar="N", help="The most samples of a pixel.")
+@click.option("--size", callback=pixels, metavar="WxH", help="Pixels across and down, such as 1280x720.")
+@click.option("--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", help="What computes it.")
+@click.option("--time", "limit", callback=duration, metavar="TIME", help="Stop after 10s, 2min or 1h.")
+@click.option("--bits", type=click.Choice(["8", "16"]), default="8", help="Of a PNG file, per colour.")
+@click.option("--pass-images", type=click.Path(file_okay=False), metavar="DIR", help="Keep the picture of every pass.")
+@click.option("--state", type=click.Path(dir_okay=False), metavar="FILE.npz", help="Go on from it, and save to it.")
+@set_option
+@threads_option
+@quiet_option
+def render(
+    source: str,
+    output: str,
+    samples: int | None,
+    size: tuple[int, int] | None,
+    device: str,
+    limit: float | None,
+    bits: str,
+    pass_images: str | None,
+    state: str | None,
+    settings: tuple[str, ...],
+    threads: int,
+    quiet: bool,
+) -> None:
+    """Render a picture of SCENE, as its camera, lights and materials say."""
+    from fracslice.export import check_target
+    from fracslice.export.images import check_image
+    from fracslice.render import Renderer
+
+    check_image(output)
+    check_target(output)
+    scene = load_scene(source, settings)
+    with working(threads, quiet) as work:
+        renderer = Renderer(scene.root, scene.view, size, work, device)
+        if state and Path(state).exists():
+            renderer.resume(state)
+        last = None
+        for last in timed(renderer, samples, limit):
+            work.progress(shown(last), fraction(last, renderer, samples))
+            if pass_images:
+                Path(pass_images).mkdir(parents=True, exist_ok=True)
+                save(Path(pass_images) / f"pass{last.number:04}.png", last, scene, "8")
+            if state:
+                save_state(renderer, state)
+    if last is None:
+        last = renderer.seen()
+    save(output, last, scene, bits)
+    if not quiet:
+        height, width, _ = last.image.shape
+        click.echo(f"{output}: {width} x {height} pixels, {shown(last)}, {renderer.setting.precision}, {renderer.device}")
+
+
+def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
+    """The passes that fit into the time; at least one."""
+    start = time.monotonic()
+    for done in renderer.passes(samples):
+        yield done
+        if limit is not None and time.monotonic() - start > limit:
+            return
+
+
+def shown(done: Pass) -> str:
+    """How far the picture is, in words."""
+    rate = f", {done.rate / 1e6:.2f} M samples/s" if done.rate else ""
+    return f"{done.samples:.1f} samples a pixel, error {done.error:.2g}{rate}"
+
+
+def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
+    return done.number / ((samples or renderer.setting.view.film.samples) + 1)
+
+
+def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:
+    """Writes a picture with what it is of."""
+    from fracslice.export import application
+    from fracslice.export.images import write_image
+    from fracslice.render import develop
+
+    text = {
+        "Title": scene.name,
+        "Software": application(),
+        "scene_hash": scene.hash,
+        "samples": f"{done.samples:.2f}",
+    }
+    write_image(path, develop(done.image, scene.view.film, scene.view.shading.mode), done.image, int(bits), text)
+
+
+def save_state(renderer: Renderer, path: str) -> None:
+    from fracslice.export import replacing
+
+    with replacing(path) as file:
+        renderer.accumulator.save(file)
