@@ -62,7 +62,7 @@ def contours(tiles: Tiles, k: int, z: float, stack: Stack, exact: CpuKernel | No
     edges, ends = np.empty((size, 3), np.int32), np.empty((size, 2))
     marching.number_edges(*words, k, ids, edges, ends)
     following = np.empty(size, np.int32)
-    marching.link(*words, k, ids, following)
+    marching.link(tiles.where, tiles.inside, tiles.cross, k, ids, following)
     order, starts = np.empty(size, np.int32), np.empty(size + 1, np.int32)
     starts = starts[: marching.walk(following, order, starts) + 1]
     along = ends[:, 0] / (ends[:, 0] - ends[:, 1])

@@ -49,20 +49,17 @@ class Layer:
 
     @cached_property
     def _painted(self) -> tuple[np.ndarray, float, int]:
-        ny, nx = self.stack.shape
+        (ny, nx), tiles = self.stack.shape, self.tiles
         words = np.zeros((ny, -(-nx // 8)), np.uint64)
-        area, partly = marching.paint(*self._words, self.place, words)
+        area, partly = marching.paint(tiles.where, tiles.inside, tiles.cross, self.place, words)
         return words.view(np.uint8)[:, :nx], area, partly
-
-    @property
-    def _words(self) -> tuple[np.ndarray, ...]:
-        return self.tiles.where, self.tiles.inside, self.tiles.values
 
     @property
     def coverage(self) -> np.ndarray:
         """How much of each pixel is inside, uint8 [ny, nx], 255 wholly; row 0 is the front (lowest y).
 
-        The area that the contour, its crossings interpolated linearly, cuts from each pixel.
+        The area that the polygon through the crossings of the pixel's sides cuts from it. Crossings are interpolated, for
+        fields with weak insides from three values, for others from two.
         """
         return self._painted[0]
 

@@ -1,8 +1,7 @@
 """Marching squares on the tiles of one layer: coverage of pixels, and crossings linked to contours.
 
 A pixel is the cell between four samples. Corners and edges are counted counter-clockwise from the lower left corner and the
-lower edge; edge c lies between the corners c and c + 1. A cell whose corners alternate is joined or parted by the saddle
-value of the bilinear patch (Nielson and Hamann 1991, "The asymptotic decider").
+lower edge; edge c lies between the corners c and c + 1.
 """
 
 from __future__ import annotations
@@ -37,17 +36,70 @@ def at(where, values, k, y, x, t, r, c):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def corners(where, values, k, y, x, t, bit):  # type: ignore[no-untyped-def]
-    """The values at the corners 0 to 3 of a cell."""
-    r, c = bit >> 3, bit & 7
-    if r < 7 and c < 7:
-        return values[t, bit], values[t, bit + 1], values[t, bit + 9], values[t, bit + 8]
-    return (
-        values[t, bit],
-        at(where, values, k, y, x, t, r, c + 1),
-        at(where, values, k, y, x, t, r + 1, c + 1),
-        at(where, values, k, y, x, t, r + 1, c),
-    )
+def crossing_words(where, inside, k, y, x, t):  # type: ignore[no-untyped-def]
+    """The samples of a tile whose edge to the right crosses the contour, and those whose edge upwards does."""
+    s = inside[t]
+    right = s ^ rights(s, neighbour_word(where, inside, k, y, x + 1))
+    return right, s ^ uppers(s, neighbour_word(where, inside, k, y + 1, x))
+
+
+@njit(cache=True, nogil=True)
+def cross_edges(where, place, inside, values, count, cross, edges):  # type: ignore[no-untyped-def]
+    """Where each edge of all tiles is crossed, by linear interpolation.
+
+    cross: float32 [tiles, 128], filled with the share of the edge before the crossing: of the edge from each sample to its
+    right, then of the one upwards. edges: int64, filled with 128 * tile + number of the edge; returns how many.
+    """
+    n = 0
+    for t in range(count):
+        k, y, x = place[t]
+        words = crossing_words(where, inside, k, y, x, t)
+        for up in range(2):
+            word = words[up]
+            while word:
+                bit = lowest(word)
+                word &= word - ONE
+                a, b = values[t, bit], at(where, values, k, y, x, t, (bit >> 3) + up, (bit & 7) + 1 - up)
+                cross[t, 64 * up + bit] = a / (a - b)
+                edges[n] = 128 * t + 64 * up + bit
+                n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def halve(where, place, values, edges, middle, cross):  # type: ignore[no-untyped-def]
+    """Better crossings from the field's values at the middles of edges, for fields whose inside values are too small.
+
+    A middle that is outside makes a line with the end that is outside; both are distances.
+    """
+    for n in range(len(edges)):
+        t, up, bit = edges[n] >> 7, (edges[n] >> 6) & 1, edges[n] & 63
+        k, y, x = place[t]
+        a, b = values[t, bit], at(where, values, k, y, x, t, (bit >> 3) + up, (bit & 7) + 1 - up)
+        out, into, m = max(a, b), min(a, b), middle[n]
+        if m < 0:
+            share = 0.5 * out / (out - m)
+        elif out > m:
+            share = min(0.5 * out / (out - m), 1.0)
+        else:
+            share = 0.5 + 0.5 * m / (m - into)
+        cross[t, edges[n] & 127] = share if a >= 0 else 1 - share
+
+
+@njit(cache=True, nogil=True)
+def shares(where, cross, k, y, x, t, bit):  # type: ignore[no-untyped-def]
+    """For each corner of a cell, and the edges after and before it, the share of the edge before its crossing as seen from
+    the corner: eight numbers; those of edges that are not crossed have no meaning."""
+    right = upper = t
+    if bit & 7 == 7:
+        right = max(where[k, y, x + 1], 0)
+    if bit >> 3 == 7:
+        upper = max(where[k, y + 1, x], 0)
+    one = np.float32(1)
+    e0, e3 = cross[t, bit], cross[t, 64 + bit]
+    e1 = cross[right, 64 + (bit & 56) + ((bit + 1) & 7)]
+    e2 = cross[upper, (bit + 8) & 63]
+    return e0, e3, e1, one - e0, one - e2, one - e1, one - e3, e2
 
 
 @njit(cache=True, nogil=True)
@@ -60,39 +112,36 @@ def signs(words, bit):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def joined(v):  # type: ignore[no-untyped-def]
-    """Whether the inside corners of an alternating cell are connected."""
-    below = v[0] + v[2] - v[1] - v[3]
-    return (v[0] * v[2] - v[1] * v[3]) / below < 0 if below != 0 else False
+def joined(e, q):  # type: ignore[no-untyped-def]
+    """Whether the inside corners q and q + 2 of an alternating cell are connected: if more of its border is inside."""
+    return e[2 * q] + e[2 * q + 1] + e[2 * q + 4] + e[2 * q + 5] > 2
 
 
 @njit(cache=True, nogil=True)
-def cut(v, q):  # type: ignore[no-untyped-def]
-    """The area of the triangle that the contour cuts off at corner q, its crossings by linear interpolation."""
-    a = v[q]
-    return (a / (a - v[(q + 1) & 3])) * (a / (a - v[(q + 3) & 3])) / 2
+def cut(e, q):  # type: ignore[no-untyped-def]
+    """The area of the triangle that the contour cuts off at corner q."""
+    return e[2 * q] * e[2 * q + 1] / 2
 
 
 @njit(cache=True, nogil=True)
-def cell_area(v, inside):  # type: ignore[no-untyped-def]
-    """The inside part of a mixed cell's area. v: its corners' values; inside: their signs as bits."""
+def cell_area(e, inside):  # type: ignore[no-untyped-def]
+    """The inside part of a mixed cell's area. e: its `shares`; inside: the signs of its corners as bits."""
     if inside == 5 or inside == 10:
         q = 0 if inside == 5 else 1
-        if joined(v):
-            return 1 - cut(v, q + 1) - cut(v, (q + 3) & 3)
-        return cut(v, q) + cut(v, q + 2)
+        if joined(e, q):
+            return 1 - cut(e, q + 1) - cut(e, (q + 3) & 3)
+        return cut(e, q) + cut(e, q + 2)
     for q in range(4):
         if inside == 1 << q:
-            return cut(v, q)
+            return cut(e, q)
         if inside == 15 - (1 << q):
-            return 1 - cut(v, q)
+            return 1 - cut(e, q)
     q = 0 if inside == 3 else 1 if inside == 6 else 2 if inside == 12 else 3
-    a, b, c, d = v[q], v[(q + 1) & 3], v[(q + 2) & 3], v[(q + 3) & 3]
-    return (a / (a - d) + b / (b - c)) / 2
+    return (e[2 * q + 1] + e[2 * ((q + 1) & 3)]) / 2
 
 
 @njit(cache=True, nogil=True)
-def paint(where, inside, values, k, image):  # type: ignore[no-untyped-def]
+def paint(where, inside, cross, k, image):  # type: ignore[no-untyped-def]
     """Writes the coverage of one layer to a zeroed image; 255 is wholly inside.
 
     image: uint64 [ny, tx], eight pixels a word, row 0 lowest. Returns (inside area in pixels, number of partly covered
@@ -119,7 +168,7 @@ def paint(where, inside, values, k, image):  # type: ignore[no-untyped-def]
                 mixed &= mixed - ONE
                 r = bit >> 3
                 if r < rows:
-                    a = cell_area(corners(where, values, k, y, x, t, bit), signs(words, bit))
+                    a = cell_area(shares(where, cross, k, y, x, t, bit), signs(words, bit))
                     grey[y0 + r, 8 * (x - 1) + (bit & 7)] = np.uint8(255 * a + 0.5)
                     area += a
                     partly += 1
@@ -140,16 +189,14 @@ def number_edges(where, inside, values, k, ids, points, ends):  # type: ignore[n
             t = where[k, y, x]
             if t < 0:
                 continue
-            s = inside[t]
-            crossing_right = s ^ rights(s, neighbour_word(where, inside, k, y, x + 1))
-            crossing_up = s ^ uppers(s, neighbour_word(where, inside, k, y + 1, x))
-            crossing = crossing_right | crossing_up
+            words = crossing_words(where, inside, k, y, x, t)
+            crossing = words[0] | words[1]
             while crossing:
                 bit = lowest(crossing)
                 crossing &= crossing - ONE
                 r, c = bit >> 3, bit & 7
                 for up in range(2):
-                    if ((crossing_up if up else crossing_right) >> np.uint64(bit)) & ONE:
+                    if (words[up] >> np.uint64(bit)) & ONE:
                         if n < len(points):
                             ids[t, 64 * up + bit] = n
                             points[n, 0], points[n, 1], points[n, 2] = 8 * (x - 1) + c, 8 * (y - 1) + r, up
@@ -159,7 +206,7 @@ def number_edges(where, inside, values, k, ids, points, ends):  # type: ignore[n
 
 
 @njit(cache=True, nogil=True)
-def link(where, inside, values, k, ids, following):  # type: ignore[no-untyped-def]
+def link(where, inside, cross, k, ids, following):  # type: ignore[no-untyped-def]
     """For each numbered edge the one that follows on its contour, the inside to the left; int32 [n]."""
     e = np.empty(4, np.int32)
     for y in range(1, where.shape[1] - 1):
@@ -178,13 +225,13 @@ def link(where, inside, values, k, ids, following):  # type: ignore[no-untyped-d
                 e[0], e[3] = ids[t, bit], ids[t, 64 + bit]
                 e[1] = ids[right, 64 + 8 * r + ((c + 1) & 7)] if right >= 0 else -1
                 e[2] = ids[upper, 8 * ((r + 1) & 7) + c] if upper >= 0 else -1
-                _link_cell(corners(where, values, k, y, x, t, bit), signs(words, bit), e, following)
+                _link_cell(shares(where, cross, k, y, x, t, bit), signs(words, bit), e, following)
 
 
 @njit(cache=True, nogil=True)
-def _link_cell(v, inside, e, following):  # type: ignore[no-untyped-def]
+def _link_cell(share, inside, e, following):  # type: ignore[no-untyped-def]
     """Where the outline of the cell's inside, counter-clockwise, leaves along one edge, it comes back along another."""
-    alone = (inside == 5 or inside == 10) and not joined(v)
+    alone = (inside == 5 and not joined(share, 0)) or (inside == 10 and not joined(share, 1))
     for q in range(4):
         g = (q + 1) & 3
         if (inside >> q) & 1 and not (inside >> g) & 1:

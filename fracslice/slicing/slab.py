@@ -19,6 +19,7 @@ import numpy as np
 from ..errors import SliceError
 from ..formulas.registry import Facts
 from ..kernel import CpuKernel
+from . import marching
 from . import tiles as t
 from .tiles import INSIDE, OUTSIDE, TILE, Tiles
 
@@ -46,14 +47,14 @@ class Sampler:
         Raises `SliceError` where the solid reaches the rim of the lattice.
         """
         ty, tx = (-(-n // TILE) for n in self.shape)
-        tiles = Tiles.of(len(z), ty, tx)
+        tiles = Tiles.empty(len(z), ty, tx)
         spent = self._coarse(tiles, z)
         for size in (8, 4, 2):
             spent += self._finer(tiles, z, size)
         spent += self._closed(tiles, z)
         tiles.reserve(tiles.count)
         tiles.count = t.corner_tiles(*tiles.arrays[:4], tiles.count)
-        return tiles, spent
+        return tiles, spent + self._crossed(tiles, z)
 
     # --- top down ---------------------------------------------------------------------------------------------------
     def _coarse(self, tiles: Tiles, z: np.ndarray) -> int:
@@ -117,6 +118,19 @@ class Sampler:
             spent += asked
         return spent
 
+    def _crossed(self, tiles: Tiles, z: np.ndarray) -> int:
+        """Finds where edges are crossed."""
+        tiles.cross = np.empty((tiles.count, 2 * TILE * TILE), np.float32)
+        words = (tiles.where, tiles.place, tiles.inside, tiles.values)
+        edges = np.empty(tiles.count * 2 * TILE * TILE, np.int64)
+        edges = edges[: marching.cross_edges(*words, tiles.count, tiles.cross, edges)]
+        if not self.facts.weak:
+            return 0
+        up = (edges >> 6) & 1
+        middle = self._field(tiles, z, (edges >> 7 << 6) + (edges & 63), 0.5 * (1 - up), 0.5 * up)
+        marching.halve(tiles.where, tiles.place, tiles.values, edges, middle, tiles.cross)
+        return len(edges)
+
     def _mend(self, tiles: Tiles) -> None:
         """Allocates tiles said to be full beside ones said to be empty: the bound is wrong there."""
         empty = tiles.where == OUTSIDE
@@ -138,10 +152,12 @@ class Sampler:
         x0, y0, dx, dy = self.frame
         return _whole(self.kernel.points(x0 + dx * yx[:, 1], y0 + dy * yx[:, 0], z), dx)
 
-    def _field(self, tiles: Tiles, z: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """The field at samples 64 * tile + bit."""
+    def _field(self, tiles: Tiles, z: np.ndarray, points: np.ndarray, *beside: np.ndarray) -> np.ndarray:
+        """The field at samples 64 * tile + bit, or beside them by so many pixels in x and y."""
         xyz = np.empty((3, len(points)), self.kernel.dtype)
         t.coordinates(points, tiles.place, self.frame, z, *xyz)
+        for axis, by in enumerate(beside):
+            xyz[axis] += (by * self.frame[2 + axis]).astype(xyz.dtype)
         return _whole(self.kernel.points(*xyz), self.frame[2])
 
 

@@ -10,7 +10,7 @@ evaluated, until no such pair is left. So every edge that the contour crosses ha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
@@ -45,7 +45,7 @@ class Tiles:
     """The tiles of a few layers, growing while they are explored.
 
     where: int32 [layers, ty + 2, tx + 2], the row of each tile, or `OUTSIDE` or `INSIDE` where none is needed; its rim is
-    outside. place: int32 [n, 3], (layer, y, x) in `where`. inside, known: uint64 [n]. values: float32 [n, 64].
+    outside. cross: float32 [n, 128], where edges are crossed, when all is explored; see `marching.cross_edges`. place: int32 [n, 3], (layer, y, x) in `where`. inside, known: uint64 [n]. values: float32 [n, 64].
     """
 
     where: np.ndarray
@@ -53,10 +53,11 @@ class Tiles:
     inside: np.ndarray
     known: np.ndarray
     values: np.ndarray
+    cross: np.ndarray = field(default_factory=lambda: np.empty((0, 128), np.float32))
     count: int = 0
 
     @classmethod
-    def of(cls, layers: int, ty: int, tx: int) -> Tiles:
+    def empty(cls, layers: int, ty: int, tx: int) -> Tiles:
         where = np.full((layers, ty + 2, tx + 2), OUTSIDE, np.int32)
         return cls(where, np.empty((0, 3), np.int32), *(np.empty(0, np.uint64) for _ in range(2)), np.empty((0, 64), np.float32))
 
