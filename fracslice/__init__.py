@@ -19,8 +19,9 @@ True
 
 Values can be changed from outside, as ``--set`` does:
 
->>> cheese.with_values(["menger.level=1", "solid.size=2cm"])
-Scene(root=difference(menger(level=1), sphere(radius=1.2)), size_mm=20.0, name='cheese')
+>>> smaller = cheese.with_values(["menger.level=1", "solid.size=2cm"])
+>>> smaller.root, smaller.size_mm
+(difference(menger(level=1), sphere(radius=1.2)), 20.0)
 
 One call makes the mesh, in mm, and a report on it. *What* to make (`MeshJob`) is apart from *how* (`Work`):
 

@@ -27,7 +27,7 @@ COARSEST, FINEST = 8, 16384
 """Voxels along the longest side."""
 
 ALWAYS_FITS = 256
-BYTES_A_BRICK = 40_000
+BYTES_A_BRICK = 60_000
 """Peak memory for each brick of samples, its triangles in all their stages included; measured."""
 
 NOISE = 8.0
@@ -92,8 +92,8 @@ class Placement:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """mesh: in mm, standing on z = 0, coordinates as a file holds them. bricks: the samples it was made of, in
-    scene units. place: what leads from there to the mesh."""
+    """mesh: in mm, standing on z = 0, coordinates as a file holds them. bricks: its samples, in scene units.
+    place: the map from there to the mesh."""
 
     mesh: Mesh
     report: Report
@@ -122,7 +122,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     what, work = what or MeshJob(), work or Work()
     voxels, clock = what.voxels(scene), Clock(work)
     from .mesh.check import check
-    from .mesh.extract import extract
+    from .mesh.extract import contour
     from .volume import plan, sample_scene
 
     with clock("planning"):
@@ -131,7 +131,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     with clock("sampling"):
         bricks = sample_scene(planned, work)
     with clock("meshing"):
-        raw = extract(bricks, work.threads)
+        raw = contour(planned.root, bricks, work)
     with clock("finishing"):
         mesh, removed, place = _finished(raw, what, what.size(scene), bricks.voxel)
     with clock("checking"):

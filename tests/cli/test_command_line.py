@@ -10,10 +10,12 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fracslice_cli.main import run
 
 from fracslice.scene import library
+from fracslice.volume.grid import read_vdb
 
 BALL = '<scene version="1"><solid size="20mm"><sphere/></solid></scene>'
 COMMAND = [sys.executable, "-c", "from fracslice_cli import main; main()"]
@@ -66,6 +68,19 @@ def test_a_shipped_scene_is_known_by_its_name(tmp_path, capfd):
         == 0
     )
     assert (tmp_path / "m.ply").exists()
+
+
+def test_a_vdb_file_holds_the_samples_in_mm(ball, tmp_path):
+    report = tmp_path / "b.json"
+    assert (
+        fracslice("mesh", ball, "-o", tmp_path / "b.vdb", "--resolution", 24, "-q", "--report", report) == 0
+    )
+    bricks = read_vdb(tmp_path / "b.vdb")
+    assert bricks.voxel == pytest.approx(json.loads(report.read_text())["voxel_mm"])
+    row = int(np.argmin(bricks.values.min(axis=1)))
+    x, y, z = bricks.origin + bricks.voxel * bricks.ijk[row]
+    distance = np.linalg.norm([x, y, z - 10]) - 10
+    assert bricks.values[row, 0] == pytest.approx(distance, abs=0.1)
 
 
 def test_a_file_of_that_name_goes_before_a_shipped_scene(ball, tmp_path, monkeypatch):

@@ -1,0 +1,22 @@
+"""One scene, several objects: the Mandelbulb from power 2 to 9, each as a small STL.
+
+python examples/a_family.py [FOLDER] [RESOLUTION]
+"""
+
+import sys
+from pathlib import Path
+
+from fracslice import MeshJob, make_mesh, read, write
+from fracslice.scene import library
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    resolution = float(sys.argv[2]) if len(sys.argv) > 2 else 160
+    bulb = read(library.path("mandelbulb"))
+    for power in range(2, 10):
+        member = bulb.with_values([f"mandelbulb.power={power}", "solid.size=3cm"])
+        result = make_mesh(member, MeshJob(resolution=resolution, keep="largest"))
+        write(result.mesh, folder / f"mandelbulb-{power}.stl")
+        print(
+            f"power {power}: {result.report.mesh.volume_mm3:.0f} mm3, {result.report.mesh.triangles} triangles"
+        )
