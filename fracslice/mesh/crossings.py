@@ -19,6 +19,8 @@ from fracslice.mesh.model import Mesh
 from fracslice.mesh.predicates import side_of_line, side_of_plane
 from fracslice.mesh.tree import LEAF, Tree, build
 
+ASIDE, FLAT, ASTRIDE = 0, 1, 2
+
 
 def crossing_triangles(mesh: Mesh, tree: Tree | None = None, threads: int | None = None) -> NDArray[np.bool_]:
     """Which triangles meet another one in more than the vertices both have by index, bool [m].
@@ -160,9 +162,18 @@ def _cross(vertices, triangles, s, t, drop_s, drop_t):
         return _folded(a, b, p, q, drop_s)
     a, b, c = _turned(vertices, triangles, s, i)
     d, e, f = _turned(vertices, triangles, t, j)
-    if shared == 1:  # what they share beyond the vertex ends on one of the edges opposite to it
+    if shared == 1:
+        beyond = _two_sides(a, b, c, e, f)
+        if beyond == ASIDE or (beyond == FLAT and _apart_at_corner(a, b, c, e, f, drop_s)):
+            return False
+        if beyond == ASTRIDE and _two_sides(d, e, f, b, c) == ASIDE:
+            return False
+        # what they share beyond the vertex ends on one of the edges opposite to it
         return _edge_meets(b, c, d, e, f, drop_t) or _edge_meets(e, f, a, b, c, drop_s)
-    if _aside(a, b, c, d, e, f) or _aside(d, e, f, a, b, c):
+    beyond = _sides(a, b, c, d, e, f)
+    if beyond == FLAT:
+        return not (_apart(a, b, c, d, e, f, drop_s) or _apart(d, e, f, a, b, c, drop_t))
+    if beyond == ASIDE or _sides(d, e, f, a, b, c) == ASIDE:
         return False
     return (
         _edge_meets(a, b, d, e, f, drop_t)
@@ -175,10 +186,47 @@ def _cross(vertices, triangles, s, t, drop_s, drop_t):
 
 
 @njit(cache=True, nogil=True)
-def _aside(a, b, c, d, e, f):
-    """Whether the triangle d e f lies wholly on one side of the plane of a b c."""
+def _sides(a, b, c, d, e, f):
+    """How d, e and f lie to the plane of a b c: all on one side, all in it, or otherwise."""
     side = side_of_plane(a, b, c, d)
-    return side != 0 and side == side_of_plane(a, b, c, e) and side == side_of_plane(a, b, c, f)
+    if side != side_of_plane(a, b, c, e) or side != side_of_plane(a, b, c, f):
+        return ASTRIDE
+    return FLAT if side == 0 else ASIDE
+
+
+@njit(cache=True, nogil=True)
+def _two_sides(a, b, c, d, e):
+    """The same for d and e."""
+    side = side_of_plane(a, b, c, d)
+    if side != side_of_plane(a, b, c, e):
+        return ASTRIDE
+    return FLAT if side == 0 else ASIDE
+
+
+@njit(cache=True, nogil=True)
+def _apart(a, b, c, d, e, f, drop):
+    """Whether an edge of a b c has the triangle d e f, of the same plane, strictly on its outer side."""
+    outside = -_turn(a, b, c, drop)
+    for p, q in ((a, b), (b, c), (c, a)):
+        if (
+            _turn(p, q, d, drop) == outside
+            and _turn(p, q, e, drop) == outside
+            and _turn(p, q, f, drop) == outside
+        ):
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _apart_at_corner(a, b, c, e, f, drop):
+    """Whether an edge at a separates the triangles a b c and a e f of one plane; sure if true."""
+    outside, other = -_turn(a, b, c, drop), -_turn(a, e, f, drop)
+    return (
+        (_turn(a, b, e, drop) == outside and _turn(a, b, f, drop) == outside)
+        or (_turn(c, a, e, drop) == outside and _turn(c, a, f, drop) == outside)
+        or (_turn(a, e, b, drop) == other and _turn(a, e, c, drop) == other)
+        or (_turn(f, a, b, drop) == other and _turn(f, a, c, drop) == other)
+    )
 
 
 @njit(cache=True, nogil=True)

@@ -21,6 +21,8 @@ SPLITTER = 2.0**27 + 1
 @njit(cache=True, nogil=True)
 def _add(terms, count, value):
     """Add one number to the expansion in terms[:count], without rounding; the new count."""
+    if value == 0.0:
+        return count
     kept = 0
     for i in range(count):
         total = value + terms[i]
@@ -64,6 +66,17 @@ def _sign_of_sum(terms, count):
 
 
 @njit(cache=True, nogil=True)
+def _exact_differences(a, b):
+    """Whether a - b is free of rounding, as for most neighbours with float32 coordinates; it saves terms."""
+    exact = True
+    for k in range(len(a)):
+        difference = a[k] - b[k]
+        back = a[k] - difference
+        exact &= (a[k] - (difference + back)) + (back - b[k]) == 0.0
+    return exact
+
+
+@njit(cache=True, nogil=True)
 def side_of_line(ax, ay, bx, by, cx, cy):
     """1 if a, b, c turn counter-clockwise, -1 if clockwise, 0 if they lie on one line. Exact."""
     left = (ax - cx) * (by - cy)
@@ -77,6 +90,9 @@ def side_of_line(ax, ay, bx, by, cx, cy):
     if bound == 0.0:
         return 0
     terms = np.empty(16)
+    if _exact_differences((ax, ay), (cx, cy)) and _exact_differences((bx, by), (cx, cy)):
+        n = _add_product(terms, 0, ax - cx, by - cy)
+        return _sign_of_sum(terms, _add_product(terms, n, cy - ay, bx - cx))
     n = _add_product(terms, 0, ax, by)
     n = _add_product(terms, n, -ay, bx)
     n = _add_product(terms, n, bx, cy)
@@ -122,6 +138,9 @@ def side_of_plane(a, b, c, d):
     if bound == 0.0:
         return 0
     terms = np.empty(128)
+    if _exact_differences(a, d) and _exact_differences(b, d) and _exact_differences(c, d):
+        n = _add_volume(terms, 0, (adx, ady, adz), (bdx, bdy, bdz), (cdx, cdy, cdz), 1.0)
+        return _sign_of_sum(terms, n)
     n = _add_volume(terms, 0, a, b, c, 1.0)
     n = _add_volume(terms, n, b, c, d, -1.0)
     n = _add_volume(terms, n, c, d, a, 1.0)
