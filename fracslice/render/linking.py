@@ -111,7 +111,8 @@ class _Frame:
         widest = 1.4143 * self.block * seen.cone * 1.02
         side: dict[str, Any] = {} if self.inside else {"side": Fixed(1.0)}
         common = {"steepness": steepness}
-        self.linker.bind("step_ray", march.advance, side | common | {"relax": RELAX, "cone": seen.cone, "least": seen.least})
+        stepping = {"relax": RELAX, "cone": seen.cone, "least": seen.least, "glass": Fixed(self.inside)}
+        self.linker.bind("step_ray", march.advance, side | common | stepping)
         self.linker.bind("step_cone", march.widen, {"side": Fixed(1.0), "path": Fixed(0.0)} | common | {"spread": widest})
         self.linker.bind("width_at", _width, {"cone": seen.cone, "least": seen.least})
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,8 +17,11 @@ from ..scene.view import View
 from ..work import Work
 from .accumulator import Accumulator
 from .cpu import BLOCK, CpuTracer, ordered
-from .linking import link_frame
+from .linking import Frame, link_frame
 from .setting import Setting, settle
+
+if TYPE_CHECKING:
+    from .cuda import CudaTracer
 
 COARSE = 4
 """The first pass looks at every fourth pixel of every fourth row."""
@@ -45,10 +49,23 @@ class Pass:
 
 
 def chosen(device: str) -> str:
-    """The device to use: "cpu". Raises `RenderError` where another is asked for."""
-    if device == "cuda":
-        raise RenderError("device cuda: pictures are rendered on the CPU only; leave --device out")
-    return "cpu"
+    """The device to use, "cpu" or "cuda"; "auto" takes the GPU if there is one. Raises `RenderError` if there is none."""
+    if device == "cpu":
+        return device
+    from ..kernel.cuda import missing
+
+    reason = missing()
+    if reason and device == "cuda":
+        raise RenderError(f"device cuda: {reason}")
+    return "cpu" if reason else "cuda"
+
+
+def _tracer(device: str) -> Callable[..., CpuTracer | CudaTracer]:
+    if device == "cpu":
+        return CpuTracer
+    from .cuda import CudaTracer
+
+    return CudaTracer
 
 
 class Renderer:
@@ -71,7 +88,7 @@ class Renderer:
         self.device = chosen(device)
         self.setting = settle(root, view, (self.width, self.height))
         dtype = np.dtype(self.setting.precision)
-        self.tracer = CpuTracer(self._frame(0), dtype, self.width, self.height)
+        self.tracer = _tracer(self.device)(self._frame(0), dtype, self.width, self.height)
         self.accumulator = Accumulator.empty(self.width, self.height, dtype, self.key)
         self._order = ordered(self.width, self.height)
         self._aimed: Node | None = None
@@ -130,7 +147,7 @@ class Renderer:
             self.tracer.look_ahead(limit, self.work)
             self._aimed = root
 
-    def _frame(self, number: int):  # type: ignore[no-untyped-def]
+    def _frame(self, number: int) -> Frame:
         what = self.setting
         return link_frame(what.root(number), what.view, what.camera, what.optics, BLOCK)
 

@@ -27,17 +27,25 @@ def span(ox, oy, oz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped-def]
     return maximum(enter, 0.0), leave
 
 
-def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, relax, cone, least):  # type: ignore[no-untyped-def]
+def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, relax, cone, least, glass):  # type: ignore[no-untyped-def]
     """One step of safe, over-relaxed sphere tracing: the new t, radius and stride, and the gap, negative at a hit.
 
     Hart 1996, "Sphere Tracing"; over-relaxation: Keinert et al. 2014, "Enhanced Sphere Tracing". ``|f| / L`` is the
     radius of an empty ball. A step of `relax` times it is kept if the next ball touches the one before; if not, the ray
-    goes back to the end of that ball. A hit is where the surface is nearer than half a pixel is wide. side: -1 inside.
+    goes back to the end of that ball. A hit is where the surface is nearer than half a pixel is wide. side: -1 inside, where the field
+    of a fractal says little: there a hit is a change of sign, and steps are two pixels at least.
     """
     radius = side * field(ox + t * dx, oy + t * dy, oz + t * dz, P) * steepness
+    near = cone * (path + t) + least
     kept = radius + before >= stride
-    gap = where(kept, radius - (cone * (path + t) + least), 1.0)
     step = relax * radius
+    margin = near
+    if glass:
+        inside = side < 0.0
+        kept = kept | inside
+        margin = where(inside, 0.0, near)
+        step = where(inside, maximum(step, 4.0 * near), step)
+    gap = where(kept, radius - margin, 1.0)
     after = where(kept, where(gap < 0.0, t, t + step), t - stride + before)
     return after, where(kept, radius, before), where(kept, step, 0.0), gap
 

@@ -1,0 +1,103 @@
+"""Passes: what they show, that they stop, and that stopping changes nothing."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fracslice.errors import Cancelled, RenderError
+from fracslice.formulas import material, menger, sphere, union
+from fracslice.render import Renderer
+from fracslice.scene.view import Camera, Film, Light, View
+from fracslice.work import Work
+
+ROOT = union(menger(level=2), material(sphere(radius=1.2), reflect=0.4))
+VIEW = View(
+    camera=Camera(eye=(2.5, -3, 1.6), aperture=0.05),
+    lights=(Light(kind="sun", size=4), Light(kind="sky")),
+    film=Film(samples=12),
+)
+SIZE = (50, 34)
+
+
+def renderer(threads: int = 1) -> Renderer:
+    return Renderer(ROOT, VIEW, SIZE, Work(threads=threads), "cpu")
+
+
+def finished(of: Renderer, samples: int = 12) -> np.ndarray:
+    *_, last = of.passes(samples, tolerance=0.01)
+    return last.image
+
+
+def test_the_first_pass_shows_something_everywhere_and_the_second_has_every_pixel() -> None:
+    of = renderer()
+    passes = of.passes()
+    first = next(passes)
+    assert 0 < first.samples < 0.08
+    assert (first.image.sum(2) > 0).all()
+    second = next(passes)
+    assert second.samples == 1
+    assert (of.accumulator.counts == 1).all()
+
+
+def test_samples_reduce_the_error_and_clean_pixels_get_no_more() -> None:
+    of = renderer()
+    errors, counts = [], []
+    for done in of.passes(40, tolerance=0.01):
+        errors.append(done.error)
+        counts.append(of.accumulator.counts.copy())
+    assert errors[-1] < errors[4] / 2
+    assert counts[-1].min() < counts[-1].max() <= 40
+    assert counts[-1].min() >= 8
+
+
+def test_threads_change_no_bit() -> None:
+    assert finished(renderer(1)).tobytes() == finished(renderer(3)).tobytes()
+
+
+def test_resuming_changes_no_bit(tmp_path: Path) -> None:
+    of = renderer()
+    for done in of.passes(12, tolerance=0.01):
+        if done.number == 5:
+            break
+    with open(tmp_path / "state.npz", "wb") as file:
+        of.accumulator.save(file)
+    again = renderer()
+    again.resume(tmp_path / "state.npz")
+    assert again.accumulator.passes == 5
+    assert finished(again).tobytes() == finished(renderer()).tobytes()
+
+
+def test_a_state_of_another_picture_is_refused(tmp_path: Path) -> None:
+    with open(tmp_path / "state.npz", "wb") as file:
+        renderer().accumulator.save(file)
+    other = Renderer(ROOT, VIEW, (34, 50), Work(threads=1), "cpu")
+    with pytest.raises(RenderError, match="another scene"):
+        other.resume(tmp_path / "state.npz")
+    (tmp_path / "state.npz").write_bytes(b"no")
+    with pytest.raises(RenderError, match="expected a picture in the making"):
+        other.resume(tmp_path / "state.npz")
+
+
+def test_cancelling_keeps_what_was_complete() -> None:
+    work = Work(threads=1)
+    of = Renderer(ROOT, VIEW, SIZE, work, "cpu")
+    passes = of.passes()
+    next(passes), next(passes)
+    before = of.accumulator.sums.copy()
+    work.cancel.set()
+    with pytest.raises(Cancelled):
+        next(passes)
+    assert (of.accumulator.sums == before).all()
+    work.cancel.clear()
+    buffer = io.BytesIO()
+    of.accumulator.save(buffer)
+    assert len(buffer.getvalue()) > before.nbytes
+
+
+def test_the_mean_does_not_depend_on_where_sampling_stopped() -> None:
+    rough, clean = finished(renderer(), 16), finished(renderer(), 200)
+    assert abs(rough.mean() - clean.mean()) < 0.01 * clean.mean()
