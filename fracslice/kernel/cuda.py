@@ -7,6 +7,7 @@ the text that it was made of.
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import importlib.util
 import math
@@ -31,24 +32,35 @@ from .linker import Linked, link
 BLOCK = 128
 """Threads of a block."""
 
-CONSTANTS = 512
-"""Parameters that are passed as constants of the launch; more go through memory."""
-
 _LAUNCH = threading.Lock()
 """Numba's first launch of a kernel may happen once only, and launching holds the interpreter anyway."""
 
 LOOPS = cuda_source.POINTS + cuda_source.BRICKS
 
 
+NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
+
+
 def missing() -> str | None:
     """What keeps this process from using CUDA, in one line; None if nothing does."""
     if importlib.util.find_spec("numba_cuda") is None:
         return 'CUDA needs numba-cuda, which is not installed: pip install "fracslice[cuda]"'
-    from . import cuda_words
+    if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1" and not _driver():
+        return NO_GPU
+    try:
+        from . import cuda_words
+    except (ImportError, RuntimeError) as error:
+        return f"CUDA cannot be used: {str(error).splitlines()[0]}"
+    return None if cuda_words.cuda.is_available() else NO_GPU
 
-    if not cuda_words.cuda.is_available():
-        return "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
-    return None
+
+def _driver() -> bool:
+    """Whether NVIDIA's driver is there: known at once, without Numba."""
+    try:
+        ctypes.CDLL("nvcuda.dll" if os.name == "nt" else "libcuda.so.1")
+    except OSError:
+        return False
+    return True
 
 
 def available() -> bool:
@@ -141,9 +153,8 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
 
 
 def parameters(linked: Linked, precision: Precision) -> Any:
-    """A linked scene's P, as the loops take it."""
-    values = linked.parameters.astype(precision)
-    return tuple(values) if len(values) <= CONSTANTS else require().to_device(values)
+    """A linked scene's P, on the GPU. (As constants of the launch it is no faster, and each launch is slower.)"""
+    return require().to_device(linked.parameters.astype(precision))
 
 
 def load_loops(linked: Linked, precision: Precision, loops: str) -> ModuleType:
