@@ -153,7 +153,7 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
 
 
 def parameters(linked: Linked, precision: Precision) -> Any:
-    """A linked scene's P, on the GPU. (As constants of the launch it is no faster, and each launch is slower.)"""
+    """A linked scene's P, on the GPU. As constants of the launch it is no faster, and launching is slower."""
     return require().to_device(linked.parameters.astype(precision))
 
 

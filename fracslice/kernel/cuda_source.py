@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 from typing import Any
 
+from ..errors import KernelError
 from ..formulas.vocabulary import NAMES
 from .linker import Linked
 
@@ -46,9 +47,17 @@ def module(linked: Linked, bits: int, loops: str) -> str:
     """The text of a Python module that Numba compiles for CUDA (and its simulator runs).
 
     loops: functions marked ``@kernel`` that may call ``field(x, y, z, P)``. In them numbers are typed by
-    hand: ``real(0.5)``, ``whole(3)``. P is a tuple of numbers, which become constants of the launch.
+    hand: ``real(0.5)``, ``whole(3)``.
     """
-    words = [*sorted(NAMES), "device", "divide", f"float{bits} as real", "int32 as whole", "kernel"]
+    words = [
+        *sorted(NAMES),
+        "device",
+        "divide",
+        f"float{bits} as real",
+        "int32 as whole",
+        "kernel",
+        "together",
+    ]
     header = f"from numba import cuda\nfrom {WORDS} import {', '.join(words)}\n"
     return "\n".join([header, typed(linked.source), loops])
 
@@ -61,10 +70,11 @@ def typed(source: str) -> str:
 
 
 class _Typed(ast.NodeTransformer):
-    """Wherever a whole number meets a real it becomes ``real``; among themselves, and in subscripts, they stay.
+    """Whole numbers become ``real`` where they meet one; among themselves, and in subscripts, they stay.
 
-    Whole are literals without a point, the counters of loops, and all names of a function that shifts bits. Zero
-    times something, by which a formula makes a number as wide as its points, is zero: a thread has one point.
+    Whole are literals without a point, the counters of loops, and all names of a function that shifts bits.
+    Zero times something, by which a formula makes a number as wide as its points, is zero: a thread has one
+    point.
     """
 
     def __init__(self, tree: ast.Module) -> None:
@@ -108,27 +118,34 @@ class _Typed(ast.NodeTransformer):
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         if self.whole(node):
             return node
-        if isinstance(node.op, ast.Mult) and isinstance(node.left, ast.Constant) and node.left.value == 0.0:
-            return self.real(node.left)
-        node.left, node.right = self.real(node.left), self.real(node.right)
-        return _call("divide", node.left, node.right) if isinstance(node.op, ast.Div) else node
+        left, right = self.real(node.left), self.real(node.right)
+        match node:
+            case ast.BinOp(ast.Constant(0.0), ast.Mult()):
+                return _call("real", node.left)
+            case ast.BinOp(op=ast.Div()):
+                return _call("divide", left, right)
+        return ast.BinOp(left, node.op, right)
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         if not all(map(self.whole, [node.left, *node.comparators])):
             node.left, node.comparators = self.real(node.left), [self.real(c) for c in node.comparators]
         return node
 
+    def visit_For(self, node: ast.For) -> Any:
+        """As a plain loop of 32-bit numbers: Numba's own iterator costs several instructions a round."""
+        match node:
+            case ast.For(ast.Name(i), ast.Call(ast.Name("range"), [end])):
+                first, after = ast.parse(f"{i} = whole(0)\n{i} = whole({i} + 1)").body
+                end = self.visit(end) if isinstance(end, ast.Call) else _call("whole", end)
+                body = [part for s in node.body for part in _listed(self.visit(s))]
+                return [first, ast.While(ast.Compare(ast.Name(i), [ast.Lt()], [end]), [*body, after], [])]
+        raise KernelError(f"a formula cannot be compiled: a loop over {ast.unparse(node.iter)}")
+
     def visit_Call(self, node: ast.Call) -> ast.AST:
         called = node.func.id if isinstance(node.func, ast.Name) else ""
-        if called in self.shifting:
-            return node
         if called == "int":
             return _call("whole", *node.args)
-        if called == "range":
-            node.args = [
-                self.visit(end) if isinstance(end, ast.Call) else _call("whole", end) for end in node.args
-            ]
-        else:
+        if called not in self.shifting:
             node.args = [self.real(a) for a in node.args]
         return node
 
@@ -141,19 +158,18 @@ class _Typed(ast.NodeTransformer):
         return node
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
-        node.test, node.body, node.orelse = (
-            self.visit(node.test),
-            self.given(node.body),
-            self.given(node.orelse),
-        )
-        return node
+        return ast.IfExp(self.visit(node.test), self.given(node.body), self.given(node.orelse))
 
     def given(self, node: ast.expr) -> ast.expr:
         """An expression that becomes the value of a name or a function."""
         if isinstance(node, ast.Tuple):
-            node.elts = [self.given(e) for e in node.elts]
-            return node
-        return self.visit(node) if self.shifts else self.real(node)
+            return ast.Tuple([self.given(e) for e in node.elts], ast.Load())
+        found: ast.expr = self.visit(node) if self.shifts else self.real(node)
+        return found
+
+
+def _listed(found: Any) -> list[ast.stmt]:
+    return found if isinstance(found, list) else [found]
 
 
 _SHIFTS = (ast.LShift, ast.RShift, ast.BitXor)

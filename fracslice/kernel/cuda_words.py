@@ -71,6 +71,10 @@ def _word(arity: int, single: Instruction, double: Instruction) -> Any:
 if SIMULATED:
     globals().update({name: getattr(vocabulary, name) for name in vocabulary.NAMES})
     divide = np.divide
+
+    @device
+    def together():  # type: ignore[no-untyped-def]
+        """Waits for the other threads of the warp; here each runs alone."""
 else:
     intrinsic = import_module("numba.cuda.extending").intrinsic
     LOG_2 = float32(math.log(2))
@@ -133,3 +137,8 @@ else:
     @device
     def any_of(mask):  # type: ignore[no-untyped-def]
         return mask
+
+    @device
+    def together():  # type: ignore[no-untyped-def]
+        """Waits for the other threads of the warp, so that they go on in step."""
+        cuda.syncwarp()

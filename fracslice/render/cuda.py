@@ -6,12 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from ..kernel.cpu import Precision
 from ..kernel.cuda import launched, load_loops, parameters, require
 from ..work import Work
 from .cpu import BLOCK
 from .cuda_loops import loops
 from .linking import Frame
 from .sobol import point
+
+AHEAD = 64
+"""Sobol points that are sent to the GPU at once."""
 
 
 class CudaTracer:
@@ -20,13 +24,13 @@ class CudaTracer:
     def __init__(self, frame: Frame, dtype: np.dtype, width: int, height: int) -> None:
         self._cuda = require()
         self.dtype, self.width, self.height = dtype, width, height
-        self._precision: Any = dtype.name
+        self._precision: Precision = "float32" if dtype == np.float32 else "float64"
         self._loops = load_loops(frame.linked, self._precision, loops(frame, BLOCK))
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
         """Takes the numbers of another frame of the same source: another camera, another depth."""
-        self.frame = frame
+        self.frame, self._first = frame, -1
         self._parameters = parameters(frame.linked, self._precision)
         self.blocks = -(-self.width // BLOCK)
         self._starts = self._cuda.to_device(np.zeros(self.blocks * -(-self.height // BLOCK), self.dtype))
@@ -49,15 +53,10 @@ class CudaTracer:
 
     def add_on_device(self, sums: Any, pixels: Any, index: int, limit: int) -> None:
         """`add` on arrays of the GPU. Copies neither and does not wait for the GPU."""
-        q = self._cuda.to_device(np.asarray(point(index, self.frame.samples), np.int32))
-        given = (
-            self._parameters,
-            q,
-            self._starts,
-            pixels,
-            sums,
-            self.width,
-            self.dtype.type(limit),
-            self.blocks,
-        )
-        launched(self._loops.tile, pixels.size, *given)
+        first = index - index % AHEAD
+        if first != self._first:
+            points = np.array([point(i, self.frame.samples) for i in range(first, first + AHEAD)])
+            self._first, self._points = first, self._cuda.to_device(points)
+        film = (pixels, sums, self.width, self.dtype.type(limit), self.blocks)
+        sample = (self._points, index - first, self._starts)
+        launched(self._loops.tile, pixels.size, self._parameters, *sample, *film)

@@ -1,6 +1,6 @@
 """The loops around the units on CUDA: one thread takes one ray from the film to the last bounce.
 
-They do what the lanes' loops in `fracslice.render.waves` do, in the same order of the same words.
+They do what the lanes' loops in `fracslice.render.waves` do, in the same words.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from .linking import Frame
 
 TILE = """
 @kernel
-def tile(P, Q, S, pixels, A, width, limit, blocks):
+def tile(P, Q, q, S, pixels, A, width, limit, blocks):
     k = cuda.grid(1)
     if k < pixels.size:
         pixel = whole(pixels[k])
         column = pixel & 65535
         row = pixel >> 16
-        px = real(column) + centred(whole(Q[0]), pixel, 0)
-        py = real(row) + centred(whole(Q[1]), pixel, 1)
+        px = real(column) + centred(whole(Q[q, 0]), pixel, 0)
+        py = real(row) + centred(whole(Q[q, 1]), pixel, 1)
         ox, oy, oz, dx, dy, dz = camera_ray(px, py, $lens, P)
         start, end = span_box(ox, oy, oz, dx, dy, dz, P)
         start = maximum(start, S[(row >> $shift) * blocks + (column >> $shift)])
@@ -36,6 +36,7 @@ def tile(P, Q, S, pixels, A, width, limit, blocks):
                 missed = t > end
                 if steps >= limit:
                     break
+            together()
             if missed:
                 hr, hg, hb = background(dx, dy, dz, P)
                 r, g, b = r + tr * hr, g + tg * hg, b + tb * hb
@@ -65,7 +66,7 @@ def gather(A, a, r, g, b):
 def tamed(c):
     return minimum(maximum(c, real(0.0)), real(1e4)) if c == c else real(0.0)
 """
-"""Adds one sample to each pixel; no NaN, no infinity, no negative light. What hardly counts any more sees the background."""
+"""Adds one sample to each pixel, at point q of Q; no NaN, no infinity, no negative light."""
 
 ONWARD = """
             tr, tg, tb = tr * er, tg * eg, tb * eb
@@ -97,8 +98,8 @@ def cones(P, S, blocks, limit):
 def loops(frame: Frame, block: int) -> str:
     """The kernels around a frame's source: `tile`, and `cones` where rays start at the eye."""
     first = f"{frame.camera_samples} + bounce * {frame.bounce_samples}"
-    drawn = [f"sample(whole(Q[{first} + {k}]), pixel, {first} + {k})" for k in range(frame.bounce_samples)]
-    lens = [f"sample(whole(Q[{d}]), pixel, {d})" for d in (2, 3)]
+    drawn = [f"sample(whole(Q[q, {first} + {k}]), pixel, {first} + {k})" for k in range(frame.bounce_samples)]
+    lens = [f"sample(whole(Q[q, {d}]), pixel, {d})" for d in (2, 3)]
     words = {
         "block": block,
         "shift": block.bit_length() - 1,

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda, reference
 from tests.examples import EXAMPLES
 
@@ -20,7 +19,6 @@ def main() -> None:
             for precision in ("float32", "float64"):
                 points(name, cuda.compile_scene(root, precision), reference(root))
         bricks()
-        many_parameters()
 
 
 def points(name: str, kernel: cuda.CudaKernel, expected: Callable[..., np.ndarray]) -> None:
@@ -42,16 +40,6 @@ def bricks() -> None:
     assert (alone == out).all()
     assert kernel.points(*np.empty((3, 0))).shape == (0,)
     kernel.bricks(corners[:0], (0, 0, 0), 1.0, out[:0])
-
-
-def many_parameters() -> None:
-    """Where they are too many for constants of the launch they go through memory, and give the same."""
-    root, p = mandelbulb(iterations=4), np.full((3, 1), 0.7)
-    expected = cuda.compile_scene(root).points(*p)
-    cuda.CONSTANTS, kept = 0, cuda.CONSTANTS
-    cuda._kernel.cache_clear()
-    assert cuda.compile_scene(root).points(*p) == expected
-    cuda.CONSTANTS = kept
 
 
 if __name__ == "__main__":

@@ -64,15 +64,13 @@ def compiled(root: Node, bits: int, folder: Path) -> str:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     real = types.float32 if bits == 32 else types.float64
-    array, P = types.Array(real, 1, "C"), types.UniTuple(real, len(linked.parameters))
+    array = types.Array(real, 1, "C")
     with pytest.MonkeyPatch.context() as patch:
         # Numba asks the GPU for its capability even where it is told one.
         patch.setattr(
             dispatcher, "get_current_device", lambda: type("H200", (), {"compute_capability": (9, 0)})
         )
-        ptx, _ = numba_cuda.compile(
-            module.points.py_func, (P, array, array, array, array), cc=(9, 0), output="ptx"
-        )
+        ptx, _ = numba_cuda.compile(module.points.py_func, (array,) * 5, cc=(9, 0), output="ptx")
     return str(ptx)
 
 
@@ -112,15 +110,20 @@ class TestTyping:
             ("return where(x < 1, P[3], -2)", "return where(x < real(1), P[3], real(-2))"),
             ("return 0.0 * x + 1.5", "return real(0.0) + real(1.5)"),
             ("return True", "return True"),
-            ("for i in range(int(P[1])):\n        x = x + (i - 1)", "for i in range(whole(P[1])):\n        x = x + real(i - 1)"),
-            ("for i in range(4):\n        x = 1.0 if i % 2 == 1 else x", "for i in range(whole(4)):\n        x = real(1.0) if i % 2 == 1 else x"),
             ("return (x >> 8 & 255) * 0.5", "return real(x >> 8 & 255) * real(0.5)"),
             ("x, y = 0, x\n    return y", "x, y = (real(0), x)\n    return y"),
         ],
-    )  # fmt: skip
+    )
     def test_of_numbers(self, formula: str, thread: str) -> None:
         text = cuda_source.typed(f"def f(x, P):\n    {formula}")
         assert text == f"@device\ndef f(x, P):\n    {thread}\n"
+
+    def test_of_loops(self) -> None:
+        loop = "def f(x, P):\n    for i in range(int(P[1])):\n        x = 2.0 if i % 2 == 1 else x + (i - 1)"
+        assert cuda_source.typed(loop) == (
+            "@device\ndef f(x, P):\n    i = whole(0)\n    while i < whole(P[1]):\n"
+            "        x = real(2.0) if i % 2 == 1 else x + real(i - 1)\n        i = whole(i + 1)\n"
+        )
 
 
 def run_simulated(module: str) -> None:

@@ -52,9 +52,31 @@ using Parameters = Tuple<{count}>;
 
 def translated(source: str, parameters: Sequence[float]) -> str:
     """The functions of a linked scene, each name with a ``_`` behind it, and its parameters GIVEN."""
-    functions = [_function(f) for f in ast.parse(source).body if isinstance(f, ast.FunctionDef)]
+    functions = [_function(f) for f in _callees_first(source)]
     given = f"const Parameters GIVEN = {{{{{', '.join(_number(p) for p in parameters)}}}}};"
     return "\n".join([PRELUDE.format(count=len(parameters)), *functions, given, ""])
+
+
+def _callees_first(source: str) -> list[ast.FunctionDef]:
+    """The functions in the order that C++ asks for, without those that shift bits, written by hand."""
+    named = {f.name: f for f in ast.parse(source).body if isinstance(f, ast.FunctionDef)}
+    ordered: dict[str, ast.FunctionDef] = {}
+
+    def visit(name: str) -> None:
+        called = [
+            n.func.id
+            for n in ast.walk(named[name])
+            if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
+        ]
+        for callee in called:
+            if callee in named and callee not in ordered:
+                visit(callee)
+        ordered[name] = named[name]
+
+    for name, function in named.items():
+        if not any(isinstance(n, (ast.BitXor, ast.RShift)) for n in ast.walk(function)):
+            visit(name)
+    return list(ordered.values())
 
 
 def _number(value: Any) -> str:
@@ -134,8 +156,12 @@ def _expression(node: ast.expr) -> str:
             return str(value).lower()
         case ast.Constant(value):
             return _number(value)
-        case ast.Subscript(value, ast.Constant(int(index))):
-            return f"{_expression(value)}[{index}]"
+        case ast.Subscript(value, index):
+            return f"{_expression(value)}[{ast.unparse(index)}]"
+        case ast.IfExp(test, yes, no):
+            return f"({_expression(test)} ? {_expression(yes)} : {_expression(no)})"
+        case ast.BinOp(left, ast.Mod(), right):
+            return f"({ast.unparse(left)} % {ast.unparse(right)})"
         case ast.Tuple(values):
             return f"Tuple<{len(values)}>{{{{{', '.join(map(_expression, values))}}}}}"
         case ast.UnaryOp(op, value):

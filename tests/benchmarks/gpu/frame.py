@@ -1,0 +1,161 @@
+"""A 1080p frame of the Mandelbulb on a real GPU: ``python -m tests.benchmarks.gpu.frame [picture.npy]``.
+
+The renderer's kernel against nvcc on the same arithmetic: the same units word for word, and the same loop.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from fracslice.formulas import mandelbulb
+from fracslice.kernel import cuda
+from fracslice.render.cpu import BLOCK, CpuTracer, ordered
+from fracslice.render.cuda import CudaTracer
+from fracslice.render.linking import Frame, link_frame, optics
+from fracslice.scene.view import Camera, Light, Shading, View
+from fracslice.work import Work
+
+from . import native
+from .sampling import best
+
+WIDTH, HEIGHT, LIMIT = 1920, 1080, 256
+SINGLE = np.dtype(np.float32)
+
+
+def frame(width: int, height: int) -> Frame:
+    """A Mandelbulb under one light without a shadow."""
+    root, camera = mandelbulb(iterations=8), Camera(eye=(0.0, -2.6, 0.0), fov=37.0)
+    light = Light(kind="sun", position=(1.0, -1.2, 1.2), shadows="no")
+    view = View(camera=camera, lights=(light,), shading=Shading(ambient=0.15))
+    return link_frame(root, view, camera, optics(camera, (width, height), root, 1e-5), BLOCK)
+
+
+FRAME = r"""
+#include <cstdio>
+#include <vector>
+typedef unsigned int u32;
+__device__ u32 hashed(u32 a) {
+    a = (a ^ (a >> 16)) * 0x7FEB352Du;
+    a = (a ^ (a >> 15)) * 0x846CA68Bu;
+    return a ^ (a >> 16);
+}
+__device__ u32 scrambled(u32 a, u32 seed) {
+    a ^= a * 0x3D20ADEAu;
+    a += seed;
+    a *= (seed >> 16) | 1;
+    a ^= a * 0x05526C56u;
+    a ^= a * 0x53A22864u;
+    return __brev(a);
+}
+__device__ float centred(u32 a, u32 pixel, u32 dimension) {
+    u32 seed = hashed(pixel * 64 + dimension);
+    return ((scrambled(a, seed) ^ scrambled(0, seed) ^ 0x80000000u) >> 8) * 5.9604644775390625e-08f;
+}
+__device__ float tamed(float c) { return c == c ? fminf(fmaxf(c, 0.0f), 1e4f) : 0.0f; }
+__global__ void tile(Parameters P, const float *S, const int *pixels, int count, float *A, int width,
+                     float limit, int blocks) {
+    int k = blockIdx.x * blockDim.x + threadIdx.x;
+    if (k >= count) return;
+    int pixel = pixels[k], column = pixel & 65535, row = pixel >> 16;
+    auto ray = camera_ray_(column + centred(0, pixel, 0), row + centred(0, pixel, 1), 0.0f, 0.0f, P);
+    float ox = ray[0], oy = ray[1], oz = ray[2], dx = ray[3], dy = ray[4], dz = ray[5];
+    auto span = span_box_(ox, oy, oz, dx, dy, dz, P);
+    float start = fmaxf(span[0], S[(row >> 3) * blocks + (column >> 3)]), end = span[1];
+    float t = start, steps = 0, before = 0, stride = 0;
+    bool missed = start >= end;
+    while (!missed) {
+        auto step = step_ray_(ox, oy, oz, dx, dy, dz, t, before, stride, 0.0f, P);
+        t = step[0], before = step[1], stride = step[2];
+        steps += 1.0f;
+        if (step[3] < 0.0f) break;
+        missed = t > end;
+        if (steps >= limit) break;
+    }
+    float r, g, b;
+    if (missed) {
+        auto colour = background_(dx, dy, dz, P);
+        r = colour[0], g = colour[1], b = colour[2];
+    } else {
+        auto colour = surface_(ox + t * dx, oy + t * dy, oz + t * dz, dx, dy, dz, t, 0.0f, steps, 1.0f, P);
+        r = colour[0], g = colour[1], b = colour[2];
+    }
+    r = tamed(r), g = tamed(g), b = tamed(b);
+    float bright = 0.2126f * r + 0.7152f * g + 0.0722f * b;
+    bright = bright / (1.0f + bright);
+    float *a = A + 6 * (row * width + column);
+    a[0] += r, a[1] += g, a[2] += b, a[3] += bright, a[4] += bright * bright, a[5] += 1.0f;
+}
+int main(int, char **argument) {
+    int width = 1920, height = 1080, count = width * height, blocks = width / 8, *placed;
+    std::vector<int> pixels(count);
+    FILE *file = fopen(argument[1], "rb");
+    if (fread(pixels.data(), 4, count, file) != count) return 1;
+    float *A, *S, best = 1e30f;
+    cudaMalloc(&A, count * 24);
+    cudaMalloc(&S, blocks * height / 8 * 4);
+    cudaMalloc(&placed, count * 4);
+    cudaMemset(S, 0, blocks * height / 8 * 4);
+    cudaMemcpy(placed, pixels.data(), count * 4, cudaMemcpyHostToDevice);
+    cudaEvent_t start, end;
+    cudaEventCreate(&start);
+    cudaEventCreate(&end);
+    for (int round = 0; round < 50; round++) {
+        cudaMemset(A, 0, count * 24);
+        cudaEventRecord(start);
+        tile<<<(count + 127) / 128, 128>>>(GIVEN, S, placed, count, A, width, 256.0f, blocks);
+        cudaEventRecord(end);
+        cudaEventSynchronize(end);
+        float time;
+        cudaEventElapsedTime(&time, start, end);
+        best = fminf(best, time);
+    }
+    std::vector<float> sums(6 * count);
+    cudaMemcpy(sums.data(), A, count * 24, cudaMemcpyDeviceToHost);
+    double mean = 0;
+    for (int i = 0; i < count; i++) mean += sums[6 * i + 3];
+    printf("%g %.9g %d\n", best, mean / count, int(cudaGetLastError()));
+}
+"""
+"""Takes the file of the pixels; prints the best time of fifty in ms, the mean brightness, the error code."""
+
+
+def main() -> None:
+    numba_cuda, seen, pixels = cuda.require(), frame(WIDTH, HEIGHT), ordered(WIDTH, HEIGHT)
+    tracer = CudaTracer(seen, SINGLE, WIDTH, HEIGHT)
+    placed = numba_cuda.to_device(pixels)
+    sums = numba_cuda.to_device(np.zeros((WIDTH * HEIGHT, 6), SINGLE))
+    tracer.add_on_device(sums, placed, 0, LIMIT)
+    picture = sums.copy_to_host()
+    timed: dict[str, Callable[[], None]] = {
+        "frame": lambda: tracer.add_on_device(sums, placed, 0, LIMIT),
+        "cones": lambda: tracer.look_ahead(LIMIT, Work(1)),
+        "frame after cones": lambda: tracer.add_on_device(sums, placed, 0, LIMIT),
+    }
+    for name, run in timed.items():
+        print(f"fracslice {name:<20} {best(run, 50):.3f} ms")
+    print(f"fracslice mean {picture[:, 3].mean():.7f}, CPU mean {on_cpu(seen, pixels)[:, 3].mean():.7f}")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "pixels"
+        pixels.tofile(path)
+        for name, flags in native.FLAGS.items():
+            took, mean, error = native.run(seen.linked, FRAME, flags, str(path))
+            assert error == 0
+            print(f"{name:<30} {took:.3f} ms, mean {mean:.7f}")
+    if len(sys.argv) > 1:
+        np.save(sys.argv[1], picture[:, :3].reshape(HEIGHT, WIDTH, 3).astype(np.float16))
+
+
+def on_cpu(seen: Frame, pixels: np.ndarray) -> np.ndarray:
+    """The same sums from the lanes."""
+    sums = np.zeros((WIDTH * HEIGHT, 6), SINGLE)
+    CpuTracer(seen, SINGLE, WIDTH, HEIGHT).add(sums, pixels, 0, LIMIT, Work())
+    return sums
+
+
+if __name__ == "__main__":
+    main()
