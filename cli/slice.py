@@ -33,22 +33,50 @@ def signed_length(context: click.Context, option: click.Parameter, text: str) ->
 
 @click.command("slice")
 @click.argument("source", metavar="SCENE")
-@click.option("-o", "--output", required=True, metavar="OUT", help="A file or folder; its ending names the format.")
+@click.option(
+    "-o", "--output", required=True, metavar="OUT", help="A file or folder; its ending names the format."
+)
 @click.option("--format", "form", metavar="NAME", help="png, sl1, 3mf, svg, slic3r, cli, cli-binary or json.")
 @click.option("--size", callback=length, metavar="LENGTH", help="The longest side, such as 80mm.")
-@click.option("--layer", callback=length, default=LAYER, metavar="LENGTH", help="Layer height; 0.05mm by default.")
+@click.option(
+    "--layer", callback=length, default=LAYER, metavar="LENGTH", help="Layer height; 0.05mm by default."
+)
 @click.option("--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's, or 0.05mm.")
-@click.option("--printer", "machine", metavar="NAME", help='Whose screen the layers are for; "list" shows them.')
-@click.option("--up", nargs=3, type=float, metavar="X Y Z", help="The scene's direction that is up; 0 0 1 by default.")
-@click.option("--compensation", callback=signed_length, default="0", metavar="LENGTH", help="Move all outlines outwards.")
+@click.option(
+    "--printer", "machine", metavar="NAME", help='Whose screen the layers are for; "list" shows them.'
+)
+@click.option(
+    "--up", nargs=3, type=float, metavar="X Y Z", help="The scene's direction that is up; 0 0 1 by default."
+)
+@click.option(
+    "--compensation",
+    callback=signed_length,
+    default="0",
+    metavar="LENGTH",
+    help="Move all outlines outwards.",
+)
 @click.option("--gamma", type=float, default=1.0, help="Of the grey levels.")
-@click.option("--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default.")
-@click.option("--exposure", nargs=2, type=float, default=(8.0, 35.0), metavar="S S", help="Seconds: each, the first.")
-@click.option("--preview", metavar="FILE", help="A contact sheet (.png) or an animation (.webp) of the layers.")
+@click.option(
+    "--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default."
+)
+@click.option(
+    "--exposure", nargs=2, type=float, default=(8.0, 35.0), metavar="S S", help="Seconds: each, the first."
+)
+@click.option(
+    "--preview", metavar="FILE", help="A contact sheet (.png) or an animation (.webp) of the layers."
+)
 @set_option
 @threads_option
 @quiet_option
-def slice_(source: str, output: str, form: str | None, settings: tuple[str, ...], threads: int, quiet: bool, **options: Any) -> int:
+def slice_(
+    source: str,
+    output: str,
+    form: str | None,
+    settings: tuple[str, ...],
+    threads: int,
+    quiet: bool,
+    **options: Any,
+) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
     An interrupted job goes on when it is started again (PNG folders and SL1 archives).
@@ -87,7 +115,8 @@ def list_printers() -> int:
     from fracslice.slicing.printers import PRINTERS
 
     for p in PRINTERS.values():
-        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {' x '.join(f'{r:g}' for r in p.room)} mm")
+        room = " x ".join(f"{r:g}" for r in p.room)
+        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {room} mm")
     return 0
 
 
@@ -105,7 +134,9 @@ def job(scene: Scene, machine: Printer | None, options: dict[str, Any]) -> Slice
     if pixel is not None and machine is not None:
         raise click.UsageError("--pixel and --printer: expected one of them")
     given = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
-    return SliceJob(options["size"] or scene.size_mm, options["layer"], given, tuple(options.get("up") or (0.0, 0.0, 1.0)))
+    return SliceJob(
+        options["size"] or scene.size_mm, options["layer"], given, tuple(options.get("up") or (0.0, 0.0, 1.0))
+    )
 
 
 def write_preview(stack: Any, path: str, work: Any) -> None:
@@ -116,7 +147,9 @@ def write_preview(stack: Any, path: str, work: Any) -> None:
         (contact_sheet if path.lower().endswith(".png") else animation)(stack, file, work)
 
 
-def check_print(source: str, settings: tuple[str, ...], as_json: bool, threads: int, quiet: bool, **options: Any) -> int:
+def check_print(
+    source: str, settings: tuple[str, ...], as_json: bool, threads: int, quiet: bool, **options: Any
+) -> int:
     """Says whether the layers of a scene would print; the exit status."""
     from fracslice.export import check_target, replacing
     from fracslice.slicing import plan_stack
@@ -140,7 +173,9 @@ def check_print(source: str, settings: tuple[str, ...], as_json: bool, threads: 
 def told(source: str, report: PrintReport) -> str:
     """A line of numbers, then one for each reason not to print."""
     size = " x ".join(f"{s:.2f}" for s in report.size)
-    first = f"{source}: {report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
+    first = (
+        f"{source}: {report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
+    )
     if not report.problems:
         return f"{first}, would print"
     return os.linesep.join([f"{first}, would not print:", *(f"  {p}" for p in report.problems)])

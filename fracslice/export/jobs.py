@@ -56,17 +56,21 @@ class SliceRun:
             "gamma": screen.gamma,
             "compensation_mm": screen.compensation,
             "mirror": screen.mirror,
-            "layers": [{"file": f"{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)],
+            "layers": [
+                {"file": f"{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)
+            ],
         }
         return json.dumps(said, indent=1).encode()
 
 
 @contextmanager
 def resumable_zip(path: Path, first: tuple[str, bytes]) -> Iterator[tuple[zipfile.ZipFile, set[str]]]:
-    """A stored ZIP file that appears at `path` when the block ends; what an interrupted block wrote is kept beside it.
+    """A stored ZIP file that appears at `path` when the block ends; what an interrupted block wrote is kept
+    beside it.
 
-    first: name and content of the first member; a remainder that begins with the same goes on, any other is dropped.
-    Yields the archive and the names it has already. Raises ExportError for what the file system refuses.
+    first: name and content of the first member; a remainder that begins with the same goes on, any other is
+    dropped. Yields the archive and the names it has already. Raises ExportError for what the file system
+    refuses.
     """
     target = check_target(path)
     part = target.with_name(f".{target.name}.part")
@@ -95,7 +99,9 @@ def resumable_zip(path: Path, first: tuple[str, bytes]) -> Iterator[tuple[zipfil
 
 def add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
     """A stored member that carries no time."""
-    archive.writestr(zipfile.ZipInfo(name), data)
+    info = zipfile.ZipInfo(name)
+    info.external_attr = _ATTRIBUTES
+    archive.writestr(info, data)
 
 
 def _leave(archive: zipfile.ZipFile, file: BinaryIO) -> None:
@@ -105,6 +111,7 @@ def _leave(archive: zipfile.ZipFile, file: BinaryIO) -> None:
         file.flush()
 
 
+_ATTRIBUTES = 0o644 << 16
 _HEADER = struct.Struct("<4s5H3L2H")
 
 
@@ -122,6 +129,7 @@ def _members(file: BinaryIO) -> list[zipfile.ZipInfo]:
             break
         info.header_offset = found[-1].header_offset + _length(found[-1]) if found else 0
         info.CRC, info.file_size, info.compress_size = crc, size, size
+        info.external_attr = _ATTRIBUTES
         found.append(info)
     return found
 

@@ -41,7 +41,8 @@ def _holes(found: Contours) -> np.ndarray:
     return depth % 2 == 1
 
 
-# --- SVG ---------------------------------------------------------------------------------------------------------------
+# --- SVG ----------------------------------------------------------------------------------------------------
+# -----------
 def _size(run: SliceRun) -> tuple[float, float]:
     """Width and height of the layers' window in mm."""
     ny, nx = run.stack.shape
@@ -62,7 +63,9 @@ def _head(run: SliceRun, namespaces: str = "") -> str:
 
 
 def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
-    """A folder with an SVG file for each layer, one path with all contours, in mm. The folder must be new or empty."""
+    """A folder with an SVG file for each layer, one path with all contours, in mm. The folder must be new
+    or empty.
+    """
     folder = Path(path)
     try:
         folder.mkdir(exist_ok=True)
@@ -98,10 +101,13 @@ def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
     return _streamed(path, head.encode(), run.slicer.map(make), b"</svg>\n")
 
 
-# --- Common Layer Interface, version 2.0 (1994) --------------------------------------------------------------------
+# --- Common Layer Interface, version 2.0 (1994)
+# --------------------------------------------------------------------
 def write_cli(run: SliceRun, path: str | Path) -> Path:
     """The Common Layer Interface as text."""
-    return _streamed(path, _cli_head(run, "ASCII") + b"$$GEOMETRYSTART\n", run.slicer.map(_cli_text), b"$$GEOMETRYEND\n")
+    return _streamed(
+        path, _cli_head(run, "ASCII") + b"$$GEOMETRYSTART\n", run.slicer.map(_cli_text), b"$$GEOMETRYEND\n"
+    )
 
 
 def write_cli_binary(run: SliceRun, path: str | Path) -> Path:
@@ -112,7 +118,13 @@ def write_cli_binary(run: SliceRun, path: str | Path) -> Path:
 def _cli_head(run: SliceRun, kind: str) -> bytes:
     x, y = (s / 2 for s in run.stack.size[:2])
     box = ",".join(f"{v:.6f}" for v in (-x, -y, 0.0, x, y, float(run.stack.tops[-1])))
-    lines = [f"$${kind}", f"$$UNITS/{MICRON:015.6f}", "$$VERSION/200", "$$LABEL/1,fracslice", f"$$DIMENSION/{box}"]
+    lines = [
+        f"$${kind}",
+        f"$$UNITS/{MICRON:015.6f}",
+        "$$VERSION/200",
+        "$$LABEL/1,fracslice",
+        f"$$DIMENSION/{box}",
+    ]
     lines.append(f"$$LAYERS/{run.layers:06d}")
     return "\n".join(["$$HEADERSTART", *lines, "$$HEADEREND\n"]).encode()
 
@@ -139,7 +151,8 @@ def _cli_bytes(layer: Layer) -> bytes:
     return b"".join(parts)
 
 
-# --- JSON ------------------------------------------------------------------------------------------------------------
+# --- JSON
+# ------------------------------------------------------------------------------------------------------------
 def write_json(run: SliceRun, path: str | Path) -> Path:
     """Contours as JSON: for each layer its top and height, and its polygons with their parents, in mm."""
     head = json.loads(run.describe())
@@ -153,7 +166,8 @@ def write_json(run: SliceRun, path: str | Path) -> Path:
             for i, parent in enumerate(found.parent)
         )
         comma = "," if layer.index else ""
-        return f'{comma}\n{{"top": {layer.top:.6g}, "height": {layer.height:.6g}, "contours": [{rings}]}}'.encode()
+        begin = f'{comma}\n{{"top": {layer.top:.6g}, "height": {layer.height:.6g}'
+        return f'{begin}, "contours": [{rings}]}}'.encode()
 
     return _streamed(path, opening.encode(), run.slicer.map(make), b"\n]}\n")
 

@@ -18,8 +18,8 @@ MOST_MEMBERS = 65_535
 def write_folder(run: SliceRun, path: str | Path) -> Path:
     """00000.png, ... and, when all are there, manifest.json that says what they are.
 
-    A folder that an interrupted job left is gone on with, after its last whole picture; its job.json tells that it was the
-    same job. Raises ExportError for a folder with anything else in it.
+    A folder that an interrupted job left is gone on with, after its last whole picture; its job.json tells
+    that it was the same job. Raises ExportError for a folder with anything else in it.
     """
     folder = Path(path)
     said = run.describe()
@@ -57,10 +57,11 @@ def _pictures(run: SliceRun, start: int) -> Iterator[bytes]:
 
 
 def write_sl1(run: SliceRun, path: str | Path) -> Path:
-    """An archive for the SL1 family: config.ini, prusaslicer.ini and a PNG for each layer; opens in PrusaSlicer.
+    """An archive for the SL1 family: config.ini, prusaslicer.ini and a PNG for each layer; opens in
+    PrusaSlicer.
 
-    Interrupted, it goes on from what it had. Raises ExportError without a printer, or for layers of unequal heights, which
-    the format cannot say.
+    Interrupted, it goes on from what it had. Raises ExportError without a printer, or for layers of unequal
+    heights, which the format cannot say.
     """
     target = Path(path)
     if not run.screen.printer:

@@ -8,14 +8,16 @@ import numpy as np
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 LEVEL = 1
-"""Of ISA-L. Measured on 900 x 960 layers of a Mandelbulb: 0.29 ms and 27.6 kB; zlib-ng's level 1 0.41 ms and 34.9 kB,
-libdeflate's 2.4 ms and 26.0 kB, zlib's 1.7 ms and 31.0 kB."""
+"""Of ISA-L. Measured on 900 x 960 layers of a Mandelbulb: 0.29 ms and 27.6 kB; zlib-ng's level 1 0.41 ms
+and 34.9 kB, libdeflate's 2.4 ms and 26.0 kB, zlib's 1.7 ms and 31.0 kB.
+"""
 
 
 def encode(image: np.ndarray) -> bytes:
     """A grey picture, uint8 [rows, columns], as a PNG file.
 
-    No row filter: on layers, filtering the differences of rows made the files a third larger in the same time.
+    No row filter: on layers, filtering the differences of rows made the files a third larger in the same
+    time.
     """
     from isal import isal_zlib
 
@@ -25,7 +27,10 @@ def encode(image: np.ndarray) -> bytes:
     head = struct.pack(">IIBBBBB", columns, rows, 8, 0, 0, 0, 0)
     parts = ((b"IHDR", head), (b"IDAT", isal_zlib.compress(filtered, LEVEL)), (b"IEND", b""))
     return SIGNATURE + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", isal_zlib.crc32(data, isal_zlib.crc32(kind)))
+        struct.pack(">I", len(data))
+        + kind
+        + data
+        + struct.pack(">I", isal_zlib.crc32(data, isal_zlib.crc32(kind)))
         for kind, data in parts
     )
 

@@ -17,7 +17,15 @@ FORMATS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
     **outlines.WRITERS,
 }
 FOLDERS = {"png", "svg"}
-ENDINGS = {".sl1": "sl1", ".sl1s": "sl1", ".3mf": "3mf", ".svg": "slic3r", ".cli": "cli", ".json": "json", "": "png"}
+ENDINGS = {
+    ".sl1": "sl1",
+    ".sl1s": "sl1",
+    ".3mf": "3mf",
+    ".svg": "slic3r",
+    ".cli": "cli",
+    ".json": "json",
+    "": "png",
+}
 
 
 def slice_format(path: str | Path, name: str | None = None) -> str:
@@ -29,7 +37,9 @@ def slice_format(path: str | Path, name: str | None = None) -> str:
     if name is None:
         name = ENDINGS.get(ending)
         if name is None:
-            raise ExportError(f"{path}: unknown kind of file; known are {', '.join(e for e in ENDINGS if e)}, or a folder")
+            raise ExportError(
+                f"{path}: unknown kind of file; known are {', '.join(e for e in ENDINGS if e)}, or a folder"
+            )
     elif name not in FORMATS:
         raise ExportError(f"format {name!r}: known are {', '.join(FORMATS)}")
     check_target(Path(path) / "layer" if name in FOLDERS and Path(path).is_dir() else path)

@@ -15,25 +15,43 @@ from fracslice.slicing import Layer
 
 LEVEL = 1
 HEAD = (
-    '<?xml version="1.0" encoding="UTF-8"?>\n<model unit="millimeter" xml:lang="en-US" requiredextensions="s" '
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<model unit="millimeter" xml:lang="en-US" requiredextensions="s" '
     'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" '
     'xmlns:s="http://schemas.microsoft.com/3dmanufacturing/slice/2015/07">\n'
     '<metadata name="Application">fracslice</metadata>\n<resources>\n<s:slicestack id="1" zbottom="0">\n'
 )
-BOX = ((0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7))
+BOX = (
+    (0, 2, 1),
+    (0, 3, 2),
+    (4, 5, 6),
+    (4, 6, 7),
+    (0, 1, 5),
+    (0, 5, 4),
+    (1, 2, 6),
+    (1, 6, 5),
+    (2, 3, 7),
+    (2, 7, 6),
+    (3, 0, 4),
+    (3, 4, 7),
+)
 
 
 def write_3mf(run: SliceRun, path: str | Path) -> Path:
-    """The slice stack of one object, streamed. The mesh has "low resolution": its box, which the extension allows where
-    the slices are what is printed."""
-    with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
+    """The slice stack of one object, streamed. The mesh has "low resolution": its box, which the extension
+    allows where the slices are what is printed.
+    """
+    with (
+        replacing(path) as file,
+        zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive,
+    ):
         for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS)):
             with archive.open(name, "w") as part:
                 part.write(text.encode())
         with archive.open("3D/3dmodel.model", "w", force_zip64=run.layers > 1000) as part:
             part.write(HEAD.encode())
-            for text in run.slicer.map(lambda layer: _slice(run, layer)):
-                part.write(text)
+            for slice_ in run.slicer.map(lambda layer: _slice(run, layer)):
+                part.write(slice_)
             part.write(f"</s:slicestack>\n{_object(run)}".encode())
     return Path(path)
 
@@ -42,10 +60,17 @@ def _slice(run: SliceRun, layer: Layer) -> bytes:
     found = layer.contours
     parts = [f'<s:slice ztop="{layer.top:.6f}">\n'.encode()]
     if len(found):
-        parts += [b"<s:vertices>\n", *rows('<s:vertex x="%.5f" y="%.5f"/>\n', found.points + _middle(run)), b"</s:vertices>\n"]
+        parts += [
+            b"<s:vertices>\n",
+            *rows('<s:vertex x="%.5f" y="%.5f"/>\n', found.points + _middle(run)),
+            b"</s:vertices>\n",
+        ]
     for first, end in zip(found.starts[:-1], found.starts[1:], strict=True):
         following = np.concatenate([np.arange(first + 1, end), [first]])
-        parts += [f'<s:polygon startv="{first}">\n'.encode(), *rows('<s:segment v2="%d"/>\n', following[:, None])]
+        parts += [
+            f'<s:polygon startv="{first}">\n'.encode(),
+            *rows('<s:segment v2="%d"/>\n', following[:, None]),
+        ]
         parts.append(b"</s:polygon>\n")
     return b"".join([*parts, b"</s:slice>\n"])
 
@@ -61,6 +86,7 @@ def _object(run: SliceRun) -> str:
     vertices = "".join(f'<vertex x="{a:.5f}" y="{b:.5f}" z="{c:.6f}"/>' for a, b, c in corners)
     triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in BOX)
     return (
-        f'<object id="2" type="model" s:slicestackid="1" s:meshresolution="lowres"><mesh><vertices>{vertices}</vertices>'
-        f'<triangles>{triangles}</triangles></mesh></object>\n</resources>\n<build><item objectid="2"/></build>\n</model>\n'
+        '<object id="2" type="model" s:slicestackid="1" s:meshresolution="lowres"><mesh>'
+        f"<vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>\n"
+        '</resources>\n<build><item objectid="2"/></build>\n</model>\n'
     )

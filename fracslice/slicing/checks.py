@@ -1,4 +1,6 @@
-"""Would it print? Islands, overhangs, cups, traps, cavities, loose bodies, thin walls and gaps, fit, volume and weight."""
+"""Would it print? Islands, overhangs, cups, traps, cavities, loose bodies, thin walls and gaps, fit, volume
+and weight.
+"""
 
 from __future__ import annotations
 
@@ -26,9 +28,10 @@ WORST = 6
 
 @dataclass(frozen=True)
 class Limits:
-    """What counts. speck: parts with less area (mm^2) in every layer are dust that is counted but no reason to stop. cup: the
-    least area of a suction cup, mm^2. wall: the thinnest wall, mm; it is judged by the thinnest hundredth. density: of the
-    resin, g/cm^3."""
+    """What counts. speck: parts with less area (mm^2) in every layer are dust that is counted but no reason
+    to stop. cup: the least area of a suction cup, mm^2. wall: the thinnest wall, mm; it is judged by the
+    thinnest hundredth. density: of the resin, g/cm^3.
+    """
 
     speck: float = 0.02
     cup: float = 1.0
@@ -38,8 +41,9 @@ class Limits:
 
 @dataclass(frozen=True)
 class Widths:
-    """Of walls or gaps in mm: the smallest, the thinnest hundredth, the median; and how many pixels of middle lines are in
-    each bin, whose edges `edges` are."""
+    """Of walls or gaps in mm: the smallest, the thinnest hundredth, the median; and how many pixels of
+    middle lines are in each bin, whose edges `edges` are.
+    """
 
     smallest: float
     thinnest_hundredth: float
@@ -90,8 +94,12 @@ class _Told:
     gaps: np.ndarray | None
 
 
-def check_layers(stack: Stack, limits: Limits | None = None, printer: Printer | None = None, work: Work | None = None) -> PrintReport:
-    """Checks a planned stack, layer by layer; memory grows with the number of parts only. Raises `SliceError`, `Cancelled`."""
+def check_layers(
+    stack: Stack, limits: Limits | None = None, printer: Printer | None = None, work: Work | None = None
+) -> PrintReport:
+    """Checks a planned stack, layer by layer; memory grows with the number of parts only. Raises
+    `SliceError`, `Cancelled`.
+    """
     chosen = set(np.linspace(0, len(stack.z) - 1, THICKNESS_LAYERS).astype(int).tolist())
 
     def make(layer: Layer) -> _Told:
@@ -115,7 +123,9 @@ class _Collector:
         for k, now in enumerate(told):
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
-            overhangs.append(0.0 if below is None else square * unsupported(below, now.solid, reach, stack.shape[1]))
+            overhangs.append(
+                0.0 if below is None else square * unsupported(below, now.solid, reach, stack.shape[1])
+            )
             solid.add(now.solid)
             empty.add(now.empty)
             volume += now.area * float(stack.heights[k])
@@ -189,9 +199,12 @@ def _problems(r: PrintReport, limits: Limits, printer: Printer | None) -> list[s
     if len(r.bodies) > 1:
         found.append(f"{len(r.bodies)} loose bodies")
     if r.islands:
-        found.append(f"{len(r.islands)} islands begin in the air, the first in layer {min(i.layers[0] for i in r.islands)}")
+        first = min(i.layers[0] for i in r.islands)
+        found.append(f"{len(r.islands)} islands begin in the air, the first in layer {first}")
     if r.cavities:
-        found.append(f"{len(r.cavities)} sealed cavities keep {sum(c.volume for c in r.cavities):.3g} mm3 of resin")
+        found.append(
+            f"{len(r.cavities)} sealed cavities keep {sum(c.volume for c in r.cavities):.3g} mm3 of resin"
+        )
     cups = [c for c in r.cups if c not in r.cavities]
     if cups:
         found.append(f"{len(cups)} suction cups, the largest {max(c.area for c in cups):.3g} mm2")

@@ -20,9 +20,9 @@ PRECISE = 1e-3
 class Contours:
     """Closed polygons, outer ones counter-clockwise, holes clockwise; no two meet.
 
-    points: float64 [n, 2], mm from the middle of the object's box, x to the right and y to the back. starts: int32
-    [m + 1]: polygon i has the points ``starts[i]:starts[i + 1]``, the first not repeated. parent: int32 [m], the polygon
-    just around it, -1 for none; a parent comes before its children.
+    points: float64 [n, 2], mm from the middle of the object's box, x to the right and y to the back.
+    starts: int32 [m + 1]: polygon i has the points ``starts[i]:starts[i + 1]``, the first not repeated.
+    parent: int32 [m], the polygon just around it, -1 for none; a parent comes before its children.
     """
 
     points: np.ndarray
@@ -75,9 +75,12 @@ def contours(tiles: Tiles, k: int, z: float, stack: Stack, exact: CpuKernel | No
     return _nested(points, order, starts, edges, ends[:, 0] < 0)
 
 
-def refined(kernel: CpuKernel, edges: np.ndarray, ends: np.ndarray, z: float, frame: np.ndarray) -> np.ndarray:
-    """Where on its edge each crossing lies, 0 to 1, to `PRECISE`: false position with the Illinois rule (Dowell and Jarratt
-    1971), all edges at once; those that are done are left out."""
+def refined(
+    kernel: CpuKernel, edges: np.ndarray, ends: np.ndarray, z: float, frame: np.ndarray
+) -> np.ndarray:
+    """Where on its edge each crossing lies, 0 to 1, to `PRECISE`: false position with the Illinois rule
+    (Dowell and Jarratt 1971), all edges at once; those that are done are left out.
+    """
     base = frame[:2, None] + frame[2:, None] * edges[:, :2].T
     step = frame[2:, None] * np.eye(2)[edges[:, 2]].T
     lo, hi = np.zeros(len(edges)), np.ones(len(edges))
@@ -101,11 +104,14 @@ def refined(kernel: CpuKernel, edges: np.ndarray, ends: np.ndarray, z: float, fr
     return best
 
 
-def _nested(points: np.ndarray, order: np.ndarray, starts: np.ndarray, edges: np.ndarray, leaves: np.ndarray) -> Contours:
+def _nested(
+    points: np.ndarray, order: np.ndarray, starts: np.ndarray, edges: np.ndarray, leaves: np.ndarray
+) -> Contours:
     """Contours in the order of their lowest, leftmost crossing of a row of samples, each with its parent.
 
-    The crossing left of that one in its row tells: it is on the parent, or on a sibling, by whether the solid begins or
-    ends there (as in Suzuki and Abe 1985, "Topological structural analysis of digitized binary images").
+    The crossing left of that one in its row tells: it is on the parent, or on a sibling, by whether the
+    solid begins or ends there (as in Suzuki and Abe 1985, "Topological structural analysis of digitized
+    binary images").
     """
     count = len(starts) - 1
     loop = np.empty(len(order), np.int32)

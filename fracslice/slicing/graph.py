@@ -1,8 +1,10 @@
-"""The parts of all layers and what lies over what: islands, bodies, cups, traps and cavities, by union and find.
+"""The parts of all layers and what lies over what: islands, bodies, cups, traps and cavities, by union and
+find.
 
-On a masked printer the object hangs from the plate, its first layer uppermost, and grows downwards into the resin. So a
-hollow that has no way out through the layers printed so far is a cup that sucks at the film; one that has none through the
-layers that follow keeps its resin when it is lifted; one that has none at all is a cavity.
+On a masked printer the object hangs from the plate, its first layer uppermost, and grows downwards into the
+resin. So a hollow that has no way out through the layers printed so far is a cup that sucks at the film;
+one that has none through the layers that follow keeps its resin when it is lifted; one that has none at all
+is a cavity.
 """
 
 from __future__ import annotations
@@ -17,8 +19,9 @@ from .runs import Parts, find, overlaps, unite
 
 @dataclass(frozen=True)
 class Found:
-    """Something that a check found. layers: the first and last it is in. area: its largest in a layer, mm^2. volume: mm^3. at:
-    the middle of its first layer's part, mm from the middle of the object."""
+    """Something that a check found. layers: the first and last it is in. area: its largest in a layer,
+    mm^2. volume: mm^3. at: the middle of its first layer's part, mm from the middle of the object.
+    """
 
     layers: tuple[int, int]
     area: float
@@ -42,7 +45,7 @@ class Graph:
         """The parts of the next layer."""
         if self.last is not None:
             pairs = overlaps(self.last, parts).astype(np.int64)
-            self.edges.append(pairs + (self.count - len(self.last), self.count))
+            self.edges.append(pairs + np.array([self.count - len(self.last), self.count]))
         self.layer.append(np.full(len(parts), len(self.layer), np.int32))
         self.area.append(parts.area)
         self.middle.append(parts.middle)
@@ -53,12 +56,17 @@ class Graph:
     def nodes(self) -> Nodes:
         """All that was fed, as arrays."""
         edges = np.concatenate([np.empty((0, 2), np.int64), *self.edges])
-        return Nodes(*(np.concatenate(a) for a in (self.layer, self.area, self.middle, self.open)), edges)
+        layer, area, middle, free = (
+            np.concatenate(a) for a in (self.layer, self.area, self.middle, self.open)
+        )
+        return Nodes(layer, area, middle, free, edges)
 
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """layer int32 [n], area int64 [n] and middle float64 [n, 2] in pixels, open bool [n]; edges int64 [e, 2], by layers."""
+    """layer int32 [n], area int64 [n] and middle float64 [n, 2] in pixels, open bool [n]; edges int64 [e,
+    2], by layers.
+    """
 
     layer: np.ndarray
     area: np.ndarray
@@ -77,13 +85,16 @@ class Nodes:
         return ~held
 
     def shut(self, backwards: bool) -> np.ndarray:
-        """Which empty nodes have no way out through the layers up to their own (or, backwards, from their own on).
+        """Which empty nodes have no way out through the layers up to their own (or, backwards, from their
+        own on).
 
         The plate shuts the first layer; what reaches the last one is open.
         """
         order = -1 if backwards else 1
         free = self.open | (backwards & (self.layer == self.layer.max(initial=0)))
-        later = np.maximum(*self.layer[self.edges].T) if not backwards else -np.minimum(*self.layer[self.edges].T)
+        later = (
+            np.maximum(*self.layer[self.edges].T) if not backwards else -np.minimum(*self.layer[self.edges].T)
+        )
         edges = self.edges[np.argsort(later, kind="stable")]
         return _shut(edges, np.sort(later), order * self.layer, free)
 
@@ -94,7 +105,9 @@ class Nodes:
         free[body[self.open | (self.layer == 0) | (self.layer == self.layer.max(initial=0))]] = True
         return ~free[body]
 
-    def grouped(self, chosen: np.ndarray, heights: np.ndarray, pixel: tuple[float, float], shape: tuple[int, int]) -> list[Found]:
+    def grouped(
+        self, chosen: np.ndarray, heights: np.ndarray, pixel: tuple[float, float], shape: tuple[int, int]
+    ) -> list[Found]:
         """The chosen nodes as connected groups, the largest volume first. heights: of the layers, mm."""
         inner = self.edges[chosen[self.edges].all(1)]
         root = _united(inner, len(self.layer))
@@ -108,7 +121,15 @@ class Nodes:
         np.maximum.at(last, group, self.layer[nodes])
         at = (self.middle[names] - np.array(shape[::-1]) / 2) * pixel
         order = np.argsort(-volume, kind="stable")
-        return [Found((int(first[i]), int(last[i])), float(area[i]), float(volume[i]), (float(at[i, 0]), float(at[i, 1]))) for i in order]
+        return [
+            Found(
+                (int(first[i]), int(last[i])),
+                float(area[i]),
+                float(volume[i]),
+                (float(at[i, 0]), float(at[i, 1])),
+            )
+            for i in order
+        ]
 
 
 def _united(edges: np.ndarray, count: int) -> np.ndarray:

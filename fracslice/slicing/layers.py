@@ -58,8 +58,8 @@ class Layer:
     def coverage(self) -> np.ndarray:
         """How much of each pixel is inside, uint8 [ny, nx], 255 wholly; row 0 is the front (lowest y).
 
-        The area that the polygon through the crossings of the pixel's sides cuts from it. Crossings are interpolated, for
-        fields with weak insides from three values, for others from two.
+        The area that the polygon through the crossings of the pixel's sides cuts from it. Crossings are
+        interpolated, for fields with weak insides from three values, for others from two.
         """
         return self._painted[0]
 
@@ -89,8 +89,8 @@ class Slicer:
     def map(self, make: Callable[[Layer], T], layers: Sequence[int] | None = None) -> Iterator[T]:
         """``make(layer)`` of every layer, or of the chosen ones, which ascend.
 
-        `make` runs in worker threads; results do not depend on their number. At most a few slabs are held at a time.
-        Raises `SliceError`, `Cancelled`, or what `make` raises.
+        `make` runs in worker threads; results do not depend on their number. At most a few slabs are held
+        at a time. Raises `SliceError`, `Cancelled`, or what `make` raises.
         """
         root, shape = self.stack.root, self.stack.shape
         exact = compile_scene(root, "float64")
@@ -117,7 +117,9 @@ class Slicer:
                 for done in range(len(groups)):
                     while len(ahead) <= self.work.threads and (group := next(waiting, None)):
                         ahead.append(pool.submit(slab, group))
-                    yield from ahead.popleft().result()
+                    made = ahead.popleft().result()
+                    self.work.check()
+                    yield from made
                     self.work.progress("slicing", (done + 1) / len(groups))
             except BaseException:
                 for future in ahead:

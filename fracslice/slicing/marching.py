@@ -1,7 +1,7 @@
 """Marching squares on the tiles of one layer: coverage of pixels, and crossings linked to contours.
 
-A pixel is the cell between four samples. Corners and edges are counted counter-clockwise from the lower left corner and the
-lower edge; edge c lies between the corners c and c + 1.
+A pixel is the cell between four samples. Corners and edges are counted counter-clockwise from the lower
+left corner and the lower edge; edge c lies between the corners c and c + 1.
 """
 
 from __future__ import annotations
@@ -9,9 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .tiles import ALL, FIRST_ROW, NONE, ONE, OUTSIDE, bits, lowest, neighbour_word, rights, uppers
+from .tiles import ALL, FIRST_ROW, ONE, OUTSIDE, bits, lowest, neighbour_word, rights, uppers
 
-SPREAD = 255 * np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").view(np.uint64).ravel()
+SPREAD = (
+    255
+    * np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little")
+    .view(np.uint64)
+    .ravel()
+)
 """For each byte, eight bytes that are 255 where it has a bit set."""
 
 
@@ -28,7 +33,7 @@ def corner_words(where, inside, k, y, x, t):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def at(where, values, k, y, x, t, r, c):  # type: ignore[no-untyped-def]
-    """The value of sample (r, c) of a tile, 0 to 8; what is returned where nothing is known has no meaning."""
+    """The value of sample (r, c) of a tile, 0 to 8; without meaning where nothing is known."""
     if r < 8 and c < 8:
         return values[t, 8 * r + c]
     other = where[k, y + (r >> 3), x + (c >> 3)]
@@ -37,7 +42,7 @@ def at(where, values, k, y, x, t, r, c):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def crossing_words(where, inside, k, y, x, t):  # type: ignore[no-untyped-def]
-    """The samples of a tile whose edge to the right crosses the contour, and those whose edge upwards does."""
+    """The samples of a tile whose edge to the right is crossed, and those whose edge upwards is."""
     s = inside[t]
     right = s ^ rights(s, neighbour_word(where, inside, k, y, x + 1))
     return right, s ^ uppers(s, neighbour_word(where, inside, k, y + 1, x))
@@ -47,8 +52,9 @@ def crossing_words(where, inside, k, y, x, t):  # type: ignore[no-untyped-def]
 def cross_edges(where, place, inside, values, count, cross, edges):  # type: ignore[no-untyped-def]
     """Where each edge of all tiles is crossed, by linear interpolation.
 
-    cross: float32 [tiles, 128], filled with the share of the edge before the crossing: of the edge from each sample to its
-    right, then of the one upwards. edges: int64, filled with 128 * tile + number of the edge; returns how many.
+    cross: float32 [tiles, 128], filled with the share of the edge before the crossing: of the edge from
+    each sample to its right, then of the one upwards. edges: int64, filled with 128 * tile + number of the
+    edge; returns how many.
     """
     n = 0
     for t in range(count):
@@ -68,7 +74,8 @@ def cross_edges(where, place, inside, values, count, cross, edges):  # type: ign
 
 @njit(cache=True, nogil=True)
 def halve(where, place, values, edges, middle, cross):  # type: ignore[no-untyped-def]
-    """Better crossings from the field's values at the middles of edges, for fields whose inside values are too small.
+    """Better crossings from the field's values at the middles of edges, for fields whose inside values are
+    too small.
 
     A middle that is outside makes a line with the end that is outside; both are distances.
     """
@@ -88,13 +95,11 @@ def halve(where, place, values, edges, middle, cross):  # type: ignore[no-untype
 
 @njit(cache=True, nogil=True)
 def shares(where, cross, k, y, x, t, bit):  # type: ignore[no-untyped-def]
-    """For each corner of a cell, and the edges after and before it, the share of the edge before its crossing as seen from
-    the corner: eight numbers; those of edges that are not crossed have no meaning."""
-    right = upper = t
-    if bit & 7 == 7:
-        right = max(where[k, y, x + 1], 0)
-    if bit >> 3 == 7:
-        upper = max(where[k, y + 1, x], 0)
+    """For each corner of a cell, and the edges after and before it, the share of the edge before its
+    crossing as seen from the corner: eight numbers; those of edges that are not crossed have no meaning.
+    """
+    right = max(where[k, y, x + 1], 0) if bit & 7 == 7 else t
+    upper = max(where[k, y + 1, x], 0) if bit >> 3 == 7 else t
     one = np.float32(1)
     e0, e3 = cross[t, bit], cross[t, 64 + bit]
     e1 = cross[right, 64 + (bit & 56) + ((bit + 1) & 7)]
@@ -113,7 +118,9 @@ def signs(words, bit):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def joined(e, q):  # type: ignore[no-untyped-def]
-    """Whether the inside corners q and q + 2 of an alternating cell are connected: if more of its border is inside."""
+    """Whether the inside corners q and q + 2 of an alternating cell are connected: if more of its border is
+    inside.
+    """
     return e[2 * q] + e[2 * q + 1] + e[2 * q + 4] + e[2 * q + 5] > 2
 
 
@@ -144,8 +151,8 @@ def cell_area(e, inside):  # type: ignore[no-untyped-def]
 def paint(where, inside, cross, k, image):  # type: ignore[no-untyped-def]
     """Writes the coverage of one layer to a zeroed image; 255 is wholly inside.
 
-    image: uint64 [ny, tx], eight pixels a word, row 0 lowest. Returns (inside area in pixels, number of partly covered
-    pixels).
+    image: uint64 [ny, tx], eight pixels a word, row 0 lowest. Returns (inside area in pixels, number of
+    partly covered pixels).
     """
     grey = image.view(np.uint8)
     area, partly = 0.0, 0
@@ -179,9 +186,9 @@ def paint(where, inside, cross, k, image):  # type: ignore[no-untyped-def]
 def number_edges(where, inside, values, k, ids, points, ends):  # type: ignore[no-untyped-def]
     """Numbers the crossing edges of a layer.
 
-    ids: int32 [tiles, 128], the number of the edge from each sample to its right, then to the one above it. points: int32
-    [n, 3], (column, row, 0 right or 1 up). ends: float64 [n, 2], values at both ends. Returns how many there are; writes
-    none beyond the arrays' length.
+    ids: int32 [tiles, 128], the number of the edge from each sample to its right, then to the one above it.
+    points: int32 [n, 3], (column, row, 0 right or 1 up). ends: float64 [n, 2], values at both ends. Returns
+    how many there are; writes none beyond the arrays' length.
     """
     n = 0
     for y in range(1, where.shape[1] - 1):
@@ -200,7 +207,10 @@ def number_edges(where, inside, values, k, ids, points, ends):  # type: ignore[n
                         if n < len(points):
                             ids[t, 64 * up + bit] = n
                             points[n, 0], points[n, 1], points[n, 2] = 8 * (x - 1) + c, 8 * (y - 1) + r, up
-                            ends[n, 0], ends[n, 1] = values[t, bit], at(where, values, k, y, x, t, r + up, c + 1 - up)
+                            ends[n, 0], ends[n, 1] = (
+                                values[t, bit],
+                                at(where, values, k, y, x, t, r + up, c + 1 - up),
+                            )
                         n += 1
     return n
 
@@ -230,7 +240,9 @@ def link(where, inside, cross, k, ids, following):  # type: ignore[no-untyped-de
 
 @njit(cache=True, nogil=True)
 def _link_cell(share, inside, e, following):  # type: ignore[no-untyped-def]
-    """Where the outline of the cell's inside, counter-clockwise, leaves along one edge, it comes back along another."""
+    """Where the outline of the cell's inside, counter-clockwise, leaves along one edge, it comes back along
+    another.
+    """
     alone = (inside == 5 and not joined(share, 0)) or (inside == 10 and not joined(share, 1))
     for q in range(4):
         g = (q + 1) & 3
@@ -243,7 +255,9 @@ def _link_cell(share, inside, e, following):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def walk(following, order, starts):  # type: ignore[no-untyped-def]
-    """Cuts the permutation `following` into its cycles: order int32 [n], starts int32 [n + 1]. Returns how many."""
+    """Cuts the permutation `following` into its cycles: order int32 [n], starts int32 [n + 1]. Returns how
+    many.
+    """
     seen = np.zeros(len(following), np.bool_)
     loops, n = 0, 0
     for first in range(len(following)):

@@ -36,7 +36,9 @@ def _spread(stack: Stack, count: int) -> list[int]:
     return sorted({int((i + 0.5) * total / min(count, total)) for i in range(min(count, total))})
 
 
-def contact_sheet(stack: Stack, file: BinaryIO, work: Work | None = None, layers: Sequence[int] | None = None) -> None:
+def contact_sheet(
+    stack: Stack, file: BinaryIO, work: Work | None = None, layers: Sequence[int] | None = None
+) -> None:
     """A PNG with chosen layers, or 24 over the height, each with its height above the bed."""
     from PIL import Image, ImageDraw
 
@@ -55,7 +57,9 @@ def contact_sheet(stack: Stack, file: BinaryIO, work: Work | None = None, layers
 
 def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
     """An endless animated WebP that climbs through the object in up to 60 layers, three seconds long."""
-    frames = list(Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), _spread(stack, FRAMES)))
+    frames = list(
+        Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), _spread(stack, FRAMES))
+    )
     frames[0].save(file, "WEBP", save_all=True, append_images=frames[1:], duration=50, loop=0, lossless=True)
 
 

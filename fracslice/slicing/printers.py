@@ -12,8 +12,8 @@ from ..errors import SliceError
 class Printer:
     """A masked resin printer.
 
-    pixels: of the screen along the bed's x and y. screen: its size in mm. height: the highest print in mm. mirror: the
-    picture is mirrored along x. portrait: the picture's rows run along the bed's x.
+    pixels: of the screen along the bed's x and y. screen: its size in mm. height: the highest print in mm.
+    mirror: the picture is mirrored along x. portrait: the picture's rows run along the bed's x.
     """
 
     name: str
@@ -57,4 +57,7 @@ def printer(name: str) -> Printer:
     if name in PRINTERS:
         return PRINTERS[name]
     near = difflib.get_close_matches(name.lower().replace(" ", "-"), PRINTERS, 1, 0.4)
-    raise SliceError(f"printer {name!r}: unknown; " + (f"did you mean {near[0]}?" if near else f"known: {', '.join(PRINTERS)}"))
+    raise SliceError(
+        f"printer {name!r}: unknown; "
+        + (f"did you mean {near[0]}?" if near else f"known: {', '.join(PRINTERS)}")
+    )

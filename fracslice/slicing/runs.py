@@ -15,9 +15,9 @@ THRESHOLD = 128
 class Parts:
     """The connected parts of one layer, solid ones or empty ones.
 
-    rows: int32 [ny + 1], the runs of row y are ``rows[y]:rows[y + 1]``. begin, end: int32 [r], the pixels of each run, end
-    excluded. part: int32 [r], the part of each run. area: int64 [m] in pixels. middle: float64 [m, 2], (x, y) in pixels.
-    open: bool [m], whether the part reaches the border of the window.
+    rows: int32 [ny + 1], the runs of row y are ``rows[y]:rows[y + 1]``. begin, end: int32 [r], the pixels
+    of each run, end excluded. part: int32 [r], the part of each run. area: int64 [m] in pixels. middle:
+    float64 [m, 2], (x, y) in pixels. open: bool [m], whether the part reaches the border of the window.
     """
 
     rows: np.ndarray
@@ -33,7 +33,9 @@ class Parts:
 
 
 def parts_of(image: np.ndarray) -> tuple[Parts, Parts]:
-    """The solid parts, pixels that touch at a corner connected, and the empty ones, by sides only; uint8 [ny, nx]."""
+    """The solid parts, pixels that touch at a corner connected, and the empty ones, by sides only; uint8
+    [ny, nx].
+    """
     ny, nx = image.shape
     rows = np.zeros(ny + 1, np.int32)
     count = _solid_runs(image, rows, np.empty(0, np.int32), np.empty(0, np.int32))
@@ -141,7 +143,9 @@ def _label(rows, begin, end, reach, part):  # type: ignore[no-untyped-def]
 def overlaps(below: Parts, above: Parts) -> np.ndarray:
     """Pairs of parts of two layers that share a pixel, int32 [n, 2] (below, above), in order, each once."""
     pairs = np.empty((len(below.begin) + len(above.begin), 2), np.int32)
-    count = _overlaps(below.rows, below.begin, below.end, below.part, above.rows, above.begin, above.end, above.part, pairs)
+    count = _overlaps(
+        below.rows, below.begin, below.end, below.part, above.rows, above.begin, above.end, above.part, pairs
+    )
     return np.unique(pairs[:count], axis=0)
 
 
@@ -163,7 +167,9 @@ def _overlaps(rows_a, begin_a, end_a, part_a, rows_b, begin_b, end_b, part_b, pa
 
 def unsupported(below: Parts, above: Parts, reach: float, width: int) -> int:
     """Solid pixels of a layer that are farther than `reach` pixels from all solid ones of the layer below."""
-    return int(_unsupported(below.rows, below.begin, below.end, above.rows, above.begin, above.end, reach, width))
+    return int(
+        _unsupported(below.rows, below.begin, below.end, above.rows, above.begin, above.end, reach, width)
+    )
 
 
 @njit(cache=True, nogil=True)

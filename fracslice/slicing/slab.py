@@ -1,12 +1,13 @@
 """A few neighbouring layers, from the field to the samples around their contours.
 
-Top down, blocks of 64, 32 and 16 pixels over all layers of the slab, then of 8 pixels in each layer, then, within tiles,
-of 4, 2 and 1: a block is dropped where ``|f| > L * reach`` at its middle says that no sample in it has the other sign. What is
-left is closed by `tiles.asked`. Every probe from 8 pixels down is a sample itself, so nothing is evaluated twice.
+Top down, blocks of 64, 32 and 16 pixels over all layers of the slab, then of 8 pixels in each layer, then,
+within tiles, of 4, 2 and 1: a block is dropped where ``|f| > L * reach`` at its middle says that no sample
+in it has the other sign. What is left is closed by `tiles.asked`. Every probe from 8 pixels down is a
+sample itself, so nothing is evaluated twice.
 
-Where inside values say little about distance (escape-time fractals), going down to single pixels everywhere would cost
-more than the contours: there probing ends at `WEAK_INSIDE` and `WEAK_OUTSIDE` pixels, and the closure does the rest. Parts of
-a layer smaller than that which touch no probe are then not found.
+Where inside values say little about distance (escape-time fractals), going down to single pixels everywhere
+would cost more than the contours: there probing ends at `WEAK_INSIDE` and `WEAK_OUTSIDE` pixels, and the
+closure does the rest. Parts of a layer smaller than that which touch no probe are then not found.
 """
 
 from __future__ import annotations
@@ -56,12 +57,17 @@ class Sampler:
         tiles.count = t.corner_tiles(*tiles.arrays[:4], tiles.count)
         return tiles, spent + self._crossed(tiles, z)
 
-    # --- top down ---------------------------------------------------------------------------------------------------
+    # --- top down
+    # ---------------------------------------------------------------------------------------------------
     def _coarse(self, tiles: Tiles, z: np.ndarray) -> int:
-        """Blocks over the whole slab, then tiles of each layer; fills `where` and allocates what may hold a contour."""
+        """Blocks over the whole slab, then tiles of each layer; fills `where` and allocates what may hold a
+        contour.
+        """
         _, height, width = tiles.where.shape
         size = COARSEST
-        blocks = np.stack(np.meshgrid(*(np.arange(1, n - 1, size) for n in (height, width)), indexing="ij"), -1).reshape(-1, 2)
+        blocks = np.stack(
+            np.meshgrid(*(np.arange(1, n - 1, size) for n in (height, width)), indexing="ij"), -1
+        ).reshape(-1, 2)
         middle, half = (z.max() + z.min()) / 2, (z.max() - z.min()) / 2
         spent = 0
         while size > 1:
@@ -100,7 +106,8 @@ class Sampler:
         t.record(size // 2, points, self._field(tiles, z, points), *words)
         return len(points)
 
-    # --- outside in, and inside out ---------------------------------------------------------------------------------
+    # --- outside in, and inside out
+    # ---------------------------------------------------------------------------------
     def _closed(self, tiles: Tiles, z: np.ndarray) -> int:
         self._mend(tiles)
         spent, active = 0, np.arange(tiles.count, dtype=np.int32)
@@ -142,7 +149,8 @@ class Sampler:
         for k, y, x in lost:
             tiles.count = t.allocate(*tiles.arrays[:4], tiles.count, k, y, x)
 
-    # --- the field ----------------------------------------------------------------------------------------------------
+    # --- the field
+    # ----------------------------------------------------------------------------------------------------
     def _diagonal(self, size: float) -> float:
         """From the middle of a block of `size` pixels to its farthest sample, scene units."""
         return math.hypot(self.frame[2], self.frame[3]) * size / 2 if size > 1 else 0.0

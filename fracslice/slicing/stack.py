@@ -21,8 +21,8 @@ MOST_PIXELS = 65_536
 class SliceJob:
     """What to cut, lengths in mm.
 
-    size: the object's longest side. layer: layer height. pixel: width and height of a pixel. up: the direction of the
-    scene that is up in the print. Raises `SliceError` for values that cannot be.
+    size: the object's longest side. layer: layer height. pixel: width and height of a pixel. up: the
+    direction of the scene that is up in the print. Raises `SliceError` for values that cannot be.
     """
 
     size: float
@@ -46,10 +46,11 @@ class SliceJob:
 class Stack:
     """A planned job: the field, and where its layers and pixels lie.
 
-    root: the scene with all depths known, turned so that z is up. scale: mm per scene unit. corner: position of the
-    lattice point (0, 0) in scene units. pixel: mm (x, y). shape: pixels (ny, nx); there is one more lattice point along
-    each. z: float64 [n], the heights at which the layers are cut, scene units. tops: float64 [n], the layers' upper faces in
-    mm above the object's lowest point. size: the object's size in mm.
+    root: the scene with all depths known, turned so that z is up. scale: mm per scene unit. corner:
+    position of the lattice point (0, 0) in scene units. pixel: mm (x, y). shape: pixels (ny, nx); there is
+    one more lattice point along each. z: float64 [n], the heights at which the layers are cut, scene units.
+    tops: float64 [n], the layers' upper faces in mm above the object's lowest point. size: the object's
+    size in mm.
     """
 
     root: Node
@@ -92,7 +93,16 @@ def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
         raise SliceError(f"{shape[1]} x {shape[0]} pixels: at most {MOST_PIXELS} along a side")
     middles = tops - np.diff(tops, prepend=0.0) / 2
     z = box.lo[2] + middles / scale
-    return Stack(planned.root, scale, (corner[0], corner[1]), job.pixel, (shape[0], shape[1]), z, tops, (mm[0], mm[1], mm[2]))
+    return Stack(
+        planned.root,
+        scale,
+        (corner[0], corner[1]),
+        job.pixel,
+        (shape[0], shape[1]),
+        z,
+        tops,
+        (mm[0], mm[1], mm[2]),
+    )
 
 
 def _tops(height: float, layer: float) -> np.ndarray:

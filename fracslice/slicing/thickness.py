@@ -9,11 +9,13 @@ BINS = 0.05 * np.arange(41)
 
 
 def widths(image: np.ndarray, pixel: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Widths of walls and of gaps along their middle lines, mm, float64 [n] and [m]; one for each pixel of those lines.
+    """Widths of walls and of gaps along their middle lines, mm, float64 [n] and [m]; one for each pixel of
+    those lines.
 
-    Twice the distance to the outline, where the distance has no slope (Blum 1967, "A transformation for extracting new
-    descriptors of shape"): along the lines that run into right corners it has one of 0.7, and in a corner's last pixel it is lower than beside. The outline lies at half
-    coverage, so a width is right within a pixel.
+    Twice the distance to the outline, where the distance has no slope (Blum 1967, "A transformation for
+    extracting new descriptors of shape"): along the lines that run into right corners it has one of 0.7,
+    and in a corner's last pixel it is lower than beside. The outline lies at half coverage, so a width is
+    right within a pixel.
     """
     solid = image >= 128
     rows, columns = np.flatnonzero(solid.any(1)), np.flatnonzero(solid.any(0))

@@ -1,11 +1,12 @@
-"""Tiles of 8 x 8 samples of one layer, and the integer work on them: who is inside, and who must be asked next.
+"""Tiles of 8 x 8 samples of one layer, and the integer work on them: who is inside, and who must be asked
+next.
 
-A tile is two words of 64 bits, *inside* and *known*, and 64 values; bit 8 * row + column belongs to the sample at
-(8 tx + column, 8 ty + row). The sign of a sample that is not known is implied by a probe near it. Whole rows of neighbours
-are compared at once by shifting words.
+A tile is two words of 64 bits, *inside* and *known*, and 64 values; bit 8 * row + column belongs to the
+sample at (8 tx + column, 8 ty + row). The sign of a sample that is not known is implied by a probe near it.
+Whole rows of neighbours are compared at once by shifting words.
 
-Closure, as in the sampler of volumes: where two neighbours differ in sign and one of them is only implied, it is
-evaluated, until no such pair is left. So every edge that the contour crosses has two evaluated ends.
+Closure, as in the sampler of volumes: where two neighbours differ in sign and one of them is only implied,
+it is evaluated, until no such pair is left. So every edge that the contour crosses has two evaluated ends.
 """
 
 from __future__ import annotations
@@ -44,8 +45,10 @@ for _n in (8, 4, 2):
 class Tiles:
     """The tiles of a few layers, growing while they are explored.
 
-    where: int32 [layers, ty + 2, tx + 2], the row of each tile, or `OUTSIDE` or `INSIDE` where none is needed; its rim is
-    outside. cross: float32 [n, 128], where edges are crossed, when all is explored; see `marching.cross_edges`. place: int32 [n, 3], (layer, y, x) in `where`. inside, known: uint64 [n]. values: float32 [n, 64].
+    where: int32 [layers, ty + 2, tx + 2], the row of each tile, or `OUTSIDE` or `INSIDE` where none is
+    needed; its rim is outside. cross: float32 [n, 128], where edges are crossed, when all is explored; see
+    `marching.cross_edges`. place: int32 [n, 3], (layer, y, x) in `where`. inside, known: uint64 [n].
+    values: float32 [n, 64].
     """
 
     where: np.ndarray
@@ -59,7 +62,9 @@ class Tiles:
     @classmethod
     def empty(cls, layers: int, ty: int, tx: int) -> Tiles:
         where = np.full((layers, ty + 2, tx + 2), OUTSIDE, np.int32)
-        return cls(where, np.empty((0, 3), np.int32), *(np.empty(0, np.uint64) for _ in range(2)), np.empty((0, 64), np.float32))
+        words = np.empty((2, 0), np.uint64)
+        place, values = np.empty((0, 3), np.int32), np.empty((0, TILE * TILE), np.float32)
+        return cls(where, place, words[0], words[1], values)
 
     def reserve(self, more: int) -> None:
         """Room for `more` tiles."""
@@ -79,7 +84,9 @@ class Tiles:
 
 @njit(cache=True, nogil=True)
 def lowest(word):  # type: ignore[no-untyped-def]
-    """The number of the lowest bit that is set (Leiserson, Prokop and Randall 1998, "Using de Bruijn sequences")."""
+    """The number of the lowest bit that is set (Leiserson, Prokop and Randall 1998, "Using de Bruijn
+    sequences").
+    """
     return _PLACES[((word & (~word + ONE)) * _DE_BRUIJN) >> _58]
 
 
@@ -146,11 +153,12 @@ def block_mask(size, y, x):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def undecided(size, limit, stop_inside, stop_outside, inside, known, values, count, points):  # type: ignore[no-untyped-def]
-    """The probes of the next level: for each block whose own probe decides too little, the middles of its quarters.
+    """The probes of the next level: for each block whose own probe decides too little, the middles of its
+    quarters.
 
-    size: of the blocks, 8, 4 or 2; limit: the largest value that leaves a block of this size undecided. Blocks of
-    `stop_inside` or `stop_outside` samples (by the sign of their probe) are not cut. points: int64, filled with
-    64 * tile + bit; returns how many.
+    size: of the blocks, 8, 4 or 2; limit: the largest value that leaves a block of this size undecided.
+    Blocks of `stop_inside` or `stop_outside` samples (by the sign of their probe) are not cut. points:
+    int64, filled with 64 * tile + bit; returns how many.
     """
     n, half, quarter = 0, size // 2, size // 4
     for t in range(count):
@@ -189,8 +197,9 @@ def record(size, points, f, inside, known, values):  # type: ignore[no-untyped-d
 def asked(where, place, inside, known, active, n_active, count, marks, points):  # type: ignore[no-untyped-def]
     """One wave of the closure: the implied samples that differ from a neighbour.
 
-    active: int32, the tiles to look at, its first `n_active` filled; tiles allocated on the way are appended. Returns
-    (number of active tiles, number of tiles, number of points, whether the solid reaches the rim).
+    active: int32, the tiles to look at, its first `n_active` filled; tiles allocated on the way are
+    appended. Returns (number of active tiles, number of tiles, number of points, whether the solid reaches
+    the rim).
     """
     n, a = 0, 0
     while a < n_active:
@@ -219,7 +228,9 @@ def asked(where, place, inside, known, active, n_active, count, marks, points): 
             if face and where[k, y + dy, x + dx] < 0:
                 ny, nx = y + dy, x + dx
                 if ny == 0 or nx == 0 or ny == where.shape[1] - 1 or nx == where.shape[2] - 1:
-                    return n_active, count, n, True
+                    if face & known[t]:
+                        return n_active, count, n, True
+                    continue
                 active[n_active] = count
                 n_active += 1
                 count = allocate(where, place, inside, known, count, k, ny, nx)
@@ -255,7 +266,9 @@ def answered(where, place, inside, known, values, points, f, active, marks):  # 
 
 @njit(cache=True, nogil=True)
 def corner_tiles(where, place, inside, known, count):  # type: ignore[no-untyped-def]
-    """Allocates tiles of which the contour cuts nothing but the last cell, at the corner. Returns the new count."""
+    """Allocates tiles of which the contour cuts nothing but the last cell, at the corner. Returns the new
+    count.
+    """
     for t in range(count):
         k, y, x = place[t]
         there = where[k, y - 1, x - 1]

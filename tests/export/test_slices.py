@@ -1,0 +1,286 @@
+"""Layer formats read back, by lib3mf where it can; interrupted jobs go on; bad targets leave nothing."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fracslice.errors import Cancelled, ExportError
+from fracslice.export import png
+from fracslice.export.jobs import SliceRun
+from fracslice.export.slices import FORMATS, slice_format, write_slices
+from fracslice.formulas import difference, menger, sphere
+from fracslice.slicing import SliceJob, Slicer, plan_stack
+from fracslice.slicing.printers import Printer
+from fracslice.slicing.raster import Screen
+from fracslice.work import Work
+
+MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
+ROOT = difference(menger(level=1), sphere(radius=0.9))
+
+
+def run(work: Work | None = None, layer: float = 0.5) -> SliceRun:
+    stack = plan_stack(ROOT, SliceJob(size=12, layer=layer, pixel=MACHINE.pixel))
+    return SliceRun(stack, Screen(stack, MACHINE), work or Work(), metadata={"Title": "test"})
+
+
+@pytest.fixture(scope="module")
+def areas() -> np.ndarray:
+    return np.array(list(Slicer(run().stack).map(lambda layer: layer.contours.area)))
+
+
+def shoelace(points: np.ndarray) -> float:
+    x, y = points.T
+    return float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2
+
+
+def test_png_is_what_pillow_reads() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (37, 101), np.uint8)
+    data = png.encode(image)
+    assert png.is_whole(data)
+    assert not png.is_whole(data[:-1])
+    with Image.open(io.BytesIO(data)) as read:
+        assert read.mode == "L"
+        assert (np.asarray(read) == image).all()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_the_same_bytes_every_time(name: str, tmp_path: Path) -> None:
+    paths = [write_slices(run(Work(threads=n)), tmp_path / f"{n}", name) for n in (1, 3)]
+    if name == "sl1":
+        return  # names of members follow the file's
+    files = [sorted(p.iterdir()) if p.is_dir() else [p] for p in paths]
+    assert [f.read_bytes() for f in files[0]] == [f.read_bytes() for f in files[1]]
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["1", "3"]
+
+
+def test_sl1(tmp_path: Path) -> None:
+    job = run()
+    with zipfile.ZipFile(write_slices(job, tmp_path / "part.sl1")) as archive:
+        assert archive.testzip() is None
+        config = dict(line.split(" = ") for line in archive.read("config.ini").decode().splitlines())
+        settings = dict(line.split(" = ") for line in archive.read("prusaslicer.ini").decode().splitlines())
+        pictures = [n for n in archive.namelist() if n.endswith(".png")]
+        assert config["layerHeight"] == "0.5"
+        assert config["numFast"] == "24"
+        assert config["jobDir"] == "part"
+        assert settings["display_pixels_x"] == "96"
+        assert settings["display_orientation"] == "portrait"
+        assert pictures == [f"part{k:05d}.png" for k in range(24)]
+        with Image.open(io.BytesIO(archive.read(pictures[3]))) as image:
+            assert image.size == (80, 96)
+            assert image.mode == "L"
+            assert (np.asarray(image) == list(job.slicer.map(job.screen.picture))[3]).all()
+
+
+def test_folder_and_manifest(tmp_path: Path) -> None:
+    folder = write_slices(run(), tmp_path / "layers")
+    said = json.loads((folder / "manifest.json").read_text())
+    names = [layer["file"] for layer in said["layers"]]
+    assert sorted(p.name for p in folder.iterdir()) == [*names, "manifest.json"]
+    assert said["layers"][-1]["top_mm"] == 12.0
+    assert said["pixels"] == [80, 96]
+    assert said["pixel_mm"] == [0.25, 0.25]
+
+
+def test_3mf_by_lib3mf(tmp_path: Path, areas: np.ndarray) -> None:
+    lib3mf = pytest.importorskip("lib3mf")
+    path = write_slices(run(), tmp_path / "part.3mf")
+    model = lib3mf.get_wrapper().CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromFile(str(path))
+    assert reader.GetWarningCount() == 0
+    stacks = model.GetSliceStacks()
+    assert stacks.MoveNext()
+    stack = stacks.GetCurrentSliceStack()
+    found = []
+    for k in range(stack.GetSliceCount()):
+        layer = stack.GetSlice(k)
+        points = np.array([tuple(v.Coordinates) for v in layer.GetVertices()])
+        rings = [list(layer.GetPolygonIndices(i)) for i in range(layer.GetPolygonCount())]
+        assert all(ring[0] == ring[-1] for ring in rings)
+        assert points.min() >= 0
+        found.append(sum(shoelace(points[ring[:-1]]) for ring in rings))
+        assert layer.GetZTop() == pytest.approx(0.5 * (k + 1))
+    np.testing.assert_allclose(found, areas, rtol=1e-5)
+
+
+def test_svg_by_layer(tmp_path: Path, areas: np.ndarray) -> None:
+    folder = write_slices(run(), tmp_path / "svg", "svg")
+    files = sorted(folder.iterdir())
+    assert [f.name for f in files] == [f"{k:05d}.svg" for k in range(24)]
+    path = ET.parse(files[5]).getroot()[0].attrib["d"]
+    rings = [
+        np.array([p.split(",") for p in ring.strip(" z").split()], float) for ring in path.split("M")[1:]
+    ]
+    assert -sum(map(shoelace, rings)) == pytest.approx(areas[5], rel=1e-4)
+
+
+def test_svg_with_layers(tmp_path: Path, areas: np.ndarray) -> None:
+    root = ET.parse(write_slices(run(), tmp_path / "part.svg")).getroot()
+    names = "{http://slic3r.org/namespaces/slic3r}"
+    assert [float(g.attrib[f"{names}z"]) for g in root] == pytest.approx(0.5 * np.arange(1, 25))
+    for group, area in zip(root, areas, strict=True):
+        total = 0.0
+        for polygon in group:
+            ring = np.array([p.split(",") for p in polygon.attrib["points"].split()], float)
+            assert (shoelace(ring) > 0) == (polygon.attrib[f"{names}type"] == "hole")  # y points down
+            total -= shoelace(ring)
+        assert total == pytest.approx(area, rel=1e-4)
+
+
+def test_cli_as_text(tmp_path: Path, areas: np.ndarray) -> None:
+    lines = write_slices(run(), tmp_path / "part.cli").read_text().splitlines()
+    assert lines[:2] == ["$$HEADERSTART", "$$ASCII"]
+    assert lines[-1] == "$$GEOMETRYEND"
+    assert "$$LAYERS/000024" in lines
+    found: list[float] = []
+    for line in lines:
+        if line.startswith("$$LAYER/"):
+            found.append(0.0)
+            assert float(line[8:]) * 1e-3 == pytest.approx(0.5 * len(found))
+        if line.startswith("$$POLYLINE/"):
+            _, direction, count, *numbers = line[11:].split(",")
+            ring = np.array(numbers, float).reshape(-1, 2) * 1e-3
+            assert len(ring) == int(count)
+            assert (ring[0] == ring[-1]).all()
+            assert (shoelace(ring[:-1]) > 0) == (direction == "1")
+            found[-1] += shoelace(ring[:-1])
+    np.testing.assert_allclose(found, areas, rtol=1e-4)
+
+
+def test_cli_in_binary(tmp_path: Path, areas: np.ndarray) -> None:
+    data = write_slices(run(), tmp_path / "part.cli", "cli-binary").read_bytes()
+    at = data.index(b"$$HEADEREND") + len(b"$$HEADEREND")
+    found: list[float] = []
+    while at < len(data):
+        (command,) = struct.unpack_from("<H", data, at)
+        if command == 127:
+            assert struct.unpack_from("<f", data, at + 2)[0] * 1e-3 == pytest.approx(0.5 * len(found) + 0.5)
+            found.append(0.0)
+            at += 6
+        else:
+            assert command == 130
+            _, direction, count = struct.unpack_from("<iii", data, at + 2)
+            ring = np.frombuffer(data, "<f4", 2 * count, at + 14).reshape(-1, 2) * 1e-3
+            assert (shoelace(ring[:-1]) > 0) == (direction == 1)
+            found[-1] += shoelace(ring[:-1])
+            at += 14 + 8 * count
+    np.testing.assert_allclose(found, areas, rtol=1e-4)
+
+
+def test_json(tmp_path: Path, areas: np.ndarray) -> None:
+    said = json.loads(write_slices(run(), tmp_path / "part.json").read_text())
+    assert said["unit"] == "mm"
+    assert said["metadata"] == {"Title": "test"}
+    for layer, area in zip(said["layers"], areas, strict=True):
+        assert sum(shoelace(np.array(c["points"])) for c in layer["contours"]) == pytest.approx(
+            area, rel=1e-4
+        )
+        assert all(c["parent"] < i for i, c in enumerate(layer["contours"]))
+
+
+def cancelled_after(layers: int) -> Work:
+    """Work that is cancelled once so many slabs are done."""
+    work = Work(threads=1)
+
+    def progress(stage: str, done: float) -> None:
+        if done * 24 >= layers:
+            work.cancel.set()
+
+    object.__setattr__(work, "progress", progress)
+    return work
+
+
+@pytest.mark.parametrize("name", ["part.sl1", "layers"])
+def test_an_interrupted_job_goes_on(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    target = tmp_path / name
+    with pytest.raises(Cancelled):
+        write_slices(run(cancelled_after(8)), target)
+    assert not (target.exists() and target.is_file())
+    assert not (target / "manifest.json").exists()
+    encoded: list[int] = []
+    real = png.encode
+    monkeypatch.setattr(png, "encode", lambda image: encoded.append(1) or real(image))
+    write_slices(run(), target)
+    assert 0 < len(encoded) < 24
+    whole = write_slices(run(), _beside(tmp_path, name))
+    assert contents(target) == contents(whole)
+    assert not [p for p in tmp_path.iterdir() if p.name.endswith(".part")]
+
+
+def _beside(folder: Path, name: str) -> Path:
+    (folder / "again").mkdir(exist_ok=True)
+    return folder / "again" / name
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    if path.is_dir():
+        return {p.name: p.read_bytes() for p in path.iterdir()}
+    with zipfile.ZipFile(path) as archive:
+        return {n: archive.read(n) for n in archive.namelist()} | {"": path.read_bytes()}
+
+
+@pytest.mark.parametrize("cut", [1, 50, 700, 2000])
+def test_a_truncated_remainder_goes_on_from_what_is_whole(cut: int, tmp_path: Path) -> None:
+    target, part = tmp_path / "part.sl1", tmp_path / ".part.sl1.part"
+    with pytest.raises(Cancelled):
+        write_slices(run(cancelled_after(16)), target)
+    part.write_bytes(part.read_bytes()[:-cut])
+    write_slices(run(), target)
+    assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1")))
+
+
+def test_the_remainder_of_another_job_is_not_used(tmp_path: Path) -> None:
+    with pytest.raises(Cancelled):
+        write_slices(run(cancelled_after(8), layer=0.4), tmp_path / "part.sl1")
+    target = write_slices(run(), tmp_path / "part.sl1")
+    assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1")))
+    with pytest.raises(Cancelled):
+        write_slices(run(cancelled_after(8), layer=0.4), tmp_path / "layers")
+    with pytest.raises(ExportError, match="not this job"):
+        write_slices(run(), tmp_path / "layers")
+
+
+def test_a_full_disk_leaves_the_remainder_and_no_archive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: zipfile.ZipFile, *_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(zipfile.ZipFile, "writestr", full)
+        with pytest.raises(ExportError, match="disk is full"):
+            write_slices(run(), tmp_path / "part.sl1")
+    assert not (tmp_path / "part.sl1").exists()
+    write_slices(run(), tmp_path / "part.sl1")
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "message"),
+    [
+        ("x.gcode", None, "unknown kind of file"),
+        ("x.cli", "dxf", "format 'dxf': known are"),
+        ("missing/x.cli", None, "does not exist"),
+    ],
+)
+def test_bad_targets(path: str, name: str | None, message: str, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=message):
+        slice_format(tmp_path / path, name)
+
+
+def test_folders_with_something_in_them(tmp_path: Path) -> None:
+    (tmp_path / "other.txt").write_text("mine")
+    for name in ("png", "svg"):
+        with pytest.raises(ExportError, match="not empty"):
+            write_slices(run(), tmp_path, name)
+    assert [p.name for p in tmp_path.iterdir()] == ["other.txt"]

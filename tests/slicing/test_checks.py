@@ -1,0 +1,164 @@
+"""Seeded defects are found, clean solids are not blamed, and time grows with the outline only."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import Node, box, cylinder, difference, menger, sphere, transform, union
+from fracslice.slicing import SliceJob, plan_stack
+from fracslice.slicing.checks import PrintReport, check_layers
+from fracslice.slicing.graph import Graph
+from fracslice.slicing.printers import PRINTERS
+from fracslice.slicing.runs import overlaps, parts_of, unsupported
+
+
+def checked(root: Node, **options: object) -> PrintReport:
+    return check_layers(plan_stack(root, SliceJob(size=10, layer=0.1)), **options)  # type: ignore[arg-type]
+
+
+def at(node: Node, x: float, y: float, z: float) -> Node:
+    return transform(node, translate=(x, y, z))
+
+
+CUBE = box(size=(1, 1, 1))
+
+
+@pytest.mark.parametrize(
+    "root",
+    [CUBE, at(CUBE, 0.3, 0.1, 0.2), cylinder(), union(CUBE, at(box(size=(0.5, 0.5, 1)), 0, 0, 0.9))],
+    ids=["cube", "moved", "cylinder", "tower"],
+)
+def test_clean_solids(root: Node) -> None:
+    report = checked(root)
+    assert report.problems == []
+    assert len(report.bodies) == 1
+    assert not (report.islands)
+    assert not (report.cups)
+    assert not (report.traps)
+    assert not (report.cavities)
+    assert not (report.specks)
+    assert report.overhang_area == 0
+    assert report.worst == []
+
+
+def test_volume_and_weight() -> None:
+    report = checked(CUBE)
+    assert report.volume == pytest.approx(1000, rel=2e-3)
+    assert report.weight_g == pytest.approx(1.1, rel=2e-3)
+
+
+def test_sealed_cavity() -> None:
+    report = checked(difference(CUBE, sphere(radius=0.2)))
+    assert [round(c.volume) for c in report.cavities] == [34]
+    assert len(report.problems) == 2
+    assert report.cavities[0].layers == (30, 69)
+    assert report.cavities[0].at == pytest.approx((0, 0), abs=0.05)
+
+
+def test_cup_that_is_open_above_and_trap_that_is_open_below() -> None:
+    """Above in the scene is below on the printer: what is open above drains but sucks; what is open below
+    does both.
+    """
+    cup = checked(difference(CUBE, at(box(size=(0.5, 0.5, 0.8)), 0, 0, 0.4)))
+    assert [c.layers for c in cup.cups] == [(50, 99)]
+    assert not cup.traps
+    assert not cup.cavities
+    trap = checked(difference(CUBE, at(box(size=(0.5, 0.5, 0.8)), 0, 0, -0.4)))
+    assert [c.layers for c in trap.traps] == [(0, 49)]
+    assert not trap.cavities
+    assert trap.traps[0].area == pytest.approx(25, rel=0.03)
+
+
+def test_a_drain_hole_ends_the_cup() -> None:
+    bowl = difference(CUBE, at(box(size=(0.5, 0.5, 0.8)), 0, 0, 0.4))
+    drained = difference(bowl, at(box(size=(1, 0.1, 0.1)), 0.5, 0, 0.06))
+    assert not checked(drained).cups or checked(drained).cups[0].volume < 60
+
+
+def test_islands_and_overhang() -> None:
+    """A gallows: from its arm a bar hangs down, and begins in the air."""
+    post, arm, bar = (
+        at(box(size=(0.2, 0.2, 1)), 0.4, 0, 0.5),
+        at(box(size=(1, 0.2, 0.1)), 0, 0, 1.05),
+        at(box(size=(0.2, 0.2, 0.4)), -0.4, 0, 0.8),
+    )
+    report = checked(union(box(size=(1, 1, 0.2)), post, arm, bar))
+    assert len(report.islands) == 1
+    assert len(report.bodies) == 1
+    island = report.islands[0]
+    assert island.at == pytest.approx((-3.3, 0), abs=0.15)
+    assert island.layers[0] in report.worst
+    assert report.largest_overhang > 5
+    assert any("begin in the air" in p for p in report.problems)
+
+
+def test_loose_bodies() -> None:
+    report = checked(union(at(box(size=(0.4, 0.4, 1)), -0.5, 0, 0), at(box(size=(0.4, 0.4, 1)), 0.5, 0, 0)))
+    assert len(report.bodies) == 2
+    assert report.problems == ["2 loose bodies"]
+    assert report.gaps is not None
+    assert report.gaps.smallest == pytest.approx(0.6 * 10 / 1.4, abs=0.06)
+
+
+@pytest.mark.parametrize("width", [0.008, 0.016, 0.05])
+def test_thin_walls(width: float) -> None:
+    wall = 10 * width
+    report = checked(union(box(size=(1, 1, 0.2)), at(box(size=(1, width, 0.7)), 0, 0, 0.35)))
+    assert report.walls is not None
+    assert report.walls.smallest == pytest.approx(wall, abs=0.055)
+    assert any("walls of" in p for p in report.problems) == (wall < 0.1)
+
+
+def test_menger_walls_and_gaps_are_known() -> None:
+    report = checked(menger(level=2))
+    assert report.walls is not None
+    assert report.gaps is not None
+    assert report.walls.smallest == pytest.approx(10 / 9, abs=0.11)
+    assert report.gaps.smallest == pytest.approx(10 / 9, abs=0.11)
+    assert sum(report.gaps.counts) > 100
+
+
+def test_fit() -> None:
+    stack = plan_stack(CUBE, SliceJob(size=100, layer=1, pixel=(0.5, 0.5)))
+    report = check_layers(stack, printer=PRINTERS["sl1"])
+    assert report.fits is False
+    assert any("does not fit" in p for p in report.problems)
+    assert check_layers(stack, printer=PRINTERS["saturn-4-ultra"]).fits is True
+
+
+def test_parts_by_hand() -> None:
+    """Solid pixels that touch at a corner are one part; empty ones are not."""
+    image = 255 * np.array(
+        [[0, 0, 0, 0, 0], [0, 1, 1, 0, 0], [0, 1, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 0]], np.uint8
+    )
+    solid, empty = parts_of(image)
+    assert solid.area.tolist() == [5]
+    assert sorted(empty.area.tolist()) == [1, 19]
+    assert empty.open[np.argsort(empty.area)].tolist() == [False, True]
+    other, _ = parts_of(np.roll(image, 1, 1))
+    assert overlaps(solid, other).tolist() == [[0, 0]]
+    assert unsupported(solid, other, 0.0, 5) == 5 - (image & np.roll(image, 1, 1) > 0).sum()
+    assert unsupported(solid, other, 1.0, 5) == 0
+
+
+def test_time_is_linear_in_the_holes() -> None:
+    """10^4 holes: the parts of a layer and their graph take at most a few times what 100 holes do in as
+    many pixels.
+    """
+
+    def seconds(holes: int) -> float:
+        side = 1600 // holes
+        image = np.full((1604, 1604), 255, np.uint8)
+        y, x = np.mgrid[:1600, :1600]
+        image[2:-2, 2:-2][(y % side < side // 2) & (x % side < side // 2)] = 0
+        begin, graph = time.perf_counter(), Graph()
+        for _ in range(3):
+            graph.add(parts_of(image)[1])
+        assert len(graph.nodes().grouped(~graph.nodes().open, np.ones(3), (1, 1), image.shape)) == holes**2
+        return time.perf_counter() - begin
+
+    seconds(10)
+    assert min(seconds(100) for _ in range(3)) < 20 * min(seconds(10) for _ in range(3))

@@ -1,0 +1,250 @@
+"""Layers against dense sampling and closed forms: every sign, every area, every vertex."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fracslice.errors import Cancelled, SliceError
+from fracslice.formulas import Node, box, difference, mandelbulb, menger, sphere, torus, transform, union
+from fracslice.formulas.registry import Facts
+from fracslice.kernel import compile_scene
+from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
+from fracslice.slicing.slab import Sampler
+from fracslice.slicing.tiles import INSIDE, Tiles
+from fracslice.work import Work
+from tests.examples import EXAMPLES
+
+FINITE = [name for name, root in EXAMPLES.items() if root.facts.box.finite]
+
+
+def stack_of(root: Node, pixels: int = 96, layer: float = 0.8, **job: Any) -> Stack:
+    return plan_stack(root, SliceJob(size=0.2 * pixels, layer=layer, pixel=(0.2, 0.2), **job))
+
+
+def all_of(stack: Stack, make: Callable[[Layer], Any], threads: int = 2) -> list[Any]:
+    return list(Slicer(stack, Work(threads=threads)).map(make))
+
+
+def sampler_of(stack: Stack, facts: Facts | None = None) -> Sampler:
+    shape = (stack.shape[0] + 1, stack.shape[1] + 1)
+    return Sampler(compile_scene(stack.root), facts or stack.root.facts, stack.frame, shape)
+
+
+def unfolded(tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
+    """Inside and known, bool [layers, y, x], of all samples."""
+    inside = np.repeat(np.repeat(tiles.where == INSIDE, 8, 1), 8, 2)
+    known = np.zeros_like(inside)
+    for row in range(tiles.count):
+        k, y, x = tiles.place[row]
+        part = np.s_[k, 8 * y : 8 * y + 8, 8 * x : 8 * x + 8]
+        for out, words in ((inside, tiles.inside), (known, tiles.known)):
+            out[part] = np.unpackbits(words[row : row + 1].view(np.uint8), bitorder="little").reshape(8, 8)
+    return inside[:, 8:-8, 8:-8], known[:, 8:-8, 8:-8]
+
+
+def dense(stack: Stack, z: np.ndarray, like: np.ndarray) -> np.ndarray:
+    x0, y0, dx, dy = stack.frame
+    y, x = np.mgrid[: like.shape[1], : like.shape[2]]
+    kernel = compile_scene(stack.root)
+    return np.stack([kernel.points(x0 + dx * x, y0 + dy * y, np.full(x.shape, at)) < 0 for at in z])
+
+
+def open_edges(inside: np.ndarray, known: np.ndarray) -> int:
+    across = (inside[:, :, 1:] != inside[:, :, :-1]) & ~(known[:, :, 1:] & known[:, :, :-1])
+    along = (inside[:, 1:] != inside[:, :-1]) & ~(known[:, 1:] & known[:, :-1])
+    return int(across.sum() + along.sum())
+
+
+@pytest.mark.parametrize("name", FINITE)
+def test_closed_and_equal_to_dense_sampling(name: str) -> None:
+    stack = stack_of(EXAMPLES[name])
+    z = stack.z[len(stack.z) // 3 :][:8]
+    inside, known = unfolded(sampler_of(stack).sample(z)[0])
+    assert open_edges(inside, known) == 0
+    differing = int((inside != dense(stack, z, inside)).sum())
+    # What differs can only be specks of a fractal, smaller than what its layers are probed for.
+    assert differing == 0 or (stack.root.facts.weak and differing < 0.02 * known.sum())
+
+
+def test_a_bound_that_lies_leaves_no_open_contour() -> None:
+    root = union(sphere(radius=0.7), box(size=(2.0, 0.2, 0.2)))
+    stack = stack_of(root)
+    z = stack.z[8:16]
+    inside, known = unfolded(sampler_of(stack, Facts(root.facts.box, 1 / 3, False)).sample(z)[0])
+    assert open_edges(inside, known) == 0
+
+
+@pytest.mark.parametrize("name", ["mandelbulb", "menger", "twist"])
+def test_threads_and_the_choice_of_layers_do_not_matter(name: str) -> None:
+    stack = stack_of(EXAMPLES[name])
+    first = all_of(stack, lambda layer: (layer.coverage.tobytes(), layer.contours.points.tobytes()), 1)
+    assert (
+        all_of(stack, lambda layer: (layer.coverage.tobytes(), layer.contours.points.tobytes()), 5) == first
+    )
+    some = list(Slicer(stack).map(lambda layer: layer.contours.points.tobytes(), [3, 9, 11]))
+    assert some == [first[k][1] for k in (3, 9, 11)]
+
+
+def disc(stack: Stack) -> np.ndarray:
+    return math.pi * (1 - stack.z**2) * stack.scale**2
+
+
+def ring(stack: Stack) -> np.ndarray:
+    values = torus().values
+    return 4 * math.pi * values["radius"] * np.sqrt(values["tube"] ** 2 - stack.z**2) * stack.scale**2
+
+
+def sponge(stack: Stack) -> np.ndarray:
+    grid = np.ones((1, 1, 1), bool)
+    block = (np.indices((3, 3, 3)) == 1).sum(0) < 2
+    for _ in range(3):
+        grid = np.kron(grid, block)
+    row = ((stack.z + 1) / 2 * 27).astype(int)
+    return grid.sum((0, 1))[row] * (2 * stack.scale / 27) ** 2
+
+
+@pytest.mark.parametrize(("root", "area"), [(sphere(), disc), (torus(), ring), (menger(level=3), sponge)])
+def test_areas_of_every_layer(root: Node, area: Callable[[Stack], np.ndarray]) -> None:
+    """Within 0.05 % of the closed form at 1024 pixels."""
+    stack = stack_of(root, 1024, 8.3)
+    found = np.array(all_of(stack, lambda layer: layer.contours.area))
+    np.testing.assert_allclose(found, area(stack), rtol=5e-4)
+
+
+def test_vertices_lie_on_the_surface() -> None:
+    """Within 0.01 pixels; the contour of a Mandelbulb by its own field, the sphere's by its equation."""
+    stack = stack_of(sphere(), 200)
+    for contours, z in zip(all_of(stack, lambda layer: layer.contours), stack.z, strict=True):
+        radius = math.sqrt(1 - z * z) * stack.scale
+        assert abs(np.hypot(*contours.points.T) - radius).max() < 0.01 * 0.2
+    stack = stack_of(mandelbulb(iterations=4), 200)
+    exact = compile_scene(stack.root, "float64")
+    for layer in all_of(stack, lambda layer: layer)[10:80:10]:
+        x, y = (
+            layer.contours.points / stack.scale
+            + np.array(stack.corner)
+            + stack.frame[2:] * np.array(stack.shape[::-1]) / 2
+        ).T
+        z = np.full(len(x), stack.z[layer.index])
+        step = 0.01 * stack.frame[2]
+        lattice = [(x - step, y), (x + step, y), (x, y - step), (x, y + step)]
+        signs = np.array([exact.points(*at, z) < 0 for at in lattice])
+        assert (signs.any(0) & ~signs.all(0)).mean() > 0.999
+
+
+def test_coverage_is_the_area_of_the_contours() -> None:
+    stack = stack_of(sphere(), 256)
+    for coverage, area, exact in all_of(
+        stack, lambda layer: (layer.coverage, layer.area, layer.contours.area)
+    )[2:-2]:
+        assert abs(area / exact - 1) < 5e-4
+        assert abs(coverage.sum() / 255 * 0.04 / exact - 1) < 2e-3
+
+
+def test_each_pixel_of_a_disc() -> None:
+    """Coverage against the disc sampled 64 x 64 times a pixel: within 2 %."""
+    stack = stack_of(sphere(), 64)
+    layer = all_of(stack, lambda layer: layer)[len(stack.z) // 2]
+    ny, nx = stack.shape
+    radius = math.sqrt(1 - stack.z[layer.index] ** 2) * stack.scale / 0.2
+    y, x = ((np.arange(n * 64) + 0.5) / 64 - n / 2 for n in (ny, nx))
+    truth = (np.hypot(*np.meshgrid(x, y)) < radius).reshape(ny, 64, nx, 64).mean((1, 3))
+    assert abs(layer.coverage / 255 - truth).max() < 0.02
+
+
+def test_contours_are_nested_and_oriented() -> None:
+    """A ball in a ring-shaped hole of a box, itself with a hole."""
+    holed = difference(sphere(radius=0.5), sphere(radius=0.2))
+    stack = stack_of(union(difference(box(size=(2, 2, 2)), sphere(radius=0.8)), holed), 100)
+    contours = all_of(stack, lambda layer: layer.contours)[len(stack.z) // 2]
+    order = np.argsort(-abs(contours.areas))
+    assert (np.sign(contours.areas[order]) == [1, -1, 1, -1]).all()
+    assert [contours.parent[i] for i in order] == [-1, order[0], order[1], order[2]]
+
+
+def test_contours_of_a_fractal_are_sound() -> None:
+    """Every contour turns the right way round for its depth, and lies in its parent; no point comes twice
+    in a row.
+    """
+    stack = stack_of(mandelbulb(iterations=6), 256)
+    for contours in all_of(stack, lambda layer: layer.contours)[::7]:
+        depth = np.zeros(len(contours), int)
+        for i, parent in enumerate(contours.parent):
+            assert parent < i
+            depth[i] = depth[parent] + 1 if parent >= 0 else 0
+            if parent >= 0:
+                low, high = contours[parent].min(0), contours[parent].max(0)
+                assert (contours[i] >= low).all()
+                assert (contours[i] <= high).all()
+            assert (np.diff(contours[i], axis=0, append=contours[i][:1]) != 0).any(1).all()
+        assert (np.sign(contours.areas) == 1 - 2 * (depth % 2)).all()
+
+
+def test_cost_grows_with_the_boundary() -> None:
+    """Twice the resolution in all directions: four to five times the evaluations, not eight."""
+    small, large = (
+        sum(all_of(stack_of(menger(level=2), n, 0.2), lambda layer: layer.evaluations)) for n in (48, 96)
+    )
+    assert large < 6 * small
+
+
+def test_volume_of_all_layers() -> None:
+    stack = stack_of(sphere(), 200, 0.2)
+    volume = float(np.dot(all_of(stack, lambda layer: layer.contours.area), stack.heights))
+    assert abs(volume / (4 / 3 * math.pi * stack.scale**3) - 1) < 2e-4
+
+
+def test_any_direction_can_be_up() -> None:
+    bar = transform(box(size=(2, 0.5, 0.5)), translate=(0.3, 0, 0))
+    stack = stack_of(bar, up=(1, 0, 0))
+    assert stack.size[2] == pytest.approx(19.2, rel=1e-2)
+    areas = np.array(all_of(stack, lambda layer: layer.contours.area))
+    np.testing.assert_allclose(areas, 0.25 * stack.scale**2, rtol=5e-3)
+    assert stack_of(bar, up=(-2, 0, 0)).size[2] == pytest.approx(stack.size[2])
+    assert stack_of(bar, up=(0, 0, -1)).size == pytest.approx(stack_of(bar).size)
+
+
+@pytest.mark.parametrize(
+    ("job", "message"),
+    [
+        ({"layer": 0.0}, "layer 0 mm"),
+        ({"layer": 50.0}, "as high as the object"),
+        ({"pixel": (50.0, 0.1)}, "as large as the object"),
+        ({"pixel": (0.0, 0.1)}, "pixel 0 mm"),
+        ({"size": math.inf}, "size inf"),
+        ({"up": (0, 0, 0)}, "up:"),
+    ],
+)
+def test_impossible_jobs(job: dict[str, Any], message: str) -> None:
+    with pytest.raises(SliceError, match=message):
+        SliceJob(**{"size": 20.0, **job})
+
+
+def test_too_many_layers_or_pixels() -> None:
+    with pytest.raises(SliceError, match="layers: at most"):
+        plan_stack(sphere(), SliceJob(size=20, layer=1e-4))
+    with pytest.raises(SliceError, match="pixels: at most"):
+        plan_stack(sphere(), SliceJob(size=20, pixel=(2e-4, 2e-4)))
+
+
+def test_cancelled() -> None:
+    work = Work(cancel=threading.Event())
+    layers = Slicer(stack_of(sphere()), work).map(lambda layer: layer.area)
+    next(layers)
+    work.cancel.set()
+    with pytest.raises(Cancelled):
+        list(layers)
+
+
+def test_an_error_in_a_worker_comes_out() -> None:
+    def fail(layer: Layer) -> None:
+        raise SliceError("no")
+
+    with pytest.raises(SliceError, match="no"):
+        all_of(stack_of(sphere()), fail)

@@ -1,0 +1,134 @@
+"""Pictures for screens: compensation, gamma, place and mirror."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fracslice.errors import SliceError
+from fracslice.formulas import box, sphere, transform, union
+from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
+from fracslice.slicing.printers import PRINTERS, Printer, printer
+from fracslice.slicing.raster import Screen, compensated
+
+SMALL = Printer("small", "Small", (120, 100), (12.0, 10.0), 30)
+
+
+def stack_of(root, size: float = 6.0, at: Printer = SMALL) -> Stack:  # type: ignore[no-untyped-def]
+    return plan_stack(root, SliceJob(size=size, layer=0.5, pixel=at.pixel))
+
+
+def picture(screen: Screen) -> np.ndarray:
+    layers = list(Slicer(screen.stack).map(screen.picture))
+    return layers[len(layers) // 2]
+
+
+ELL = union(box(size=(2, 0.5, 0.5)), transform(box(size=(0.5, 1, 0.5)), translate=(0.75, 0.5, 0)))
+"""Its short leg is at the right, and points to the back."""
+
+
+def heavy(image: np.ndarray) -> tuple[bool, bool]:
+    """Whether the object's mass lies in the lower and the right half of its box."""
+    rows, columns = np.nonzero(image > 127)
+    return (
+        bool(rows.mean() > (rows.min() + rows.max()) / 2),
+        bool(columns.mean() > (columns.min() + columns.max()) / 2),
+    )
+
+
+def test_the_back_is_up_and_the_right_is_right_unless_mirrored() -> None:
+    stack = stack_of(ELL)
+    assert heavy(picture(Screen(stack))) == (True, True)
+    assert heavy(picture(Screen(stack, mirror=True))) == (True, False)
+    assert heavy(picture(Screen(stack, SMALL))) == (True, False)
+    assert heavy(picture(Screen(stack, SMALL, mirror=False))) == (True, True)
+
+
+def test_portrait_screens_have_the_bed_s_x_upwards() -> None:
+    """As PrusaSlicer 2.5 writes it for the SL1; compared by hand, pixel by pixel."""
+    tall = Printer("tall", "Tall", (120, 100), (12.0, 10.0), 30, portrait=True)
+    image = picture(Screen(stack_of(ELL), tall))
+    assert image.shape == (120, 100)
+    assert heavy(image) == (False, False)
+
+
+@pytest.mark.parametrize("name", PRINTERS)
+def test_objects_lie_in_the_middle_of_every_screen(name: str) -> None:
+    machine = printer(name)
+    stack = plan_stack(sphere(), SliceJob(size=10, layer=2, pixel=machine.pixel))
+    image = picture(Screen(stack, machine))
+    pixels = machine.pixels[::-1] if not machine.portrait else machine.pixels
+    assert image.shape == pixels
+    assert image.dtype == np.uint8
+    assert image.flags.c_contiguous
+    rows, columns = np.nonzero(image)
+    assert abs(rows.mean() - (pixels[0] - 1) / 2) <= 1
+    assert abs(columns.mean() - (pixels[1] - 1) / 2) <= 1
+    covered = image.sum() / 255 * machine.pixel[0] * machine.pixel[1]
+    middle = len(stack.z) // 2
+    assert covered == pytest.approx(math.pi * (1 - stack.z[middle] ** 2) * 25, rel=2e-3)
+
+
+def test_an_object_as_large_as_the_bed_fits() -> None:
+    image = picture(Screen(stack_of(box(size=(12, 10, 1)), 12.0), SMALL))
+    assert image.shape == (100, 120)
+    assert (image[1:-1, 1:-1] == 255).all()
+
+
+def test_too_large_for_the_printer() -> None:
+    with pytest.raises(SliceError, match="13 mm along x, the Small has 12 mm"):
+        Screen(stack_of(box(size=(13, 1, 1)), 13.0), SMALL)
+
+
+@pytest.mark.parametrize("by", [0.05, 0.13, 0.3, -0.08, -0.21])
+def test_compensation_moves_outlines(by: float) -> None:
+    stack = stack_of(sphere())
+    before, after = picture(Screen(stack)), picture(Screen(stack, compensation=by))
+    radius = [math.sqrt(i.sum() / 255 * 0.01 / math.pi) for i in (before, after)]
+    assert radius[1] - radius[0] == pytest.approx(by, abs=0.02)
+
+
+def test_compensation_of_a_straight_edge_is_exact() -> None:
+    image = np.zeros((9, 12), np.uint8)
+    image[:, :5], image[:, 5] = 255, 128
+    assert compensated(image, 0.13, (0.1, 0.1))[4].tolist() == [255] * 6 + [205] + [0] * 5
+    assert compensated(image, -0.13, (0.1, 0.1))[4].tolist() == [255] * 4 + [51] + [0] * 7
+
+
+def test_gamma_leaves_black_and_white() -> None:
+    stack = stack_of(sphere())
+    before, after = picture(Screen(stack)), picture(Screen(stack, gamma=2.0))
+    grey = (before > 0) & (before < 255)
+    assert (after[~grey] == before[~grey]).all()
+    assert grey.any()
+    np.testing.assert_allclose(after[grey], 255 * (before[grey] / 255.0) ** 2, atol=0.5)
+
+
+@pytest.mark.parametrize(
+    "options", [{"gamma": 0.0}, {"gamma": math.nan}, {"compensation": 2.0}, {"compensation": math.nan}]
+)
+def test_impossible_screens(options: dict[str, float]) -> None:
+    with pytest.raises(SliceError, match="expected"):
+        Screen(stack_of(sphere()), **options)  # type: ignore[arg-type]
+
+
+def test_unknown_printers() -> None:
+    with pytest.raises(SliceError, match="did you mean saturn-4-ultra"):
+        printer("saturn 4 ultra")
+    with pytest.raises(SliceError, match="known: sl1"):
+        printer("xyz")
+
+
+def test_pixels_of_the_printers_are_what_makers_say() -> None:
+    """Micrometres, to a tenth."""
+    said = {"sl1": (47.25, 47.25), "sl1s": (50, 50), "mars-5-ultra": (18, 18), "saturn-4-ultra": (19, 24)}
+    said |= {
+        "saturn-4-ultra-16k": (14, 19),
+        "photon-mono-m7-pro": (16.8, 24.8),
+        "halot-mage-pro": (29.7, 29.7),
+    }
+    said |= {"sonic-mini-8k-s": (22, 22), "photon-mono-4": (17, 17), "photon-mono-4k": (35, 35)}
+    for name, pixel in said.items():
+        assert np.array(printer(name).pixel) * 1000 == pytest.approx(pixel, abs=0.05)
