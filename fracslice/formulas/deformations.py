@@ -8,7 +8,7 @@ from .box import Box
 from .parameters import REQUIRED, Axis, Number
 from .registry import Node, warp
 from .transforms import along
-from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt
+from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt, where
 
 
 @warp(
@@ -81,7 +81,7 @@ def _(node: Node) -> float:
     axis=Axis("z", "the hinge, which stays straight: z bends x towards y, x bends y towards z, y bends z towards x"),
     degrees=Number(REQUIRED, "how far to turn per unit of length along the bent axis"),
 )
-def bend(child, x, y, z, curvature, side, inner_radius, half, slope, margin, along_x, along_y):  # type: ignore[no-untyped-def]
+def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, margin, along_x, along_y):  # type: ignore[no-untyped-def]
     """A straight axis made an arc (Barr 1984, "Global and Local Deformations of Solid Primitives").
 
     In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is looked at in
@@ -95,12 +95,14 @@ def bend(child, x, y, z, curvature, side, inner_radius, half, slope, margin, alo
         a, b, t = z, side * x, y
     else:
         a, b, t = x, side * y, z
-    centre = 1.0 / curvature
-    up = centre - b
-    r = sqrt(a * a + up * up)
-    u = atan2(a, up) * centre
-    v = side * (centre - r)
-    d = maximum(inner_radius - r, minimum(slope * (absolute(u) - half), 0.5 * inner_radius))
+    # Distances are taken from the arc, not from its centre, which for a slight bend is too far away for float32.
+    s = curvature * a
+    c = 1.0 - curvature * b
+    r = sqrt(s * s + c * c)
+    u = atan2(s, c) / curvature
+    deep = where(r < 2.0, (2.0 * b - curvature * (a * a + b * b)) / (1.0 + r), (1.0 - r) / curvature)
+    v = side * deep
+    d = maximum(deep - inward, minimum(slope * (absolute(u) - half), 0.5 * inner_radius))
     f = d
     if any_of(d < margin):
         if along_x:
@@ -140,6 +142,7 @@ def _(node: Node) -> dict[str, object]:
     return {
         "curvature": curvature,
         "side": side,
+        "inward": 1 / curvature - inner_radius,
         "inner_radius": inner_radius,
         "half": half,
         "slope": slope,
