@@ -17,6 +17,5 @@ if __name__ == "__main__":
         member = bulb.with_values([f"mandelbulb.power={power}", "solid.size=3cm"])
         result = make_mesh(member, MeshJob(resolution=resolution, keep="largest"))
         write(result.mesh, folder / f"mandelbulb-{power}.stl")
-        print(
-            f"power {power}: {result.report.mesh.volume_mm3:.0f} mm3, {result.report.mesh.triangles} triangles"
-        )
+        volume = result.report.mesh.volume_mm3
+        print(f"power {power}: {volume:.0f} mm3, {result.report.mesh.triangles} triangles")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from .errors import MeshError, SceneError, VolumeError
+from .errors import SceneError, VolumeError
 from .memory import available_bytes, peak_rss_mb
 from .report import Report, SurfaceError, version
 from .scene import Scene, parse_length
@@ -186,6 +186,10 @@ def _finished(raw: Mesh, what: MeshJob, size: float, voxel: float) -> tuple[Mesh
 
     scale = size / float(raw.size.max())
     dust = NOISE * (voxel * scale) ** 3 if what.dust_mm3 is None else what.dust_mm3
+    if dust > (most := raw.volume * scale**3):
+        raise SceneError(
+            f"dust {dust:.4g}mm3: expected at most the volume of the whole object, {most:.4g}mm3"
+        )
     kept, removed = select(raw.scaled(scale), keep=what.keep, dust_mm3=dust, cavities=what.cavities)
     scale *= _growth(kept, what.base_mm, size)
     mesh = kept.scaled(scale * float(raw.size.max()) / size)
@@ -210,7 +214,7 @@ def _growth(mesh: Mesh, base: float, size: float) -> float:
         floor = low[2] + base / factor
         left = points[points[:, 2] >= floor]
         if not len(left):
-            raise MeshError(f"a base cut of {base:g} mm leaves nothing of the object")
+            raise SceneError(f"base {base:g}mm: leaves nothing of the object")
         width = left[:, :2].max(axis=0) - left[:, :2].min(axis=0)
         factor = size / max(*width.tolist(), float(high[2] - floor))
     return factor

@@ -74,6 +74,10 @@ def refused(text: str | bytes) -> str:
             "<transform scale='1e308'><sphere radius='10'/></transform>",
             "f.xml:3: <transform> has numbers too",
         ),
+        (
+            "<sphere radius='1e10'/>",
+            "f.xml:3: <sphere> has numbers too large to compute with: expected none beyond",
+        ),
         ("<cone radius='1e-200' height='1e-200'/>", "f.xml:3: <cone> has numbers too large or too small"),
         ("<repeat period='.1 1 1'><box/></repeat>", "f.xml:3: <repeat> period: expected at least a sixth"),
         ("<union/>", "f.xml:3: <union> takes at least 1 element inside it, found 0"),
@@ -116,7 +120,10 @@ def test_wrong_sizes(size):
         ),
         ("<scene version='2'/>", 'f.xml:1: <scene> version="2": expected 1'),
         ("<scene version='1'/>", "f.xml:1: <scene> expected <solid> inside it"),
-        ("<scene version='1'><box/></scene>", "f.xml:1: <box> cannot stand here; expected <camera>, <film>, <fog>, <light>, <shading> or <solid>"),
+        (
+            "<scene version='1'><box/></scene>",
+            "f.xml:1: <box> cannot stand here; expected <camera>, <film>, <fog>, <light>, <shading> or <solid>",
+        ),
         (
             "<scene version='1'><solid><box/></solid></scene>",
             'f.xml:1: <solid> needs the attribute size="..."',

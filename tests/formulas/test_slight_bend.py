@@ -1,0 +1,17 @@
+"""A slight bend has its centre far away; in float32 the shape must survive that."""
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import bend, box
+from fracslice.kernel import compile_scene
+
+
+@pytest.mark.parametrize("degrees", [1e-12, 1e-6, 1e-3, 0.1, -0.1])
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_a_slight_bend_changes_little(degrees, axis):
+    points = np.random.default_rng(0).uniform(-1, 1, (3, 1000)).astype(np.float32)
+    bent = compile_scene(bend(box(), degrees=degrees, axis=axis)).points(*points)
+    near = np.abs(compile_scene(box()).points(*points)) < 0.2
+    straight = compile_scene(box()).points(*points)
+    assert np.allclose(bent[near], straight[near], atol=2 * np.radians(abs(degrees)) + 1e-6)
