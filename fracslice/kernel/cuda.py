@@ -136,7 +136,7 @@ class CudaKernel:
 
 
 def launched(loop: Any, threads: int, *arguments: Any) -> None:
-    """Starts a loop on at least so many threads; does not wait for them."""
+    """Starts a loop on at least so many threads, more than 0; does not wait for them."""
     with _LAUNCH:
         loop[-(-threads // BLOCK), BLOCK](*arguments)
 

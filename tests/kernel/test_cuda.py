@@ -18,6 +18,7 @@ from fracslice.errors import KernelError
 from fracslice.formulas import Node, sphere
 from fracslice.kernel import cuda, cuda_source, link
 from tests.examples import EXAMPLES
+from tests.kernel.cuda_ptx import compiled
 
 installed = pytest.mark.skipif(
     importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not installed"
@@ -30,53 +31,39 @@ class TestMachineCode:
 
     @pytest.mark.parametrize("name", EXAMPLES)
     def test_float32_kernels_hold_no_float64(self, name: str, tmp_path: Path) -> None:
-        ptx = compiled(EXAMPLES[name], 32, tmp_path)
+        ptx = points_of(EXAMPLES[name], 32, tmp_path)
         assert ".f32" in ptx
         assert ".f64" not in ptx
 
     @pytest.mark.parametrize("name", ["sphere", "repeat", "mandelbulb", "mandelbulb 7.5", "twist"])
     def test_float64_kernels_compute_in_float64(self, name: str, tmp_path: Path) -> None:
         instructions = re.findall(
-            r"(?:add|sub|mul|fma)\S*\.(f32|f64)", compiled(EXAMPLES[name], 64, tmp_path)
+            r"(?:add|sub|mul|fma)\S*\.(f32|f64)", points_of(EXAMPLES[name], 64, tmp_path)
         )
         assert set(instructions) == {"f64"}
 
     @pytest.mark.parametrize("name", ["mandelbulb", "menger", "union"])
     def test_everything_is_inlined_into_registers(self, name: str, tmp_path: Path) -> None:
-        ptx = compiled(EXAMPLES[name], 32, tmp_path)
+        ptx = points_of(EXAMPLES[name], 32, tmp_path)
         assert "call" not in ptx
         assert ".local" not in ptx
 
     def test_nothing_assumes_that_there_is_no_nan(self, tmp_path: Path) -> None:
-        assert "setp.nan" in compiled(EXAMPLES["mandelbulb"], 32, tmp_path)
+        assert "setp.nan" in points_of(EXAMPLES["mandelbulb"], 32, tmp_path)
 
 
-def compiled(root: Node, bits: int, folder: Path) -> str:
-    """The PTX of the points loop for compute capability 9.0."""
-    names = ("numba.cuda", "numba.cuda.dispatcher", "numba.cuda.types")
-    numba_cuda, dispatcher, types = (importlib.import_module(name) for name in names)
-    linked = link(root)
-    path = folder / "scene.py"
-    path.write_text(cuda_source.module(linked, bits, cuda_source.POINTS + cuda_source.BRICKS))
-    spec = importlib.util.spec_from_file_location("scene", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    real = types.float32 if bits == 32 else types.float64
-    array = types.Array(real, 1, "C")
-    with pytest.MonkeyPatch.context() as patch:
-        # Numba asks the GPU for its capability even where it is told one.
-        patch.setattr(
-            dispatcher, "get_current_device", lambda: type("H200", (), {"compute_capability": (9, 0)})
-        )
-        ptx, _ = numba_cuda.compile(module.points.py_func, (array,) * 5, cc=(9, 0), output="ptx")
-    return str(ptx)
+def points_of(root: Node, bits: int, folder: Path) -> str:
+    """The PTX of the loop over points."""
+    return compiled(link(root), bits, cuda_source.POINTS, "points", "RRRRR", folder)
 
 
 @installed
 def test_every_example_agrees_with_the_reference_on_the_simulator() -> None:
-    run_simulated("tests.kernel.cuda_simulated")
+    # The simulator is chosen when Numba is imported, so it needs a process of its own.
+    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1"}
+    command = [sys.executable, "-m", "tests.kernel.cuda_simulated"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 @installed
@@ -124,10 +111,3 @@ class TestTyping:
             "@device\ndef f(x, P):\n    i = whole(0)\n    while i < whole(P[1]):\n"
             "        x = real(2.0) if i % 2 == 1 else x + real(i - 1)\n        i = whole(i + 1)\n"
         )
-
-
-def run_simulated(module: str) -> None:
-    """Runs a module in a process whose CUDA is Numba's simulator, which is chosen when Numba is imported."""
-    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1"}
-    done = subprocess.run([sys.executable, "-m", module], env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr

@@ -1,0 +1,40 @@
+"""What Numba compiles a CUDA module to, without a GPU."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from fracslice.kernel import Linked, cuda_source
+
+
+def compiled(linked: Linked, bits: int, loops: str, name: str, arguments: str, folder: Path) -> str:
+    """The PTX of one loop for compute capability 9.0, an H100 or H200.
+
+    arguments: a letter each: "r" a real, "n" a whole number; "R", "I" arrays of reals and int32, "M", "N"
+    2-D ones.
+    """
+    path = folder / "scene.py"
+    path.write_text(cuda_source.module(linked, bits, loops))
+    spec = importlib.util.spec_from_file_location("scene", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    names = ("numba.cuda", "numba.cuda.dispatcher", "numba.cuda.types")
+    numba_cuda, dispatcher, types = (importlib.import_module(name) for name in names)
+    real = types.float32 if bits == 32 else types.float64
+    kinds = {"r": real, "n": types.int64}
+    for letters, element in (("RM", real), ("IN", types.int32)):
+        kinds |= {letter: types.Array(element, k, "C") for k, letter in enumerate(letters, 1)}
+    signature = tuple(kinds[letter] for letter in arguments)
+    with pytest.MonkeyPatch.context() as patch:
+        # Numba asks the GPU for its capability even where it is told one.
+        patch.setattr(
+            dispatcher, "get_current_device", lambda: type("H200", (), {"compute_capability": (9, 0)})
+        )
+        ptx, _ = numba_cuda.compile(getattr(module, name).py_func, signature, cc=(9, 0), output="ptx")
+    return str(ptx)
