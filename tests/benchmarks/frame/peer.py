@@ -1,0 +1,68 @@
+"""A frame of the Mandelbulb, against hand-written AVX-512 C++ on the same rays: ratios of CPU seconds in one run.
+
+    python -m tests.benchmarks.frame.peer PATH/cpp_ref [rounds]
+
+Both render 800 x 600 pixels with Phong's shading from the same place, on two threads, in turns. Ours finds its depth by
+itself elsewhere; here it is pinned to the peer's ten steps.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+from fracslice.formulas import mandelbulb
+from fracslice.render.cpu import BLOCK, CpuTracer, ordered
+from fracslice.render.linking import link_frame, optics
+from fracslice.scene.view import Camera, Light, Shading, View
+from fracslice.work import Work
+
+WIDTH, HEIGHT, SAMPLES, STEPS = 800, 600, 16, 300
+
+
+def tracer() -> CpuTracer:
+    camera, root = Camera(eye=(2.2, -2.0, 1.4)), mandelbulb(iterations=10)
+    sides = np.array([camera.right, camera.above, camera.forward])
+    light = Light(position=tuple(np.array([-0.35, 0.5, -0.8]) @ sides), strength=0.7, shadows="no")
+    view = View(camera=camera, lights=(light,), shading=Shading(ambient=0.1))
+    seen = optics(camera, (WIDTH, HEIGHT), root, 1e-7)
+    return CpuTracer(link_frame(root, view, camera, seen, BLOCK), np.dtype(np.float32), WIDTH, HEIGHT)
+
+
+def ours(of: CpuTracer, pixels: np.ndarray) -> tuple[float, float]:
+    """CPU seconds of the first sample, the look ahead included, and of all of them."""
+    work, sums = Work(threads=2), np.zeros((WIDTH * HEIGHT, 6), np.float32)
+    of.aim(of.frame)
+    start = time.process_time()
+    of.look_ahead(STEPS, work)
+    of.add(sums, pixels, 0, STEPS, work)
+    first = time.process_time() - start
+    for index in range(1, SAMPLES):
+        of.add(sums, pixels, index, STEPS, work)
+    return first, time.process_time() - start
+
+
+def peer(program: str) -> tuple[float, float]:
+    with tempfile.NamedTemporaryFile(suffix=".ppm") as file:
+        command = [program, "render", file.name, str(WIDTH), str(HEIGHT), str(SAMPLES), "1"]
+        found = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    return found["cpu_s"], found["cpu16_s"]
+
+
+def main(program: str, rounds: int = 9) -> None:
+    of, pixels = tracer(), ordered(WIDTH, HEIGHT)
+    ours(of, pixels)
+    pairs = np.array([(*ours(of, pixels), *peer(program)) for _ in range(rounds)])
+    mine, other = np.median(pairs[:, :2], 0), np.median(pairs[:, 2:], 0)
+    ratios = np.median(pairs[:, :2] / pairs[:, 2:], 0)
+    for name, a, b, ratio in zip(("first sample", f"{SAMPLES} samples"), mine, other, ratios, strict=True):
+        print(f"{name}: {a:.4f} s, C++ {b:.4f} s, ratio {ratio:.3f}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], *map(int, sys.argv[2:]))
