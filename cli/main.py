@@ -66,7 +66,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except FracsliceError as error:
         return say(str(error), USAGE if isinstance(error, BAD_INPUT) else FAILED)
     except (KeyboardInterrupt, click.Abort):
-        return say("interrupted", INTERRUPTED)
+        return say("stopped; nothing was written", INTERRUPTED)
     except MemoryError:
         return say("out of memory: a coarser voxel needs less", FAILED)
     except BrokenPipeError:

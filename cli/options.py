@@ -52,7 +52,11 @@ _JOB = [
     ),
     click.option("--keep", type=click.Choice(["all", "largest"]), default="all", help="All bodies, or one."),
     click.option(
-        "--dust", type=float, callback=amount, metavar="MM3", help="Drop bodies with less; noise by default."
+        "--dust",
+        type=float,
+        callback=amount,
+        metavar="MM3",
+        help="Drop bodies with less; 1e-5 of the whole by default.",
     ),
     click.option(
         "--cavities",

@@ -30,8 +30,8 @@ ALWAYS_FITS = 256
 BYTES_A_BRICK = 60_000
 """Peak memory for each brick of samples, its triangles in all their stages included; measured."""
 
-NOISE = 8.0
-"""Bodies with fewer voxels are noise of the sampling."""
+DUST = 1e-5
+"""The share of the whole below which a body is dust, as it comes off the rim of a fractal of finite depth."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class MeshJob:
 
     size_mm: the longest side, if not what the scene says. voxel_mm or resolution (voxels along the longest
     side): how fine; 256 along the longest side if neither is given. keep: every body, or the largest alone.
-    dust_mm3: bodies with less material are dropped; if not given, those under 8 voxels, which are noise.
+    dust_mm3: bodies with less material are dropped; if not given, those under 1e-5 of the whole.
     cavities: sealed hollows stay or are filled. base_mm: so much is cut off at the bottom, for the object to
     stand on. Raises `SceneError` for values that cannot be.
     """
@@ -133,7 +133,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     with clock("meshing"):
         raw = contour(planned.root, bricks, work)
     with clock("finishing"):
-        mesh, removed, place = _finished(raw, what, what.size(scene), bricks.voxel)
+        mesh, removed, place = _finished(raw, what, what.size(scene))
     with clock("checking"):
         checked = check(mesh, threads=work.threads)
         error = _surface_error(planned, mesh, place, what.base_mm > 0, work)
@@ -178,18 +178,17 @@ def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Wor
         )
 
 
-def _finished(raw: Mesh, what: MeshJob, size: float, voxel: float) -> tuple[Mesh, Removed, Placement]:
+def _finished(raw: Mesh, what: MeshJob, size: float) -> tuple[Mesh, Removed, Placement]:
     """The mesh that is wanted, in mm on the bed, as a file will hold it."""
     from .mesh.clean import clean
     from .mesh.components import select
     from .mesh.solid import cut_base, place_on_bed
 
     scale = size / float(raw.size.max())
-    dust = NOISE * (voxel * scale) ** 3 if what.dust_mm3 is None else what.dust_mm3
-    if dust > (most := raw.volume * scale**3):
-        raise SceneError(
-            f"dust {dust:.4g}mm3: expected at most the volume of the whole object, {most:.4g}mm3"
-        )
+    volume = raw.volume * scale**3
+    dust = DUST * volume if what.dust_mm3 is None else what.dust_mm3
+    if dust > volume:
+        raise SceneError(f"dust {dust:.4g}mm3: expected at most the volume of the object, {volume:.4g}mm3")
     kept, removed = select(raw.scaled(scale), keep=what.keep, dust_mm3=dust, cavities=what.cavities)
     scale *= _growth(kept, what.base_mm, size)
     mesh = kept.scaled(scale * float(raw.size.max()) / size)

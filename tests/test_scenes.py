@@ -18,7 +18,7 @@ NAMES = library.names()
 def test_there_are_at_least_ten_and_they_show_what_there_is():
     used = {node.formula.name for name in NAMES for node in read(library.path(name)).root.walk()}
     assert len(NAMES) >= 10
-    assert set(formula_names()) - used <= {"octahedron", "mirror", "offset"}
+    assert set(formula_names()) - used <= {"octahedron", "mirror", "offset", "material"}
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -164,14 +164,23 @@ def read(terminal: int) -> bytes:
         return b""
 
 
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_stops_it_and_leaves_no_file(tmp_path, number, status):
     target = tmp_path / "out"
     target.mkdir()
     arguments = ["mesh", "mandelbulb", "-o", str(target / "m.stl"), "--resolution", "768"]
     running = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
-    time.sleep(1.5)
+    while not listens(running.pid):
+        time.sleep(0.05)
+    time.sleep(0.5)
     running.send_signal(number)
     assert running.communicate(timeout=60)[1] == "fracslice: stopped; nothing was written\n"
     assert running.returncode == status
     assert list(target.iterdir()) == []
+
+
+def listens(pid: int) -> bool:
+    """Whether a process has a handler for SIGTERM."""
+    status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
+    return bool(int(status["SigCgt"], 16) >> (signal.SIGTERM - 1) & 1)
