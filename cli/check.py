@@ -9,7 +9,7 @@ import click
 
 from .inputs import is_model, load_model, load_scene
 from .options import job_of, job_options, length, quiet_option, set_option, threads_option
-from .slice import check_print
+from .slice import check_print, print_options
 from .summary import found, summary
 from .working import working
 
@@ -17,10 +17,11 @@ from .working import working
 @click.command()
 @click.argument("source", metavar="MODEL|SCENE")
 @click.option("--json", "as_json", is_flag=True, help="All numbers, as JSON.")
-@click.option("--layer", callback=length, metavar="LENGTH", help="Check the layers of a resin print of this layer height.")
-@click.option("--pixel", callback=length, metavar="LENGTH", help="With --layer: pixel size; the printer's, or 0.05mm.")
+@click.option("--layer", callback=length, metavar="LENGTH", help="Check a resin print's layers, this high.")
+@click.option("--pixel", callback=length, metavar="LENGTH", help="With --layer; the printer's, or 0.05mm.")
 @click.option("--printer", "machine", metavar="NAME", help="With --layer: whose bed it has to fit.")
 @click.option("--picture", metavar="FILE.png", help="With --layer: draw the worst layers.")
+@print_options
 @job_options
 @set_option
 @threads_option

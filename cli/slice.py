@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +16,10 @@ from .working import working
 
 if TYPE_CHECKING:
     from fracslice.scene import Scene
-    from fracslice.slicing import SliceJob
+    from fracslice.slicing import SliceJob, Stack
     from fracslice.slicing.checks import PrintReport
     from fracslice.slicing.printers import Printer
+    from fracslice.work import Work
 
 LAYER, PIXEL_MM = "0.05mm", 0.05
 
@@ -29,6 +31,25 @@ def signed_length(context: click.Context, option: click.Parameter, text: str) ->
     size = length(context, option, text.strip().removeprefix("-"))
     assert size is not None
     return -size if text.strip().startswith("-") else size
+
+
+def print_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """How the object is made printable: adds the options that `stack_of` takes."""
+    for option in reversed(_PRINT):
+        command = option(command)
+    return command
+
+
+_PRINT = [
+    click.option(
+        "--hollow", callback=length, metavar="LENGTH", help="Hollow it out; walls of this thickness."
+    ),
+    click.option(
+        "--drain", callback=signed_length, default="3mm", metavar="LENGTH", help="Drain holes; 0: none."
+    ),
+    click.option("--close-gaps", callback=length, metavar="LENGTH", help="Close gaps up to this width."),
+    click.option("--raft", callback=length, metavar="LENGTH", help="Stand it on a plate of this height."),
+]
 
 
 @click.command("slice")
@@ -65,6 +86,11 @@ def signed_length(context: click.Context, option: click.Parameter, text: str) ->
 @click.option(
     "--preview", metavar="FILE", help="A contact sheet (.png) or an animation (.webp) of the layers."
 )
+@click.option("--keep", type=click.Choice(["all", "largest"]), default="all", help="All bodies, or one.")
+@click.option(
+    "--base", callback=length, metavar="LENGTH", help="Cut off this much at the bottom, to stand flat."
+)
+@print_options
 @set_option
 @threads_option
 @quiet_option
@@ -84,7 +110,6 @@ def slice_(
     from fracslice.export import check_target
     from fracslice.export.jobs import SliceRun
     from fracslice.export.slices import slice_format, write_slices
-    from fracslice.slicing import plan_stack
     from fracslice.slicing.raster import Screen
 
     if options["machine"] == "list":
@@ -98,7 +123,7 @@ def slice_(
     scene = load_scene(source, settings)
     machine = chosen_printer(options["machine"])
     with working(threads, quiet) as work:
-        stack = plan_stack(scene.root, job(scene, machine, options), work)
+        stack = stack_of(scene, machine, options, work)
         screen = Screen(stack, machine, options["compensation"], options["gamma"], options["mirror"])
         about = {"Title": scene.name, "scene_hash": scene.hash}
         write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about), output, form)
@@ -134,12 +159,25 @@ def job(scene: Scene, machine: Printer | None, options: dict[str, Any]) -> Slice
     if pixel is not None and machine is not None:
         raise click.UsageError("--pixel and --printer: expected one of them")
     given = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
-    return SliceJob(
-        options["size"] or scene.size_mm, options["layer"], given, tuple(options.get("up") or (0.0, 0.0, 1.0))
+    up = tuple(options.get("up") or (0.0, 0.0, 1.0))
+    size, base, raft = options["size"] or scene.size_mm, options["base"] or 0.0, options["raft"] or 0.0
+    return SliceJob(size, options["layer"], given, up, base, raft)
+
+
+def stack_of(scene: Scene, machine: Printer | None, options: dict[str, Any], work: Work) -> Stack:
+    """The layers that are wanted, of the object made printable."""
+    from fracslice.slicing import Changes, changed, plan_stack
+
+    changes = Changes(
+        wall=options["hollow"] or 0.0,
+        drain=options["drain"],
+        gap=options["close_gaps"] or 0.0,
+        largest=options["keep"] == "largest",
     )
+    return changed(plan_stack(scene.root, job(scene, machine, options), work), changes, work)
 
 
-def write_preview(stack: Any, path: str, work: Any) -> None:
+def write_preview(stack: Stack, path: str, work: Work) -> None:
     from fracslice.export import replacing
     from fracslice.slicing.preview import animation, contact_sheet
 
@@ -152,7 +190,6 @@ def check_print(
 ) -> int:
     """Says whether the layers of a scene would print; the exit status."""
     from fracslice.export import check_target, replacing
-    from fracslice.slicing import plan_stack
     from fracslice.slicing.checks import check_layers
     from fracslice.slicing.preview import worst_layers
 
@@ -161,7 +198,7 @@ def check_print(
     scene = load_scene(source, settings)
     machine = chosen_printer(options["machine"])
     with working(threads, quiet) as work:
-        stack = plan_stack(scene.root, job(scene, machine, options), work)
+        stack = stack_of(scene, machine, options, work)
         report = check_layers(stack, printer=machine, work=work)
         if options["picture"]:
             with replacing(options["picture"]) as file:

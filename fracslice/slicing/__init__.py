@@ -2,6 +2,7 @@
 
 from .contours import Contours
 from .layers import Layer, Slicer
+from .printable import Changes, changed
 from .stack import SliceJob, Stack, plan_stack
 
-__all__ = ["Contours", "Layer", "SliceJob", "Slicer", "Stack", "plan_stack"]
+__all__ = ["Changes", "Contours", "Layer", "SliceJob", "Slicer", "Stack", "changed", "plan_stack"]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernel import CpuKernel
 from . import marching
+from .slab import Field
 from .stack import Stack
 from .tiles import Tiles
 
@@ -51,7 +51,7 @@ class Contours:
         return float(self.areas.sum())
 
 
-def contours(tiles: Tiles, k: int, z: float, stack: Stack, exact: CpuKernel | None) -> Contours:
+def contours(tiles: Tiles, k: int, z: float, stack: Stack, exact: Field | None) -> Contours:
     """The contours of layer `k` of a slab, at height `z` (scene units).
 
     exact: the float64 kernel that the crossings are refined with; None for linear interpolation.
@@ -75,9 +75,7 @@ def contours(tiles: Tiles, k: int, z: float, stack: Stack, exact: CpuKernel | No
     return _nested(points, order, starts, edges, ends[:, 0] < 0)
 
 
-def refined(
-    kernel: CpuKernel, edges: np.ndarray, ends: np.ndarray, z: float, frame: np.ndarray
-) -> np.ndarray:
+def refined(kernel: Field, edges: np.ndarray, ends: np.ndarray, z: float, frame: np.ndarray) -> np.ndarray:
     """Where on its edge each crossing lies, 0 to 1, to `PRECISE`: false position with the Illinois rule
     (Dowell and Jarratt 1971), all edges at once; those that are done are left out.
     """

@@ -12,11 +12,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..kernel import CpuKernel, compile_scene
+from ..kernel import compile_scene
 from ..work import Work
 from . import marching
 from .contours import Contours, contours
-from .slab import Sampler
+from .printable import Changed, facts_of
+from .slab import Field, Sampler
 from .stack import Stack
 from .tiles import Tiles
 
@@ -35,7 +36,7 @@ class Layer:
     evaluations: float
     tiles: Tiles
     place: int
-    exact: CpuKernel
+    exact: Field
 
     @property
     def top(self) -> float:
@@ -93,8 +94,10 @@ class Slicer:
         at a time. Raises `SliceError`, `Cancelled`, or what `make` raises.
         """
         root, shape = self.stack.root, self.stack.shape
-        exact = compile_scene(root, "float64")
-        sampler = Sampler(compile_scene(root), root.facts, self.stack.frame, (shape[0] + 1, shape[1] + 1))
+        terms = self.stack.terms
+        exact = Changed(compile_scene(root, "float64"), terms)
+        kernel = Changed(compile_scene(root), terms) if terms else compile_scene(root)
+        sampler = Sampler(kernel, facts_of(self.stack), self.stack.frame, (shape[0] + 1, shape[1] + 1))
         chosen = range(len(self.stack.z)) if layers is None else layers
 
         def slab(group: list[int]) -> list[T]:

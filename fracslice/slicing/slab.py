@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from ..errors import SliceError
 from ..formulas.registry import Facts
-from ..kernel import CpuKernel
 from . import marching
 from . import tiles as t
 from .tiles import INSIDE, OUTSIDE, TILE, Tiles
@@ -30,6 +30,15 @@ COARSEST = 8
 WEAK_INSIDE, WEAK_OUTSIDE = 4, 2
 
 
+class Field(Protocol):
+    """What is sampled: a kernel, or one with changes."""
+
+    @property
+    def dtype(self) -> np.dtype: ...  # type: ignore[type-arg]
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray, /) -> np.ndarray: ...
+
+
 @dataclass(frozen=True, eq=False)
 class Sampler:
     """Samples slabs of a stack; may be used from many threads.
@@ -37,7 +46,7 @@ class Sampler:
     frame: (x0, y0, dx, dy) of the lattice, scene units. shape: lattice points (ny, nx).
     """
 
-    kernel: CpuKernel
+    kernel: Field
     facts: Facts
     frame: np.ndarray
     shape: tuple[int, int]
