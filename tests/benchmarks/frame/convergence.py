@@ -2,6 +2,8 @@
 
     python -m tests.benchmarks.frame.convergence [PLOT.png]
 
+Found: antialiasing and soft shadows reach it after 64 samples; a sky or a lens, whose integrals have four to six dimensions
+and edges in all of them, after 256. Independent, shuffled pairs of dimensions were worse in all four scenes.
 Random: every round one uniform sample of each pixel, as the paper's 1000 rounds. The true picture is the mean of 4096 of
 ours with another scrambling. Prints how many of our samples reach the error of 1000 random rounds.
 """

@@ -1,0 +1,89 @@
+"""fracslice render."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fracslice_cli.main import run
+from PIL import Image
+
+SCENE = """<scene version="1">
+  <solid size="80mm"><material colour="0.9 0.3 0.2"><sphere/></material></solid>
+  <camera eye="3 -2 1"/>
+  <film width="40" height="24" samples="3"/>
+  <light position="1 -2 3"/>
+</scene>"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "ball.xml"
+    path.write_text(SCENE)
+    return path
+
+
+def test_a_picture_with_what_it_is_of(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["render", str(scene), "-o", str(tmp_path / "a.png"), "--device", "cpu"]) == 0
+    assert "40 x 24 pixels, 3.0 samples a pixel" in capsys.readouterr().out
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.size == (40, 24)
+        assert image.text["Title"] == "ball"  # type: ignore[attr-defined]
+        assert len(image.text["scene_hash"]) == 12  # type: ignore[attr-defined]
+        middle, corner = np.asarray(image)[12, 20], np.asarray(image)[0, 0]
+    assert middle[0] > 2 * middle[2], "the ball is red"
+    assert corner[2] > corner[0], "and the background is not"
+
+
+def test_pass_images_and_going_on_from_a_state(scene: Path, tmp_path: Path) -> None:
+    common = ["render", str(scene), "-q", "--device", "cpu"]
+    state = ["--state", str(tmp_path / "s.npz")]
+    assert run([*common, "-o", str(tmp_path / "a.png"), "--samples", "2", *state]) == 0
+    passes = ["--pass-images", str(tmp_path / "passes")]
+    assert run([*common, "-o", str(tmp_path / "a.png"), "--samples", "4", *state, *passes]) == 0
+    assert sorted(p.name for p in (tmp_path / "passes").iterdir()) == ["pass0004.png", "pass0005.png"]
+    assert run([*common, "-o", str(tmp_path / "b.png"), "--samples", "4"]) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--size", "0x10"], "expected pixels across and down"),
+        (["--samples", "0"], "not in the range"),
+        (["--time", "never"], "expected a time"),
+        (["--set", "camera.eye=0.3 0 0.2"], "outside the solid"),
+        (["--set", "camera.up=3 -2 1"], "other than the one the camera looks in"),
+        (["--set", "light.strength=nan"], "expected a number"),
+        (["--set", "light[2].strength=1"], "the scene has 1 <light>"),
+        (["--set", "film.width=0"], "expected a whole number"),
+        (["--set", "shading.mode=cel"], "expected light, normal"),
+        (["--set", "shading.glitter=1"], "no attribute 'glitter'"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(
+    scene: Path, tmp_path: Path, options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["render", str(scene), "-o", str(tmp_path / "a.png"), *options]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "a.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ('<light position="1 -2 3"/>', '<light position="1 -2"/>', 5),
+        ('eye="3 -2 1"', 'eye="0 0 0"', 3),
+        ('<camera eye="3 -2 1"/>', '<camera eye="3 -2 1"/>\n<camera eye="1 -2 1"/>', 4),
+        ('samples="3"', 'grain="3"', 4),
+    ],
+)
+def test_mistakes_in_the_file_have_their_line(
+    scene: Path, tmp_path: Path, old: str, new: str, line: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene.write_text(SCENE.replace(old, new))
+    assert run(["render", str(scene), "-o", str(tmp_path / "a.png")]) == 2
+    assert f"ball.xml:{line}: " in capsys.readouterr().err

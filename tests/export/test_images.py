@@ -1,0 +1,56 @@
+"""Pictures in files, read back by other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fracslice.errors import ExportError
+from fracslice.export.images import png, write_image
+
+RNG = np.random.default_rng(0)
+SHOWN = RNG.uniform(0, 1, (13, 21, 3)).astype(np.float32)
+SMOOTH = np.linspace(0, 1, 64 * 48 * 3, dtype=np.float32).reshape(48, 64, 3)
+
+
+@pytest.mark.parametrize("picture", [SHOWN, SMOOTH, SHOWN[:1, :1]])
+def test_png_of_8_bits_reads_back(tmp_path: Path, picture: np.ndarray) -> None:
+    write_image(tmp_path / "a.png", picture, picture, 8, {"scene_hash": "abc", "Title": "größer"})
+    with Image.open(tmp_path / "a.png") as image:
+        assert (np.asarray(image) == np.round(picture * 255)).all()
+        assert image.text["scene_hash"] == "abc"  # type: ignore[attr-defined]
+        assert image.text["Title"] == "größer"  # type: ignore[attr-defined]
+
+
+def test_png_of_16_bits_reads_back(tmp_path: Path) -> None:
+    vtk = pytest.importorskip("vtkmodules.vtkIOImage")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    write_image(tmp_path / "a.png", SHOWN, SHOWN, 16)
+    reader = vtk.vtkPNGReader()
+    reader.SetFileName(str(tmp_path / "a.png"))
+    reader.Update()
+    found = vtk_to_numpy(reader.GetOutput().GetPointData().GetScalars())
+    assert found.dtype == np.uint16
+    assert (found.reshape(SHOWN.shape)[::-1] == np.round(SHOWN * np.float64(65535))).all()
+
+
+def test_tiff_holds_the_light_as_floats(tmp_path: Path) -> None:
+    tifffile = pytest.importorskip("tifffile")
+    light = SHOWN * 1000
+    write_image(tmp_path / "a.tif", SHOWN, light, text={"Title": "a"})
+    found = tifffile.imread(tmp_path / "a.tif")
+    assert found.dtype == np.float32
+    assert (found == light).all()
+
+
+def test_smooth_pictures_make_small_files() -> None:
+    assert len(png(SMOOTH, 8, {})) < SMOOTH.size / 8
+
+
+def test_unknown_endings_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"known are \.png"):
+        write_image(tmp_path / "a.jpg", SHOWN, SHOWN)
