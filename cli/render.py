@@ -27,7 +27,9 @@ def pixels(_: click.Context, __: click.Parameter, value: str | None) -> tuple[in
         return None
     match = re.fullmatch(r"\s*(\d{1,5})\s*x\s*(\d{1,5})\s*", value)
     if not match or not all(1 <= int(n) <= 32767 for n in match.groups()):
-        raise click.BadParameter(f"{value!r}: expected pixels across and down, such as 1280x720, from 1 to 32767")
+        raise click.BadParameter(
+            f"{value!r}: expected pixels across and down, such as 1280x720, from 1 to 32767"
+        )
     return int(match[1]), int(match[2])
 
 
@@ -43,14 +45,24 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 
 @click.command()
 @click.argument("source", metavar="SCENE")
-@click.option("-o", "--output", required=True, metavar="FILE", help="A .png file, or .tif for linear 32-bit floats.")
-@click.option("--samples", type=click.IntRange(1, 1_000_000), metavar="N", help="The most samples of a pixel.")
+@click.option(
+    "-o", "--output", required=True, metavar="FILE", help="A .png file, or .tif for linear 32-bit floats."
+)
+@click.option(
+    "--samples", type=click.IntRange(1, 1_000_000), metavar="N", help="The most samples of a pixel."
+)
 @click.option("--size", callback=pixels, metavar="WxH", help="Pixels across and down, such as 1280x720.")
-@click.option("--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", help="What computes it.")
+@click.option(
+    "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", help="What computes it."
+)
 @click.option("--time", "limit", callback=duration, metavar="TIME", help="Stop after 10s, 2min or 1h.")
 @click.option("--bits", type=click.Choice(["8", "16"]), default="8", help="Of a PNG file, per colour.")
-@click.option("--pass-images", type=click.Path(file_okay=False), metavar="DIR", help="Keep the picture of every pass.")
-@click.option("--state", type=click.Path(dir_okay=False), metavar="FILE.npz", help="Go on from it, and save to it.")
+@click.option(
+    "--pass-images", type=click.Path(file_okay=False), metavar="DIR", help="Keep the picture of every pass."
+)
+@click.option(
+    "--state", type=click.Path(dir_okay=False), metavar="FILE.npz", help="Go on from it, and save to it."
+)
 @set_option
 @threads_option
 @quiet_option
@@ -93,7 +105,10 @@ def render(
     save(output, last, scene, bits)
     if not quiet:
         height, width, _ = last.image.shape
-        click.echo(f"{output}: {width} x {height} pixels, {shown(last)}, {renderer.setting.precision}, {renderer.device}")
+        click.echo(
+            f"{output}: {width} x {height} pixels, {shown(last)}, "
+            f"{renderer.setting.precision}, {renderer.device}"
+        )
 
 
 def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
@@ -127,7 +142,9 @@ def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:
         "scene_hash": scene.hash,
         "samples": f"{done.samples:.2f}",
     }
-    write_image(path, develop(done.image, scene.view.film, scene.view.shading.mode), done.image, int(bits), text)
+    write_image(
+        path, develop(done.image, scene.view.film, scene.view.shading.mode), done.image, int(bits), text
+    )
 
 
 def save_state(renderer: Renderer, path: str) -> None:

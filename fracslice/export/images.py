@@ -16,7 +16,8 @@ IMAGES = (".png", ".tif", ".tiff")
 
 
 def check_image(path: str | Path) -> str:
-    """The ending that names the format of `path`; raises ExportError, with those that are known, for any other."""
+    """The ending that names the format of `path`; raises ExportError, with those that are known, for any
+    other."""
     ending = Path(path).suffix.lower()
     if ending not in IMAGES:
         raise ExportError(f"{path}: unknown kind of picture; known are {', '.join(IMAGES)}")
@@ -24,17 +25,19 @@ def check_image(path: str | Path) -> str:
 
 
 def write_image(
-    path: str | Path, shown: np.ndarray, light: np.ndarray, bits: int = 8, text: Mapping[str, str] | None = None
+    path: str | Path,
+    shown: np.ndarray,
+    light: np.ndarray,
+    bits: int = 8,
+    text: Mapping[str, str] | None = None,
 ) -> Path:
     """Writes a picture to a file of the kind its name ends in.
 
-    shown: float32 [height, width, 3], sRGB in [0, 1], for PNG of `bits` 8 or 16; text: keywords and what they say, in
-    the file. light: float32 of the same shape, linear, for TIFF. Raises ExportError.
+    shown: float32 [height, width, 3], sRGB in [0, 1], for PNG of `bits` 8 or 16; text: keywords and what they
+    say, in the file. light: float32 of the same shape, linear, for TIFF. Raises ExportError.
     """
-    if check_image(path) == ".png":
-        data = png(shown, bits, text or {})
-    else:
-        data = tiff(light, text or {})
+    said = text or {}
+    data = png(shown, bits, said) if check_image(path) == ".png" else tiff(light, said)
     with replacing(path) as file:
         file.write(data)
     return Path(path)
@@ -53,7 +56,8 @@ def png(shown: np.ndarray, bits: int, text: Mapping[str, str]) -> bytes:
 
 
 def _filtered(rows: np.ndarray, pixel: int) -> np.ndarray:
-    """Rows of bytes as differences to what is left of and above them, each row by the filter that leaves least."""
+    """Rows of bytes as differences to what is left of and above them, each row by the filter that leaves
+    least."""
     value = rows.astype(np.int16)
     above = np.vstack([np.zeros_like(value[:1]), value[:-1]])
     left = np.pad(value, ((0, 0), (pixel, 0)))[:, : value.shape[1]]
@@ -61,7 +65,9 @@ def _filtered(rows: np.ndarray, pixel: int) -> np.ndarray:
     guess = left + above - corner
     a, b, c = abs(guess - left), abs(guess - above), abs(guess - corner)
     paeth = np.where((a <= b) & (a <= c), left, np.where(b <= c, above, corner))
-    tried = np.stack([value - p for p in (np.zeros_like(value), left, above, (left + above) // 2, paeth)]).astype(np.uint8)
+    tried = np.stack(
+        [value - p for p in (np.zeros_like(value), left, above, (left + above) // 2, paeth)]
+    ).astype(np.uint8)
     best = np.abs(tried.view(np.int8).astype(np.int32)).sum(2).argmin(0)
     return np.hstack([best[:, None].astype(np.uint8), tried[best, np.arange(len(rows))]])
 

@@ -17,8 +17,8 @@ TRUSTED = 8
 
 @dataclass(eq=False)
 class Accumulator:
-    """sums: [height * width, 6] of the kernel's float type, see `waves.CHANNELS`. passes: how many are in it. key: of what
-    it is a picture; only the same scene, view, size and precision can go on with it."""
+    """sums: [height * width, 6] of the kernel's float type, see `waves.CHANNELS`. passes: how many are in
+    it. key: of what it is a picture; only the same scene, view, size and precision can go on with it."""
 
     width: int
     height: int
@@ -42,7 +42,8 @@ class Accumulator:
         return np.asarray(colours, np.float32)
 
     def errors(self) -> np.ndarray:
-        """The standard error of each pixel's brightness, as shown: float32 [height, width]; infinite below 2 samples."""
+        """The standard error of each pixel's brightness, as shown: float32 [height, width]; infinite below 2
+        samples."""
         n = self.sums[:, 5].astype(np.float64)
         mean = self.sums[:, 3] / np.maximum(n, 1)
         spread = np.maximum(self.sums[:, 4] / np.maximum(n, 1) - mean * mean, 0)
@@ -50,11 +51,14 @@ class Accumulator:
         return np.asarray(error.reshape(self.height, self.width), np.float32)
 
     def unfinished(self, tolerance: float) -> np.ndarray:
-        """Whether a pixel's error or a neighbour's is above the tolerance, or its samples too few: bool [height, width]."""
+        """Whether a pixel's error or a neighbour's is above the tolerance, or its samples too few: bool
+        [height, width]."""
         error = self.errors()
         error[self.counts < TRUSTED] = np.inf
         padded = np.pad(error, 1, mode="edge")
-        worst = np.max([padded[j : j + self.height, i : i + self.width] for j in range(3) for i in range(3)], 0)
+        worst = np.max(
+            [padded[j : j + self.height, i : i + self.width] for j in range(3) for i in range(3)], 0
+        )
         return np.asarray(worst > tolerance)
 
     def save(self, file: BinaryIO) -> None:
@@ -64,7 +68,7 @@ class Accumulator:
 
     @classmethod
     def load(cls, path: str | Path, key: str) -> Accumulator:
-        """Reads what `save` wrote. Raises `RenderError` if it is of another picture, or no such file at all."""
+        """Reads what `save` wrote. Raises `RenderError` if it is of another picture, or no such file."""
         try:
             with np.load(path, allow_pickle=False) as stored:
                 width, height, passes = map(int, stored["shape"])

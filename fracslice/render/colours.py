@@ -21,7 +21,8 @@ def linear(colour: Sequence[float]) -> tuple[float, ...]:
 class Look:
     """The materials of a scene, and the lines that put the one at a hit into variables.
 
-    Where there is one material, its numbers are read from P; where there are several, they are chosen by paint.
+    Where there is one material, its numbers are read from P; where there are several, they are chosen by
+    paint.
     """
 
     linker: Linker
@@ -51,8 +52,8 @@ class Look:
             values = [[self.linker.argument(n[name])] for n in self.all]
             lines += self.chosen([([], v) for v in values], (name,))
         if self.inside:
-            absorbs = [([], [self.linker.argument(a) for a in n["absorb"]]) for n in self.all]
-            lines += self.chosen(absorbs, ("absorbr", "absorbg", "absorbb"))
+            fading = [[self.linker.argument(a) for a in n["absorb"]] for n in self.all]
+            lines += self.chosen([([], v) for v in fading], ("absorbr", "absorbg", "absorbb"))
         return lines
 
     def colour(self, k: int, node: Node) -> tuple[list[str], list[str]]:

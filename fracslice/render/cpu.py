@@ -15,7 +15,8 @@ from .waves import loops, workspace
 TILE = 2048
 """Rays that are in the works at once: their rows stay in the cache."""
 BLOCK = 4
-"""Pixels along the side of a block that the cone prepass looks at as one. A frame takes 7 % less with 4 than with 8."""
+"""Pixels along the side of a block that the cone prepass looks at as one. A frame takes 7 % less with 4 than
+with 8."""
 
 
 class CpuTracer:
@@ -40,20 +41,24 @@ class CpuTracer:
 
     def look_ahead(self, limit: int, work: Work) -> None:
         """Finds, for every block of pixels, up to where all its rays are free."""
-        if self._cones is None:
+        cones = self._cones
+        if cones is None:
             return
         ids = np.arange(len(self._starts), dtype=np.int32)
 
         def task(part: np.ndarray) -> None:
             m, space, who = self._room(part)
-            self._cones(*_addresses(self._parameters, self._starts, who, space), len(part), m, self.blocks, limit)
+            cones(
+                *_addresses(self._parameters, self._starts, who, space), len(part), m, self.blocks, limit
+            )
 
         work.map(task, np.array_split(ids, max(1, len(ids) // 512)))
 
     def add(self, sums: np.ndarray, pixels: np.ndarray, index: int, limit: int, work: Work) -> None:
         """Adds sample `index` to each of the pixels.
 
-        sums: [height * width, 6], changed in place. pixels: int32 ``y << 16 | x``, each once, in the order of `ordered`.
+        sums: [height * width, 6], changed in place. pixels: int32 ``y << 16 | x``, each once, in the order of
+        `ordered`.
         """
         q = point(index, self.frame.samples)
 
@@ -75,7 +80,8 @@ class CpuTracer:
 
 
 def ordered(width: int, height: int) -> np.ndarray:
-    """All pixels, int32 ``y << 16 | x``, so that a packet's are neighbours: rows of blocks, in a block 8 x 4 pixels."""
+    """All pixels, int32 ``y << 16 | x``, so that a packet's are neighbours: rows of blocks, in a block 8 x 4
+    pixels."""
     y, x = np.divmod(np.arange(width * height, dtype=np.int32), np.int32(width))
     return (y << 16 | x)[np.lexsort((x, y, x // 8, y // 4, x // 64, y // 32))]
 

@@ -13,8 +13,8 @@ BRIGHT = 1.0
 def develop(image: np.ndarray, film: Film, mode: str = "light") -> np.ndarray:
     """A picture as screens show it.
 
-    image: float32 [height, width, 3], linear light. Returns float32 of that shape, sRGB in [0, 1]. Modes that show
-    numbers (`Shading.mode`) are left as they are.
+    image: float32 [height, width, 3], linear light. Returns float32 of that shape, sRGB in [0, 1]. Modes that
+    show numbers (`Shading.mode`) are left as they are.
     """
     if mode != "light":
         return np.asarray(np.clip(image, 0, 1), np.float32)

@@ -1,13 +1,13 @@
-"""From a scene and how it is looked at to one kernel: only the units that it uses, called one after the other.
+"""From a scene and how it is looked at to one kernel: only the units that it uses, called one after the
+other.
 
-The text that is written here is straight-line code; every calculation is in a unit of `fracslice.render.units`, bound
-to its numbers under a name. A scene without an effect has no line of it.
+The text that is written here is straight-line code; every calculation is in a unit of
+`fracslice.render.units`, bound to its numbers under a name. A scene without an effect has no line of it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -31,10 +31,10 @@ RELAX = 1.4
 class Frame:
     """A kernel for one scene, camera and depth. Two frames of one scene differ in their parameters only.
 
-    linked: the source and P. camera_samples, bounce_samples: how many random numbers a ray takes at the start, and at
-    each bounce. bounces: how often a ray goes on. inside: whether rays go through the solid. far: an expression for how
-    far there is anything. sharp: rays of a pixel start at the eye, so that empty space before a
-    block of pixels can be remembered.
+    linked: the source and P. camera_samples, bounce_samples: how many random numbers a ray takes at the
+    start, and at each bounce. bounces: how often a ray goes on. inside: whether rays go through the solid.
+    far: an expression for how far there is anything. sharp: rays of a pixel start at the eye, so that empty
+    space before a block of pixels can be remembered.
     """
 
     linked: Linked
@@ -52,8 +52,8 @@ class Frame:
 
 @dataclass(frozen=True)
 class Optics:
-    """What the kernel has to know of lengths: the film's size in pixels, a pixel's half width at distance 1, the smallest
-    distance that counts, how far there is anything."""
+    """What the kernel has to know of lengths: the film's size in pixels, a pixel's half width at distance 1,
+    the smallest distance that counts, how far there is anything."""
 
     size: tuple[int, int]
     cone: float
@@ -71,7 +71,7 @@ def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> O
 
 
 def link_frame(root: Node, view: View, camera: Camera, seen: Optics, block: int) -> Frame:
-    """Links a scene whose depths are resolved. block: pixels along the side of a block for the cone prepass."""
+    """Links a scene whose depths are resolved. block: pixels along the side of a block of the prepass."""
     return _Frame(root, view, camera, seen, block).linked()
 
 
@@ -100,7 +100,9 @@ class _Frame:
         for function in (sample, centred):
             linker.share(function, {})
         linked = Linked(linker.text(), np.array(linker.parameters, np.float64))
-        return Frame(linked, camera_samples, self.dimensions, self.bounces, self.inside, self.camera.aperture == 0, far)
+        return Frame(
+            linked, camera_samples, self.dimensions, self.bounces, self.inside, self.camera.aperture == 0, far
+        )
 
     def marching(self) -> None:
         seen, steepness = self.seen, 1 / self.root.facts.lipschitz
@@ -113,7 +115,9 @@ class _Frame:
         common = {"steepness": steepness}
         stepping = {"relax": RELAX, "cone": seen.cone, "least": seen.least, "glass": Fixed(self.inside)}
         self.linker.bind("step_ray", march.advance, side | common | stepping)
-        self.linker.bind("step_cone", march.widen, {"side": Fixed(1.0), "path": Fixed(0.0)} | common | {"spread": widest})
+        self.linker.bind(
+            "step_cone", march.widen, {"side": Fixed(1.0), "path": Fixed(0.0)} | common | {"spread": widest}
+        )
         self.linker.bind("width_at", _width, {"cone": seen.cone, "least": seen.least})
 
     @property
@@ -127,7 +131,12 @@ class _Frame:
         scale = 2 * self.seen.cone
         right, up = np.array(camera.right), np.array(camera.above)
         corner = np.array(camera.forward) - right * (scale * width / 2) + up * (scale * height / 2)
-        values: dict[str, Any] = {"eye": camera.eye, "corner": tuple(corner), "across": tuple(right * scale), "down": tuple(-up * scale)}
+        values: dict[str, Any] = {
+            "eye": camera.eye,
+            "corner": tuple(corner),
+            "across": tuple(right * scale),
+            "down": tuple(-up * scale),
+        }
         if camera.aperture == 0:
             self.linker.bind("camera_ray", cameras.pinhole, values)
             return 2
@@ -143,7 +152,8 @@ class _Frame:
         return names
 
     def surface(self, look: Look) -> str:
-        """``surface(x, y, z, dx, dy, dz, t, path, steps, side, u..., P)``: colour, then the ray that goes on."""
+        """``surface(x, y, z, dx, dy, dz, t, path, steps, side, u..., P)``: colour, then the ray that goes
+        on."""
         mode = self.view.shading.mode
         lines = ["h = width_at(path + t, P)"]
         if mode in ("light", "normal"):
@@ -168,7 +178,9 @@ class _Frame:
         if shading.ambient:
             lines = [*lines, f"ambient = ambient + {self.linker.argument(shading.ambient)}"]
             if shading.occlusion:
-                self.linker.bind("openness", shade.occlusion, {"strength": shading.occlusion, "reach": shading.reach})
+                self.linker.bind(
+                    "openness", shade.occlusion, {"strength": shading.occlusion, "reach": shading.reach}
+                )
                 lines.append("ambient = ambient * openness(x, y, z, nx, ny, nz, P)")
         if look.glows:
             lines.append("ambient = ambient + glow")
@@ -192,8 +204,12 @@ class _Frame:
             "diffuse, gloss = phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess)",
         ]
         if light.shadows == "yes":
-            lines.append("power = power * visible_(sx, sy, sz, lx, ly, lz, where(diffuse > 0.0, far, 0.0), 0.5 * h, P)")
-        return lines + [f"{c} = {c} + power * {s} * (diffuse * c{c} + gloss)" for c, s in zip("rgb", colour, strict=True)]
+            lines.append(
+                "power = power * visible_(sx, sy, sz, lx, ly, lz, where(diffuse > 0.0, far, 0.0), 0.5 * h, P)"
+            )
+        return lines + [
+            f"{c} = {c} + power * {s} * (diffuse * c{c} + gloss)" for c, s in zip("rgb", colour, strict=True)
+        ]
 
     def bind_light(self, name: str, light: Light) -> None:
         if light.kind == "lamp":
@@ -258,7 +274,10 @@ class _Frame:
             return ["r = exp(-0.02 * steps)", "g = r", "b = r"]
         reach = "t"
         if mode == "depth":
-            reach = " + ".join(f"{self.linker.argument(f)} * t * d{a}" for f, a in zip(self.camera.forward, "xyz", strict=True))
+            reach = " + ".join(
+                f"{self.linker.argument(f)} * t * d{a}"
+                for f, a in zip(self.camera.forward, "xyz", strict=True)
+            )
         scale = self.linker.argument(2.0 / (near + far))
         return [f"r = exp(-{scale} * ({reach}))", "g = r", "b = r"]
 

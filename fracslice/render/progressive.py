@@ -1,4 +1,5 @@
-"""A picture that sharpens while one looks: passes over the film, each adding a sample where one is still needed."""
+"""A picture that sharpens while one looks: passes over the film, each adding a sample where one is still
+needed."""
 
 from __future__ import annotations
 
@@ -35,9 +36,9 @@ TOLERANCE = 0.002
 class Pass:
     """The picture after one more pass.
 
-    image: float32 [height, width, 3], linear light. number: of the pass, from 1. samples: per pixel, on average. error:
-    the root mean square of the pixels' standard errors, as shown. active: the part of the pixels that this pass was about.
-    rate: samples a second.
+    image: float32 [height, width, 3], linear light. number: of the pass, from 1. samples: per pixel, on
+    average. error: the root mean square of the pixels' standard errors, as shown. active: the part of the
+    pixels that this pass was about. rate: samples a second.
     """
 
     image: np.ndarray
@@ -49,7 +50,8 @@ class Pass:
 
 
 def chosen(device: str) -> str:
-    """The device to use, "cpu" or "cuda"; "auto" takes the GPU if there is one. Raises `RenderError` if there is none."""
+    """The device to use, "cpu" or "cuda"; "auto" takes the GPU if there is one. Raises `RenderError` if
+    there is none."""
     if device == "cpu":
         return device
     from ..kernel.cuda import missing
@@ -69,10 +71,11 @@ def _tracer(device: str) -> Callable[..., CpuTracer | CudaTracer]:
 
 
 class Renderer:
-    """Renders one view of one scene. `passes` may be left at any time and asked for again: it goes on where it was.
+    """Renders one view of one scene. `passes` may be left at any time and asked for again: it goes on where
+    it was.
 
-    root: the tree of formulas, depths may be "auto". size: pixels across and down; the film's if not given. Raises
-    `SceneError` for a view that cannot be rendered.
+    root: the tree of formulas, depths may be "auto". size: pixels across and down; the film's if not given.
+    Raises `SceneError` for a view that cannot be rendered.
     """
 
     def __init__(
@@ -102,14 +105,16 @@ class Renderer:
         return hashlib.sha256(f"{self.width} {self.height} {what.precision} {text}".encode()).hexdigest()[:20]
 
     def resume(self, path: str | Path) -> None:
-        """Goes on with a file that `accumulator.save` wrote. Raises `RenderError` if it is of another picture."""
+        """Goes on with a file that `accumulator.save` wrote. Raises `RenderError` if it is of another
+        picture."""
         self.accumulator = Accumulator.load(path, self.key)
 
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
-        """Yields the picture after every pass, until all pixels have so many samples or are within the tolerance.
+        """Yields the picture after every pass, until all pixels have so many samples or are within the
+        tolerance.
 
-        The first pass has one sample in 16 pixels, the second one in every pixel. Raises `Cancelled`; what was complete
-        before stays valid.
+        The first pass has one sample in 16 pixels, the second one in every pixel. Raises `Cancelled`; what
+        was complete before stays valid.
         """
         most = self.setting.view.film.samples if samples is None else samples
         while self.accumulator.passes < most + 1:
@@ -121,12 +126,11 @@ class Renderer:
     def _wanted(self, tolerance: float) -> np.ndarray:
         """The pixels of the next pass, in order."""
         number, x, y = self.accumulator.passes, self._order & 65535, self._order >> 16
-        coarse = (x % COARSE == 0) & (y % COARSE == 0)
-        if number == 0:
-            return self._order[coarse]
-        if number == 1:
-            return self._order[~coarse]
-        return self._order[self.accumulator.unfinished(tolerance)[y, x]]
+        if number > 1:
+            wanted = self.accumulator.unfinished(tolerance)[y, x]
+        else:
+            wanted = ((x % COARSE == 0) & (y % COARSE == 0)) == (number == 0)
+        return np.asarray(self._order[wanted])
 
     def _pass(self, pixels: np.ndarray) -> Pass:
         number = self.accumulator.passes

@@ -15,16 +15,20 @@ from ..scene.view import Camera, Light, View
 from .linking import Optics, optics
 
 SUN = Light(kind="sun", position=(-0.6, -1.0, 1.4), colour=(1.0, 0.95, 0.86), strength=1.6, size=2.0)
-SKY = Light(kind="sky", colour=(0.42, 0.58, 0.85), horizon=(0.82, 0.86, 0.92), ground=(0.35, 0.33, 0.31), strength=0.8)
+SKY = Light(
+    kind="sky", colour=(0.42, 0.58, 0.85), horizon=(0.82, 0.86, 0.92), ground=(0.35, 0.33, 0.31), strength=0.8
+)
 DETAIL = (4.0, 1.0, 0.5)
 """The finest detail of the first passes and all later ones, in pixels."""
 ROUNDING = {"float32": 2.0**-21, "float64": 2.0**-49}
-"""How much nearer than this, relative to the camera's coordinates, float positions cannot be told apart: 4 ulp."""
+"""How much nearer than this, relative to the camera's coordinates, float positions cannot be told apart: 4
+ulp."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A scene with nothing left open. roots: with the depths of the first passes and, last, of all later ones."""
+    """A scene with nothing left open. roots: with the depths of the first passes and, last, of all later
+    ones."""
 
     roots: tuple[Node, ...]
     view: View

@@ -1,9 +1,9 @@
 """Low-discrepancy samples: Sobol's sequence, Owen-scrambled for every pixel and dimension by itself.
 
-Sobol 1967 with the direction numbers of Joe and Kuo 2008 ("Constructing Sobol Sequences with Better Two-Dimensional
-Projections"); scrambling by a hash: Laine and Karras 2011, "Stratified Sampling for Stochastic Transparency", with the
-constants of Vegdahl 2021, "Owen Scrambling Based on Dithered Blue Noise Sampling"; why that is good: Burley 2020,
-"Practical Hash-based Owen Scrambling".
+Sobol 1967 with the direction numbers of Joe and Kuo 2008 ("Constructing Sobol Sequences with Better
+Two-Dimensional Projections"); scrambling by a hash: Laine and Karras 2011, "Stratified Sampling for
+Stochastic Transparency", with the constants of Vegdahl 2021, "Owen Scrambling Based on Dithered Blue Noise
+Sampling"; why that is good: Burley 2020, "Practical Hash-based Owen Scrambling".
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ _DIRECTIONS = [_directions(d) for d in range(DIMENSIONS)]
 
 
 def point(index: int, dimensions: int) -> np.ndarray:
-    """Sobol's point `index` as 32-bit whole numbers, int32 bit patterns [dimensions], each with its bits REVERSED.
+    """Sobol's point `index` as 32-bit whole numbers, int32 bit patterns [dimensions], each with its bits
+    REVERSED.
 
     Dimensions beyond the table's repeat it: their scrambling is another.
     """

@@ -1,7 +1,9 @@
-"""A scene's second function: which material a point of the surface has, and how near its orbit came to the origin.
+"""A scene's second function: which material a point of the surface has, and how near its orbit came to the
+origin.
 
-The field's tree once more, with every function returning (f, paint, tone): paint is the number of a material, 0 for
-none; tone the smallest |w| of the orbit (Pickover's and Carlson's orbit traps; Carlson 1999). It is called once per hit.
+The field's tree once more, with every function returning (f, paint, tone): paint is the number of a material,
+0 for none; tone the smallest |w| of the orbit (Pickover's and Carlson's orbit traps; Carlson 1999). It is
+called once per hit.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ TRACE = "trace"
 
 @dataclass
 class Tracer:
-    """Writes the traced functions of a tree into a linker. materials: the paint of every material node, from 1."""
+    """Writes the traced functions of a tree into a linker. materials: the paint of every material node, from
+    1."""
 
     linker: Linker
     materials: dict[int, int]
@@ -46,7 +49,9 @@ class Tracer:
 
     def painted(self, node: Node) -> str:
         child, paint = self.node(node.children[0]), self.materials[id(node)]
-        return self.write([f"f, paint, tone = {child}(x, y, z, P)", f"return f, where(paint > 0.5, paint, {paint}.0), tone"])
+        return self.write(
+            [f"f, paint, tone = {child}(x, y, z, P)", f"return f, where(paint > 0.5, paint, {paint}.0), tone"]
+        )
 
     def shape(self, function: Callable[..., Any], fixed: dict[str, Any], passed: list[str]) -> str:
         tree = specialised(function, fixed)
@@ -58,7 +63,9 @@ class Tracer:
         called = f"{tree.name}({', '.join(['x', 'y', 'z', *passed])})"
         return self.write([f"f, nearest = {called}", "return f, 0.0 * x, sqrt(minimum(nearest, 1.0))"])
 
-    def blend(self, function: Callable[..., Any], fixed: dict[str, Any], passed: list[str], children: list[str]) -> str:
+    def blend(
+        self, function: Callable[..., Any], fixed: dict[str, Any], passed: list[str], children: list[str]
+    ) -> str:
         called = self.linker.share(function, fixed)
         lines = [f"f, paint, tone = {children[0]}(x, y, z, P)"]
         if len(children) == 1:
@@ -83,7 +90,7 @@ class Tracer:
         tree.body = [*(ast.parse(line).body[0] for line in start), *tree.body]
         self.linker.helpers(tree, function)
         self.linker.functions.append(ast.unparse(ast.fix_missing_locations(tree)))
-        return tree.name
+        return str(tree.name)
 
 
 class _KeepsNearest(ast.NodeTransformer):
@@ -102,7 +109,8 @@ class _KeepsNearest(ast.NodeTransformer):
 
 
 class _KeepsChild(ast.NodeTransformer):
-    """Before every statement that looks at the child, its triple is taken; the child with the lowest value stays."""
+    """Before every statement that looks at the child, its triple is taken; the child with the lowest value
+    stays."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -116,7 +124,11 @@ class _KeepsChild(ast.NodeTransformer):
         return [*lines[:-1], ast.parse(f"return {value}, paint, tone").body[0]]
 
     def taken(self, node: Any) -> list[Any]:
-        calls = [c for c in ast.walk(node) if isinstance(c, ast.Call) and isinstance(c.func, ast.Name) and c.func.id == "child"]
+        calls = [
+            c
+            for c in ast.walk(node)
+            if isinstance(c, ast.Call) and isinstance(c.func, ast.Name) and c.func.id == "child"
+        ]
         if not calls:
             return [node]
         point = ", ".join(map(ast.unparse, calls[0].args))

@@ -1,7 +1,8 @@
 """The loops around the units on SIMD lanes: from pixels to sums of light.
 
-A tile's rays lie in rows of a workspace W: ``$t + i`` is where ray i has its t. Rays are followed in packets that are
-refilled: as soon as a lane is done, the next ray takes its place, so no lane idles while another is on its way.
+A tile's rays lie in rows of a workspace W: ``$t + i`` is where ray i has its t. Rays are followed in packets
+that are refilled: as soon as a lane is done, the next ray takes its place, so no lane idles while another is
+on its way.
 """
 
 from __future__ import annotations
@@ -12,10 +13,17 @@ from ..kernel.linker import Linked
 from ..kernel.loops import Loop
 from .linking import Frame
 
-ROWS = "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb px py".split()
-"""What is known of a ray. status: 1 hit, 2 missed, 3 out of steps. r, g, b: light gathered; tr, tg, tb: how much of what
-is still to come counts. side: -1 inside. path: how long the way was before this ray. px, py: where on the film."""
-LANES = "ox oy oz dx dy dz start end side path t steps done before stride".split()
+ROWS = (
+    "ox", "oy", "oz", "dx", "dy", "dz", "start", "end", "side", "path", "t",
+    "steps", "status", "r", "g", "b", "tr", "tg", "tb", "px", "py",
+)  # fmt: skip
+"""What is known of a ray. status: 1 hit, 2 missed, 3 out of steps. r, g, b: light gathered; tr, tg, tb: how
+much of what is still to come counts. side: -1 inside. path: how long the way was before this ray. px, py:
+where on the film."""
+LANES = (
+    "ox", "oy", "oz", "dx", "dy", "dz", "start", "end",
+    "side", "path", "t", "steps", "done", "before", "stride",
+)  # fmt: skip
 """What is known of a ray that is under way, WIDTH numbers each, behind the rows."""
 
 CHANNELS = 6
@@ -237,7 +245,7 @@ def cones(P, S, I, W, n, m, blocks, limit):
 
 
 def loops(frame: Frame, block: int) -> tuple[Linked, tuple[Loop, ...]]:
-    """The frame's source with the lanes' functions beside it, and the C functions to make: `tile` and `cones`."""
+    """The frame's source with the lanes' functions beside it, and the C functions to make of it."""
     words = _words(frame, block)
     parts = [FOLLOW.replace("STEP", "step_ray").replace("MORE", "side, path," if frame.inside else "path,")]
     parts += [BEGIN, DRAW, SHADE.replace("$onward", ONWARD if frame.bounces else ""), GATHER]
@@ -274,7 +282,9 @@ def _words(frame: Frame, block: int) -> dict[str, str]:
 
 def _filled(text: str, words: dict[str, str]) -> str:
     """The text with $names as rows and other words, @names as lanes' places behind the rows."""
-    places = [(name, f"({words['rows']} + {words['drawn']}) * m + {k} * WIDTH") for k, name in enumerate(LANES)]
+    places = [
+        (name, f"({words['rows']} + {words['drawn']}) * m + {k} * WIDTH") for k, name in enumerate(LANES)
+    ]
     for name, place in sorted(places, key=lambda p: -len(p[0])):
         text = text.replace(f"@{name}", place)
     return Template(text).substitute(words)

@@ -1,3 +1,4 @@
+# ruff: noqa: RUF009 -- `described` makes a field, as dataclasses.field does
 """How a scene is looked at: the records behind `<camera>`, `<film>`, `<light>`, `<fog>` and `<shading>`.
 
 Every field carries the kind that reads, checks, writes and describes it, as the parameters of a formula do.
@@ -110,7 +111,8 @@ class Camera(Part):
         return replace(self, eye=_plus(self.eye, shift), target=_plus(self.target, shift))
 
     def turned(self, yaw: float = 0.0, pitch: float = 0.0) -> Camera:
-        """Looking elsewhere from the same place: so many degrees to the right, and up (never over the zenith)."""
+        """Looking elsewhere from the same place: so many degrees to the right, and up (never over the
+        zenith)."""
         ahead = math.asin(max(-1.0, min(1.0, _dot(self.forward, _unit(self.up)))))
         rise = max(-1.55, min(1.55, ahead + math.radians(pitch))) - ahead
         level = _turn(self.forward, self.right, rise)
@@ -189,8 +191,8 @@ class Shading(Part):
     mode: str = described(
         Choice(
             "light",
-            "light: lit by the lights; normal: its direction; depth: how far along the view; distance: how far from the eye; "
-            "steps: how many steps the ray took, the more the darker",
+            "light: lit by the lights; normal: its direction; depth: how far along the view; "
+            "distance: how far from the eye; steps: how many steps the ray took, the more the darker",
             ("light", "normal", "depth", "distance", "steps"),
         )
     )
@@ -210,7 +212,6 @@ class View:
     fog: Fog | None = None
     shading: Shading = Shading()
 
-
     @classmethod
     def of(cls, parts: Iterable[Part]) -> View:
         """The view that so many elements make. Raises `SceneError` if one of a kind stands there twice."""
@@ -225,7 +226,11 @@ class View:
     @property
     def parts(self) -> tuple[Part, ...]:
         """The elements again, without those that say nothing."""
-        single = [part for part in (self.camera, self.film, self.fog, self.shading) if part not in (None, Film(), Shading())]
+        single = [
+            part
+            for part in (self.camera, self.film, self.fog, self.shading)
+            if part not in (None, Film(), Shading())
+        ]
         return (*single, *self.lights)  # type: ignore[arg-type]
 
 

@@ -23,7 +23,8 @@ def _lines(scene: Scene) -> Iterator[str]:
     yield f"  </{SOLID.name}>"
     for part in scene.view.parts:
         section = SECTIONS[part.element]
-        yield f"  <{section.name}{_attributes(section, {name: getattr(part, name) for name in section.parameters})}/>"
+        values = {name: getattr(part, name) for name in section.parameters}
+        yield f"  <{section.name}{_attributes(section, values)}/>"
     yield f"</{SCENE.name}>"
 
 

@@ -24,7 +24,9 @@ def scene(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_picture_with_what_it_is_of(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_picture_with_what_it_is_of(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run(["render", str(scene), "-o", str(tmp_path / "a.png"), "--device", "cpu"]) == 0
     assert "40 x 24 pixels, 3.0 samples a pixel" in capsys.readouterr().out
     with Image.open(tmp_path / "a.png") as image:

@@ -15,7 +15,8 @@ LIGHT = (Light(shadows="no"),)
 
 
 def distances(root: Node, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-    """How far the renderer finds the surface along the rays through the pixels' middles, [height, width]; NaN: nowhere."""
+    """How far the renderer finds the surface along the rays through the pixels' middles, [height, width];
+    NaN: nowhere."""
     view = View(camera=camera, lights=LIGHT, shading=Shading(mode="distance"))
     renderer = Renderer(root, view, size, Work(threads=1))
     *_, last = renderer.passes(samples=1)

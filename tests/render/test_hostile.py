@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
-from fracslice.formulas import Node, bounds, julia, mandelbulb, material, plane, repeat, sphere, transform, union
+from fracslice.formulas import (
+    Node,
+    bounds,
+    julia,
+    mandelbulb,
+    material,
+    plane,
+    repeat,
+    sphere,
+    transform,
+    union,
+)
 from fracslice.render import Renderer, develop
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
@@ -32,13 +43,23 @@ HOSTILE: dict[str, tuple[Node, View]] = {
         ),
     ),
     "glass": (
-        material(julia(iterations=6), clear=1, index=4, absorb=(1e6, 0, 1), reflect=1, shininess=10000, specular=100),
+        material(
+            julia(iterations=6),
+            clear=1,
+            index=4,
+            absorb=(1e6, 0, 1),
+            reflect=1,
+            shininess=10000,
+            specular=100,
+        ),
         View(shading=Shading(bounces=16)),
     ),
     "lens": (BULB, View(camera=Camera(eye=(2, -2, 1), aperture=100, focus=1e-6))),
     "plane": (union(plane(), sphere(radius=0.5)), View(camera=Camera(eye=(3, 0, 1e-3), target=(0, 0, 1e-3)))),
     "endless": (
-        bounds(repeat(sphere(radius=0.2), period=(0.5, 0.5, 0.5)), min=(-1e3, -1e3, -1e3), max=(1e3, 1e3, 1e3)),
+        bounds(
+            repeat(sphere(radius=0.2), period=(0.5, 0.5, 0.5)), min=(-1e3, -1e3, -1e3), max=(1e3, 1e3, 1e3)
+        ),
         View(camera=Camera(eye=(0.25, 0.25, 0.25), target=(1, 0.25, 0.25))),
     ),
 }
@@ -51,7 +72,9 @@ def test_every_pixel_is_a_number(name: str) -> None:
     assert np.isfinite(last.image).all()
     assert (last.image >= 0).all()
     shown = develop(last.image, Film(bloom=1, exposure=20))
-    assert np.isfinite(shown).all() and shown.min() >= 0 and shown.max() <= 1
+    assert np.isfinite(shown).all()
+    assert shown.min() >= 0
+    assert shown.max() <= 1
 
 
 @pytest.mark.parametrize(

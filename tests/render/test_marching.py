@@ -37,7 +37,18 @@ def test_depth_and_silhouette_are_those_of_the_closed_form(name: str) -> None:
     assert np.quantile(error, 0.9) < 10 * PIXEL
 
 
-@pytest.mark.parametrize("name", ["julia", "mandelbulb", "mandelbulb 5", "smooth union", "twist", "repeat", "example of the documentation"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "julia",
+        "mandelbulb",
+        "mandelbulb 5",
+        "smooth union",
+        "twist",
+        "repeat",
+        "example of the documentation",
+    ],
+)
 def test_no_ray_passes_what_dense_sampling_finds(name: str) -> None:
     root = EXAMPLES[name]
     camera = Camera(eye=(2.1, -1.6, 1.3), fov=55)

@@ -11,7 +11,12 @@ from fracslice.render.units.random import centred, sample
 
 def points(pixel: int, count: int, dimensions: int = 2, first: object = sample) -> np.ndarray:
     draw = [first, first, *[sample] * dimensions][:dimensions]
-    return np.array([[f(int(a), pixel, d) for d, (f, a) in enumerate(zip(draw, point(i, dimensions), strict=True))] for i in range(count)])  # type: ignore[operator]
+    return np.array(
+        [
+            [f(int(a), pixel, d) for d, (f, a) in enumerate(zip(draw, point(i, dimensions), strict=True))]
+            for i in range(count)
+        ]
+    )  # type: ignore[operator]
 
 
 @pytest.mark.parametrize("first", [sample, centred])
@@ -37,4 +42,5 @@ def test_neighbours_are_not_correlated() -> None:
     values = np.array([[sample(int(point(i, 1)[0]), pixel, 0) for i in range(16)] for pixel in range(200)])
     first, second = values[:-1].ravel() - 0.5, values[1:].ravel() - 0.5
     assert abs(np.mean(first * second)) < 0.006
-    assert 0 <= values.min() and values.max() < 1
+    assert values.min() >= 0
+    assert values.max() < 1

@@ -20,7 +20,8 @@ def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):  # type: ignore[
 def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):  # type: ignore[no-untyped-def]
     """The ray from a point of a thin lens to where the ideal camera's ray meets the plane of focus.
 
-    Cook, Porter, Carpenter 1984, "Distributed Ray Tracing". right, up: the lens' half axes; focus: the plane's distance.
+    Cook, Porter, Carpenter 1984, "Distributed Ray Tracing". right, up: the lens' half axes; focus: the
+    plane's distance.
     """
     ex, ey, ez = eye
     cx, cy, cz = corner

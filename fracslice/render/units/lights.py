@@ -1,4 +1,5 @@
-"""Where light comes from, seen from a point: a unit direction, a distance, and how much of its strength arrives."""
+"""Where light comes from, seen from a point: a unit direction, a distance, and how much of its strength
+arrives."""
 
 from __future__ import annotations
 
@@ -9,8 +10,8 @@ TURN = 6.283185307179586
 
 
 def frame(x, y, z):  # type: ignore[no-untyped-def]
-    """Two unit vectors at right angles to a unit vector and to each other (Duff et al. 2017, "Building an Orthonormal
-    Basis, Revisited")."""
+    """Two unit vectors at right angles to a unit vector and to each other (Duff et al. 2017, "Building an
+    Orthonormal Basis, Revisited")."""
     sign = where(z < 0.0, -1.0, 1.0 + 0.0 * z)
     a = -1.0 / (sign + z)
     b = x * y * a
@@ -77,4 +78,8 @@ def sky(dx, dy, dz, zenith, horizon, ground):  # type: ignore[no-untyped-def]
     gr, gg, gb = ground
     a = sqrt(absolute(dz))
     up = dz > 0.0
-    return hr + a * (where(up, zr + 0.0 * a, gr) - hr), hg + a * (where(up, zg + 0.0 * a, gg) - hg), hb + a * (where(up, zb + 0.0 * a, gb) - hb)
+    return (
+        hr + a * (where(up, zr + 0.0 * a, gr) - hr),
+        hg + a * (where(up, zg + 0.0 * a, gg) - hg),
+        hb + a * (where(up, zb + 0.0 * a, gb) - hb),
+    )

@@ -7,7 +7,8 @@ from .words import field
 
 
 def span(ox, oy, oz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped-def]
-    """Where a ray enters and leaves a box; it misses where the first is not smaller (Kay and Kajiya 1986, slabs).
+    """Where a ray enters and leaves a box; it misses where the first is not smaller (Kay and Kajiya 1986,
+    slabs).
 
     A direction's component is kept from zero: 1e-9 bends a ray by less than any pixel.
     """
@@ -28,12 +29,14 @@ def span(ox, oy, oz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped-def]
 
 
 def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, relax, cone, least, glass):  # type: ignore[no-untyped-def]
-    """One step of safe, over-relaxed sphere tracing: the new t, radius and stride, and the gap, negative at a hit.
+    """One step of safe, over-relaxed sphere tracing: the new t, radius and stride, and the gap, negative at
+    a hit.
 
-    Hart 1996, "Sphere Tracing"; over-relaxation: Keinert et al. 2014, "Enhanced Sphere Tracing". ``|f| / L`` is the
-    radius of an empty ball. A step of `relax` times it is kept if the next ball touches the one before; if not, the ray
-    goes back to the end of that ball. A hit is where the surface is nearer than half a pixel is wide. side: -1 inside, where the field
-    of a fractal says little: there a hit is a change of sign, and steps are two pixels at least.
+    Hart 1996, "Sphere Tracing"; over-relaxation: Keinert et al. 2014, "Enhanced Sphere Tracing". ``|f| / L``
+    is the radius of an empty ball. A step of `relax` times it is kept if the next ball touches the one
+    before; if not, the ray goes back to the end of that ball. A hit is where the surface is nearer than half
+    a pixel is wide. side: -1 inside, where the field of a fractal says little: there a hit is a change of
+    sign, and steps are two pixels at least.
     """
     radius = side * field(ox + t * dx, oy + t * dy, oz + t * dz, P) * steepness
     near = cone * (path + t) + least
@@ -63,7 +66,8 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, s
 
 
 def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience):  # type: ignore[no-untyped-def]
-    """1 where the light at distance `far` along a ray is seen, 0 where something is nearer than `least` to the ray."""
+    """1 where the light at distance `far` along a ray is seen, 0 where something is nearer than `least` to
+    the ray."""
     t = 0.0 * x
     blocked = 0.0 * x
     going = t < far

@@ -1,4 +1,5 @@
-"""Numbers between 0 and 1 that fill space evenly: whole-number arithmetic on one sample, for loops over samples."""
+"""Numbers between 0 and 1 that fill space evenly: whole-number arithmetic on one sample, for loops over
+samples."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ def hashed(a):  # type: ignore[no-untyped-def]
 
 
 def scrambled(a, seed):  # type: ignore[no-untyped-def]
-    """Owen's scrambling of a number whose bits come reversed; they leave in order. See `fracslice.render.sobol`."""
+    """Owen's scrambling of a number whose bits come reversed; they leave in order. See
+    `fracslice.render.sobol`."""
     a = (a ^ (a * 0x3D20ADEA)) & 0xFFFFFFFF
     a = (a + seed) & 0xFFFFFFFF
     a = (a * ((seed >> 16) | 1)) & 0xFFFFFFFF
@@ -36,7 +38,8 @@ def sample(a, pixel, dimension):  # type: ignore[no-untyped-def]
 
 
 def centred(a, pixel, dimension):  # type: ignore[no-untyped-def]
-    """As `sample`, digitally shifted so that the first point of the sequence is 1/2: the middle of the pixel."""
+    """As `sample`, digitally shifted so that the first point of the sequence is 1/2: the middle of the
+    pixel."""
     seed = hashed((pixel * 64 + dimension) & 0xFFFFFFFF)
     shifted = scrambled(a & 0xFFFFFFFF, seed) ^ scrambled(0, seed) ^ 0x80000000
     return (shifted >> 8) * 5.9604644775390625e-08

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import absolute, exp, log, maximum, minimum, rsqrt, sqrt, where
+from ...formulas.vocabulary import absolute, exp, log, maximum, minimum, sqrt, where
 from .normal import normalised
 from .words import field
 
@@ -19,7 +19,8 @@ def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):  # type: ign
 
 
 def occlusion(x, y, z, nx, ny, nz, P, strength, reach):  # type: ignore[no-untyped-def]
-    """How open a point is: the field along the normal against the distance walked (Evans 2006; five samples)."""
+    """How open a point is: the field along the normal against the distance walked (Evans 2006; five
+    samples)."""
     closed = 0.0 * x
     weight = 0.5
     for i in range(5):
@@ -66,7 +67,8 @@ def fresnel(cosine, least):  # type: ignore[no-untyped-def]
 def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):  # type: ignore[no-untyped-def]
     """The direction of a refraction, and what is below zero where all is reflected (Snell).
 
-    cosine: of the angle between the normal and the ray's reverse; ratio: of the refractive indices, here over there.
+    cosine: of the angle between the normal and the ray's reverse; ratio: of the refractive indices, here over
+    there.
     """
     left = 1.0 - ratio * ratio * (1.0 - cosine * cosine)
     k = ratio * cosine - sqrt(maximum(left, 0.0))
@@ -84,7 +86,8 @@ def reflects(dx, dy, dz, nx, ny, nz, reflect):  # type: ignore[no-untyped-def]
 def goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, chance):  # type: ignore[no-untyped-def]
     """The part of the light that goes on, one direction for it, and -1 if that is through the surface.
 
-    n points to where the ray comes from. Between reflection and refraction chance decides, as Fresnel's law weighs them.
+    n points to where the ray comes from. Between reflection and refraction chance decides, as Fresnel's law
+    weighs them.
     """
     cosine = -(dx * nx + dy * ny + dz * nz)
     glass = (index - 1.0) / (index + 1.0)

@@ -1,4 +1,5 @@
-"""The words that the units of the renderer have beside those of the formulas; the linker gives them their meaning."""
+"""The words that the units of the renderer have beside those of the formulas; the linker gives them their
+meaning."""
 
 from __future__ import annotations
 

@@ -1,11 +1,13 @@
-"""How quickly pictures become clean: error against samples and seconds, for these samples and for random ones.
+"""How quickly pictures become clean: error against samples and seconds, for these samples and for random
+ones.
 
-    python -m tests.benchmarks.frame.convergence [PLOT.png]
+python -m tests.benchmarks.frame.convergence [PLOT.png]
 
-Found: antialiasing and soft shadows reach it after 64 samples; a sky or a lens, whose integrals have four to six dimensions
-and edges in all of them, after 256. Independent, shuffled pairs of dimensions were worse in all four scenes.
-Random: every round one uniform sample of each pixel, as the paper's 1000 rounds. The true picture is the mean of 4096 of
-ours with another scrambling. Prints how many of our samples reach the error of 1000 random rounds.
+Found: antialiasing and soft shadows reach it after 64 samples; a sky or a lens, whose integrals have four to
+six dimensions and edges in all of them, after 256. Independent, shuffled pairs of dimensions were worse in
+all four scenes. Random: every round one uniform sample of each pixel, as the paper's 1000 rounds. The true
+picture is the mean of 4096 of ours with another scrambling. Prints how many of our samples reach the error of
+1000 random rounds.
 """
 
 from __future__ import annotations
@@ -28,12 +30,20 @@ SUN = Light(position=(-1, -1.4, 1.2), size=3)
 SCENES: dict[str, tuple[Node, View]] = {
     "mandelbulb": (mandelbulb(iterations=5), View(camera=Camera(), lights=(Light(shadows="no"),))),
     "soft shadow": (union(GROUND, menger(level=2)), View(camera=Camera(eye=(2.6, -3, 1.5)), lights=(SUN,))),
-    "sky": (union(GROUND, transform(julia(iterations=6), rotate=(1, 0, 0, 90))), View(camera=Camera(eye=(2.6, -3, 1.5)), lights=(SUN, Light(kind="sky")))),
-    "lens": (union(GROUND, menger(level=2)), View(camera=Camera(eye=(2, -2.6, 1.2), aperture=0.1), lights=(SUN,))),
+    "sky": (
+        union(GROUND, transform(julia(iterations=6), rotate=(1, 0, 0, 90))),
+        View(camera=Camera(eye=(2.6, -3, 1.5)), lights=(SUN, Light(kind="sky"))),
+    ),
+    "lens": (
+        union(GROUND, menger(level=2)),
+        View(camera=Camera(eye=(2, -2.6, 1.2), aperture=0.1), lights=(SUN,)),
+    ),
 }
 
 
-def mean(renderer: Renderer, indices: range, marks: tuple[int, ...] = ()) -> tuple[np.ndarray, list[tuple[np.ndarray, float]]]:
+def mean(
+    renderer: Renderer, indices: range, marks: tuple[int, ...] = ()
+) -> tuple[np.ndarray, list[tuple[np.ndarray, float]]]:
     """The picture of these samples, and what it was, and when, at the marks."""
     sums, work, seen = np.zeros((SIZE[0] * SIZE[1], 6), np.float32), Work(threads=2), []
     total, start = np.zeros((SIZE[0] * SIZE[1], 3)), time.perf_counter()
@@ -60,7 +70,9 @@ def errors(root: Node, view: View) -> tuple[np.ndarray, np.ndarray]:
     cpu.point = random_point  # type: ignore[assignment]
     _, random = mean(renderer, range(ROUNDS), MARKS)
     cpu.point = sobol
-    return tuple(np.array([(np.sqrt(((p - truth) ** 2).mean()), s) for p, s in found]) for found in (ours, random))  # type: ignore[return-value]
+    return tuple(
+        np.array([(np.sqrt(((p - truth) ** 2).mean()), s) for p, s in found]) for found in (ours, random)
+    )  # type: ignore[return-value]
 
 
 def main(plot: str | None = None) -> None:
@@ -68,7 +80,8 @@ def main(plot: str | None = None) -> None:
     for name, (root, view) in SCENES.items():
         ours, random = curves[name] = errors(root, view)
         reached = next((n for n, e in zip(MARKS, ours[:, 0], strict=True) if e <= random[-1, 0]), None)
-        print(f"{name:12} random after {ROUNDS}: {random[-1, 0]:.5f}; ours after 100: {ours[MARKS.index(100), 0]:.5f}; reached after {reached}")
+        at_100 = ours[MARKS.index(100), 0]
+        print(f"{name:12} random: {random[-1, 0]:.5f}; ours after 100: {at_100:.5f}; reached after {reached}")
     if plot:
         draw(curves, plot)
 

@@ -1,9 +1,10 @@
 """Normals by 4, 6 and 3 more samples: how wrong, at what cost.
 
-    python -m tests.benchmarks.frame.normals
+python -m tests.benchmarks.frame.normals
 
-On points that rays hit, with the spacing that the renderer takes (half a pixel's width): the mean and the worst hundredth
-of the angles to the gradient of the same field over a sphere of that size (26 directions, float64).
+On points that rays hit, with the spacing that the renderer takes (half a pixel's width): the mean and the
+worst hundredth of the angles to the gradient of the same field over a sphere of that size (26 directions,
+float64).
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def surface(root: Node, count: int = 4000) -> np.ndarray:
 
 
 def gradient(root: Node, points: np.ndarray, offsets: np.ndarray, centre: bool = False) -> np.ndarray:
-    """Unit gradients from samples at the points plus offsets; centre: differences to the point's own value."""
+    """Unit gradients from samples around the points; centre: differences to the point's own value."""
     field = reference(root)
     base = field(*points.T) if centre else 0.0
     total = sum(np.outer(field(*(points + HALF * v).T) - base, v) for v in offsets)
@@ -53,10 +54,16 @@ def main() -> None:
     for name, root in SCENES.items():
         points = surface(root)
         wanted = gradient(root, points, AROUND / np.linalg.norm(AROUND, axis=1, keepdims=True))
-        for way, offsets, centre in (("tetrahedron, 4", TETRAHEDRON / 3**0.5, False), ("central, 6", AXES, False), ("forward, 3", np.eye(3), True)):
+        for way, offsets, centre in (
+            ("tetrahedron, 4", TETRAHEDRON / 3**0.5, False),
+            ("central, 6", AXES, False),
+            ("forward, 3", np.eye(3), True),
+        ):
             cosine = (gradient(root, points, offsets, centre) * wanted).sum(1)
             angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-            print(f"{name:12}{way:16} mean {angle.mean():7.3f}  worst 1 % {np.quantile(angle, 0.99):7.2f} degrees")
+            print(
+                f"{name:12}{way:16} mean {angle.mean():7.3f}  worst 1 % {np.quantile(angle, 0.99):7.2f}"
+            )
 
 
 if __name__ == "__main__":

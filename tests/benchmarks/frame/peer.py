@@ -1,9 +1,10 @@
-"""A frame of the Mandelbulb, against hand-written AVX-512 C++ on the same rays: ratios of CPU seconds in one run.
+"""A frame of the Mandelbulb, against hand-written AVX-512 C++ on the same rays: ratios of CPU seconds in one
+run.
 
-    python -m tests.benchmarks.frame.peer PATH/cpp_ref [rounds]
+python -m tests.benchmarks.frame.peer PATH/cpp_ref [rounds]
 
-Both render 800 x 600 pixels with Phong's shading from the same place, on two threads, in turns. Ours finds its depth by
-itself elsewhere; here it is pinned to the peer's ten steps.
+Both render 800 x 600 pixels with Phong's shading from the same place, on two threads, in turns. Ours finds
+its depth by itself elsewhere; here it is pinned to the peer's ten steps.
 """
 
 from __future__ import annotations
