@@ -38,7 +38,7 @@ def _holes(found: Contours) -> np.ndarray:
     depth = np.zeros(len(found), np.int32)
     for i, parent in enumerate(found.parent):
         depth[i] = depth[parent] + 1 if parent >= 0 else 0
-    return depth % 2 == 1
+    return np.asarray(depth % 2 == 1)
 
 
 # --- SVG ----------------------------------------------------------------------------------------------------

@@ -90,7 +90,8 @@ def refined(kernel: Field, edges: np.ndarray, ends: np.ndarray, z: float, frame:
         if not len(todo):
             break
         t = best[todo]
-        f = kernel.points(*(base[:, todo] + t * step[:, todo]), np.full(len(todo), z))
+        x, y = base[:, todo] + t * step[:, todo]
+        f = kernel.points(x, y, np.full(len(todo), z))
         left = (f < 0) == (f_lo[todo] < 0)
         a = np.where(left, f, np.where(moved[todo] == 2, f_lo[todo] / 2, f_lo[todo]))
         b = np.where(left, np.where(moved[todo] == 1, f_hi[todo] / 2, f_hi[todo]), f)
@@ -99,7 +100,7 @@ def refined(kernel: Field, edges: np.ndarray, ends: np.ndarray, z: float, frame:
         new = lo[todo] + (hi[todo] - lo[todo]) * a / np.where(a == b, 1.0, a - b)
         best[todo] = new
         todo = todo[(np.abs(new - t) > PRECISE / 2) & (f != 0)]
-    return best
+    return np.asarray(best)
 
 
 def _nested(

@@ -82,7 +82,7 @@ class Nodes:
         """Which nodes have nothing below them, bool [n]; the first layer lies on the plate."""
         held = self.layer == 0
         held[self.edges[:, 1]] = True
-        return ~held
+        return np.asarray(~held)
 
     def shut(self, backwards: bool) -> np.ndarray:
         """Which empty nodes have no way out through the layers up to their own (or, backwards, from their
@@ -96,14 +96,14 @@ class Nodes:
             np.maximum(*self.layer[self.edges].T) if not backwards else -np.minimum(*self.layer[self.edges].T)
         )
         edges = self.edges[np.argsort(later, kind="stable")]
-        return _shut(edges, np.sort(later), order * self.layer, free)
+        return np.asarray(_shut(edges, np.sort(later), order * self.layer, free))
 
     def sealed(self) -> np.ndarray:
         """Which empty nodes have no way out at all, not even to the plate's side."""
         body = self.bodies()
         free = np.zeros(len(body), bool)
         free[body[self.open | (self.layer == 0) | (self.layer == self.layer.max(initial=0))]] = True
-        return ~free[body]
+        return np.asarray(~free[body])
 
     def grouped(
         self, chosen: np.ndarray, heights: np.ndarray, pixel: tuple[float, float], shape: tuple[int, int]

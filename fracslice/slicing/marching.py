@@ -110,7 +110,7 @@ def shares(where, cross, k, y, x, t, bit):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def signs(words, bit):  # type: ignore[no-untyped-def]
     """Which corners of a cell are inside, as the bits 0 to 3."""
-    n = 0
+    n = np.int64(0)
     for q in range(4):
         n |= np.int64((words[q] >> np.uint64(bit)) & ONE) << q
     return n

@@ -67,7 +67,7 @@ class Changed:
     terms: tuple[Term, ...]
 
     @property
-    def dtype(self) -> np.dtype:  # type: ignore[type-arg]
+    def dtype(self) -> np.dtype:
         return self.kernel.dtype
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -157,9 +157,9 @@ def interpolated(bricks: Bricks, x: np.ndarray, y: np.ndarray, z: np.ndarray) ->
     with their sign.
     """
     out = np.empty(np.shape(x))
-    flat = [np.ascontiguousarray(a, np.float64).ravel() for a in (x, y, z)]
+    u, v, w = (np.ascontiguousarray(a, np.float64).ravel() for a in (x, y, z))
     far = 1.5 * bricks.voxel
-    _interpolate(*flat, *bricks.origin, bricks.voxel, bricks.index, bricks.values, far, out.ravel())
+    _interpolate(u, v, w, *bricks.origin, bricks.voxel, bricks.index, bricks.values, far, out.ravel())
     return out
 
 

@@ -34,7 +34,7 @@ class Field(Protocol):
     """What is sampled: a kernel, or one with changes."""
 
     @property
-    def dtype(self) -> np.dtype: ...  # type: ignore[type-arg]
+    def dtype(self) -> np.dtype: ...
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray, /) -> np.ndarray: ...
 
@@ -97,7 +97,7 @@ class Sampler:
         tiles.where[layer, blocks[:, 0], blocks[:, 1]] = np.where(f < 0, INSIDE, OUTSIDE)
         kept = np.flatnonzero(~(np.abs(f) > self.facts.lipschitz * self._diagonal(TILE)))
         n = len(kept)
-        tiles.reserve(4 * n)
+        tiles.reserve(6 * n)
         tiles.count = n
         tiles.place[:n] = np.column_stack([layer, blocks])[kept]
         tiles.where[tuple(tiles.place[:n].T)] = np.arange(n)

@@ -35,7 +35,7 @@ def _across(region: np.ndarray, pixel: tuple[float, float]) -> np.ndarray:
     beside = maximum_filter(distance, 3)[1:-1, 1:-1]
     middle = (slope < 0.6) & region[1:-1, 1:-1] & (distance[1:-1, 1:-1] > beside - 0.4 * unit)
     # Where two pixels are in the middle, the middle lies between them.
-    return 2 * distance[1:-1, 1:-1][middle] + unit * (slope[middle] > 0.25)
+    return np.asarray(2 * distance[1:-1, 1:-1][middle] + unit * (slope[middle] > 0.25))
 
 
 def histogram(values: np.ndarray) -> np.ndarray:

@@ -78,7 +78,8 @@ class Tiles:
                 setattr(self, name, new)
 
     @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """where, place, inside, known and values, as the functions below take them."""
         return self.where, self.place, self.inside, self.known, self.values
 
 
