@@ -48,3 +48,9 @@ def test_the_example_of_a_family(tmp_path):
     arguments = [EXAMPLES / "a_family.py", tmp_path, "24"]
     subprocess.run([sys.executable, *map(str, arguments)], capture_output=True, check=True)
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"mandelbulb-{n}.stl" for n in range(2, 10)]
+
+
+def test_the_example_that_flies_around(tmp_path):
+    arguments = [EXAMPLES / "fly_around.py", tmp_path, "2", "40x24"]
+    subprocess.run([sys.executable, *map(str, arguments)], capture_output=True, check=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["step000.png", "step001.png"]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,11 +14,11 @@ import numpy as np
 
 from ..errors import RenderError
 from ..formulas.registry import Node
-from ..scene.view import View
+from ..scene.view import Camera, View
 from ..work import Work
 from .accumulator import Accumulator
 from .cpu import BLOCK, CpuTracer, ordered
-from .linking import Frame, link_frame
+from .linking import Frame, link_frame, optics
 from .setting import Setting, settle
 
 if TYPE_CHECKING:
@@ -103,6 +103,17 @@ class Renderer:
         numbers = [self._frame(k).linked for k in range(len(what.roots))]
         text = "".join(n.source + repr(n.parameters.tolist()) for n in numbers)
         return hashlib.sha256(f"{self.width} {self.height} {what.precision} {text}".encode()).hexdigest()[:20]
+
+    def look(self, camera: Camera) -> None:
+        """Begins the picture anew from elsewhere; depths and precision stay as they are, so this takes no time.
+
+        For steps so short that they suit; a new renderer finds them again. The eye must be outside the solid.
+        """
+        what = self.setting
+        seen = optics(camera, (self.width, self.height), what.roots[-1], what.optics.least)
+        self.setting = replace(what, camera=camera, optics=seen)
+        self._aimed = None
+        self.accumulator = Accumulator.empty(self.width, self.height, self.accumulator.sums.dtype, self.key)
 
     def resume(self, path: str | Path) -> None:
         """Goes on with a file that `accumulator.save` wrote. Raises `RenderError` if it is of another

@@ -101,3 +101,13 @@ def test_cancelling_keeps_what_was_complete() -> None:
 def test_the_mean_does_not_depend_on_where_sampling_stopped() -> None:
     rough, clean = finished(renderer(), 16), finished(renderer(), 200)
     assert abs(rough.mean() - clean.mean()) < 0.01 * clean.mean()
+
+
+def test_looking_back_again_gives_the_same_picture() -> None:
+    of, camera = renderer(), VIEW.camera
+    assert camera is not None
+    wanted = finished(of)
+    of.look(camera.moved(right=0.2).turned(yaw=5))
+    assert abs(finished(of) - wanted).mean() > 0.01
+    of.look(camera)
+    assert finished(of).tobytes() == wanted.tobytes()
