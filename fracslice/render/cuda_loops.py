@@ -33,7 +33,7 @@ def tile(P, Q, q, S, pixels, A, width, limit, blocks):
                 steps += real(1.0)
                 if gap < real(0.0):
                     break
-                missed = t > end
+                missed = (t - stride + before if stride > real(0.0) else t) > end
                 if steps >= limit:
                     break
             together()

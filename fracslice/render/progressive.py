@@ -105,7 +105,7 @@ class Renderer:
         return hashlib.sha256(f"{self.width} {self.height} {what.precision} {text}".encode()).hexdigest()[:20]
 
     def look(self, camera: Camera) -> None:
-        """Begins the picture anew from elsewhere; depths and precision stay as they are, so this takes no time.
+        """Begins the picture anew from elsewhere; depths and precision stay as they are.
 
         For steps so short that they suit; a new renderer finds them again. The eye must be outside the solid.
         """

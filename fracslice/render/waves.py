@@ -85,7 +85,8 @@ def follow_STEP(W, I, n, m, limit, P):
         while True:
             t, before, stride, gap = STEP(ox, oy, oz, dx, dy, dz, t, before, stride, MORE P)
             steps = steps + 1.0
-            done = where(gap < 0.0, 1.0, where(t > end, 2.0, where(steps < limit, 0.0 * steps, 3.0)))
+            free = where(stride > 0.0, t - stride + before, t)
+            done = where(gap < 0.0, 1.0, where(free > end, 2.0, where(steps < limit, 0.0 * steps, 3.0)))
             if any_of(done > 0.0):
                 break
         store(W, @t, t)
@@ -94,7 +95,8 @@ def follow_STEP(W, I, n, m, limit, P):
         store(W, @stride, stride)
         store(W, @done, done)
 """
-"""Follows n rays until all have hit, left or used up their steps. Lanes without a ray stand far away."""
+"""Follows n rays until all have hit, left or used up their steps. A ray has left where it is known to be free,
+not where an over-relaxed step took it. Lanes without a ray stand far away."""
 
 BEGIN = """
 def begin(W, m, P):
