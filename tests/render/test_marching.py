@@ -40,6 +40,8 @@ def test_depth_and_silhouette_are_those_of_the_closed_form(name: str) -> None:
 @pytest.mark.parametrize(
     "name",
     [
+        "difference",
+        "endless repeat",
         "julia",
         "mandelbulb",
         "mandelbulb 5",
