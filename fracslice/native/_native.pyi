@@ -31,6 +31,30 @@ def marching_cubes(
     more than 2^31 vertices or triangles.
     """
 
+def crossed_edges(
+    ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32], threads: int = 0
+) -> tuple[NDArray[int32], NDArray[uint8]]:
+    """The grid edges that the surface crosses, in the order of the vertices of `marching_cubes`: lower grid points int32
+    [n, 3] and axes uint8 [n]. Raises as `marching_cubes`."""
+
+def contour(
+    ijk: NDArray[int32],
+    values: NDArray[float32],
+    index: NDArray[int32],
+    t: NDArray[float64],
+    normals: NDArray[float64],
+    origin: Point,
+    voxel: float,
+    clamp: float,
+    threads: int = 0,
+) -> tuple[NDArray[float64], NDArray[int32], int, int]:
+    """The same surface through exact crossings, its edges and corners kept sharp.
+
+    t: where on each edge of `crossed_edges` the surface crosses it, [n]; normals: unit, outward, [n, 3]. Returns vertices
+    and triangles as `marching_cubes`, how many vertices are crossings (the first) and how many corners in cell faces (the
+    next; the rest are tips within cells). Raises as `marching_cubes`, and ValueError for other than n crossings.
+    """
+
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:
     """How many grid edges with a sign change touch a point without a sample: 0 if the surface is closed."""
 

@@ -169,13 +169,18 @@ def header() -> str:
         "    uint8_t triangles;  // how many",
         "    uint16_t edges;     // bit e: edge e is crossed",
         f"    uint8_t corners[{3 * max(map(len, cases))}];  // three edges a triangle",
+        "    uint8_t loop_length;  // of the loop of crossings, where there is one only; else 0",
+        "    uint8_t loop[12];     // its edges, in the triangles' sense",
         "};",
         "constexpr Case kCases[256] = {",
     ]
-    for triangles in cases:
+    for case, triangles in enumerate(cases):
+        found = loops(case)
+        loop = found[0] if len(found) == 1 else ()
         flat = [e for triangle in triangles for e in triangle]
         crossed = sum(1 << e for e in set(flat))
-        lines.append(f"    {{{len(triangles)}, {crossed}, {{{', '.join(map(str, flat)) or 0}}}}},")
+        ring = f"{len(loop)}, {{{', '.join(map(str, loop)) or 0}}}"
+        lines.append(f"    {{{len(triangles)}, {crossed}, {{{', '.join(map(str, flat)) or 0}}}, {ring}}},")
     return "\n".join([*lines, "};", "}  // namespace fracslice"])
 
 

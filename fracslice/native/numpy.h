@@ -14,6 +14,8 @@ namespace nb = nanobind;
 
 using IjkArray = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using ValuesArray = nb::ndarray<const float, nb::shape<-1, kSamples>, nb::c_contig, nb::device::cpu>;
+using RootsArray = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using NormalsArray = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using IndexArray = nb::ndarray<const int32_t, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 inline Bricks view(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index) {

@@ -1,0 +1,158 @@
+// The cells that the surface passes and the vertices on their edges, numbered.
+#pragma once
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "cases.h"
+#include "signs.h"
+
+namespace fracslice {
+
+using Place = std::array<int, 3>;  // of a brick, in bricks
+
+constexpr size_t kMostElements = size_t(std::numeric_limits<int32_t>::max());
+
+struct Edge {
+    uint8_t axis, dx, dy, dz;
+};
+
+constexpr std::array<Edge, 12> make_edges() {
+    std::array<Edge, 12> edges{};
+    for (uint8_t e = 0; e < 12; ++e) {
+        uint8_t axis = e / 4, p = e & 1, q = e >> 1 & 1;
+        edges[e] = axis == 0 ? Edge{0, 0, p, q} : axis == 1 ? Edge{1, p, 0, q} : Edge{2, p, q, 0};
+    }
+    return edges;
+}
+constexpr std::array<Edge, 12> kEdges = make_edges();
+
+// Where a brick's crossings are numbered: by axis, then by x, then by bit.
+struct Crossings {
+    std::array<Signs, 3> bits;
+    std::array<std::array<uint16_t, kSide>, 3> rank;  // crossings of this brick before that slab
+    size_t base;                                      // vertices before this brick
+};
+
+// A grid edge that the surface crosses.
+struct CellEdge {
+    uint32_t vertex;
+    uint8_t axis;
+    std::array<int32_t, 3> lower;  // its lower grid point
+};
+
+// A bit for each cell between two slabs of corners whose corners are not all alike.
+inline Slab mixed(const Corners& a, const Corners& b) {
+    Slab any = a[0] | a[1] | a[2] | a[3] | b[0] | b[1] | b[2] | b[3];
+    Slab all = a[0] & a[1] & a[2] & a[3] & b[0] & b[1] & b[2] & b[3];
+    return any & ~all;
+}
+
+// The cases of eight cells along z, one in each byte: the transpose of their eight corner bits.
+inline Slab cases_of_row(const Corners& a, const Corners& b, int y) {
+    Slab m = 0;
+    for (int k = 0; k < 4; ++k) {
+        m |= (a[k] >> 8 * y & 0xff) << 16 * k | (b[k] >> 8 * y & 0xff) << (16 * k + 8);
+    }
+    Slab t = (m ^ m >> 7) & 0x00aa00aa00aa00aau;
+    m ^= t ^ t << 7;
+    t = (m ^ m >> 14) & 0x0000cccc0000ccccu;
+    m ^= t ^ t << 14;
+    t = (m ^ m >> 28) & 0x00000000f0f0f0f0u;
+    return m ^ t ^ t << 28;
+}
+
+// Calls visit(x, y, z, case) for every cell of a brick that the surface passes, in that order.
+template <class Visit>
+inline void for_each_cell(const std::array<Corners, kSide + 1>& corners, const Visit& visit) {
+    for (int x = 0; x < kSide; ++x) {
+        const Corners &a = corners[x], &b = corners[x + 1];
+        Slab cells = mixed(a, b);
+        while (cells) {
+            int y = __builtin_ctzll(cells) / 8;
+            Slab cases = cases_of_row(a, b, y);
+            for (unsigned row = cells >> 8 * y & 0xff; row; row &= row - 1) {
+                int z = __builtin_ctz(row);
+                visit(x, y, z, uint8_t(cases >> 8 * z));
+            }
+            cells &= y == 7 ? 0 : ~Slab(0) << 8 * (y + 1);
+        }
+    }
+}
+
+// Replaces each count by the sum of those before it; returns the whole sum.
+template <class Items, class Member>
+size_t running_sum(Items& items, Member member, const char* what) {
+    size_t total = 0;
+    for (auto& item : items) {
+        size_t count = item.*member;
+        item.*member = total;
+        total += count;
+    }
+    if (total > kMostElements) {
+        throw std::length_error("the surface has " + std::to_string(total) + " " + what + ", more than 2^31");
+    }
+    return total;
+}
+
+// The bricks that hold cells which the surface passes: those with samples, in order, then the ghosts, without samples,
+// which see a sampled brick across an edge or a corner with another sign there. Throws std::invalid_argument if a sign
+// change leaves the samples.
+class CellGrid {
+  public:
+    explicit CellGrid(const Bricks& bricks);
+
+    size_t size() const { return places_.size(); }
+    size_t sampled() const { return bricks_.count; }
+    size_t vertices() const { return vertices_; }
+    const Bricks& bricks() const { return bricks_; }
+    const std::vector<Signs>& signs() const { return signs_; }
+    const Place& place(size_t i) const { return places_[i]; }
+    const Crossings& crossings(size_t i) const { return crossings_[i]; }
+    Octant octant(size_t i) const { return {bricks_, places_[i][0], places_[i][1], places_[i][2]}; }
+
+    // Number of the brick with the cell at x, y, z relative to a place, -1 if the surface passes no cell of it.
+    int64_t find(const Place& place, int x, int y, int z) const;
+
+    // The vertex on edge e of the cell x, y, z of a brick.
+    uint32_t vertex(const Octant& near, int x, int y, int z, int e) const {
+        const Edge& edge = kEdges[e];
+        int ex = x + edge.dx, ey = y + edge.dy, ez = z + edge.dz;
+        const Crossings& owner = crossings_[size_t(near.rows[ex / 8 + ey / 8 * 2 + ez / 8 * 4])];
+        Slab before = (Slab(1) << (ey % 8 * 8 + ez % 8)) - 1;
+        return uint32_t(owner.base) + owner.rank[edge.axis][ex % 8] +
+               uint32_t(__builtin_popcountll(owner.bits[edge.axis][ex % 8] & before));
+    }
+
+    CellEdge edge(const Octant& near, const Place& place, int x, int y, int z, int e) const {
+        const Edge& edge = kEdges[e];
+        return {vertex(near, x, y, z, e), edge.axis,
+                {place[0] * kSide + x + edge.dx, place[1] * kSide + y + edge.dy, place[2] * kSide + z + edge.dz}};
+    }
+
+    // Calls visit(edge) for the crossings that a brick with samples numbers, in order.
+    template <class Visit>
+    void for_each_own_edge(size_t i, const Visit& visit) const {
+        if (i >= sampled()) return;
+        const Crossings& own = crossings_[i];
+        uint32_t vertex = uint32_t(own.base);
+        for (uint8_t axis = 0; axis < 3; ++axis) {
+            for (int x = 0; x < kSide; ++x) {
+                for (Slab bits = own.bits[axis][x]; bits; bits &= bits - 1) {
+                    int bit = __builtin_ctzll(bits);
+                    const int32_t* p = bricks_.ijk + 3 * i;
+                    visit(CellEdge{vertex++, axis, {p[0] + x, p[1] + bit / 8, p[2] + bit % 8}});
+                }
+            }
+        }
+    }
+
+  private:
+    Bricks bricks_;
+    std::vector<Signs> signs_;
+    std::vector<Crossings> crossings_;
+    std::vector<Place> places_;
+    size_t vertices_;
+};
+
+}  // namespace fracslice

@@ -1,0 +1,138 @@
+"""Exact surfaces: vertices on the zero set, edges and corners where they are, and a manifold whatever it is given."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from fracslice._native import contour as build
+from fracslice._native import crossed_edges
+from fracslice.errors import MeshError
+from fracslice.formulas import Node, box, difference, julia, menger, octahedron, sphere, torus, transform, union
+from fracslice.kernel import reference
+from fracslice.mesh import Mesh
+from fracslice.mesh.check import check
+from fracslice.mesh.extract import contour, extract
+from fracslice.volume import Bricks, plan, sample_scene
+from fracslice.volume.crossings import refine_crossings
+from fracslice.work import Work
+
+
+def made(root: Node, resolution: float) -> Mesh:
+    planned = plan(root, resolution)
+    return contour(planned.root, sample_scene(planned))
+
+
+def assert_solid(mesh: Mesh) -> None:
+    report = check(mesh)
+    assert report.watertight and report.manifold and report.self_intersections == 0, report
+
+
+def test_sphere() -> None:
+    mesh = made(sphere(), 256)
+    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 1e-6
+    assert abs(mesh.volume / (4 / 3 * np.pi) - 1) < 5e-5
+
+
+def test_julia_without_a_constant_is_a_sphere() -> None:
+    """|w_N| = |p|^(2^N) = R, so its radius is R^(1 / 2^N)."""
+    mesh = made(julia(c=(0, 0, 0, 0), iterations=12, bailout=2), 96)
+    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) / 2 ** (1 / 4096) - 1).max() < 1e-6
+
+
+@pytest.mark.parametrize("level, resolution", [(0, 40.3), (1, 47.9), (2, 61.7), (3, 101.3)])
+def test_menger(level: int, resolution: float) -> None:
+    """Volume 8 (20/27)^n and area 8 (20/9)^n + 16 (8/9)^n, whatever the voxel is to the cells."""
+    mesh = made(menger(level=level), resolution)
+    assert mesh.volume == pytest.approx(8 * (20 / 27) ** level, rel=1e-7)
+    assert mesh.area == pytest.approx(8 * (20 / 9) ** level + 16 * (8 / 9) ** level, rel=1e-7)
+    assert_solid(mesh)
+
+
+@pytest.mark.parametrize(
+    "root, volume, area",
+    [
+        (box(size=(1, 2, 0.7)), 1.4, 8.2),
+        (transform(box(size=(1, 1.3, 0.8)), rotate=(1, 2, 3, 37)), 1.04, 6.28),
+        (octahedron(radius=1), 4 / 3, 4 * np.sqrt(3)),
+        (torus(radius=1, tube=0.3), 2 * np.pi**2 * 0.09, 4 * np.pi**2 * 0.3),
+        (difference(box(size=(2, 2, 2)), sphere(radius=0.7)), 8 - 4 / 3 * np.pi * 0.343, 24 + 4 * np.pi * 0.49),
+    ],
+)
+def test_known_volumes_and_areas(root: Node, volume: float, area: float) -> None:
+    mesh = made(root, 128)
+    assert mesh.volume == pytest.approx(volume, rel=1e-3)
+    assert mesh.area == pytest.approx(area, rel=1e-3)
+    assert_solid(mesh)
+
+
+def test_much_nearer_than_marching_cubes() -> None:
+    planned = plan(union(box(), transform(box(), translate=(0.45, 0.4, 0.3), rotate=(1, 1, 0, 30))), 64)
+    bricks, f = sample_scene(planned), reference(planned.root)
+    plain, exact = extract(bricks), contour(planned.root, bricks)
+
+    def error(mesh: Mesh) -> float:
+        middles = mesh.vertices[mesh.triangles].mean(1)
+        return float(np.abs(f(*middles.T)).mean() / bricks.voxel)
+
+    assert error(exact) < error(plain) / 10
+
+
+def noise(seed: int, size: int = 2) -> Bricks:
+    """White noise in a box of outside samples: every case of a cell, side by side."""
+    rng = np.random.default_rng(seed)
+    field = np.ones((8 * size,) * 3, np.float32)
+    field[1:-1, 1:-1, 1:-1] = rng.normal(size=(8 * size - 2,) * 3)
+    ijk = np.array(list(itertools.product(range(size), repeat=3)), np.int32) * 8
+    values = np.stack([field[i : i + 8, j : j + 8, k : k + 8].ravel() for i, j, k in ijk])
+    return Bricks((0.0, 0.0, 0.0), 1.0, ijk, values, np.arange(len(ijk), dtype=np.int32).reshape((size,) * 3))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_solid_for_any_crossings_and_normals(seed: int) -> None:
+    bricks, rng = noise(seed), np.random.default_rng(100 + seed)
+    arrays = bricks.ijk, bricks.values, bricks.index
+    n = len(crossed_edges(*arrays)[1])
+    t = rng.choice([rng.uniform(0, 1, n), rng.integers(0, 2, n)])
+    normals = rng.normal(size=(n, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    vertices, triangles, crossings, corners = build(*arrays, t, normals, (0.0, 0.0, 0.0), 1.0, 1e-3)
+    assert n == crossings and corners > 0 and len(vertices) > crossings + corners
+    assert_solid(Mesh(vertices, triangles))
+
+
+def test_threads_do_not_matter() -> None:
+    planned = plan(difference(box(), sphere(radius=0.6)), 64)
+    bricks = sample_scene(planned)
+    first, other = (contour(planned.root, bricks, Work(threads=n)) for n in (1, 3))
+    assert first.vertices.tobytes() == other.vertices.tobytes()
+    assert first.triangles.tobytes() == other.triangles.tobytes()
+
+
+def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
+    planned = plan(torus(radius=1, tube=0.3), 64)
+    bricks = sample_scene(planned)
+    lower, axis = crossed_edges(bricks.ijk, bricks.values, bricks.index)
+    exact = refine_crossings(planned.root, bricks.origin, bricks.voxel, lower, axis)
+    points = np.array(bricks.origin) + bricks.voxel * (lower + exact.t[:, None] * np.eye(3)[axis])
+    assert np.abs(reference(planned.root)(*points.T)).max() < 1e-7 * bricks.voxel
+    ring = points * [1, 1, 0]
+    truth = (points - ring / np.linalg.norm(ring, axis=1, keepdims=True)) / 0.3
+    assert np.abs(exact.normals - truth).max() < 1e-5
+
+
+def test_the_wrong_number_of_crossings_is_refused() -> None:
+    bricks = noise(0)
+    with pytest.raises(ValueError, match="crossings"):
+        build(bricks.ijk, bricks.values, bricks.index, np.zeros(3), np.zeros((3, 3)), (0.0, 0.0, 0.0), 1.0, 1e-3)
+
+
+def test_open_samples_are_refused() -> None:
+    bricks = noise(0)
+    index = bricks.index.copy()
+    index[0, 0, 0] = -1
+    open_bricks = Bricks(bricks.origin, 1.0, bricks.ijk[1:], bricks.values[1:], np.where(index > 0, index - 1, index))
+    with pytest.raises(MeshError, match="not closed"):
+        contour(sphere(), open_bricks)
