@@ -1,0 +1,53 @@
+# make demo: a shipped scene becomes a printable mesh. make test: tests and linters. make wheel: a wheel that needs no OpenVDB.
+# All of them set up what is missing first: Debian packages (as root or with sudo) and an own .venv. Debian 12, Ubuntu 24.04.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
+
+# The compiler and OpenVDB's headers (they include Boost's); Python's headers; what draws without a screen.
+PACKAGES := g++ python3-dev python3-venv libopenvdb-dev libtbb-dev libimath-dev libboost-dev \
+	libgl1 libegl1 libgl1-mesa-dri libopenvdb-tools
+MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
+NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/*)
+
+.PHONY: demo test lint wheel setup packages clean
+
+demo: setup
+	mkdir -p out
+	$(BIN)/fracslice mesh scenes/mandelbulb.xml -o out/mandelbulb.3mf --report out/mandelbulb.json --picture out/mandelbulb.png
+	$(BIN)/fracslice mesh scenes/mandelbulb.xml -o out/mandelbulb.stl --quiet
+	@ls -l out/mandelbulb.*
+
+test: lint
+	$(BIN)/python -m pytest -n 2
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+wheel: setup
+	rm -rf dist && mkdir -p dist/raw
+	$(BIN)/pip wheel --quiet --no-deps --no-build-isolation -w dist/raw .
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/auditwheel repair -w dist dist/raw/*.whl
+	sh tests/wheel.sh dist/*.whl
+
+setup: packages $(VENV)/.installed
+
+packages:
+	@test -z "$(MISSING)" || { $(SUDO) apt-get update -q && \
+	$(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $(MISSING); }
+
+$(VENV)/.locked: requirements.lock | packages
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet -r requirements.lock
+	touch $@
+
+$(VENV)/.installed: $(VENV)/.locked pyproject.toml $(NATIVE)
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	touch $@
+
+clean:
+	rm -rf $(VENV) build dist out
