@@ -34,7 +34,7 @@ std::vector<Place> ghosts(const Bricks& bricks, const std::vector<Signs>& signs)
             Place q = {p[0] / kSide - (k & 1), p[1] / kSide - (k >> 1 & 1), p[2] / kSide - (k >> 2 & 1)};
             int32_t at = bricks.at(q[0], q[1], q[2]);
             if (at >= 0) continue;
-            Slab seen = (k & 2 ? 0xff : ~Slab(0)) & (k & 4 ? 0x0101010101010101u : ~Slab(0)), differ = 0;
+            Slab seen = (k & 2 ? kFirstY : ~Slab(0)) & (k & 4 ? kFirstZ : ~Slab(0)), differ = 0;
             for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) differ |= (signs[row][x] ^ constant(at)) & seen;
             if (differ) found.push_back(q);
         }

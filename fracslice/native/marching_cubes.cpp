@@ -9,6 +9,31 @@
 namespace fracslice {
 namespace {
 
+// Numbers of the vertices around a brick's cells: by axis, then by x, y, z of the lower end, 0 to 8.
+constexpr int kReach = kSide + 1;
+using Numbers = std::array<uint32_t, 3 * kReach * kReach * kReach>;
+
+constexpr int number_at(int axis, int x, int y, int z) { return ((axis * kReach + x) * kReach + y) * kReach + z; }
+
+// The case table with, for each corner of a triangle, where Numbers holds it for the cell at 0, 0, 0.
+struct Pattern {
+    uint8_t triangles;
+    std::array<uint16_t, sizeof(Case::corners)> corners;
+};
+
+constexpr std::array<Pattern, 256> make_patterns() {
+    std::array<Pattern, 256> patterns{};
+    for (int c = 0; c < 256; ++c) {
+        patterns[c].triangles = kCases[c].triangles;
+        for (int k = 0; k < 3 * kCases[c].triangles; ++k) {
+            const Edge& edge = kEdges[kCases[c].corners[k]];
+            patterns[c].corners[k] = uint16_t(number_at(edge.axis, edge.dx, edge.dy, edge.dz));
+        }
+    }
+    return patterns;
+}
+constexpr std::array<Pattern, 256> kPatterns = make_patterns();
+
 class Extraction {
   public:
     Extraction(const Bricks& bricks, const Placement& placement) : cells_(bricks), placement_(placement) {}
@@ -18,7 +43,7 @@ class Extraction {
         tbb::parallel_for(size_t(0), cells_.size(), [&](size_t i) {
             size_t& total = counts[i].triangles;
             for_each_cell(corners_of(cells_.octant(i), cells_.signs()),
-                          [&](int, int, int, uint8_t number) { total += kCases[number].triangles; });
+                          [&](int, int, int, uint8_t number) { total += kPatterns[number].triangles; });
         });
         surface_.triangles = {running_sum(counts, &Count::triangles, "triangles"), 3};
         surface_.vertices = {cells_.vertices(), 3};
@@ -26,8 +51,8 @@ class Extraction {
         surface_.axis = {cells_.vertices(), 1};
         tbb::parallel_for(size_t(0), cells_.size(), [&](size_t i) {
             Octant near = cells_.octant(i);
-            cells_.for_each_own_edge(i, [&](const CellEdge& edge) { write_vertex(i, near, edge); });
-            write_triangles(i, near, surface_.triangles.data.get() + 3 * counts[i].triangles);
+            if (i < cells_.sampled()) write_vertices(i, near);
+            write_triangles(near, surface_.triangles.data.get() + 3 * counts[i].triangles);
         });
         return std::move(surface_);
     }
@@ -37,45 +62,73 @@ class Extraction {
         size_t triangles = 0;
     };
 
-    void write_vertex(size_t row, const Octant& near, const CellEdge& edge) {
+    void write_vertices(size_t row, const Octant& near) {
         const Bricks& bricks = cells_.bricks();
-        std::array<int, 3> p, next;
-        for (int k = 0; k < 3; ++k) p[k] = next[k] = edge.lower[k] - bricks.ijk[3 * row + k];
-        bool leaves = ++next[edge.axis] == kSide;
-        if (leaves) next[edge.axis] = 0;
-        double a = value(row, p), b = value(leaves ? size_t(near.rows[1 << edge.axis]) : row, next);
+        const float* values = bricks.values + row * kSamples;
+        cells_.for_each_own_edge(row, [&](const CellEdge& edge) {
+            int at = 0, step = 64 >> 3 * edge.axis;
+            for (int k = 0; k < 3; ++k) at = at * kSide + (edge.lower[k] - bricks.ijk[3 * row + k]);
+            bool leaves = (at / step) % kSide == kSide - 1;
+            const float* other = leaves ? bricks.values + size_t(near.rows[1 << edge.axis]) * kSamples : values;
+            write_vertex(edge, crossing(values[at], other[at + (leaves ? 1 - kSide : 1) * step]));
+        });
+    }
+
+    double crossing(double a, double b) const {
         double t = a / (a - b), low = placement_.clamp, high = 1 - low;
-        t = t > low ? (t < high ? t : high) : low;
-        for (int k = 0; k < 3; ++k) {
-            double grid = edge.lower[k] + (k == edge.axis ? t : 0);
-            surface_.lower.data[3 * size_t(edge.vertex) + k] = edge.lower[k];
-            surface_.vertices.data[3 * size_t(edge.vertex) + k] = placement_.origin[k] + placement_.voxel * grid;
+        return t > low ? (t < high ? t : high) : low;
+    }
+
+    void write_vertex(const CellEdge& edge, double t) {
+        size_t first = 3 * size_t(edge.vertex);
+        std::array<double, 3> place = {double(edge.lower[0]), double(edge.lower[1]), double(edge.lower[2])};
+        place[edge.axis] += t;
+        for (size_t k = 0; k < 3; ++k) {
+            surface_.vertices.data[first + k] = placement_.origin[k] + placement_.voxel * place[k];
+            surface_.lower.data[first + k] = edge.lower[k];
         }
         surface_.axis.data[edge.vertex] = edge.axis;
     }
 
-    double value(size_t row, const std::array<int, 3>& p) const {
-        return cells_.bricks().values[row * kSamples + size_t(p[0] * 64 + p[1] * 8 + p[2])];
+    void write_triangles(const Octant& near, int32_t* out) const {
+        Numbers numbers;
+        collect(near, numbers);
+        for_each_cell(corners_of(near, cells_.signs()), [&](int x, int y, int z, uint8_t number) {
+            const Pattern& pattern = kPatterns[number];
+            const uint32_t* cell = &numbers[size_t(number_at(0, x, y, z))];
+            for (int k = 0; k < 3 * pattern.triangles; ++k) *out++ = int32_t(cell[pattern.corners[k]]);
+        });
     }
 
-    void write_triangles(size_t i, const Octant& near, int32_t* out) const;
+    // The numbers of a brick's own crossings and of those on its neighbours' near sides.
+    void collect(const Octant& near, Numbers& numbers) const {
+        for (int k = 0; k < 8; ++k) {
+            if (near.rows[k] < 0) continue;
+            const Crossings& owner = cells_.crossings(size_t(near.rows[k]));
+            Slab seen = (k & 2 ? kFirstY : ~Slab(0)) & (k & 4 ? kFirstZ : ~Slab(0));
+            for (int axis = 0; axis < 3; ++axis) {
+                for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) {
+                    int corner = number_at(axis, x + (k & 1) * 8, (k & 2) * 4, (k & 4) * 2);
+                    number(owner, axis, x, seen, &numbers[size_t(corner)]);
+                }
+            }
+        }
+    }
+
+    static void number(const Crossings& owner, int axis, int x, Slab seen, uint32_t* numbers) {
+        Slab all = owner.bits[axis][x];
+        uint32_t first = uint32_t(owner.base) + owner.rank[axis][x];
+        for (Slab bits = all & seen; bits; bits &= bits - 1) {
+            int bit = __builtin_ctzll(bits);
+            Slab before = (Slab(1) << bit) - 1;
+            numbers[bit / 8 * kReach + bit % 8] = first + uint32_t(__builtin_popcountll(all & before));
+        }
+    }
 
     CellGrid cells_;
     Placement placement_;
     Surface surface_;
 };
-
-void Extraction::write_triangles(size_t i, const Octant& near, int32_t* out) const {
-    for_each_cell(corners_of(cells_.octant(i), cells_.signs()), [&](int x, int y, int z, uint8_t number) {
-        const Case& cell = kCases[number];
-        uint32_t vertex[12];
-        for (unsigned edges = cell.edges; edges; edges &= edges - 1) {
-            int e = __builtin_ctz(edges);
-            vertex[e] = cells_.vertex(near, x, y, z, e);
-        }
-        for (int k = 0; k < 3 * cell.triangles; ++k) *out++ = int32_t(vertex[cell.corners[k]]);
-    });
-}
 
 }  // namespace
 

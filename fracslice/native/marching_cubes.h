@@ -1,19 +1,8 @@
 #pragma once
-#include <memory>
-
+#include "array.h"
 #include "bricks.h"
 
 namespace fracslice {
-
-template <class T>
-struct Array {
-    std::unique_ptr<T[]> data;
-    size_t rows = 0;
-
-    Array() = default;
-    // Left uninitialised: every element is written by the thread that makes it, which is also where its page is laid.
-    Array(size_t n, size_t columns) : data(new T[n * columns]), rows(n) {}
-};
 
 struct Surface {
     Array<double> vertices;    // [n, 3], origin + voxel * (grid position)

@@ -27,7 +27,7 @@ inline Bricks view(const IjkArray& ijk, const ValuesArray& values, const IndexAr
 template <class T>
 nb::object to_numpy(Array<T>&& array, std::initializer_list<size_t> shape) {
     T* data = array.data.release();
-    nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+    nb::capsule owner(data, [](void* p) noexcept { std::free(p); });
     return nb::cast(nb::ndarray<nb::numpy, T>(data, shape, owner));
 }
 

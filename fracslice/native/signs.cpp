@@ -15,7 +15,7 @@
 namespace fracslice {
 namespace {
 
-constexpr Slab kFirstZ = 0x0101010101010101u, kLastZ = kFirstZ << 7, kFirstY = 0xff, kLastY = kFirstY << 56;
+constexpr Slab kLastY = kFirstY << 56, kLastZ = kFirstZ << 7;
 
 Slab negative(const float* values) {
     Slab bits = 0;

@@ -9,6 +9,9 @@ namespace fracslice {
 using Slab = uint64_t;
 using Signs = std::array<Slab, kSide>;
 
+// The bits of a slab's samples at y = 0, and at z = 0.
+constexpr Slab kFirstY = 0xff, kFirstZ = 0x0101010101010101u;
+
 std::vector<Signs> signs_of(const Bricks& bricks);
 
 // How many grid edges with a sign change touch a point without a sample. Zero means that the surface is closed.
@@ -19,7 +22,7 @@ inline Slab constant(int32_t at) { return at == kInside ? ~Slab(0) : Slab(0); }
 // The slab read one step along y or z; `next` is the slab of the neighbour on that side.
 inline Slab shift_y(Slab slab, Slab next) { return slab >> 8 | next << 56; }
 inline Slab shift_z(Slab slab, Slab next) {
-    return (slab >> 1 & 0x7f7f7f7f7f7f7f7fu) | (next & 0x0101010101010101u) << 7;
+    return (slab >> 1 & ~(kFirstZ << 7)) | (next & kFirstZ) << 7;
 }
 
 // A brick and its neighbours on the positive sides: number dx + 2*dy + 4*dz.
