@@ -20,8 +20,9 @@ def _silent(stage: str, done: float) -> None:
 
 @dataclass(frozen=True)
 class Work:
-    """threads: how many to use (default: all cores). progress: called as ``progress(stage, fraction)`` from time to time.
-    cancel: set it from anywhere and the work stops within a fraction of a second with `Cancelled`."""
+    """threads: how many to use (default: all cores). progress: called as ``progress(stage, fraction)`` from
+    time to time. cancel: set it from anywhere and the work stops within a fraction of a second with
+    `Cancelled`."""
 
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
     progress: Callable[[str, float], None] = _silent
@@ -33,7 +34,9 @@ class Work:
             raise Cancelled("cancelled")
 
     def map(self, task: Callable[[T], None], items: Sequence[T]) -> None:
-        """Runs `task` on every item, in parallel. Tasks write to places of their own; their order must not matter."""
+        """Runs `task` on every item, in parallel. Tasks write to places of their own; their order must not
+        matter.
+        """
         if self.threads == 1 or len(items) <= 1:
             for item in items:
                 self.check()

@@ -65,7 +65,9 @@ EXAMPLES: dict[str, Node] = {
     "mirror": mirror(transform(sphere(radius=0.5), translate=(0.3, 0.2, 0)), axis="x"),
     "repeat": repeat(sphere(radius=0.2), period=(0.5, 0.5, 0.5), count=(3, 3, 1)),
     "repeat overlapping": repeat(sphere(radius=0.5), period=(0.6, 0.8, 3.0), count=(4, 2, 1)),
-    "endless repeat": bounds(repeat(torus(radius=0.12, tube=0.04), period=(0.4, 0.4, 0.4)), min=(-1, -1, -1), max=(1, 0.9, 0.8)),
+    "endless repeat": bounds(
+        repeat(torus(radius=0.12, tube=0.04), period=(0.4, 0.4, 0.4)), min=(-1, -1, -1), max=(1, 0.9, 0.8)
+    ),
     "bounds": bounds(plane(), min=(-0.5, -0.6, -0.7), max=(0.8, 0.9, 1.0)),
     "twist": twist(transform(BAR, rotate=(0, 1, 0, 90)), degrees=100),
     "twist x": twist(BAR, axis="x", degrees=-80),

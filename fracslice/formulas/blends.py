@@ -10,13 +10,17 @@ from .registry import Formula, Node, blend
 from .vocabulary import absolute, maximum, minimum
 
 SMOOTH = Number(
-    0.0, "width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)", least=0
+    0.0,
+    "width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)",
+    least=0,
 )
 
 
 @blend((1, None), smooth=SMOOTH)
 def union(a, b, smooth):  # type: ignore[no-untyped-def]
-    """All that is in any of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013, quadratic)."""
+    """All that is in any of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
+    quadratic).
+    """
     h = maximum(smooth - absolute(a - b), 0.0)
     return minimum(a, b) - h * h / (4.0 * smooth)
 
@@ -73,7 +77,12 @@ def _(node: Node) -> Box:
     return node.children[0].facts.box
 
 
-@blend((1, 1), thickness=Number(REQUIRED, "of the wall, in scene units; its outer face is the element's surface", above=0))
+@blend(
+    (1, 1),
+    thickness=Number(
+        REQUIRED, "of the wall, in scene units; its outer face is the element's surface", above=0
+    ),
+)
 def shell(a, thickness):  # type: ignore[no-untyped-def]
     """The element made hollow: what is deeper inside than the thickness is taken out."""
     return maximum(a, -(a + thickness))

@@ -50,7 +50,7 @@ class Box:
 
     @property
     def corners(self) -> list[Triple]:
-        return list(product(*zip(self.lo, self.hi, strict=True)))
+        return [_triple(corner) for corner in product(*zip(self.lo, self.hi, strict=True))]
 
     def __or__(self, other: Box) -> Box:
         if self.empty or other.empty:

@@ -9,10 +9,10 @@ from .parameters import REQUIRED, Number, Vector
 from .registry import Fixed, Node, warp
 from .vocabulary import absolute, any_of, floor, maximum, minimum
 
-
-# Each operator below that confines its child returns ``maximum(d, minimum(child, 2 m - d))`` with d a distance to a
-# volume around the child and m > 0. The surface is unchanged where d <= 0, the result does not jump, and where d >= m it
-# is d whatever the child's value: there the child need not be evaluated, and its Lipschitz bound is not needed either.
+# Each operator below that confines its child returns ``maximum(d, minimum(child, 2 m - d))`` with d a
+# distance to a volume around the child and m > 0. The surface is unchanged where d <= 0, the result does not
+# jump, and where d >= m it is d whatever the child's value: there the child need not be evaluated, and its
+# Lipschitz bound is not needed either.
 
 
 @warp(
@@ -95,13 +95,19 @@ def _frame(box: Box) -> dict[str, object]:
 
 @warp(
     period=Vector(REQUIRED, "distance between copies along x, y and z", above=0),
-    count=Vector((0, 0, 0), "copies along x, y and z, centred at the origin; 0: without end", least=0, most=1e6, whole=True),
+    count=Vector(
+        (0, 0, 0),
+        "copies along x, y and z, centred at the origin; 0: without end",
+        least=0,
+        most=1e6,
+        whole=True,
+    ),
 )
 def repeat(child, x, y, z, period, first, last, centre, half, middle, reach, gap, nx, ny, nz):  # type: ignore[no-untyped-def]
     """Copies on a lattice. Every copy that can be the nearest is looked at, so cell borders are right.
 
-    Copies further than `gap` are not; the value never exceeds it inside the lattice, so that leaving one out is not
-    seen. A copy's value is at least the distance to its box, for the same reason.
+    Copies further than `gap` are not; the value never exceeds it inside the lattice, so that leaving one out
+    is not seen. A copy's value is at least the distance to its box, for the same reason.
     """
     px, py, pz = period
     fx, fy, fz = first
@@ -135,9 +141,12 @@ def _window(node: Node, axis: int) -> int:
         return 1
     overlap = box.size[axis] / 2 / period
     if not overlap <= 3:
-        raise node.fail(f"period: expected at least a sixth of the element's size, {box.size[axis]:.4g}, along {'xyz'[axis]}")
+        raise node.fail(
+            f"period: expected at least a sixth of the element's size, {box.size[axis]:.4g}, "
+            f"along {'xyz'[axis]}"
+        )
     window = 2 * math.ceil(max(overlap, 0.0) + 0.5)
-    return min(window, count or window)
+    return int(min(window, count or window))
 
 
 @repeat.arguments

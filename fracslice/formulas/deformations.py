@@ -1,4 +1,6 @@
-"""Twisted and bent space (Barr 1984, "Global and Local Deformations of Solid Primitives"). They confine, see `confining`."""
+"""Twisted and bent space (Barr 1984, "Global and Local Deformations of Solid Primitives"). They confine, see
+`confining`.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +18,11 @@ from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqr
     degrees=Number(REQUIRED, "how far to turn per unit of length along the axis"),
 )
 def twist(child, x, y, z, rate, radius, margin, along_x, along_y):  # type: ignore[no-untyped-def]
-    """Turned about an axis, further the further along it (Barr 1984, "Global and Local Deformations of Solid Primitives").
+    """Turned about an axis, further the further along it (Barr 1984, "Global and Local Deformations of Solid
+    Primitives").
 
-    At radius rho space is sheared by s = rate rho, which stretches by (s + sqrt(s^2 + 4)) / 2. The bound is taken at
-    5/4 of the element's own radius; beyond, the value is the distance to the cylinder around it.
+    At radius rho space is sheared by s = rate rho, which stretches by (s + sqrt(s^2 + 4)) / 2. The bound is
+    taken at 5/4 of the element's own radius; beyond, the value is the distance to the cylinder around it.
     """
     if along_x:
         a, b, t = y, z, x
@@ -48,7 +51,9 @@ def _twist_radius(node: Node) -> float:
     across = [a for a in range(3) if a != "xyz".index(node["axis"])]
     radius = node.children[0].facts.box.radius(*across)
     if not math.isfinite(radius):
-        raise node.fail(f"can only twist what is bounded across the {node['axis']} axis; put <bounds> around it")
+        raise node.fail(
+            f"can only twist what is bounded across the {node['axis']} axis; put <bounds> around it"
+        )
     return max(radius, 1e-30)
 
 
@@ -78,16 +83,18 @@ def _(node: Node) -> float:
 
 
 @warp(
-    axis=Axis("z", "the hinge, which stays straight: z bends x towards y, x bends y towards z, y bends z towards x"),
+    axis=Axis(
+        "z", "the hinge, which stays straight: z bends x towards y, x bends y towards z, y bends z towards x"
+    ),
     degrees=Number(REQUIRED, "how far to turn per unit of length along the bent axis"),
 )
 def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, margin, along_x, along_y):  # type: ignore[no-untyped-def]
     """A straight axis made an arc (Barr 1984, "Global and Local Deformations of Solid Primitives").
 
-    In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is looked at in
-    theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; the bound is taken at half the smallest
-    radius the element reaches. Nearer than that, and near the cut opposite to it, the value is a distance to the sector
-    that holds the element.
+    In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is looked
+    at in theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; the bound is taken at
+    half the smallest radius the element reaches. Nearer than that, and near the cut opposite to it, the value
+    is a distance to the sector that holds the element.
     """
     if along_x:
         a, b, t = y, side * z, x
@@ -95,7 +102,8 @@ def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, mar
         a, b, t = z, side * x, y
     else:
         a, b, t = x, side * y, z
-    # Distances are taken from the arc, not from its centre, which for a slight bend is too far away for float32.
+    # Distances are taken from the arc, not from its centre, which for a slight bend is too far away for
+    # float32.
     s = curvature * a
     c = 1.0 - curvature * b
     r = sqrt(s * s + c * c)
@@ -116,16 +124,24 @@ def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, mar
 
 
 def _bend_frame(node: Node) -> tuple[float, float, float, float]:
-    """Curvature, side (+1 or -1), the smallest radius the element reaches, and its half length along the bent axis."""
+    """Curvature, side (+1 or -1), the smallest radius the element reaches, and its half length along the bent
+    axis.
+    """
     hinge, box = "xyz".index(node["axis"]), node.children[0].facts.box
     along, across = (hinge + 1) % 3, (hinge + 2) % 3
     curvature, side = abs(math.radians(node["degrees"])), math.copysign(1.0, node["degrees"])
     half = max(abs(box.lo[along]), abs(box.hi[along]))
     inward = box.hi[across] if side > 0 else -box.lo[across]
     if not half * curvature < 0.999 * math.pi:
-        raise node.fail(f"degrees={node['degrees']:g}: expected less than {math.degrees(math.pi / half):.4g}, a full circle")
+        raise node.fail(
+            f"degrees={node['degrees']:g}: expected less than "
+            f"{math.degrees(math.pi / half):.4g}, a full circle"
+        )
     if not inward * curvature < 0.99:
-        raise node.fail(f"degrees={node['degrees']:g}: expected less than {math.degrees(1 / inward):.4g}, or it is bent through itself")
+        raise node.fail(
+            f"degrees={node['degrees']:g}: expected less than "
+            f"{math.degrees(1 / inward):.4g}, or it is bent through itself"
+        )
     return curvature, side, min(1 / curvature - inward, 1 / curvature), half
 
 
@@ -161,7 +177,11 @@ def _(node: Node) -> Box:
     outer = 1 / curvature - min(side * box.lo[across], side * box.hi[across])
     top = half * curvature
     turns = [t for t in (-math.pi / 2, 0.0, math.pi / 2) if abs(t) <= top] + [-top, top]
-    points = [(r * math.sin(t), side * (1 / curvature - r * math.cos(t))) for t in turns for r in (inner_radius, outer)]
+    points = [
+        (r * math.sin(t), side * (1 / curvature - r * math.cos(t)))
+        for t in turns
+        for r in (inner_radius, outer)
+    ]
     lo, hi = list(box.lo), list(box.hi)
     for axis, values in ((along, [p[0] for p in points]), (across, [p[1] for p in points])):
         lo[axis], hi[axis] = min(values), max(values)

@@ -1,12 +1,13 @@
 """What escape-time fractals have in common: from an orbit to a signed distance.
 
-The solid of N iterations and bailout R is ``{p : |w_N(p)| <= R}``, exactly. A point whose orbit leaves a larger circle E
-at step n < N would have ``log |w_N| = p^(N-n) log |w_n|``, p the power; that continues the field through zero into the
-inside without any jump larger than 1e-4 of its value (E^p = 10^4). With the potential ``G = log |w_n| / p^n`` the
-distance to the solid is about ``G / |G'|`` near it, and for the complex quadratic maps at least
-``(1 - exp(-2 G)) / (4 |G'|)`` (Koebe's 1/4 theorem, as in Milnor 2006, "Dynamics in One Complex Variable", and Hart,
-Sandin, Kauffman 1989, "Ray Tracing Deterministic 3-D Fractals"). We return ``(G - G_0) / (|G'| (1 + 2 G))``, which is
-about the distance near the surface, never above twice that lower bound, and needs no exponential.
+The solid of N iterations and bailout R is ``{p : |w_N(p)| <= R}``, exactly. A point whose orbit leaves a
+larger circle E at step n < N would have ``log |w_N| = p^(N-n) log |w_n|``, p the power; that continues the
+field through zero into the inside without any jump larger than 1e-4 of its value (E^p = 10^4). With the
+potential ``G = log |w_n| / p^n`` the distance to the solid is about ``G / |G'|`` near it, and for the complex
+quadratic maps at least ``(1 - exp(-2 G)) / (4 |G'|)`` (Koebe's 1/4 theorem, as in Milnor 2006, "Dynamics in
+One Complex Variable", and Hart, Sandin, Kauffman 1989, "Ray Tracing Deterministic 3-D Fractals"). We return
+``(G - G_0) / (|G'| (1 + 2 G))``, which is about the distance near the surface, never above twice that lower
+bound, and needs no exponential.
 """
 
 from __future__ import annotations
@@ -16,18 +17,19 @@ import math
 from .vocabulary import inverse, log, maximum, minimum, rsqrt
 
 JUMP = 1e4
-"""E^p: how large |w| gets in the step past the escape circle; 1/JUMP is the relative jump of the field there."""
+"""E^p: how large |w| gets in the step past the escape circle; 1/JUMP is the relative jump of the field there.
+"""
 
 
 def potential_distance(r2, slope, level, first_level, last_level):  # type: ignore[no-untyped-def]
     """Signed distance estimate from an orbit's last radius.
 
-    r2: |w|^2 where the orbit stopped. slope: the largest bound of the norm of the derivative of w along the orbit, at
-    least 1. level: log R / p^(N-n), what log |w| would be on the surface; first_level and last_level: the same for n = 0
-    and n = N.
+    r2: |w|^2 where the orbit stopped. slope: the largest bound of the norm of the derivative of w along the
+    orbit, at least 1. level: log R / p^(N-n), what log |w| would be on the surface; first_level and
+    last_level: the same for n = 0 and n = N.
 
-    The largest, not the last: inside, an attracting orbit lets the derivative decay and the quotient grow without limit.
-    There ``0.1 / slope`` keeps it below the distance to the surface.
+    The largest, not the last: inside, an attracting orbit lets the derivative decay and the quotient grow
+    without limit. There ``0.1 / slope`` keeps it below the distance to the surface.
     """
     r2 = minimum(maximum(r2, 1e-4), 1e30)
     slope = minimum(slope, 1e30)

@@ -14,16 +14,24 @@ from .vocabulary import any_of, maximum, minimum, orbit, rsqrt, where
 @shape(
     lipschitz=2.0,
     weak=True,
-    c=Vector((-0.2, 0.8, 0.0, 0.0), "the constant added in each step: real part, i, j, k", sizes=(4,), least=-4, most=4),
-    iterations=Count(AUTO, 'steps of the orbit; "auto" takes the depth whose detail is a voxel', least=1, auto=True),
+    c=Vector(
+        (-0.2, 0.8, 0.0, 0.0),
+        "the constant added in each step: real part, i, j, k",
+        sizes=(4,),
+        least=-4,
+        most=4,
+    ),
+    iterations=Count(
+        AUTO, 'steps of the orbit; "auto" takes the depth whose detail is a voxel', least=1, auto=True
+    ),
     bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
 )
 def julia(x, y, z, c, iterations, first_level, last_level, escape2, flat):  # type: ignore[no-untyped-def]
     """The solid filled Julia set of q^2 + c in the quaternions, cut at k = 0.
 
-    Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman 1989, "Ray
-    Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is Koebe's bound for
-    complex Julia sets; the worst quotient seen in 10^5 points of five sets was 1.54.
+    Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
+    1989, "Ray Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is
+    Koebe's bound for complex Julia sets; the worst quotient seen in 10^5 points of five sets was 1.54.
     """
     cr, ci, cj, ck = c
     r2 = x * x + y * y + z * z

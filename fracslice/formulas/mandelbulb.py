@@ -14,24 +14,48 @@ from .vocabulary import absolute, any_of, atan2, cos, exp, log, maximum, orbit, 
 @shape(
     lipschitz=2.0,
     weak=True,
-    power=Number(8.0, "the exponent; whole numbers need no trigonometry and are several times faster", least=2, most=32),
-    iterations=Count(AUTO, 'steps of the orbit; "auto" takes the depth whose detail is a voxel', least=1, auto=True),
+    power=Number(
+        8.0, "the exponent; whole numbers need no trigonometry and are several times faster", least=2, most=32
+    ),
+    iterations=Count(
+        AUTO, 'steps of the orbit; "auto" takes the depth whose detail is a voxel', least=1, auto=True
+    ),
     bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
-    julia=Vector(None, "adds this point in each step instead of the start point: a Julia set of the Mandelbulb", most=4, least=-4),
+    julia=Vector(
+        None,
+        "adds this point in each step instead of the start point: a Julia set of the Mandelbulb",
+        most=4,
+        least=-4,
+    ),
 )
 def mandelbulb(  # type: ignore[no-untyped-def]
-    x, y, z, power, iterations, first_level, last_level, escape2, over_escape2, c, digits, half_digits, even, linear, fixed_c
+    x,
+    y,
+    z,
+    power,
+    iterations,
+    first_level,
+    last_level,
+    escape2,
+    over_escape2,
+    c,
+    digits,
+    half_digits,
+    even,
+    linear,
+    fixed_c,
 ):
     """The Mandelbulb of an integer power, by complex multiplication.
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
-    w = (rho (u, v), z), (u, v) a unit vector, w^n = (Im (u + iv)^n (z + i rho)^n...): both powers are products, and
-    Im (z + i rho)^n is carried divided by rho, so nothing is divided by zero at the poles.
+    w = (rho (u, v), z), (u, v) a unit vector, w^n = (Im (u + iv)^n (z + i rho)^n...): both powers are
+    products, and Im (z + i rho)^n is carried divided by rho, so nothing is divided by zero at the poles.
 
-    The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of latitude.
-    The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles; with it, faded out
-    towards the escape radius, where the map of a whole neighbourhood is radial, no quotient above 1.4 was seen in 10^5
-    points for powers 2, 3, 5 and 8 and a Julia set (60 directions each, roots by bisection). L = 2 is used.
+    The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
+    latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
+    with it, faded out towards the escape radius, where the map of a whole neighbourhood is radial, no
+    quotient above 1.4 was seen in 10^5 points for powers 2, 3, 5 and 8 and a Julia set (60 directions each,
+    roots by bisection). L = 2 is used.
     """
     cx, cy, cz = x, y, z
     grow = 1.0
@@ -150,7 +174,12 @@ def _(node: Node) -> dict[str, object]:
     if _whole(power):
         n = int(power)
         half = Fixed(_digits((n - 1) // 2))
-        arguments |= {"digits": Fixed(_digits(n)), "half_digits": half, "even": Fixed(n % 2 == 0), "linear": Fixed(n == 2)}
+        arguments |= {
+            "digits": Fixed(_digits(n)),
+            "half_digits": half,
+            "even": Fixed(n % 2 == 0),
+            "linear": Fixed(n == 2),
+        }
     return arguments
 
 
@@ -158,7 +187,8 @@ def _(node: Node) -> dict[str, object]:
 def _(node: Node) -> None:
     if node["bailout"] ** node["power"] > 1e15:
         raise node.fail(
-            f"bailout={node['bailout']:g}: expected at most {1e15 ** (1 / node['power']):.4g} for power {node['power']:g}"
+            f"bailout={node['bailout']:g}: expected at most {1e15 ** (1 / node['power']):.4g} "
+            f"for power {node['power']:g}"
         )
 
 

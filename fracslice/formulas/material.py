@@ -19,10 +19,14 @@ from .registry import Node, warp
     specular=Number(0.2, "strength of the highlight", least=0, most=100),
     shininess=Number(32.0, "sharpness of the highlight", least=1, most=10000),
     glow=Number(0.0, "light of its own, in its colour", least=0, most=1000),
-    reflect=Number(0.0, "the part of light that is mirrored head on; more is at grazing angles", least=0, most=1),
+    reflect=Number(
+        0.0, "the part of light that is mirrored head on; more is at grazing angles", least=0, most=1
+    ),
     clear=Number(0.0, "the part of light that goes through", least=0, most=1),
     index=Number(1.5, "how strongly that light is bent: 1.33 water, 1.5 glass, 2.4 diamond", least=1, most=4),
-    absorb=Vector((0.0, 0.0, 0.0), "how quickly red, green and blue fade inside, per scene unit", least=0, most=1e6),
+    absorb=Vector(
+        (0.0, 0.0, 0.0), "how quickly red, green and blue fade inside, per scene unit", least=0, most=1e6
+    ),
 )
 def material(child, x, y, z):  # type: ignore[no-untyped-def]
     """What the element inside looks like in pictures. A material further inside takes precedence."""

@@ -12,9 +12,9 @@ from .vocabulary import absolute, floor, maximum, minimum, orbit, sqrt
 def menger(x, y, z, level):  # type: ignore[no-untyped-def]
     """The Menger sponge of any level in the cube [-1, 1]^3.
 
-    Menger 1926; distance: Quilez 2011, "Menger fractal": a box minus, per level, an infinite lattice of crosses. Every
-    term is the distance to its own solid or less, so their maximum has L = 1. Volume 8 (20/27)^n, area
-    4 (2 (20/9)^n + 4 (8/9)^n).
+    Menger 1926; distance: Quilez 2011, "Menger fractal": a box minus, per level, an infinite lattice of
+    crosses. Every term is the distance to its own solid or less, so their maximum has L = 1. Volume 8
+    (20/27)^n, area 4 (2 (20/9)^n + 4 (8/9)^n).
     """
     ax = absolute(x) - 1.0
     ay = absolute(y) - 1.0

@@ -1,7 +1,8 @@
 """What a parameter of a formula can be: how it is read, checked, written and described.
 
-Each kind turns text from a scene file into a value (`read`), refuses what cannot be (`check`, a `ValueError` that says
-what is expected) and writes the value back (`text`). The schema and the documentation are made from the same objects.
+Each kind turns text from a scene file into a value (`read`), refuses what cannot be (`check`, a `ValueError`
+that says what is expected) and writes the value back (`text`). The schema and the documentation are made from
+the same objects.
 """
 
 from __future__ import annotations
@@ -99,7 +100,9 @@ class Vector:
         return self.check(tuple(_number(word, self.expects) for word in text.split()))
 
     def check(self, value: Any) -> Any:
-        items: Sequence[Any] = value if isinstance(value, Sequence) and not isinstance(value, str) else (value,)
+        items: Sequence[Any] = (
+            value if isinstance(value, Sequence) and not isinstance(value, str) else (value,)
+        )
         if len(items) not in self.sizes:
             raise ValueError(self.expects)
         numbers = tuple(float(_checked(item, self)) for item in items)
@@ -184,8 +187,20 @@ def _checked(value: Any, kind: Number | Vector) -> Any:
 
 
 def _range(kind: Number | Vector) -> str:
-    low = f" > {kind.above:g}" if math.isfinite(kind.above) else f" >= {kind.least:g}" if math.isfinite(kind.least) else ""
-    high = f" < {kind.below:g}" if math.isfinite(kind.below) else f" <= {kind.most:g}" if math.isfinite(kind.most) else ""
+    low = (
+        f" > {kind.above:g}"
+        if math.isfinite(kind.above)
+        else f" >= {kind.least:g}"
+        if math.isfinite(kind.least)
+        else ""
+    )
+    high = (
+        f" < {kind.below:g}"
+        if math.isfinite(kind.below)
+        else f" <= {kind.most:g}"
+        if math.isfinite(kind.most)
+        else ""
+    )
     return low + (" and" if low and high else "") + high
 
 

@@ -1,8 +1,11 @@
-"""The solids that everything else is cut with: exact distances, after Quilez, "Distance functions" (2008-2020)."""
+"""The solids that everything else is cut with: exact distances, after Quilez, "Distance functions"
+(2008-2020).
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from .box import Box
 from .parameters import Number, Vector
@@ -40,7 +43,9 @@ def box(x, y, z, half, round):  # type: ignore[no-untyped-def]
 @box.check
 def _(node: Node) -> None:
     if 2 * node["round"] > min(node["size"]):
-        raise node.fail(f"round={node['round']:g}: expected at most half the shortest edge, {min(node['size']) / 2:g}")
+        raise node.fail(
+            f"round={node['round']:g}: expected at most half the shortest edge, {min(node['size']) / 2:g}"
+        )
 
 
 @box.arguments
@@ -92,13 +97,14 @@ def _(node: Node) -> Box:
     return Box.centred(node["radius"], node["radius"], node["height"] / 2)
 
 
-@shape(
-    **{
-        "from": Vector((0.0, 0.0, -0.5), "centre of one end"),
-        "to": Vector((0.0, 0.0, 0.5), "centre of the other end"),
-        "radius": Number(0.25, "the radius", above=0),
-    }
-)
+_CAPSULE: dict[str, Any] = {
+    "from": Vector((0.0, 0.0, -0.5), "centre of one end"),
+    "to": Vector((0.0, 0.0, 0.5), "centre of the other end"),
+    "radius": Number(0.25, "the radius", above=0),
+}
+
+
+@shape(**_CAPSULE)
 def capsule(x, y, z, start, along, scale, radius):  # type: ignore[no-untyped-def]
     """All points within the radius of a segment."""
     sx, sy, sz = start
@@ -192,7 +198,8 @@ def octahedron(x, y, z, radius):  # type: ignore[no-untyped-def]
     ay = absolute(y)
     az = absolute(z)
     m = ax + ay + az - radius
-    # The nearest of the face and, where its foot leaves the face, the edge opposite to the smallest coordinate.
+    # The nearest of the face and, where its foot leaves the face, the edge opposite to the smallest
+    # coordinate.
     in_x = 3.0 * ax < m
     in_y = 3.0 * ay < m
     in_z = 3.0 * az < m

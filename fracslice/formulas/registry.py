@@ -1,9 +1,11 @@
-"""One formula, one registration: the scene reader, the kernels, the schema, the docs and the tests follow from it.
+"""One formula, one registration: the scene reader, the kernels, the schema, the docs and the tests follow
+from it.
 
-A *shape* is a distance field ``f(x, y, z, ...)``: negative inside, zero exactly on the surface. A *blend* makes one
-field of the values of others. A *warp* decides at which points its child is evaluated; it is written as a function whose
-first argument is the child. All three are plain functions in the words of `fracslice.formulas.vocabulary`; decorating
-one makes it a `Formula`, and calling a `Formula` makes a `Node` of a scene tree.
+A *shape* is a distance field ``f(x, y, z, ...)``: negative inside, zero exactly on the surface. A *blend*
+makes one field of the values of others. A *warp* decides at which points its child is evaluated; it is
+written as a function whose first argument is the child. All three are plain functions in the words of
+`fracslice.formulas.vocabulary`; decorating one makes it a `Formula`, and calling a `Formula` makes a `Node`
+of a scene tree.
 """
 
 from __future__ import annotations
@@ -23,7 +25,9 @@ Kind = Literal["shape", "blend", "warp"]
 
 @dataclass(frozen=True)
 class Fixed:
-    """An argument that is compiled into the kernel instead of being passed to it: it changes which code is needed."""
+    """An argument that is compiled into the kernel instead of being passed to it: it changes which code is
+    needed.
+    """
 
     value: Any
 
@@ -33,9 +37,11 @@ class Facts:
     """What is known of a field without evaluating it.
 
     box: encloses all points where the field is negative, in the node's own coordinates.
-    lipschitz: L such that the distance from p to the surface is at least ``|f(p)| / L``. For all formulas but the
+    lipschitz: L such that the distance from p to the surface is at least ``|f(p)| / L``. For all formulas but
+    the
         escape-time ones it is more: ``|f(p) - f(q)| <= L |p - q|``.
-    weak: True if inside values are much smaller than the distance to the surface (escape-time fractals), so that the
+    weak: True if inside values are much smaller than the distance to the surface (escape-time fractals), so
+    that the
         inside cannot be recognised from afar.
     """
 
@@ -85,7 +91,9 @@ class Formula:
         least, most = self.children
         for child in children:
             if not isinstance(child, Node):
-                raise SceneError(f"<{self.name}> takes elements such as sphere() inside it, found {child!r:.60}")
+                raise SceneError(
+                    f"<{self.name}> takes elements such as sphere() inside it, found {child!r:.60}"
+                )
         if len(children) < least or (most == 0 and children):
             wanted = "no elements" if most == 0 else f"at least {least} element{'s' if least > 1 else ''}"
             raise SceneError(f"<{self.name}> takes {wanted} inside it, found {len(children)}")
@@ -103,7 +111,8 @@ class Formula:
         return self._hook("slope", hook)
 
     def arguments(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
-        """The function's arguments after the points or values, where they are not the parameters themselves."""
+        """The function's arguments after the points or values, where they are not the parameters themselves.
+        """
         return self._hook("arguments", hook)
 
     def select(self, hook: Callable[[Node], Callable[..., Any]]) -> Callable[[Node], Callable[..., Any]]:
@@ -129,7 +138,8 @@ class Formula:
 
 @dataclass(frozen=True)
 class Node:
-    """A formula with its parameters and children: one element of a scene. Immutable; `place` is "file:line"."""
+    """A formula with its parameters and children: one element of a scene. Immutable; `place` is "file:line".
+    """
 
     formula: Formula
     values: Mapping[str, Any]
@@ -165,11 +175,12 @@ class Node:
     def facts(self) -> Facts:
         """Box, Lipschitz bound and weakness of this field."""
         hooks, below = self.formula.hooks, [child.facts for child in self.children]
-        if "bounds" in hooks:
-            box = hooks["bounds"](self)
-        else:
-            box = below[0].box
-        slope = hooks["slope"](self) if "slope" in hooks else max([self.formula.lipschitz, *(b.lipschitz for b in below)])
+        box = hooks["bounds"](self) if "bounds" in hooks else below[0].box
+        slope = (
+            hooks["slope"](self)
+            if "slope" in hooks
+            else max([self.formula.lipschitz, *(b.lipschitz for b in below)])
+        )
         return Facts(box, slope, self.formula.weak or any(b.weak for b in below))
 
     @property
@@ -212,7 +223,9 @@ def warp(**parameters: Parameter) -> Callable[..., Formula]:
     return _register("warp", (1, 1), parameters)
 
 
-def _register(kind: Kind, children: tuple[int, int | None], parameters: dict[str, Parameter], **known: Any) -> Any:
+def _register(
+    kind: Kind, children: tuple[int, int | None], parameters: dict[str, Parameter], **known: Any
+) -> Callable[..., Formula]:
     def decorate(function: Callable[..., Any]) -> Formula:
         name = function.__name__.rstrip("_")
         formula = Formula(name, kind, function, MappingProxyType(parameters), children, **known)

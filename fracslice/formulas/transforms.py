@@ -15,15 +15,17 @@ from .vocabulary import absolute
 
 @warp(
     translate=Vector((0.0, 0.0, 0.0), "moves by this, last"),
-    rotate=Vector(None, "an axis and an angle in degrees, counter-clockwise seen against the axis", sizes=(4,)),
+    rotate=Vector(
+        None, "an axis and an angle in degrees, counter-clockwise seen against the axis", sizes=(4,)
+    ),
     scale=Vector((1.0,), "one factor, or one per axis, first", sizes=(1, 3)),
     matrix=Vector(None, "3 x 4 or 4 x 4 numbers row by row, applied before the other three", sizes=(12, 16)),
 )
 def transform(child, x, y, z, inverse, shrink):  # type: ignore[no-untyped-def]
     """Scaled, then rotated, then moved.
 
-    The child's field is multiplied by the smallest stretch of the map, its smallest singular value: f never grows faster
-    than the child's, and is a distance where the scale is uniform.
+    The child's field is multiplied by the smallest stretch of the map, its smallest singular value: f never
+    grows faster than the child's, and is a distance where the scale is uniform.
     """
     a, b, c, d, e, f, g, h, i, tx, ty, tz = inverse
     return shrink * child(
@@ -43,7 +45,8 @@ def _rotation(rotate: Sequence[float]) -> np.ndarray:
     axis = np.array(rotate[:3]) / np.linalg.norm(rotate[:3])
     angle = math.radians(rotate[3])
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    turn: np.ndarray = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    return turn
 
 
 def affine(node: Node) -> tuple[np.ndarray, np.ndarray]:
@@ -105,7 +108,11 @@ def _(node: Node) -> Box:
     return Box(tuple(low.tolist()), tuple(high.tolist()))
 
 
-@warp(axis=Axis(REQUIRED, "the axis that is mirrored: what is on its positive side also appears on its negative side"))
+@warp(
+    axis=Axis(
+        REQUIRED, "the axis that is mirrored: what is on its positive side also appears on its negative side"
+    )
+)
 def mirror(child, x, y, z, along_x, along_y):  # type: ignore[no-untyped-def]
     """The half of the element on the axis' positive side, and its mirror image."""
     if along_x:

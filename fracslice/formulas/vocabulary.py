@@ -1,11 +1,11 @@
 """The words a formula may use, with their NumPy meaning.
 
-A formula is a plain function over ``x, y, z``. It is written once, in these words, Python arithmetic, ``for`` and
-``if not any_of(mask): break``. Here the words mean NumPy on arrays (the reference); `fracslice.kernel` gives the same
-names a meaning on SIMD lanes and on CUDA threads.
+A formula is a plain function over ``x, y, z``. It is written once, in these words, Python arithmetic, ``for``
+and ``if not any_of(mask): break``. Here the words mean NumPy on arrays (the reference); `fracslice.kernel`
+gives the same names a meaning on SIMD lanes and on CUDA threads.
 
-Two rules keep one source fast on all of them: branches on points are `where`, never ``if``; float constants are
-written as floats (``2.0 * x``), so that a machine that cares about the width of a literal can set it.
+Two rules keep one source fast on all of them: branches on points are `where`, never ``if``; float constants
+are written as floats (``2.0 * x``), so that a machine that cares about the width of a literal can set it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ def any_of(mask: np.ndarray) -> bool:
 
 def rsqrt(a: np.ndarray) -> np.ndarray:
     """1/sqrt(a) of a positive, finite argument; the lanes have an instruction for it."""
-    return 1.0 / np.sqrt(a)
+    found: np.ndarray = 1.0 / np.sqrt(a)
+    return found
 
 
 def inverse(a: np.ndarray) -> np.ndarray:
@@ -41,9 +42,10 @@ def inverse(a: np.ndarray) -> np.ndarray:
 
 
 def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
-    """Marks a step of an orbit that is r2 = |w|^2 away from the origin where `alive`; only pictures with palettes look."""
+    """Marks a step of an orbit that is r2 = |w|^2 away from the origin where `alive`; only pictures with
+    palettes look.
+    """
 
 
-NAMES = frozenset(
-    "where sqrt rsqrt inverse log exp sin cos atan2 floor minimum maximum absolute any_of".split()
-)  # fmt: skip
+_FUNCTIONS = ("where", "sqrt", "rsqrt", "inverse", "log", "exp", "sin", "cos", "atan2", "floor")
+NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))

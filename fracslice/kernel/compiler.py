@@ -36,9 +36,11 @@ def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> byt
     scope: dict[str, Any] = {name: getattr(lanes, name) for name in NAMES}
     scope |= {"load": lanes.loader(kind), "store": lanes.store, "WIDTH": target.width}
     exec(compile(linked.source, SOURCE, "exec"), scope)
+    options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    inlined = njit(forceinline=True, error_model="numpy", **options)
     for name, value in list(scope.items()):
         if isinstance(value, FunctionType) and value.__code__.co_filename == SOURCE:
-            scope[name] = njit(forceinline=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(value)
+            scope[name] = inlined(value)
     letters = {
         "r": types.CPointer(types.float32 if target.bits == 32 else types.float64),
         "i": types.CPointer(types.int32),
@@ -51,14 +53,16 @@ def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> byt
         try:
             text = _exported(scope[loop.name], signature, loop.name)
         except NumbaError as error:
-            raise KernelError(f"a formula cannot be compiled: {str(error).strip().splitlines()[0]}") from error
+            raise KernelError(
+                f"a formula cannot be compiled: {str(error).strip().splitlines()[0]}"
+            ) from error
         whole.link_in(llvm.parse_assembly(text))
     return bytes(_machine(target).emit_object(whole))
 
 
-def _exported(function: object, signature: object, name: str) -> str:
+def _exported(function: Any, signature: object, name: str) -> str:
     """Optimised LLVM assembly of one C function, under its own name."""
-    compiled = cfunc(signature, error_model="numpy")(function)
+    compiled: Any = cfunc(signature, error_model="numpy")(function)
     text = compiled._library.get_llvm_str()
     module = llvm.parse_assembly(text)
     for f in module.functions:
@@ -74,4 +78,6 @@ def _exported(function: object, signature: object, name: str) -> str:
 
 def _machine(target: Target) -> llvm.TargetMachine:
     triple = llvm.Target.from_triple(llvm.get_process_triple())
-    return triple.create_target_machine(cpu=target.cpu, features=target.features, opt=3, reloc="pic", codemodel="jitdefault", jit=True)
+    return triple.create_target_machine(
+        cpu=target.cpu, features=target.features, opt=3, reloc="pic", codemodel="jitdefault", jit=True
+    )

@@ -1,7 +1,7 @@
 """The CPU back end: a scene's field as machine code, from the cache or compiled once.
 
-A kernel is an object file named by the hash of everything that made it. Loading one needs llvmlite but not Numba, and
-takes milliseconds; its functions are called with the interpreter unlocked, so plain threads scale.
+A kernel is an object file named by the hash of everything that made it. Loading one needs llvmlite but not
+Numba, and takes milliseconds; its functions are called with the interpreter unlocked, so plain threads scale.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class CpuKernel:
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Field values at points.
 
-        x, y, z: arrays of one shape, any float type, scene units. Returns that shape in the kernel's dtype. A point with a
-        NaN gives NaN.
+        x, y, z: arrays of one shape, any float type, scene units. Returns that shape in the kernel's dtype. A
+        point with a NaN gives NaN.
         """
         shape, n = np.shape(x), np.size(x)
         padded = -(-max(n, 1) // self.width) * self.width
@@ -50,18 +50,27 @@ class CpuKernel:
         self._points(self._address(self._parameters), *(row.ctypes.data for row in coordinates), padded)
         return coordinates[3, :n].reshape(shape)
 
-    def bricks(self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray) -> None:
+    def bricks(
+        self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
+    ) -> None:
         """Field values on bricks of 8 x 8 x 8 grid points.
 
-        corners: int32 [n, 3], C-contiguous, the grid index of each brick's first sample. out: [n, 512] of the kernel's
-        dtype, C-contiguous, offset x*64 + y*8 + z. A grid point lies at ``origin + voxel * index``; its value depends on
-        nothing else.
+        corners: int32 [n, 3], C-contiguous, the grid index of each brick's first sample. out: [n, 512] of the
+        kernel's dtype, C-contiguous, offset x*64 + y*8 + z. A grid point lies at ``origin + voxel * index``;
+        its value depends on nothing else.
         """
         assert corners.dtype == np.int32 and corners.flags.c_contiguous and out.flags.c_contiguous
         assert out.dtype == self.dtype and out.shape == (len(corners), 512)
         frame = np.array([*origin, voxel], self.dtype)
         offsets = (row.ctypes.data for row in self._brick_offsets)
-        self._bricks(self._address(self._parameters), frame.ctypes.data, *offsets, corners.ctypes.data, out.ctypes.data, len(corners))
+        self._bricks(
+            self._address(self._parameters),
+            frame.ctypes.data,
+            *offsets,
+            corners.ctypes.data,
+            out.ctypes.data,
+            len(corners),
+        )
 
     @cached_property
     def _brick_offsets(self) -> np.ndarray:
@@ -115,10 +124,13 @@ def _toolchain() -> str:
     return "\n".join([*host(), *versions, *texts])
 
 
-def load_functions(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Callable[..., None]]:
+def load_functions(
+    linked: Linked, bits: int, width: int, loops: Sequence[Loop]
+) -> dict[str, Callable[..., None]]:
     """The C functions of loops over a linked scene, by name: from the cache, or compiled and kept there.
 
-    They take addresses and whole numbers, release the interpreter, and may run in many threads. Raises `KernelError`.
+    They take addresses and whole numbers, release the interpreter, and may run in many threads. Raises
+    `KernelError`.
     """
     parts = [linked.source, *(loop.source for loop in loops), str(bits), str(width), _toolchain()]
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
@@ -134,7 +146,9 @@ def load_functions(linked: Linked, bits: int, width: int, loops: Sequence[Loop])
 
 
 def _keep(path: Path, code: bytes) -> None:
-    """Written beside and renamed, so that two processes cannot spoil it; a folder that cannot be written is no error."""
+    """Written beside and renamed, so that two processes cannot spoil it; a folder that cannot be written is
+    no error.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
@@ -157,6 +171,8 @@ def _functions(code: bytes, loops: Sequence[Loop]) -> dict[str, Callable[..., No
     engine.finalize_object()
     _ENGINES.append(engine)  # the code lives as long as its engine
     return {
-        loop.name: ctypes.CFUNCTYPE(None, *[_C_TYPES[a] for a in loop.arguments])(engine.get_function_address(loop.name))
+        loop.name: ctypes.CFUNCTYPE(None, *[_C_TYPES[a] for a in loop.arguments])(
+            engine.get_function_address(loop.name)
+        )
         for loop in loops
     }

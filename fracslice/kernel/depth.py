@@ -17,8 +17,9 @@ BISECTIONS = 24
 def resolve_depths(root: Node, voxel: float) -> Node:
     """The scene with every automatic depth replaced by a number, for a voxel size in scene units.
 
-    For each fractal by itself: the smallest depth at which one more step would move nine tenths of its surface by less
-    than half a voxel (its own, where a transform scales it). Deeper detail is smaller than the samples can show.
+    For each fractal by itself: the smallest depth at which one more step would move nine tenths of its
+    surface by less than half a voxel (its own, where a transform scales it). Deeper detail is smaller than
+    the samples can show.
     """
     if root.formula.name == "transform":
         voxel = voxel / float(np.linalg.svd(affine(root)[0], compute_uv=False)[-1])
@@ -40,7 +41,8 @@ def _depth(node: Node, voxel: float) -> int:
 
 
 def _surface_points(node: Node) -> np.ndarray:
-    """Points [3, n] on the surface: bisection between random inside and outside points, always the same ones."""
+    """Points [3, n] on the surface: bisection between random inside and outside points, always the same ones.
+    """
     kernel, box = compile_scene(node, "float64"), node.facts.box
     rng = np.random.default_rng(0)
     points = rng.uniform(np.array(box.lo)[:, None], np.array(box.hi)[:, None], (3, PROBES))

@@ -1,8 +1,9 @@
 """SIMD lanes for Numba: the vocabulary of the formulas on vectors of 8 to 64 floats.
 
-A `Lanes` value is one LLVM vector, a `Mask` a vector of booleans. Numba types and links the formulas; everything here is
-emitted as LLVM IR and becomes one or two instructions per register. The only fast-math flag is `contract` (fused
-multiply-add): results do not depend on what surrounds an operation, and NaN and infinity behave.
+A `Lanes` value is one LLVM vector, a `Mask` a vector of booleans. Numba types and links the formulas;
+everything here is emitted as LLVM IR and becomes one or two instructions per register. The only fast-math
+flag is `contract` (fused multiply-add): results do not depend on what surrounds an operation, and NaN and
+infinity behave.
 
 Only compiling needs this module (and Numba); a kernel from the cache does not import it.
 """
@@ -22,7 +23,7 @@ from . import lanes_math
 from .lanes_math import Vec
 
 
-class Lanes(types.Type):  # type: ignore[misc]
+class Lanes(types.Type):
     def __init__(self, bits: int, width: int) -> None:
         self.bits, self.width = bits, width
         super().__init__(f"lanes_f{bits}x{width}")
@@ -32,20 +33,20 @@ class Lanes(types.Type):  # type: ignore[misc]
         return ir.VectorType(ir.FloatType() if self.bits == 32 else ir.DoubleType(), self.width)
 
 
-class Mask(types.Type):  # type: ignore[misc]
+class Mask(types.Type):
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(f"mask_x{width}")
 
 
 @register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Lanes) -> None:
         super().__init__(manager, kind, kind.llvm)
 
 
 @register_model(Mask)
-class _MaskModel(models.PrimitiveModel):  # type: ignore[misc]
+class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Mask) -> None:
         super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.width))
 
@@ -66,7 +67,7 @@ def _lanes_of(args: tuple[Any, ...]) -> Lanes | None:
 
 def _operator(op: Callable[..., Any], emit: Callable[..., Any], to_mask: bool = False) -> None:
     @infer_global(op)
-    class _Template(AbstractTemplate):  # type: ignore[misc]
+    class _Template(AbstractTemplate):
         def generic(self, args: tuple[Any, ...], _: Any) -> Any:
             lanes = _lanes_of(args)
             if lanes:
@@ -89,7 +90,7 @@ for _op in (operator.lt, operator.le, operator.gt, operator.ge, operator.eq):
 
 
 @infer_global(operator.neg)
-class _Negate(AbstractTemplate):  # type: ignore[misc]
+class _Negate(AbstractTemplate):
     def generic(self, args: tuple[Any, ...], _: Any) -> Any:
         return signature(args[0], args[0]) if isinstance(args[0], Lanes) else None
 
@@ -101,7 +102,7 @@ def _negate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 def _mask_operator(op: Callable[..., Any], method: str) -> None:
     @infer_global(op)
-    class _Template(AbstractTemplate):  # type: ignore[misc]
+    class _Template(AbstractTemplate):
         def generic(self, args: tuple[Any, ...], _: Any) -> Any:
             return signature(args[0], *args) if all(isinstance(a, Mask) for a in args) else None
 
@@ -147,7 +148,7 @@ maximum = _function(lanes_math.maximum)
 absolute = _function(lanes_math.absolute)
 
 
-@intrinsic  # type: ignore[misc]
+@intrinsic
 def where(typing: Any, mask: Any, a: Any, b: Any) -> Any:
     lanes = _lanes_of((a, b))
     if not isinstance(mask, Mask) or lanes is None:
@@ -160,7 +161,7 @@ def where(typing: Any, mask: Any, a: Any, b: Any) -> Any:
     return lanes(mask, a, b), generate
 
 
-@intrinsic  # type: ignore[misc]
+@intrinsic
 def any_of(typing: Any, mask: Any) -> Any:
     if not isinstance(mask, Mask):
         return None
@@ -172,11 +173,11 @@ def any_of(typing: Any, mask: Any) -> Any:
     return types.boolean(mask), generate
 
 
-# --- between memory and lanes, for the loops around a field ----------------------------------------------------------
+# --- between memory and lanes, for the loops around a field -------------------------------------------------
 def loader(lanes: Lanes) -> Any:
     """``load(pointer, index) -> lanes``."""
 
-    @intrinsic  # type: ignore[misc]
+    @intrinsic
     def load(typing: Any, pointer: Any, index: Any) -> Any:
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             value = builder.load(_address(builder, args, lanes))
@@ -188,7 +189,7 @@ def loader(lanes: Lanes) -> Any:
     return load
 
 
-@intrinsic  # type: ignore[misc]
+@intrinsic
 def store(typing: Any, pointer: Any, index: Any, value: Any) -> Any:
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         stored = builder.store(args[2], _address(builder, args, value))

@@ -1,8 +1,8 @@
 """Elementary functions on LLVM vectors, float32 and float64, without a mathematics library.
 
-Polynomials and argument reductions are those of fdlibm (Sun Microsystems 1993, "Freely Distributable LIBM") evaluated
-without branches, so every machine gives the same bits. Errors are a few units in the last place over the range that
-formulas use; tests hold them to it.
+Polynomials and argument reductions are those of fdlibm (Sun Microsystems 1993, "Freely Distributable LIBM")
+evaluated without branches, so every machine gives the same bits. Errors are a few units in the last place
+over the range that formulas use; tests hold them to it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ def splat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
     """A scalar in every lane."""
     undefined = ir.Constant(vector, ir.Undefined)
     first = builder.insert_element(undefined, scalar, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(ir.IntType(32), vector.count), None))
+    return builder.shuffle_vector(
+        first, undefined, ir.Constant(ir.VectorType(ir.IntType(32), vector.count), None)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,13 @@ class Vec:
     @property
     def bits(self) -> int:
         element = self.value.type.element
-        return element.width if isinstance(element, ir.IntType) else 32 if isinstance(element, ir.FloatType) else 64
+        return (
+            element.width
+            if isinstance(element, ir.IntType)
+            else 32
+            if isinstance(element, ir.FloatType)
+            else 64
+        )
 
     @property
     def whole(self) -> ir.VectorType:
@@ -224,7 +232,10 @@ def _joined(builder: Any, parts: list[Any]) -> Any:
     return parts[0]
 
 
-_LN2_HI, _LN2_LO = {32: 6.9313812256e-01, 64: 6.93147180369123816490e-01}, {32: 9.0580006145e-06, 64: 1.90821492927058770002e-10}
+_LN2_HI, _LN2_LO = (
+    {32: 6.9313812256e-01, 64: 6.93147180369123816490e-01},
+    {32: 9.0580006145e-06, 64: 1.90821492927058770002e-10},
+)
 _LOG = {
     32: [0.24279078841, 0.28498786688, 0.40000972152, 0.66666662693],
     64: [
@@ -241,7 +252,9 @@ _LOG = {
 
 def log(x: Vec) -> Vec:
     """Natural logarithm of a positive, normal number; infinity and NaN pass through."""
-    mantissa, one, root_half = (23, 0x3F800000, 0x3F3504F3) if x.bits == 32 else (52, 0x3FF << 52, 0x3FE6A09E << 32)
+    mantissa, one, root_half = (
+        (23, 0x3F800000, 0x3F3504F3) if x.bits == 32 else (52, 0x3FF << 52, 0x3FE6A09E << 32)
+    )
     shifted = x.as_whole().plus(one - root_half)
     exponent = shifted.right(mantissa).plus(-(one >> mantissa)).to_real()
     f = shifted.masked((1 << mantissa) - 1).plus(root_half).as_real() - 1.0

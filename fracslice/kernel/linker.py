@@ -1,8 +1,9 @@
 """A whole scene as one self-contained Python module: only what the scene uses, its numbers as arguments.
 
-Every node becomes one function of ``x, y, z, P``. Shapes and blends are called with their arguments taken from the
-parameter array P; `Fixed` arguments are written into a copy of the function, where Python drops the dead branches and
-loops over fixed tuples are unrolled. A warp's copy calls its child by name. Identities are left out.
+Every node becomes one function of ``x, y, z, P``. Shapes and blends are called with their arguments taken
+from the parameter array P; `Fixed` arguments are written into a copy of the function, where Python drops the
+dead branches and loops over fixed tuples are unrolled. A warp's copy calls its child by name. Identities are
+left out.
 
 The text is the same for scenes that differ in numbers only, so editing a value compiles nothing.
 """
@@ -31,7 +32,8 @@ FIELD = "field"
 
 @dataclass(frozen=True)
 class Linked:
-    """A scene as source text, whose function ``field(x, y, z, P)`` is its signed field, and its parameters P."""
+    """A scene as source text, whose function ``field(x, y, z, P)`` is its signed field, and its parameters P.
+    """
 
     source: str
     parameters: np.ndarray = field(compare=False)
@@ -61,7 +63,9 @@ class Linker:
     def node(self, node: Node) -> str:
         """Writes the functions of a node and all below it; returns the name of its own."""
         if AUTO in [v for v in node.values.values() if isinstance(v, str)]:
-            raise KernelError(f"<{node.formula.name}>: the depth is still auto; resolve it for a voxel size first")
+            raise KernelError(
+                f"<{node.formula.name}>: the depth is still auto; resolve it for a voxel size first"
+            )
         if node.is_identity:
             return self.node(node.children[0])
         children = [self.node(child) for child in node.children]
@@ -82,11 +86,20 @@ class Linker:
         place = f"P[{len(self.parameters) - 1}]"
         return f"int({place})" if isinstance(value, int) else place
 
-    def shape(self, name: str, function: Callable[..., Any], fixed: dict, passed: list[str], _: list[str]) -> str:
+    def shape(
+        self, name: str, function: Callable[..., Any], fixed: dict[str, Any], passed: list[str], _: list[str]
+    ) -> str:
         called = self.share(function, fixed)
         return f"def {name}(x, y, z, P):\n    return {called}({', '.join(['x', 'y', 'z', *passed])})"
 
-    def blend(self, name: str, function: Callable[..., Any], fixed: dict, passed: list[str], children: list[str]) -> str:
+    def blend(
+        self,
+        name: str,
+        function: Callable[..., Any],
+        fixed: dict[str, Any],
+        passed: list[str],
+        children: list[str],
+    ) -> str:
         called = self.share(function, fixed)
         lines = [f"def {name}(x, y, z, P):", f"    f = {children[0]}(x, y, z, P)"]
         if len(children) == 1:
@@ -95,7 +108,14 @@ class Linker:
             lines.append(f"    f = {called}({', '.join(['f', f'{child}(x, y, z, P)', *passed])})")
         return "\n".join([*lines, "    return f"])
 
-    def warp(self, name: str, function: Callable[..., Any], fixed: dict, passed: list[str], children: list[str]) -> str:
+    def warp(
+        self,
+        name: str,
+        function: Callable[..., Any],
+        fixed: dict[str, Any],
+        passed: list[str],
+        children: list[str],
+    ) -> str:
         tree = specialised(function, fixed)
         arguments = [a.arg for a in tree.args.args][4:]
         tree.name = name
@@ -106,7 +126,7 @@ class Linker:
         self.helpers(tree, function)
         return ast.unparse(ast.fix_missing_locations(tree))
 
-    def share(self, function: Callable[..., Any], fixed: dict) -> str:
+    def share(self, function: Callable[..., Any], fixed: dict[str, Any]) -> str:
         """Writes a copy of the function with its fixed arguments filled in, once; returns its name."""
         suffix = "".join(f"_{k}_{v}" for k, v in sorted(fixed.items()))
         name = function.__name__ + "".join(c if c.isalnum() else "_" for c in suffix)
@@ -118,7 +138,8 @@ class Linker:
         return name
 
     def bind(self, name: str, function: Callable[..., Any], values: dict[str, Any]) -> None:
-        """Writes ``name(rest..., P)``: the function with `values` taken from P (or fixed), the rest of its arguments open.
+        """Writes ``name(rest..., P)``: the function with `values` taken from P (or fixed), the rest of its
+        arguments open.
 
         A function that has an argument P of its own is passed it.
         """
@@ -127,7 +148,9 @@ class Linker:
         arguments = [a for a in inspect.signature(function).parameters if a not in fixed]
         passed = [self.argument(values[a]) if a in values else a for a in arguments]
         rest = [a for a in arguments if a not in values and a != "P"]
-        self.functions.append(f"def {name}({', '.join([*rest, 'P'])}):\n    return {called}({', '.join(passed)})")
+        self.functions.append(
+            f"def {name}({', '.join([*rest, 'P'])}):\n    return {called}({', '.join(passed)})"
+        )
 
     def text(self) -> str:
         """All that was written, callees first."""
@@ -135,9 +158,11 @@ class Linker:
 
     def helpers(self, tree: ast.FunctionDef, function: Callable[..., Any]) -> None:
         """Writes the functions and fills in the numbers that a function takes from its module."""
-        scope = function.__globals__  # type: ignore[attr-defined]
+        scope = function.__globals__
         names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
-        used = {n.id for n in names if isinstance(n.ctx, ast.Load)} - {n.id for n in names if isinstance(n.ctx, ast.Store)}
+        used = {n.id for n in names if isinstance(n.ctx, ast.Load)} - {
+            n.id for n in names if isinstance(n.ctx, ast.Store)
+        }
         used -= vocabulary.NAMES | self.given
         for name in sorted(used & set(scope)):
             if isinstance(scope[name], FunctionType):
@@ -152,14 +177,17 @@ def _text(function: Callable[..., Any]) -> str:
 
 
 def specialised(function: Callable[..., Any], fixed: dict[str, Any]) -> ast.FunctionDef:
-    """The function's tree without decorators, docstring and hints, its fixed arguments replaced by their values."""
+    """The function's tree without decorators, docstring and hints, its fixed arguments replaced by their
+    values.
+    """
     tree = ast.parse(_text(function)).body[0]
     assert isinstance(tree, ast.FunctionDef)
     tree.decorator_list, tree.returns = [], None
     if ast.get_docstring(tree) is not None:
         tree.body = tree.body[1:]
     tree.args.args = [ast.arg(a.arg) for a in tree.args.args if a.arg not in fixed]
-    return _Prune().visit(_Substitute(fixed).visit(tree))
+    pruned: ast.FunctionDef = _Prune().visit(_Substitute(fixed).visit(tree))
+    return pruned
 
 
 class _Substitute(ast.NodeTransformer):

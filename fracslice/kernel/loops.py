@@ -1,7 +1,8 @@
 """Loops around a field: what a compiled kernel does with it, as source text beside the scene's.
 
-A loop is a Python function in the words of the formulas, which may also call ``field(x, y, z, P)``, ``load(array, i)``
-and ``store(array, i, lanes)``. WIDTH is the number of lanes. Numba compiles it to a C function.
+A loop is a Python function in the words of the formulas, which may also call ``field(x, y, z, P)``,
+``load(array, i)`` and ``store(array, i, lanes)``. WIDTH is the number of lanes. Numba compiles it to a C
+function.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from dataclasses import dataclass
 class Loop:
     """A C function over a field.
 
-    arguments: one letter each: "r" a pointer to the kernel's float type, "i" to int32, "n" a whole number. The first
-    argument is P by convention.
+    arguments: one letter each: "r" a pointer to the kernel's float type, "i" to int32, "n" a whole number.
+    The first argument is P by convention.
     """
 
     name: str

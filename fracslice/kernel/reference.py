@@ -1,4 +1,5 @@
-"""The reference back end: the linked scene on NumPy float64 arrays. Slow, and the oracle of every other one."""
+"""The reference back end: the linked scene on NumPy float64 arrays. Slow, and the oracle of every other one.
+"""
 
 from __future__ import annotations
 

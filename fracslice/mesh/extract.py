@@ -18,9 +18,10 @@ from .model import Mesh
 def extract(bricks: Bricks, threads: int = 0) -> Mesh:
     """The surface of the sampled solid, in scene units, from the samples alone.
 
-    The mesh is closed, an oriented 2-manifold, and does not cross itself, whatever the samples; it stays so when its
-    coordinates are rounded to float32. threads: 0 for all cores; the mesh is the same for any number. Marching cubes
-    (Lorensen and Cline, 1987) with a table without holes or crossings; `marching_cubes.h` has the proof.
+    The mesh is closed, an oriented 2-manifold, and does not cross itself, whatever the samples; it stays so
+    when its coordinates are rounded to float32. threads: 0 for all cores; the mesh is the same for any
+    number. Marching cubes (Lorensen and Cline, 1987) with a table without holes or crossings;
+    `marching_cubes.h` has the proof.
 
     Raises `MeshError` if the samples are not closed, or need more than 2^31 vertices or triangles.
     """
@@ -33,10 +34,11 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
 def contour(root: Node, bricks: Bricks, work: Work | None = None) -> Mesh:
     """The exact surface of a scene, in scene units, its edges and corners sharp.
 
-    root: the scene that `bricks` were sampled from. Every vertex on a grid edge is moved along it to the zero set of the
-    float64 field; where the normals in a cell differ, a vertex is put where their planes meet. Closed, an oriented
-    2-manifold, and free of crossings like `extract`; `contour.h` has the proof. After Ho, Wu, Chen, Chuang and Ouhyoung
-    2005, "Cubical Marching Squares". Raises `MeshError` as `extract`, and `Cancelled`.
+    root: the scene that `bricks` were sampled from. Every vertex on a grid edge is moved along it to the zero
+    set of the float64 field; where the normals in a cell differ, a vertex is put where their planes meet.
+    Closed, an oriented 2-manifold, and free of crossings like `extract`; `contour.h` has the proof. After Ho,
+    Wu, Chen, Chuang and Ouhyoung 2005, "Cubical Marching Squares". Raises `MeshError` as `extract`, and
+    `Cancelled`.
     """
     from .._native import contour as build
     from .._native import crossed_edges
@@ -54,8 +56,8 @@ def contour(root: Node, bricks: Bricks, work: Work | None = None) -> Mesh:
 def clamp(bricks: Bricks) -> float:
     """How near a grid point a vertex may come, as a share of a voxel, so that no two are one in float32.
 
-    Vertices of one cell differ by at least that share along some axis; four float32 steps survive any rounding.
-    Raises `MeshError` where float32 has no such steps.
+    Vertices of one cell differ by at least that share along some axis; four float32 steps survive any
+    rounding. Raises `MeshError` where float32 has no such steps.
     """
     low = np.asarray(bricks.origin, dtype=np.float64)
     high = low + bricks.voxel * 8 * np.asarray(bricks.index.shape)

@@ -80,7 +80,8 @@ def triangulations(loop: Loop) -> Iterator[list[Triangle]]:
 def place(t: np.ndarray) -> np.ndarray:
     """Positions [samples, 12, 3] of the crossings at t [samples, 12]."""
     low, high = (CORNERS[[ENDS[e][k] for e in range(12)]] for k in range(2))
-    return low + t[..., None] * (high - low)
+    positions: np.ndarray = low + t[..., None] * (high - low)
+    return positions
 
 
 def samples(count: int = 6000) -> np.ndarray:
@@ -94,13 +95,17 @@ def samples(count: int = 6000) -> np.ndarray:
 def above(p: np.ndarray, a: int, b: int, c: int, d: int) -> np.ndarray:
     """Whether the point d lies on the side of triangle abc that its normal shows to, for every sample."""
     normal = np.cross(p[:, b] - p[:, a], p[:, c] - p[:, a])
-    return np.einsum("ij,ij->i", normal, p[:, d] - p[:, a]) > 0
+    side: np.ndarray = np.einsum("ij,ij->i", normal, p[:, d] - p[:, a]) > 0
+    return side
 
 
 def pierces(p: np.ndarray, ends: tuple[int, int], triangle: Triangle) -> np.ndarray:
     (a, b, c), (d, e) = triangle, ends
     turns = [above(p, d, e, u, v) for u, v in ((a, b), (b, c), (c, a))]
-    return (above(p, a, b, c, d) != above(p, a, b, c, e)) & (turns[0] == turns[1]) & (turns[1] == turns[2])
+    parted: np.ndarray = above(p, a, b, c, d) != above(p, a, b, c, e)
+    around: np.ndarray = (turns[0] == turns[1]) & (turns[1] == turns[2])
+    pierced: np.ndarray = parted & around
+    return pierced
 
 
 def meet(p: np.ndarray, first: Triangle, second: Triangle) -> bool:

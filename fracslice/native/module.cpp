@@ -1,4 +1,4 @@
-// The extension module fracslice._native. Its Python face and its documentation are in _native.pyi.
+// The extension module fracslice._native. Its Python face and its documentation are in ../_native.pyi.
 #include <tbb/task_arena.h>
 
 #include "contour.h"

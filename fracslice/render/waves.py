@@ -95,8 +95,8 @@ def follow_STEP(W, I, n, m, limit, P):
         store(W, @stride, stride)
         store(W, @done, done)
 """
-"""Follows n rays until all have hit, left or used up their steps. A ray has left where it is known to be free,
-not where an over-relaxed step took it. Lanes without a ray stand far away."""
+"""Follows n rays until all have hit, left or used up their steps. A ray has left where it is known to be
+free, not where an over-relaxed step took it. Lanes without a ray stand far away."""
 
 BEGIN = """
 def begin(W, m, P):

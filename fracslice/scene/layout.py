@@ -63,7 +63,8 @@ SOLID = Section(
     (1, None),
 )
 PICTURE = [
-    Section(part.element, part.__doc__ or "", MappingProxyType(part.kinds()), part=part, many=part.many) for part in PARTS
+    Section(part.element, part.__doc__ or "", MappingProxyType(part.kinds()), part=part, many=part.many)
+    for part in PARTS
 ]
 SECTIONS = {section.name: section for section in (SOLID, *PICTURE)}
 

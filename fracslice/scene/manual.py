@@ -89,12 +89,17 @@ def prose(doc: str) -> str:
     return inspect.cleandoc(doc)
 
 
+def summary(doc: str) -> str:
+    """The first paragraph of a docstring, on one line."""
+    return " ".join(doc.split("\n\n")[0].split())
+
+
 def overview() -> str:
-    """Every formula with the first line of its documentation, as plain text."""
+    """Every formula with the summary of its documentation, as plain text."""
     lines = []
     for kind, (title, _) in _GROUPS.items():
         members = [formula for formula in formulas() if formula.kind == kind]
-        lines += [f"{title}:", *(f"  {f.name:<13} {prose(f.doc).splitlines()[0]}" for f in members), ""]
+        lines += [f"{title}:", *(f"  {f.name:<13} {summary(f.doc)}" for f in members), ""]
     return "\n".join(lines[:-1])
 
 

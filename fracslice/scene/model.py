@@ -27,15 +27,15 @@ TOO_DEEP = f"is nested too deeply: expected at most {DEEPEST} elements inside ea
 class Scene:
     """One solid, how large to make it, and how to look at it.
 
-    root: the tree of formulas. size_mm: the longest side of the finished object. name: a label, not content. view: for
-    pictures; meshes do not depend on it.
+    root: the tree of formulas. size_mm: the longest side of the finished object. name: a label, not content.
+    view: for pictures; meshes do not depend on it.
     Raises `SceneError` for a tree that makes no sense as a whole: a twist of something unbounded, say.
     """
 
     root: Node
     size_mm: float
     name: str = field(default="scene", compare=False)
-    view: View = View()
+    view: View = field(default_factory=View)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size_mm", parse_length(self.size_mm, "size"))

@@ -83,7 +83,9 @@ def _relit(view: View, setting: Setting) -> View:
         meant = part.element == section.name and setting.number in (None, counted)
         found.append(replace(part, **{setting.attribute: setting.value(section)}) if meant else part)
     if not counted or not 1 <= (setting.number or 1) <= counted:
-        raise setting.fail(f"the scene has {counted or 'no'} <{section.name}>{', counted from 1' if counted else ''}")
+        raise setting.fail(
+            f"the scene has {counted or 'no'} <{section.name}>{', counted from 1' if counted else ''}"
+        )
     return View.of(found)
 
 

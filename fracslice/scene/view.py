@@ -231,7 +231,7 @@ class View:
             for part in (self.camera, self.film, self.fog, self.shading)
             if part not in (None, Film(), Shading())
         ]
-        return (*single, *self.lights)  # type: ignore[arg-type]
+        return (*single, *self.lights)
 
 
 PARTS: tuple[type[Part], ...] = (Camera, Film, Light, Fog, Shading)

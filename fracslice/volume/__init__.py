@@ -14,13 +14,23 @@ from .extent import Extent, extent
 from .lattice import Lattice
 from .sampler import sample
 
-__all__ = ["Bricks", "Extent", "Lattice", "Plan", "extent", "plan", "resolve_depths", "sample", "sample_scene"]
+__all__ = [
+    "Bricks",
+    "Extent",
+    "Lattice",
+    "Plan",
+    "extent",
+    "plan",
+    "resolve_depths",
+    "sample",
+    "sample_scene",
+]
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is about to be sampled: the scene with all depths known, the object's box, a box that surely encloses it, and
-    the voxel, all in scene units."""
+    """What is about to be sampled: the scene with all depths known, the object's box, a box that surely
+    encloses it, and the voxel, all in scene units."""
 
     root: Node
     box: Box

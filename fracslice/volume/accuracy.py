@@ -15,8 +15,9 @@ REACH = 1e-4
 def surface_error(root: Node, points: np.ndarray, voxel: float, work: Work | None = None) -> np.ndarray:
     """Distances of points from the zero set to first order, ``|f| / |grad f|``.
 
-    points: float [n, 3], scene units; voxel: scene units. Returns float64 [n], scene units, at most a voxel each (where
-    the gradient vanishes or jumps it says nothing more). By the float64 kernel, with central differences.
+    points: float [n, 3], scene units; voxel: scene units. Returns float64 [n], scene units, at most a voxel
+    each (where the gradient vanishes or jumps it says nothing more). By the float64 kernel, with central
+    differences.
     """
     kernel, h = compile_scene(root, "float64"), REACH * voxel
     error = np.empty(len(points))

@@ -14,16 +14,16 @@ class Bricks:
     """Samples of a signed field on the grid points near its zero set.
 
     origin: position of grid point (0, 0, 0), scene units. voxel: spacing, scene units.
-    ijk: int32 [n, 3], C-contiguous: grid index of each brick's first sample, multiples of 8, in lexicographic order.
-    values: float32 [n, 512], offset x*64 + y*8 + z; negative inside, never NaN.
+    ijk: int32 [n, 3], C-contiguous: grid index of each brick's first sample, multiples of 8, in lexicographic
+    order. values: float32 [n, 512], offset x*64 + y*8 + z; negative inside, never NaN.
     index: int32 [bx, by, bz]: the row of each brick, or `OUTSIDE` or `INSIDE` where no sample is needed.
 
-    No sign change crosses a face between a brick with samples and one without, or between two without; all beyond
-    `index` is outside. So the surface is closed and wholly within the samples.
+    No sign change crosses a face between a brick with samples and one without, or between two without; all
+    beyond `index` is outside. So the surface is closed and wholly within the samples.
 
-    evaluations: how many times the field was evaluated, probing included. audited: points that were looked at outside the
-    samples, to test the bounds that pruning relies on. repaired: bricks that a violated bound would have lost, found by
-    the audit or the closure rule, and sampled.
+    evaluations: how many times the field was evaluated, probing included. audited: points that were looked at
+    outside the samples, to test the bounds that pruning relies on. repaired: bricks that a violated bound
+    would have lost, found by the audit or the closure rule, and sampled.
     """
 
     origin: tuple[float, float, float]

@@ -1,7 +1,7 @@
 """Where exactly the surface crosses the grid's edges, and its normals there.
 
-A vertex moves along its own grid edge only, strictly between the edge's ends, so refining cannot fold or pierce a mesh
-whose triangles stay in their cells.
+A vertex moves along its own grid edge only, strictly between the edge's ends, so refining cannot fold or
+pierce a mesh whose triangles stay in their cells.
 """
 
 from __future__ import annotations
@@ -69,7 +69,9 @@ def crossings(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, n):
         store(NZ, i, gz * over)
 """,
 )
-"""Illinois' false position (Dowell and Jarratt 1971), each third step a bisection; normals by tetrahedral differences."""
+"""Illinois' false position (Dowell and Jarratt 1971), each third step a bisection; normals by tetrahedral
+differences.
+"""
 
 PRECISION = 1e-8
 """A root is where |f| is this part of a voxel."""
@@ -80,7 +82,9 @@ REACH = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """t: float64 [n], where along each grid edge the surface crosses it. normals: float64 [n, 3], outward, unit."""
+    """t: float64 [n], where along each grid edge the surface crosses it. normals: float64 [n, 3], outward,
+    unit.
+    """
 
     t: np.ndarray
     normals: np.ndarray
@@ -96,8 +100,8 @@ def refine_crossings(
 ) -> Crossings:
     """The exact crossings of grid edges whose ends have opposite signs, by the float64 kernel.
 
-    ijk: int32 [n, 3], the lower grid point of each edge; axis: uint8 [n]. Where the float64 field does not change its sign
-    (it is smaller than float32 can tell at one end) t is that end.
+    ijk: int32 [n, 3], the lower grid point of each edge; axis: uint8 [n]. Where the float64 field does not
+    change its sign (it is smaller than float32 can tell at one end) t is that end.
     """
     linked = link(root)
     width = lane_count(64)

@@ -18,7 +18,8 @@ FIRST = 16
 LEVELS = 9
 GROWTHS = 6
 MOST = 100_000
-"""Cells of the last level. A flat face has ever more of them; then its place is known a little less exactly."""
+"""Cells of the last level. A flat face has ever more of them; then its place is known a little less exactly.
+"""
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,13 @@ class Extent:
 
 
 def extent(kernel: CpuKernel, facts: Facts, work: Work | None = None) -> Extent:
-    """The box of the points where the field is negative, its faces to about 1/4000 of the longest side; 1/500 if flat.
+    """The box of the points where the field is negative, its faces to about 1/4000 of the longest side; 1/500
+    if flat.
 
-    Cells that cannot be inside (``f > L * half diagonal``), or that do not reach beyond an inside point known already, are
-    dropped; the rest are cut in eight. The box that the formulas promise is doubled as long as the object reaches its
-    border (an offset or smooth union of a field that underestimates distances can). Raises `VolumeError` if nothing is
-    inside, or the object has no end.
+    Cells that cannot be inside (``f > L * half diagonal``), or that do not reach beyond an inside point known
+    already, are dropped; the rest are cut in eight. The box that the formulas promise is doubled as long as
+    the object reaches its border (an offset or smooth union of a field that underestimates distances can).
+    Raises `VolumeError` if nothing is inside, or the object has no end.
     """
     box = facts.box
     if box.empty:
@@ -72,7 +74,7 @@ def _search(kernel: CpuKernel, facts: Facts, box: Box, work: Work) -> Extent | N
         reach = step[:, None] / 2
         beyond = ((centres + reach > hi[:, None]) | (centres - reach < lo[:, None])).any(0)
         centres = centres[:, possible & beyond]
-        if level == LEVELS - 1 or 8 * centres.shape[1] > MOST and level > 3:
+        if level == LEVELS - 1 or (8 * centres.shape[1] > MOST and level > 3):
             break
         centres = (centres[:, :, None] + offsets * step[:, None, None]).reshape(3, -1)
         step = step / 2

@@ -52,7 +52,9 @@ def from_grid(grid: Grid) -> Bricks:
 def write_vdb(
     bricks: Bricks, path: str | os.PathLike[str], metadata: Mapping[str, str] | None = None
 ) -> None:
-    """Writes a .vdb file with one grid, `NAME`, and text beside it. Raises `VolumeError` if not all could be written."""
+    """Writes a .vdb file with one grid, `NAME`, and text beside it. Raises `VolumeError` if not all could be
+    written.
+    """
     grid = to_grid(bricks)
     try:
         grid.write(os.fspath(path), dict(metadata or {}))
@@ -61,7 +63,8 @@ def write_vdb(
 
 
 def read_vdb(path: str | os.PathLike[str], name: str = "") -> Bricks:
-    """The bricks of the float grid called `name` in a .vdb file, or of the first one. Raises `VolumeError`."""
+    """The bricks of the float grid called `name` in a .vdb file, or of the first one. Raises `VolumeError`.
+    """
     from .._native import Grid
 
     try:

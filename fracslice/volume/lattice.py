@@ -25,13 +25,17 @@ class Lattice:
 
     @classmethod
     def around(cls, box: Box, voxel: float) -> Lattice:
-        """The lattice whose middle is the box' middle. Raises `VolumeError` if it would have too many points."""
+        """The lattice whose middle is the box' middle. Raises `VolumeError` if it would have too many points.
+        """
         if not (math.isfinite(voxel) and voxel > 0):
             raise VolumeError(f"voxel size {voxel!r}: expected a length > 0")
         counts = [math.ceil((s / voxel + 2 * PADDING + 1) / BRICK) for s in box.size]
         if math.prod(counts) > MOST_BRICKS:
             fits = voxel * (math.prod(counts) / MOST_BRICKS) ** (1 / 3)
-            raise VolumeError(f"a voxel of {voxel:.4g} makes a grid of {_shape(counts)} bricks; the finest that fits is {fits:.4g}")
+            raise VolumeError(
+                f"a voxel of {voxel:.4g} makes a grid of {_shape(counts)} bricks; "
+                f"the finest that fits is {fits:.4g}"
+            )
         start = [c - voxel * (n * BRICK - 1) / 2 for c, n in zip(box.centre, counts, strict=True)]
         return cls((start[0], start[1], start[2]), voxel, (counts[0], counts[1], counts[2]))
 

@@ -1,14 +1,15 @@
 """Sparse sampling: from a distance field to bricks that hold its whole surface and little else.
 
-Top down, a cell is dropped when the field at its centre says that no sign change is in it or within a voxel of it:
-``|f| > L * (half diagonal + voxel)``. What remains at brick size are candidates. They are sampled from the outside in: a
-candidate next to empty space, or whose centre is outside, is sampled; then every neighbour that a sampled brick shows an
-outside sample to, until none is left. The inside of an escape-time fractal, which costs every iteration and cannot be
-recognised from afar, is so never entered beyond its first layer.
+Top down, a cell is dropped when the field at its centre says that no sign change is in it or within a voxel
+of it: ``|f| > L * (half diagonal + voxel)``. What remains at brick size are candidates. They are sampled from
+the outside in: a candidate next to empty space, or whose centre is outside, is sampled; then every neighbour
+that a sampled brick shows an outside sample to, until none is left. The inside of an escape-time fractal,
+which costs every iteration and cannot be recognised from afar, is so never entered beyond its first layer.
 
-The same rule is a safety net: where a sign change would leave the samples, the neighbour is sampled too, whatever the
-bound said. A second one is the audit: grid points at random in what was not sampled, one in every brick beside the
-samples and many of the rest; where the sign is not the one assumed, sampling goes on from there. All results depend on the field only, not on threads or order.
+The same rule is a safety net: where a sign change would leave the samples, the neighbour is sampled too,
+whatever the bound said. A second one is the audit: grid points at random in what was not sampled, one in
+every brick beside the samples and many of the rest; where the sign is not the one assumed, sampling goes on
+from there. All results depend on the field only, not on threads or order.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ FAR_AUDITS = 1 << 15
 def sample(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> Bricks:
     """Samples a scene's field around its surface.
 
-    kernel: the scene's float32 kernel. facts: the scene's facts, whose Lipschitz bound prunes. Raises `VolumeError` if
-    there is no surface, or if it leaves the lattice; `Cancelled`.
+    kernel: the scene's float32 kernel. facts: the scene's facts, whose Lipschitz bound prunes. Raises
+    `VolumeError` if there is no surface, or if it leaves the lattice; `Cancelled`.
     """
     run = _Run(kernel, facts, lattice, work or Work())
     state, outside = run.probe()
@@ -63,7 +64,7 @@ class _Run:
     signs: list[np.ndarray] = field(default_factory=list)
     values: list[np.ndarray] = field(default_factory=list)
 
-    # --- top down ---------------------------------------------------------------------------------------------------
+    # --- top down -------------------------------------------------------------------------------------------
     def probe(self) -> tuple[np.ndarray, np.ndarray]:
         """state uint8 [bx, by, bz] of every brick, and a bool array: candidates whose centre is outside."""
         state = np.full(self.lattice.bricks, EMPTY, np.uint8)
@@ -115,7 +116,7 @@ class _Run:
         self.repaired += int(wrong.sum())
         return np.argwhere(candidate | wrong).astype(np.int32)
 
-    # --- outside in -------------------------------------------------------------------------------------------------
+    # --- outside in -----------------------------------------------------------------------------------------
     def explore(self, state: np.ndarray, front: np.ndarray) -> None:
         """Samples the front, then what it shows a sign change to, until the samples are closed."""
         while len(front):
@@ -135,10 +136,13 @@ class _Run:
         size = BRICK // 2
         middle = _grid(2, 2, 2) * size + (size - 1) / 2
         f = self.values_at((bricks[:, None] * BRICK + middle).reshape(-1, 3)).reshape(-1, 8)
-        return (f > self.reach(size)).all(1)
+        empty: np.ndarray = np.all(f > self.reach(size), axis=1)
+        return empty
 
     def reach(self, size: int) -> float:
-        """The least |f| at the centre of a cell of `size` samples that leaves no sign change within a voxel of it."""
+        """The least |f| at the centre of a cell of `size` samples that leaves no sign change within a voxel
+        of it.
+        """
         return self.facts.lipschitz * float(np.sqrt(3)) * self.lattice.voxel * (size + 1) / 2
 
     def sampled(self, bricks: np.ndarray) -> np.ndarray:
@@ -177,13 +181,14 @@ class _Run:
         return np.concatenate(found)
 
     def audit(self, state: np.ndarray, turn: int) -> np.ndarray:
-        """Bricks without samples that have a sample of the other sign than assumed; always the same points."""
+        """Bricks without samples that have a sample of the other sign than assumed; always the same points.
+        """
         rng = np.random.default_rng(turn)
         bare = state != QUEUED
         near = np.argwhere(bare & _beside(~bare, False))
         far = np.flatnonzero(bare)
-        far = np.unravel_index(rng.choice(far, min(FAR_AUDITS, len(far)), replace=False), state.shape)
-        bricks = np.concatenate([near, np.stack(far, 1)]).astype(np.int32)
+        chosen = np.unravel_index(rng.choice(far, min(FAR_AUDITS, len(far)), replace=False), state.shape)
+        bricks = np.concatenate([near, np.stack(chosen, 1)]).astype(np.int32)
         points = bricks * BRICK + rng.integers(0, BRICK, bricks.shape)
         inside = self.values_at(points) < 0
         wrong = inside != (state[tuple(bricks.T)] != EMPTY)
@@ -191,7 +196,7 @@ class _Run:
         self.repaired += int(wrong.sum())
         return np.unique(bricks[wrong], axis=0)
 
-    # --- the result -------------------------------------------------------------------------------------------------
+    # --- the result -----------------------------------------------------------------------------------------
     def finished(self, state: np.ndarray) -> Bricks:
         """The bricks that a crossing edge touches, in order."""
         ijk = np.concatenate([np.empty((0, 3), np.int32), *self.corners])
@@ -214,12 +219,14 @@ class _Run:
         )
 
     def crossed(self, bricks: np.ndarray, signs: np.ndarray, index: np.ndarray) -> np.ndarray:
-        """Which sampled bricks have a sign change in them or to a neighbour; the others' sign is written to `index`."""
+        """Which sampled bricks have a sign change in them or to a neighbour; the others' sign is written to
+        `index`.
+        """
         any_in, any_out = (signs != 0).any((1, 2)), (signs != 255).any((1, 2))
         index[tuple(bricks.T)] = np.where(any_in, INSIDE, OUTSIDE)
         row = np.full(index.shape, -1, np.int32)
         row[tuple(bricks.T)] = np.arange(len(bricks))
-        kept = any_in & any_out
+        kept: np.ndarray = any_in & any_out
         for axis, step in _FACES:
             beside = bricks + step * np.eye(3, dtype=np.int32)[axis]
             within = (beside[:, axis] >= 0) & (beside[:, axis] < index.shape[axis])
@@ -250,7 +257,8 @@ def _grid(*shape: int) -> np.ndarray:
 
 
 def _face(signs: np.ndarray, axis: int, step: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of sign bits [n, 8, 8]: whether the outermost layer on one side has inside samples, and outside ones."""
+    """Of sign bits [n, 8, 8]: whether the outermost layer on one side has inside samples, and outside ones.
+    """
     if axis == 2:
         bit = np.uint8(128 if step > 0 else 1)
         layer = signs & bit
@@ -263,11 +271,14 @@ def _around(state: np.ndarray, bricks: np.ndarray) -> np.ndarray:
     """The candidates on the faces of bricks."""
     near = np.concatenate([bricks + step * np.eye(3, dtype=np.int32)[axis] for axis, step in _FACES])
     near = near[((near >= 0) & (near < state.shape)).all(1)]
-    return near[state[tuple(near.T)] == CANDIDATE]
+    found: np.ndarray = near[state[tuple(near.T)] == CANDIDATE]
+    return found
 
 
 def _beside(cells: np.ndarray, beyond: bool) -> np.ndarray:
-    """Which cells of a boolean grid have a true neighbour on a face; `beyond` stands for what is outside the grid."""
+    """Which cells of a boolean grid have a true neighbour on a face; `beyond` stands for what is outside the
+    grid.
+    """
     padded = np.pad(cells, 1, constant_values=beyond)
     found = np.zeros_like(cells)
     for axis in range(3):

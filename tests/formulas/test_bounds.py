@@ -1,4 +1,6 @@
-"""What a formula promises of itself: its box, its Lipschitz bound, its sign; and that random trees of them keep it."""
+"""What a formula promises of itself: its box, its Lipschitz bound, its sign; and that random trees of them
+keep it.
+"""
 
 from __future__ import annotations
 
@@ -100,7 +102,12 @@ LEAVES = st.one_of(
     st.builds(lambda r, t: torus(radius=r, tube=t), lengths(), lengths(0.05, 0.3)),
     st.builds(lambda r, h: cylinder(radius=r, height=h), lengths(), lengths()),
     st.builds(lambda r, h: cone(radius=r, height=h), lengths(), lengths()),
-    st.builds(lambda a, b, r: capsule(**{"from": a, "to": b, "radius": r}), triples(-1, 1), triples(-1, 1), lengths(0.05, 0.4)),
+    st.builds(
+        lambda a, b, r: capsule(**{"from": a, "to": b, "radius": r}),
+        triples(-1, 1),
+        triples(-1, 1),
+        lengths(0.05, 0.4),
+    ),
     st.builds(lambda r: octahedron(radius=r), lengths()),
     st.builds(lambda n: menger(level=n), st.integers(0, 3)),
 )
@@ -127,7 +134,11 @@ def operators(child: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
         st.builds(lambda a, axis, d: twist(a, axis=axis, degrees=d), child, AXES, lengths(-120, 120)),
         st.builds(lambda a, p: repeat(a, period=p, count=(2, 1, 3)), child, triples(1.5, 3)),
         st.builds(lambda a: bounds(a, min=(-0.6, -0.5, -0.4), max=(0.5, 0.6, 0.7)), child),
-        st.builds(lambda a, axis: bend(bounds(a, min=(-0.5,) * 3, max=(0.5,) * 3), axis=axis, degrees=40), child, AXES),
+        st.builds(
+            lambda a, axis: bend(bounds(a, min=(-0.5,) * 3, max=(0.5,) * 3), axis=axis, degrees=40),
+            child,
+            AXES,
+        ),
     )
 
 
@@ -145,7 +156,8 @@ def test_random_trees_keep_their_bounds(root: Node) -> None:
         return  # a repetition denser than it may be
     assert worst_slope(root, count=2000) <= 1 + 1e-9
     if any(node.values.get("smooth") for node in root.walk()):
-        return  # a seam between fields that underestimate distances may leave the box; extent() widens it then
+        # A seam between fields that underestimate distances may leave the box; extent() widens it then.
+        return
     points = np.random.default_rng(3).uniform(-3, 3, (3, 4000))
     inside = points[:, reference(root)(*points) < 0]
     if inside.size:
@@ -155,7 +167,9 @@ def test_random_trees_keep_their_bounds(root: Node) -> None:
 
 @pytest.mark.parametrize("power", [2, 3, 4, 5, 8, 9])
 def test_the_mandelbulbs_derivative_bounds_its_growth(power: int) -> None:
-    """|grad log |w_1|| <= 1/|w_1| (n r^(n-1) max(1, |sin n t / sin t|) + 1): one step from outside, by differences."""
+    """|grad log |w_1|| <= 1/|w_1| (n r^(n-1) max(1, |sin n t / sin t|) + 1): one step from outside, by
+    differences.
+    """
     from fracslice.formulas import mandelbulb
 
     rng = np.random.default_rng(4)

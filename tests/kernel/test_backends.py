@@ -9,7 +9,8 @@ from fracslice.formulas import mandelbulb, sphere
 from fracslice.kernel import compile_scene, link, reference
 from tests.examples import EXAMPLES
 
-# Largest error in units of the last place of the largest coordinate, times the conditioning of the longest orbit.
+# Largest error in units of the last place of the largest coordinate, times the conditioning of the longest
+# orbit.
 TOLERANCE = {"float32": 2e-5, "float64": 1e-13}
 PRECISIONS = ["float32", "float64"]
 
@@ -54,7 +55,9 @@ class TestAgainstTheReference:
         bad = np.array([(np.nan, 0, 0), (0, np.nan, 0), (0, 0, np.nan), (np.nan,) * 3], float).T
         assert np.isnan(kernel.points(*bad)).all()
         if EXAMPLES[name].facts.box.finite:
-            endless = np.array([(np.inf, 0, 0), (0, -np.inf, 0), (0, 0, np.inf), (np.inf, np.inf, -np.inf)], float).T
+            endless = np.array(
+                [(np.inf, 0, 0), (0, -np.inf, 0), (0, 0, np.inf), (np.inf, np.inf, -np.inf)], float
+            ).T
             assert not (kernel.points(*endless) < 0).any()
 
     def test_a_value_depends_on_its_point_alone(self, name: str, precision: str) -> None:
@@ -92,6 +95,9 @@ def test_second_process_compiles_nothing(tmp_path, monkeypatch) -> None:  # type
         "import sys; from fracslice.formulas import julia; from fracslice.kernel import compile_scene;"
         "compile_scene(julia(iterations=5)).points([0.1], [0.2], [0.3]); print('numba' in sys.modules)"
     )
-    runs = [subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout for _ in range(2)]
+    runs = [
+        subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
     assert [r.strip() for r in runs] == ["True", "False"]
     assert len(list(tmp_path.iterdir())) == 1

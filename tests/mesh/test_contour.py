@@ -1,4 +1,6 @@
-"""Exact surfaces: vertices on the zero set, edges and corners where they are, and a manifold whatever it is given."""
+"""Exact surfaces: vertices on the zero set, edges and corners where they are, and a manifold whatever it is
+given.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,18 @@ import pytest
 from fracslice._native import contour as build
 from fracslice._native import crossed_edges
 from fracslice.errors import MeshError
-from fracslice.formulas import Node, box, difference, julia, menger, octahedron, sphere, torus, transform, union
+from fracslice.formulas import (
+    Node,
+    box,
+    difference,
+    julia,
+    menger,
+    octahedron,
+    sphere,
+    torus,
+    transform,
+    union,
+)
 from fracslice.kernel import reference
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check
@@ -42,7 +55,7 @@ def test_julia_without_a_constant_is_a_sphere() -> None:
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) / 2 ** (1 / 4096) - 1).max() < 1e-6
 
 
-@pytest.mark.parametrize("level, resolution", [(0, 40.3), (1, 47.9), (2, 61.7), (3, 101.3)])
+@pytest.mark.parametrize(("level", "resolution"), [(0, 40.3), (1, 47.9), (2, 61.7), (3, 101.3)])
 def test_menger(level: int, resolution: float) -> None:
     """Volume 8 (20/27)^n and area 8 (20/9)^n + 16 (8/9)^n, whatever the voxel is to the cells."""
     mesh = made(menger(level=level), resolution)
@@ -52,13 +65,17 @@ def test_menger(level: int, resolution: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "root, volume, area",
+    ("root", "volume", "area"),
     [
         (box(size=(1, 2, 0.7)), 1.4, 8.2),
         (transform(box(size=(1, 1.3, 0.8)), rotate=(1, 2, 3, 37)), 1.04, 6.28),
         (octahedron(radius=1), 4 / 3, 4 * np.sqrt(3)),
         (torus(radius=1, tube=0.3), 2 * np.pi**2 * 0.09, 4 * np.pi**2 * 0.3),
-        (difference(box(size=(2, 2, 2)), sphere(radius=0.7)), 8 - 4 / 3 * np.pi * 0.343, 24 + 4 * np.pi * 0.49),
+        (
+            difference(box(size=(2, 2, 2)), sphere(radius=0.7)),
+            8 - 4 / 3 * np.pi * 0.343,
+            24 + 4 * np.pi * 0.49,
+        ),
     ],
 )
 def test_known_volumes_and_areas(root: Node, volume: float, area: float) -> None:
@@ -126,13 +143,17 @@ def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
 def test_the_wrong_number_of_crossings_is_refused() -> None:
     bricks = noise(0)
     with pytest.raises(ValueError, match="crossings"):
-        build(bricks.ijk, bricks.values, bricks.index, np.zeros(3), np.zeros((3, 3)), (0.0, 0.0, 0.0), 1.0, 1e-3)
+        build(
+            bricks.ijk, bricks.values, bricks.index, np.zeros(3), np.zeros((3, 3)), (0.0, 0.0, 0.0), 1.0, 1e-3
+        )
 
 
 def test_open_samples_are_refused() -> None:
     bricks = noise(0)
     index = bricks.index.copy()
     index[0, 0, 0] = -1
-    open_bricks = Bricks(bricks.origin, 1.0, bricks.ijk[1:], bricks.values[1:], np.where(index > 0, index - 1, index))
+    open_bricks = Bricks(
+        bricks.origin, 1.0, bricks.ijk[1:], bricks.values[1:], np.where(index > 0, index - 1, index)
+    )
     with pytest.raises(MeshError, match="not closed"):
         contour(sphere(), open_bricks)

@@ -1,4 +1,5 @@
-"""Marching cubes: closed, manifold and without crossings whatever the samples, and right where it is known."""
+"""Marching cubes: closed, manifold and without crossings whatever the samples, and right where it is known.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fracslice._native import marching_cubes, open_edges
 
+from fracslice._native import marching_cubes, open_edges
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.crossings import crossing_triangles

@@ -122,7 +122,8 @@ def test_wrong_sizes(size):
         ("<scene version='1'/>", "f.xml:1: <scene> expected <solid> inside it"),
         (
             "<scene version='1'><box/></scene>",
-            "f.xml:1: <box> cannot stand here; expected <camera>, <film>, <fog>, <light>, <shading> or <solid>",
+            "f.xml:1: <box> cannot stand here; "
+            "expected <camera>, <film>, <fog>, <light>, <shading> or <solid>",
         ),
         (
             "<scene version='1'><solid><box/></solid></scene>",

@@ -1,4 +1,6 @@
-"""The sampler against dense sampling: every sign right, every sign change within the samples, whatever the threads."""
+"""The sampler against dense sampling: every sign right, every sign change within the samples, whatever the
+threads.
+"""
 
 from __future__ import annotations
 
@@ -115,11 +117,14 @@ def test_hollow_shells_keep_their_cavity() -> None:
 
 
 @pytest.mark.parametrize(
-    "root, message",
+    ("root", "message"),
     [
         (plane(), "no end along"),
         (intersection(sphere(), transform(sphere(), translate=(5, 0, 0))), "no point in common"),
-        (intersection(sphere(), transform(sphere(), translate=(1.99, 1, 0))), "nothing in the scene is inside"),
+        (
+            intersection(sphere(), transform(sphere(), translate=(1.99, 1, 0))),
+            "nothing in the scene is inside",
+        ),
     ],
 )
 def test_scenes_without_a_solid(root: Node, message: str) -> None:

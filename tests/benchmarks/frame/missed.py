@@ -2,8 +2,8 @@
 
     python -m tests.benchmarks.frame.missed [rays a formula] [name ...]
 
-A ray is missed if one of 500 points along it is inside the solid, and the renderer found nothing or something behind it.
-Prints a line for each formula; those with any are the unsafe ones.
+A ray is missed if one of 500 points along it is inside the solid, and the renderer found nothing or something
+behind it. Prints a line for each formula; those with any are the unsafe ones.
 """
 
 from __future__ import annotations

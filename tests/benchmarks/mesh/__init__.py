@@ -1,1 +1,3 @@
-"""Benchmarks of the main job; each prints ratios within one run, because seconds do not travel between machines."""
+"""Benchmarks of the main job; each prints ratios within one run, because seconds do not travel between
+machines.
+"""

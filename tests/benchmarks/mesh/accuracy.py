@@ -1,4 +1,6 @@
-"""Errors against closed forms, ours with and without exact contouring: `python -m tests.benchmarks.mesh.accuracy`."""
+"""Errors against closed forms, ours with and without exact contouring:
+`python -m tests.benchmarks.mesh.accuracy`.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +34,20 @@ TRUTHS = [
     Truth("torus 1 / 0.3, 192", torus(radius=1, tube=0.3), 192, 2 * math.pi**2 * 0.09, 4 * math.pi**2 * 0.3),
     Truth("box 1 x 2 x 0.7, 100", box(size=(1, 2, 0.7)), 100, 1.4, 8.2),
     Truth("turned box, 100", transform(box(size=(1, 1.3, 0.8)), rotate=(1, 2, 3, 37)), 100, 1.04, 6.28),
-    Truth("Menger level 3, 101.3", menger(level=3), 101.3, 8 * (20 / 27) ** 3, 8 * (20 / 9) ** 3 + 16 * (8 / 9) ** 3),
-    Truth("Menger level 4, 213.3", menger(level=4), 213.3, 8 * (20 / 27) ** 4, 8 * (20 / 9) ** 4 + 16 * (8 / 9) ** 4),
+    Truth(
+        "Menger level 3, 101.3",
+        menger(level=3),
+        101.3,
+        8 * (20 / 27) ** 3,
+        8 * (20 / 9) ** 3 + 16 * (8 / 9) ** 3,
+    ),
+    Truth(
+        "Menger level 4, 213.3",
+        menger(level=4),
+        213.3,
+        8 * (20 / 27) ** 4,
+        8 * (20 / 9) ** 4 + 16 * (8 / 9) ** 4,
+    ),
     Truth("Julia c = 0, 128", julia(c=(0, 0, 0, 0), iterations=12), 128, *ball(2 ** (1 / 4096))),
 ]
 
@@ -45,7 +59,10 @@ def errors(mesh: Mesh, truth: Truth, voxel: float) -> str:
 
 
 def main() -> None:
-    print(f"{'':24}{'':16}{'volume':>11}{'area':>11}{'mean |f|':>11}{'max |f|':>11}   (|f| in voxels at the vertices)")
+    print(
+        f"{'':24}{'':16}{'volume':>11}{'area':>11}{'mean |f|':>11}{'max |f|':>11}"
+        "   (|f| in voxels at the vertices)"
+    )
     for truth in TRUTHS:
         planned = plan(truth.root, truth.resolution)
         bricks = sample_scene(planned)

@@ -1,6 +1,8 @@
-"""The mesh against what one would write in an afternoon: a dense grid by parallel scalar Numba, and scikit-image.
+"""The mesh against what one would write in an afternoon: a dense grid by parallel scalar Numba, and
+scikit-image.
 
-`python -m tests.benchmarks.mesh.dense [N]`: N voxels (256) along the side of the scene's own box, warm, in one process.
+`python -m tests.benchmarks.mesh.dense [N]`: N voxels (256) along the side of the scene's own box, warm, in
+one process.
 """
 
 from __future__ import annotations
@@ -52,14 +54,20 @@ def seconds(run: Callable[[], object]) -> float:
 
 def main() -> None:
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 256
-    print(f"{'field and triangles, seconds':30}{'sparse':>9}{'exact':>9}{'dense':>9}{'dense / sparse':>16}{'/ exact':>9}")
+    print(
+        f"{'field and triangles, seconds':30}{'sparse':>9}{'exact':>9}{'dense':>9}"
+        f"{'dense / sparse':>16}{'/ exact':>9}"
+    )
     for name, root in SCENES.items():
         half = 1.05 * max(root.facts.box.hi)
         kernel, lattice = compile_scene(root), Lattice.around(Box.centred(half), 2 * half / (n - 1))
         plain = seconds(lambda k=kernel, r=root, la=lattice: extract(sample(k, r.facts, la)))
         exact = seconds(lambda k=kernel, r=root, la=lattice: contour(r, sample(k, r.facts, la)))
         slow = seconds(dense(root, half, n))
-        print(f"{name + f' at {n}^3':30}{plain:9.3f}{exact:9.3f}{slow:9.3f}{slow / plain:15.1f}x{slow / exact:8.1f}x")
+        print(
+            f"{name + f' at {n}^3':30}{plain:9.3f}{exact:9.3f}{slow:9.3f}"
+            f"{slow / plain:15.1f}x{slow / exact:8.1f}x"
+        )
 
 
 if __name__ == "__main__":

@@ -47,8 +47,12 @@ def scalar_kernel(root: Node) -> Callable[..., None]:
     exec(compile(link(root).source, "<scalar>", "exec"), scope)
     for name, value in list(scope.items()):
         if isinstance(value, FunctionType):
-            scope[name] = njit(inline="always", error_model="numpy", fastmath={"contract", "arcp", "afn", "nsz"})(value)
-    source = "def run(P, x, y, z, out):\n    for i in range(len(x)):\n        out[i] = field(x[i], y[i], z[i], P)"
+            scope[name] = njit(
+                inline="always", error_model="numpy", fastmath={"contract", "arcp", "afn", "nsz"}
+            )(value)
+    source = (
+        "def run(P, x, y, z, out):\n    for i in range(len(x)):\n        out[i] = field(x[i], y[i], z[i], P)"
+    )
     exec(source, scope)
     return njit(error_model="numpy")(scope["run"])
 

@@ -1,7 +1,8 @@
 """C++ parts of fracslice: marching cubes on bricks, and OpenVDB. Callers use `fracslice.mesh.extract` and
 `fracslice.volume.grid`.
 
-Arrays are C-contiguous and as `fracslice.volume.bricks.Bricks` describes them. Long calls let other threads run.
+Arrays are C-contiguous and as `fracslice.volume.bricks.Bricks` describes them. Long calls let other threads
+run.
 """
 
 from numpy import float32, float64, int32, uint8, uint32
@@ -18,24 +19,26 @@ def marching_cubes(
     clamp: float,
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[int32], NDArray[int32], NDArray[uint8]]:
-    """The surface between the samples < 0 and the others: closed, an oriented 2-manifold, free of self-crossings.
+    """The surface between the samples < 0 and the others: closed, an oriented 2-manifold, free of
+    self-crossings.
 
-    clamp: how near a grid point a vertex may come, as a share of the edge. threads: 0 for all cores; the result is
-    the same for any number.
+    clamp: how near a grid point a vertex may come, as a share of the edge. threads: 0 for all cores; the
+    result is the same for any number.
 
-    Returns vertices float64 [n, 3] at origin + voxel * (grid position); triangles int32 [m, 3], counter-clockwise seen
-    from outside; and the grid edge that each vertex lies on, by its lower grid point int32 [n, 3] and its axis
-    uint8 [n]. Marching cubes after Lorensen and Cline (1987), with a table that `make_cases.py` derives.
+    Returns vertices float64 [n, 3] at origin + voxel * (grid position); triangles int32 [m, 3],
+    counter-clockwise seen from outside; and the grid edge that each vertex lies on, by its lower grid point
+    int32 [n, 3] and its axis uint8 [n]. Marching cubes after Lorensen and Cline (1987), with a table that
+    `make_cases.py` derives.
 
-    Raises ValueError if a sign change leaves the samples or the arrays contradict each other, and for a surface of
-    more than 2^31 vertices or triangles.
+    Raises ValueError if a sign change leaves the samples or the arrays contradict each other, and for a
+    surface of more than 2^31 vertices or triangles.
     """
 
 def crossed_edges(
     ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32], threads: int = 0
 ) -> tuple[NDArray[int32], NDArray[uint8]]:
-    """The grid edges that the surface crosses, in the order of the vertices of `marching_cubes`: lower grid points int32
-    [n, 3] and axes uint8 [n]. Raises as `marching_cubes`."""
+    """The grid edges that the surface crosses, in the order of the vertices of `marching_cubes`: lower grid
+    points int32 [n, 3] and axes uint8 [n]. Raises as `marching_cubes`."""
 
 def contour(
     ijk: NDArray[int32],
@@ -50,9 +53,10 @@ def contour(
 ) -> tuple[NDArray[float64], NDArray[int32], int, int]:
     """The same surface through exact crossings, its edges and corners kept sharp.
 
-    t: where on each edge of `crossed_edges` the surface crosses it, [n]; normals: unit, outward, [n, 3]. Returns vertices
-    and triangles as `marching_cubes`, how many vertices are crossings (the first) and how many corners in cell faces (the
-    next; the rest are tips within cells). Raises as `marching_cubes`, and ValueError for other than n crossings.
+    t: where on each edge of `crossed_edges` the surface crosses it, [n]; normals: unit, outward, [n, 3].
+    Returns vertices and triangles as `marching_cubes`, how many vertices are crossings (the first) and how
+    many corners in cell faces (the next; the rest are tips within cells). Raises as `marching_cubes`, and
+    ValueError for other than n crossings.
     """
 
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:
@@ -78,10 +82,12 @@ class Grid:
         """origin, voxel, ijk, values, index. Raises ValueError unless voxels are axis-aligned cubes."""
 
     def mesh(self, adaptivity: float = 0.0) -> tuple[NDArray[float32], NDArray[uint32], NDArray[uint32]]:
-        """OpenVDB's own surface (dual contouring): points [n, 3], triangles [m, 3], quads [k, 4], outwards."""
+        """OpenVDB's own surface (dual contouring): points [n, 3], triangles [m, 3], quads [k, 4], outwards.
+        """
 
     def redistance(self) -> Grid:
-        """The same surface in a field of distances, found by fast sweeping (Zhao, 2004). Raises ValueError."""
+        """The same surface in a field of distances, found by fast sweeping (Zhao, 2004). Raises ValueError.
+        """
 
     def offset(self, distance: float) -> Grid:
         """The surface of a field of distances moved outwards, in scene units. Raises ValueError."""
