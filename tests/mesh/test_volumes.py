@@ -1,4 +1,4 @@
-"""Smooth solids at 192 voxels: volumes within 0.2 % of the closed forms, from the samples alone and exactly."""
+"""Smooth solids at 192 voxels: volumes within 0.2 % of the closed forms, from samples alone and exactly."""
 
 from __future__ import annotations
 
