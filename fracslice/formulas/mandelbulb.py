@@ -44,12 +44,13 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     even,
     linear,
     fixed_c,
+    whole,
 ):
-    """The Mandelbulb of an integer power, by complex multiplication.
+    """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
-    w = (rho (u, v), z), (u, v) a unit vector, w^n = (Im (u + iv)^n (z + i rho)^n...): both powers are
-    products, and Im (z + i rho)^n is carried divided by rho, so nothing is divided by zero at the poles.
+    w = (rho (u, v), z), (u, v) a unit vector, w^n = (Im (z + i rho)^n (u + iv)^n, Re (z + i rho)^n): both
+    powers are products, and Im (z + i rho)^n is carried divided by rho, so the poles are no special case.
 
     The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
     latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
@@ -70,27 +71,36 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     for _ in range(iterations):
         if not any_of(alive):
             break
-        r = r2 * rsqrt(maximum(r2, 1e-30))
+        safe = maximum(r2, 1e-30)
+        over_r = rsqrt(safe)
         rho2 = maximum(x * x + y * y, 1e-30)
         over_rho = rsqrt(rho2)
-        u = x * over_rho
-        v = y * over_rho
-        re, im, cu, cv = z, 0.0 * x + 1.0, u, v
-        for odd in digits:
-            re, im = re * re - im * im * rho2, (re + re) * im
-            cu, cv = cu * cu - cv * cv, (cu + cu) * cv
-            if odd:
-                re, im = re * z - im * rho2, re + im * z
-                cu, cv = cu * u - cv * v, cu * v + cv * u
-        meridian = r2
-        for odd in half_digits:
-            meridian = meridian * meridian
-            if odd:
-                meridian = meridian * r2
-        if even:
-            meridian = meridian * r
-        if linear:
-            meridian = r
+        if whole:
+            u = x * over_rho
+            v = y * over_rho
+            re, im, cu, cv = z, 0.0 * x + 1.0, u, v
+            for odd in digits:
+                re, im = re * re - im * im * rho2, (re + re) * im
+                cu, cv = cu * cu - cv * cv, (cu + cu) * cv
+                if odd:
+                    re, im = re * z - im * rho2, re + im * z
+                    cu, cv = cu * u - cv * v, cu * v + cv * u
+            meridian = r2
+            for odd in half_digits:
+                meridian = meridian * meridian
+                if odd:
+                    meridian = meridian * r2
+            if even:
+                meridian = meridian * (r2 * over_r)
+            if linear:
+                meridian = r2 * over_r
+        else:
+            rn = exp(0.5 * power * log(safe))
+            theta = power * atan2(rho2 * over_rho, z)
+            phi = power * atan2(y, x)
+            re, im = rn * cos(theta), rn * sin(theta) * over_rho
+            cu, cv = cos(phi), sin(phi)
+            meridian = rn * over_r
         latitude = absolute(im) * (1.0 - r2 * over_escape2)
         dr = power * maximum(meridian, latitude) * dr + grow
         s = im * rho2 * over_rho
@@ -106,62 +116,16 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     return potential_distance(end_r2, slope, level, first_level, last_level)
 
 
-def mandelbulb_real(x, y, z, power, iterations, first_level, last_level, escape2, over_escape2, c, fixed_c):  # type: ignore[no-untyped-def]
-    """The Mandelbulb of any power, in polar coordinates."""
-    cx, cy, cz = x, y, z
-    grow = 1.0
-    if fixed_c:
-        cx, cy, cz = c
-        grow = 0.0
-    r2 = x * x + y * y + z * z
-    dr = 0.0 * x + 1.0
-    level = 0.0 * x + first_level
-    end_r2, slope = r2, dr
-    alive = r2 < escape2
-    for _ in range(iterations):
-        if not any_of(alive):
-            break
-        safe = maximum(r2, 1e-30)
-        rho2 = maximum(x * x + y * y, 1e-30)
-        rho = rho2 * rsqrt(rho2)
-        theta = power * atan2(rho, z)
-        phi = power * atan2(y, x)
-        rn = exp(0.5 * power * log(safe))
-        meridian = rn * rsqrt(safe)
-        latitude = absolute(rn * sin(theta) / rho) * (1.0 - r2 * over_escape2)
-        dr = power * maximum(meridian, latitude) * dr + grow
-        s = rn * sin(theta)
-        x = s * cos(phi) + cx
-        y = s * sin(phi) + cy
-        z = rn * cos(theta) + cz
-        r2 = x * x + y * y + z * z
-        orbit(r2, alive)
-        end_r2 = where(alive, r2, end_r2)
-        slope = where(alive, maximum(dr, slope), slope)
-        level = where(alive, level * power, level)
-        alive = alive & (r2 < escape2)
-    return potential_distance(end_r2, slope, level, first_level, last_level)
-
-
-def _whole(power: float) -> bool:
-    return power == int(power)
-
-
 def _digits(n: int) -> tuple[int, ...]:
     """The binary digits of n after the first: square for each, multiply where it is 1."""
     return tuple(int(d) for d in bin(n)[3:])
-
-
-@mandelbulb.select
-def _(node: Node):  # type: ignore[no-untyped-def]
-    return mandelbulb.function if _whole(node["power"]) else mandelbulb_real
 
 
 @mandelbulb.arguments
 def _(node: Node) -> dict[str, object]:
     power = node["power"]
     first, last, escape2 = levels(power, node["iterations"], node["bailout"])
-    arguments = {
+    return {
         "power": power,
         "iterations": node["iterations"],
         "first_level": first,
@@ -170,17 +134,21 @@ def _(node: Node) -> dict[str, object]:
         "over_escape2": 1 / escape2,
         "c": node["julia"] or (0.0, 0.0, 0.0),
         "fixed_c": Fixed(node["julia"] is not None),
+        **_products(power),
     }
-    if _whole(power):
-        n = int(power)
-        half = Fixed(_digits((n - 1) // 2))
-        arguments |= {
-            "digits": Fixed(_digits(n)),
-            "half_digits": half,
-            "even": Fixed(n % 2 == 0),
-            "linear": Fixed(n == 2),
-        }
-    return arguments
+
+
+def _products(power: float) -> dict[str, Fixed]:
+    """Which products make a whole power; none are compiled for another."""
+    whole = power == int(power)
+    n = int(power) if whole else 2
+    return {
+        "whole": Fixed(whole),
+        "digits": Fixed(_digits(n)),
+        "half_digits": Fixed(_digits((n - 1) // 2)),
+        "even": Fixed(n % 2 == 0),
+        "linear": Fixed(n == 2),
+    }
 
 
 @mandelbulb.check
