@@ -11,6 +11,7 @@ from ..errors import MeshError
 from ..formulas.registry import Node
 from ..volume.bricks import Bricks
 from ..volume.crossings import refine_crossings
+from ..volume.settling import settle
 from ..work import Work
 from .model import Mesh
 
@@ -35,10 +36,10 @@ def contour(root: Node, bricks: Bricks, work: Work | None = None) -> Mesh:
     """The exact surface of a scene, in scene units, its edges and corners sharp.
 
     root: the scene that `bricks` were sampled from. Every vertex on a grid edge is moved along it to the zero
-    set of the float64 field; where the normals in a cell differ, a vertex is put where their planes meet.
-    Closed, an oriented 2-manifold, and free of crossings like `extract`; `contour.h` has the proof. After Ho,
-    Wu, Chen, Chuang and Ouhyoung 2005, "Cubical Marching Squares". Raises `MeshError` as `extract`, and
-    `Cancelled`.
+    set of the float64 field; where the normals in a cell differ, a vertex is put where their planes meet,
+    and settled. Closed, an oriented 2-manifold, and free of crossings like `extract`; `contour.h` has the
+    proof. After Ho, Wu, Chen, Chuang and Ouhyoung 2005, "Cubical Marching Squares". Raises `MeshError` as
+    `extract`, and `Cancelled`.
     """
     from .._native import contour as build
     from .._native import crossed_edges
@@ -47,10 +48,23 @@ def contour(root: Node, bricks: Bricks, work: Work | None = None) -> Mesh:
     lower, axis = _called(crossed_edges, *_arrays(bricks), work.threads)
     exact = refine_crossings(root, bricks.origin, bricks.voxel, lower, axis, work)
     work.check()
-    vertices, triangles, *_ = _called(
+    vertices, triangles, crossings, _ = _called(
         build, *_arrays(bricks), exact.t, exact.normals, *_placement(bricks), work.threads
     )
+    work.check()
+    low, high = _room(vertices[crossings:], bricks)
+    vertices[crossings:] = settle(root, vertices[crossings:], low, high, bricks.voxel, work)
     return Mesh(vertices, triangles)
+
+
+def _room(points: np.ndarray, bricks: Bricks) -> tuple[np.ndarray, np.ndarray]:
+    """How far a vertex within a cell, or within a cell's face, may move: strictly inside it."""
+    origin, voxel, margin = np.asarray(bricks.origin), bricks.voxel, clamp(bricks)
+    grid = (points - origin) / voxel
+    flat = np.abs(grid - np.round(grid)) < margin / 2
+    low = np.where(flat, points, origin + voxel * (np.floor(grid) + margin))
+    high = np.where(flat, points, origin + voxel * (np.floor(grid) + 1 - margin))
+    return low, high
 
 
 def clamp(bricks: Bricks) -> float:

@@ -1,0 +1,53 @@
+"""Vertices that lie on no grid edge are brought to the surface, each within a box of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..formulas.registry import Node
+from ..kernel import CpuKernel, compile_scene
+from ..work import Work, chunks
+
+STEPS = 4
+NEAR = 1e-6
+"""A point with |f| below this share of a voxel is where it should be: a corner has no gradient to follow."""
+
+FLAT = 0.1
+"""Slopes below this are taken for it, so that no step is longer than ten times |f|."""
+
+REACH = 1e-4
+"""The differences' step, in voxels."""
+
+
+def settle(
+    root: Node, points: np.ndarray, low: np.ndarray, high: np.ndarray, voxel: float, work: Work | None = None
+) -> np.ndarray:
+    """Points moved towards the zero set by Newton's steps along the gradient, never out of their boxes.
+
+    points, low, high: float64 [n, 3], scene units; a box may be flat. A step that does not bring a point
+    nearer is not taken, and what lies on the surface already, such as an exact corner, stays. Returns float64
+    [n, 3].
+    """
+    kernel, settled = compile_scene(root, "float64"), points.copy()
+
+    def task(part: slice) -> None:
+        p, f = settled[part].T, kernel.points(*settled[part].T)
+        for _ in range(STEPS):
+            free = np.where(low[part] < high[part], 1.0, 0.0).T
+            slope = free * _gradient(kernel, p, REACH * voxel)
+            step = f * slope / np.maximum((slope * slope).sum(0), FLAT**2)
+            moved = np.clip(p - step, low[part].T, high[part].T)
+            there = kernel.points(*moved)
+            nearer = (np.abs(there) < np.abs(f)) & (np.abs(f) > NEAR * voxel)
+            p, f = np.where(nearer, moved, p), np.where(nearer, there, f)
+        settled[part] = p.T
+
+    (work or Work()).map(task, chunks(len(points), 1 << 13))
+    return settled
+
+
+def _gradient(kernel: CpuKernel, p: np.ndarray, h: float) -> np.ndarray:
+    """Central differences, [3, n]."""
+    steps = h * np.eye(3)
+    ends = [(kernel.points(*(p + s[:, None])), kernel.points(*(p - s[:, None]))) for s in steps]
+    return np.stack([(up - down) / (2 * h) for up, down in ends])
