@@ -10,7 +10,8 @@ from ..errors import VolumeError
 from ..formulas.box import Box
 from ..formulas.registry import Facts
 from ..kernel import CpuKernel
-from ..work import Work, chunks
+from ..work import Work
+from .values import values_at
 
 FIRST = 16
 """Cells along each axis of the first level; the outermost lie beyond the box that the formulas promise."""
@@ -64,7 +65,7 @@ def _search(kernel: CpuKernel, facts: Facts, box: Box, work: Work) -> Extent | N
     lo, hi = np.full(3, np.inf), np.full(3, -np.inf)
     offsets = np.array(np.meshgrid(*[(-0.25, 0.25)] * 3)).reshape(3, 1, 8)
     for level in range(LEVELS):
-        f = _values(kernel, centres, work)
+        f = values_at(kernel, centres, work)
         inside = f < 0
         if level == 0 and (inside & rim).any():
             return None
@@ -88,13 +89,3 @@ def _search(kernel: CpuKernel, facts: Facts, box: Box, work: Work) -> Extent | N
 
 def _box(lo: np.ndarray, hi: np.ndarray) -> Box:
     return Box(tuple(lo.tolist()), tuple(hi.tolist()))
-
-
-def _values(kernel: CpuKernel, points: np.ndarray, work: Work) -> np.ndarray:
-    f = np.empty(points.shape[1], kernel.dtype)
-
-    def task(part: slice) -> None:
-        f[part] = kernel.points(*points[:, part])
-
-    work.map(task, chunks(len(f), 1 << 15))
-    return f

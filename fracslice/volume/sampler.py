@@ -24,6 +24,7 @@ from ..kernel import CpuKernel
 from ..work import Work, chunks
 from .bricks import INSIDE, OUTSIDE, Bricks
 from .lattice import BRICK, Lattice
+from .values import values_at
 
 COARSEST = 16
 """Bricks along a cell of the first level: 128 voxels, as in OpenVDB's tree."""
@@ -94,14 +95,8 @@ class _Run:
     def values_at(self, indices: np.ndarray) -> np.ndarray:
         """The field at positions given in grid indices, [n, 3]."""
         points = np.asarray(self.lattice.origin)[:, None] + self.lattice.voxel * indices.T
-        f = np.empty(len(indices), self.kernel.dtype)
-
-        def task(part: slice) -> None:
-            f[part] = self.kernel.points(*points[:, part])
-
-        self.work.map(task, chunks(len(indices), 1 << 14))
         self.evaluations += len(indices)
-        return f
+        return values_at(self.kernel, points, self.work)
 
     def seeds(self, state: np.ndarray, outside: np.ndarray) -> np.ndarray:
         """The candidates to start from, int32 [n, 3] in bricks.
