@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import reduce
 
 from .box import Box
-from .parameters import REQUIRED, Number
+from .parameters import REQUIRED, SMALLEST, Number
 from .registry import Formula, Node, blend
 from .vocabulary import absolute, maximum, minimum
 
@@ -52,8 +52,8 @@ def hard_difference(a, b):  # type: ignore[no-untyped-def]
 
 
 def _sharp_when_zero(formula: Formula, hard) -> None:  # type: ignore[no-untyped-def]
-    formula.select(lambda node: formula.function if node["smooth"] else hard)
-    formula.arguments(lambda node: {"smooth": node["smooth"]} if node["smooth"] else {})
+    formula.select(lambda node: formula.function if node["smooth"] >= SMALLEST else hard)
+    formula.arguments(lambda node: {"smooth": node["smooth"]} if node["smooth"] >= SMALLEST else {})
 
 
 _sharp_when_zero(union, hard_union)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from .box import Box
-from .parameters import REQUIRED, Axis, Number
+from .parameters import REQUIRED, SMALLEST, Axis, Number
 from .registry import Node, warp
 from .transforms import along
 from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt, where
@@ -59,7 +59,7 @@ def _twist_radius(node: Node) -> float:
 
 @twist.identity
 def _(node: Node) -> bool:
-    return bool(node["degrees"] == 0)
+    return bool(abs(node["degrees"]) < SMALLEST)
 
 
 @twist.arguments
@@ -147,7 +147,7 @@ def _bend_frame(node: Node) -> tuple[float, float, float, float]:
 
 @bend.identity
 def _(node: Node) -> bool:
-    return bool(node["degrees"] == 0)
+    return bool(abs(node["degrees"]) < SMALLEST)
 
 
 @bend.arguments

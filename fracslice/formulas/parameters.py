@@ -15,6 +15,9 @@ from typing import Any
 REQUIRED: Any = ...
 AUTO = "auto"
 
+SMALLEST, LARGEST = 1e-15, 1e9
+"""Between these a number is large and small enough for kernels in float32, which square and multiply."""
+
 
 @dataclass(frozen=True)
 class Number:
@@ -106,7 +109,7 @@ class Vector:
         if len(items) not in self.sizes:
             raise ValueError(self.expects)
         numbers = tuple(float(_checked(item, self)) for item in items)
-        if self.nonzero and not any(numbers):
+        if self.nonzero and not any(abs(n) >= SMALLEST for n in numbers):
             raise ValueError(self.expects)
         if self.whole and any(n != int(n) for n in numbers):
             raise ValueError(self.expects)
@@ -183,6 +186,8 @@ def _checked(value: Any, kind: Number | Vector) -> Any:
         raise ValueError(kind.expects)
     if not (kind.above < value < kind.below and kind.least <= value <= kind.most):
         raise ValueError(kind.expects)
+    if abs(value) > LARGEST or (kind.above == 0 and value < SMALLEST):
+        raise ValueError(f"{kind.expects}, of a size from {SMALLEST:g} to {LARGEST:g}")
     return value
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .box import Box
-from .parameters import REQUIRED, Axis, Vector
+from .parameters import REQUIRED, SMALLEST, Axis, Vector
 from .registry import Fixed, Node, warp
 from .vocabulary import absolute
 
@@ -64,12 +64,12 @@ def affine(node: Node) -> tuple[np.ndarray, np.ndarray]:
 
 @transform.check
 def _(node: Node) -> None:
-    if node["rotate"] and not any(node["rotate"][:3]):
+    if node["rotate"] and not max(map(abs, node["rotate"][:3])) >= SMALLEST:
         raise node.fail("rotate: expected an axis that is not zero, then degrees")
     if node["matrix"] and len(node["matrix"]) == 16 and node["matrix"][12:] != (0, 0, 0, 1):
         raise node.fail("matrix: expected the last row 0 0 0 1")
     stretch = np.linalg.svd(affine(node)[0], compute_uv=False)
-    if not stretch[-1] > 1e-9 * stretch[0]:
+    if not stretch[-1] > max(1e-9 * stretch[0], SMALLEST / 2):
         raise node.fail("scale or matrix: expected a map that does not flatten space")
 
 

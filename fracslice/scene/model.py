@@ -17,8 +17,6 @@ from .view import View
 
 DEEPEST = 100
 """How deep elements may be nested: far above any use, far below Python's limit on recursion."""
-LARGEST = 1e9
-"""The largest number in a scene: kernels compute in float32."""
 
 TOO_DEEP = f"is nested too deeply: expected at most {DEEPEST} elements inside each other"
 
@@ -86,18 +84,9 @@ def _refuse_too_deep(root: Node) -> None:
 def _refuse_impossible(root: Node) -> None:
     """Works out, from the leaves up, all that a kernel will ask for: what only the whole tree can tell."""
     for node in reversed(list(root.walk())):
-        if any(abs(number) > LARGEST for number in _numbers(node)):
-            raise node.fail(f"has numbers too large to compute with: expected none beyond {LARGEST:g}")
         with computing(node.fail):
             depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
             _ = node.facts, (node.changed(**depths) if depths else node).arguments
-
-
-def _numbers(node: Node) -> Iterator[float]:
-    for value in node.values.values():
-        for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, (int, float)):
-                yield item
 
 
 @contextmanager

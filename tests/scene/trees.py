@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from fracslice.errors import SceneError
 from fracslice.formulas import Node
-from fracslice.formulas.parameters import AUTO, REQUIRED, Axis, Count, Number, Vector
+from fracslice.formulas.parameters import AUTO, REQUIRED, SMALLEST, Axis, Count, Number, Vector
 from fracslice.scene import scene
 from fracslice.scene.layout import formulas
 from fracslice.scene.model import computing
@@ -25,6 +25,7 @@ def value(kind: Any) -> st.SearchStrategy[Any]:
 
 def _number(kind: Number | Vector) -> st.SearchStrategy[float]:
     low, high = max(kind.above, kind.least, -1e6), min(kind.below, kind.most, 1e6)
+    low = SMALLEST if low == 0 == kind.above else low
     return st.floats(low, high, exclude_min=low == kind.above, exclude_max=high == kind.below)
 
 
