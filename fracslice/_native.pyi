@@ -34,30 +34,45 @@ def marching_cubes(
     surface of more than 2^31 vertices or triangles.
     """
 
-def crossed_edges(
-    ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32], threads: int = 0
-) -> tuple[NDArray[int32], NDArray[uint8]]:
-    """The grid edges that the surface crosses, in the order of the vertices of `marching_cubes`: lower grid
-    points int32 [n, 3] and axes uint8 [n]. Raises as `marching_cubes`."""
+def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
+    """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) set where < 0."""
 
-def contour(
-    ijk: NDArray[int32],
-    values: NDArray[float32],
-    index: NDArray[int32],
-    t: NDArray[float64],
-    normals: NDArray[float64],
-    origin: Point,
-    voxel: float,
-    clamp: float,
-    threads: int = 0,
-) -> tuple[NDArray[float64], NDArray[int32], int, int]:
-    """The same surface through exact crossings, its edges and corners kept sharp.
+class Cells:
+    """The grid cells that a surface passes, numbered once, to be meshed as a whole or in pieces.
 
-    t: where on each edge of `crossed_edges` the surface crosses it, [n]; normals: unit, outward, [n, 3].
-    Returns vertices and triangles as `marching_cubes`, how many vertices are crossings (the first) and how
-    many corners in cell faces (the next; the rest are tips within cells). Raises as `marching_cubes`, and
-    ValueError for other than n crossings.
+    A piece is the layers of bricks `first` to `last - 1` along x; layers past both ends are allowed: cells of
+    the surface may lie beside the samples. Raises ValueError if a sign change leaves the samples, the arrays
+    contradict each other or the bricks are not in order, and for more than 2^31 crossings.
     """
+
+    def __init__(
+        self, ijk: NDArray[int32], signs: NDArray[uint8], index: NDArray[int32], threads: int = 0
+    ) -> None: ...
+    def crossings_before(self, layer: int) -> int:
+        """How many crossings the bricks before a layer number."""
+
+    def crossed_edges(self, first: int, last: int) -> tuple[NDArray[int32], NDArray[uint8]]:
+        """The grid edges that the surface crosses, in the order of the vertices of `marching_cubes`, of some
+        layers: lower grid points int32 [n, 3] and axes uint8 [n]."""
+
+    def contour(
+        self,
+        first: int,
+        last: int,
+        t: NDArray[float64],
+        normals: NDArray[float64],
+        origin: Point,
+        voxel: float,
+        clamp: float,
+    ) -> tuple[NDArray[float64], NDArray[int32], int, int]:
+        """The surface of `marching_cubes` in some layers through exact crossings, its edges and corners kept.
+
+        t: where on each edge of ``crossed_edges(first - 1, last + 2)`` the surface crosses it, [n]; normals:
+        unit, outward, [n, 3]. Returns vertices and triangles as `marching_cubes`, how many vertices are
+        crossings (the first: those of the layers `first` to `last`) and how many corners in cell faces (the
+        next; the rest are tips within cells). Raises ValueError for other than n crossings, and for more than
+        2^31 vertices or triangles.
+        """
 
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:
     """How many grid edges with a sign change touch a point without a sample: 0 if the surface is closed."""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..errors import MeshError
 from ..formulas.registry import Node
-from ..volume.bricks import Bricks
-from ..volume.crossings import refine_crossings
+from ..volume.bricks import Bricks, SignBricks
+from ..volume.crossings import Crossings, refine_crossings
+from ..volume.lattice import BRICK
 from ..volume.settling import settle
 from ..work import Work
 from .model import Mesh
@@ -28,11 +30,14 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
     """
     from .._native import marching_cubes
 
-    vertices, triangles, *_ = _called(marching_cubes, *_arrays(bricks), *_placement(bricks), threads)
+    placement = tuple(float(v) for v in bricks.origin), float(bricks.voxel), clamp(bricks)
+    vertices, triangles, *_ = _called(
+        marching_cubes, bricks.ijk, bricks.values, bricks.index, *placement, threads
+    )
     return Mesh(vertices, triangles)
 
 
-def contour(root: Node, bricks: Bricks, work: Work | None = None) -> Mesh:
+def contour(root: Node, bricks: Bricks | SignBricks, work: Work | None = None) -> Mesh:
     """The exact surface of a scene, in scene units, its edges and corners sharp.
 
     root: the scene that `bricks` were sampled from. Every vertex on a grid edge is moved along it to the zero
@@ -41,23 +46,77 @@ def contour(root: Node, bricks: Bricks, work: Work | None = None) -> Mesh:
     proof. After Ho, Wu, Chen, Chuang and Ouhyoung 2005, "Cubical Marching Squares". Raises `MeshError` as
     `extract`, and `Cancelled`.
     """
-    from .._native import contour as build
-    from .._native import crossed_edges
+    (piece,) = contour_pieces(root, bricks, work, len(bricks))
+    return piece.mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """The part of a surface in some layers of bricks, scene units.
+
+    mesh: open where the surface goes on; pieces in turn meet in equal points, bit by bit. end: the x where
+    this piece ends. crossings: int64 [n], the number of each vertex among the crossings of the grid's edges
+    with the whole surface, the same in all pieces; -1 for a vertex in a cell or a cell's face.
+    """
+
+    mesh: Mesh
+    end: float
+    crossings: np.ndarray
+
+
+def contour_pieces(
+    root: Node, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
+) -> Iterator[Piece]:
+    """The same surface, piece after piece along x, each of about `most` bricks: memory for one at a time."""
+    from .._native import Cells
 
     work = work or Work()
-    lower, axis = _called(crossed_edges, *_arrays(bricks), work.threads)
-    exact = refine_crossings(root, bricks.origin, bricks.voxel, lower, axis, work)
-    work.check()
-    vertices, triangles, crossings, _ = _called(
-        build, *_arrays(bricks), exact.t, exact.normals, *_placement(bricks), work.threads
-    )
-    work.check()
-    low, high = _room(vertices[crossings:], bricks)
-    vertices[crossings:] = settle(root, vertices[crossings:], low, high, bricks.voxel, work)
-    return Mesh(vertices, triangles)
+    signs = bricks.signs if isinstance(bricks, Bricks) else bricks
+    cells = _called(Cells, signs.ijk, signs.signs, signs.index, work.threads)
+    placement = tuple(float(v) for v in signs.origin), float(signs.voxel), clamp(signs)
+    known, start = Crossings(np.empty(0), np.empty((0, 3))), 0
+    for first, last in _layers(signs, most):
+        begin, done = cells.crossings_before(first - 1), start + len(known.t)
+        lower, axis = cells.crossed_edges(first - 1, last + 2)
+        fresh = refine_crossings(
+            root, signs.origin, signs.voxel, lower[done - begin :], axis[done - begin :], work
+        )
+        known = Crossings(
+            np.concatenate([known.t[begin - start :], fresh.t]),
+            np.concatenate([known.normals[begin - start :], fresh.normals]),
+        )
+        start = begin
+        vertices, triangles, count, _ = _called(
+            cells.contour, first, last, known.t, known.normals, *placement
+        )
+        low, high = _room(vertices[count:], signs)
+        vertices[count:] = settle(root, vertices[count:], low, high, signs.voxel, work)
+        numbers = np.full(len(vertices), -1, np.int64)
+        numbers[:count] = cells.crossings_before(first) + np.arange(count)
+        used = np.zeros(len(vertices), bool)
+        used[triangles] = True
+        whole = Mesh(vertices, triangles)
+        end = signs.origin[0] + signs.voxel * BRICK * last
+        yield Piece(
+            whole if used.all() else whole.selected(np.ones(len(triangles), bool)), end, numbers[used]
+        )
 
 
-def _room(points: np.ndarray, bricks: Bricks) -> tuple[np.ndarray, np.ndarray]:
+def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
+    """Which layers of bricks make a piece: (first, last) with last excluded; those without samples at both
+    ends, which may have cells of the surface, included.
+    """
+    counts = np.bincount(bricks.ijk[:, 0] // BRICK, minlength=bricks.index.shape[0])
+    cuts, size = [-1], 0
+    for layer, count in enumerate(counts):
+        if size and size + count > most:
+            cuts.append(layer)
+            size = 0
+        size += count
+    return list(zip(cuts, [*cuts[1:], len(counts)], strict=True))
+
+
+def _room(points: np.ndarray, bricks: SignBricks) -> tuple[np.ndarray, np.ndarray]:
     """How far a vertex within a cell, or within a cell's face, may move: strictly inside it."""
     origin, voxel, margin = np.asarray(bricks.origin), bricks.voxel, clamp(bricks)
     grid = (points - origin) / voxel
@@ -67,7 +126,7 @@ def _room(points: np.ndarray, bricks: Bricks) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
-def clamp(bricks: Bricks) -> float:
+def clamp(bricks: Bricks | SignBricks) -> float:
     """How near a grid point a vertex may come, as a share of a voxel, so that no two are one in float32.
 
     Vertices of one cell differ by at least that share along some axis; four float32 steps survive any
@@ -82,14 +141,6 @@ def clamp(bricks: Bricks) -> float:
             f"a voxel of {bricks.voxel:g} at a distance of {extent:g} is too fine for float32 coordinates"
         )
     return share
-
-
-def _arrays(bricks: Bricks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return bricks.ijk, bricks.values, bricks.index
-
-
-def _placement(bricks: Bricks) -> tuple[tuple[float, ...], float, float]:
-    return tuple(float(v) for v in bricks.origin), float(bricks.voxel), clamp(bricks)
 
 
 def _called(function: Callable[..., Any], *arguments: Any) -> Any:

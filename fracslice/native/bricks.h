@@ -10,9 +10,9 @@ constexpr int kSide = 8;
 constexpr int kSamples = kSide * kSide * kSide;
 constexpr int32_t kOutside = -1, kInside = -2;
 
-struct Bricks {
+// Where bricks are.
+struct Layout {
     const int32_t* ijk;    // [count, 3]
-    const float* values;   // [count, 512], offset x*64 + y*8 + z
     size_t count;
     const int32_t* index;  // [size[0], size[1], size[2]]
     std::array<int, 3> size;
@@ -24,7 +24,11 @@ struct Bricks {
     }
 };
 
+struct Bricks : Layout {
+    const float* values;  // [count, 512], offset x*64 + y*8 + z
+};
+
 // Throws std::invalid_argument unless rows and index name each other.
-void check(const Bricks& bricks);
+void check(const Layout& layout);
 
 }  // namespace fracslice

@@ -26,13 +26,13 @@ size_t find_crossings(const std::array<Corners, kSide + 1>& corners, Crossings& 
 }
 
 // The ghosts' places, in order.
-std::vector<Place> ghosts(const Bricks& bricks, const std::vector<Signs>& signs) {
+std::vector<Place> ghosts(const Layout& layout, const std::vector<Signs>& signs) {
     std::vector<Place> found;
-    for (size_t row = 0; row < bricks.count; ++row) {
-        const int32_t* p = bricks.ijk + 3 * row;
+    for (size_t row = 0; row < layout.count; ++row) {
+        const int32_t* p = layout.ijk + 3 * row;
         for (int k : {3, 5, 6, 7}) {
             Place q = {p[0] / kSide - (k & 1), p[1] / kSide - (k >> 1 & 1), p[2] / kSide - (k >> 2 & 1)};
-            int32_t at = bricks.at(q[0], q[1], q[2]);
+            int32_t at = layout.at(q[0], q[1], q[2]);
             if (at >= 0) continue;
             Slab seen = (k & 2 ? kFirstY : ~Slab(0)) & (k & 4 ? kFirstZ : ~Slab(0)), differ = 0;
             for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) differ |= (signs[row][x] ^ constant(at)) & seen;
@@ -49,26 +49,47 @@ int brick_of(int x) { return x >= 0 ? x / kSide : -((kSide - 1 - x) / kSide); }
 
 }  // namespace
 
-CellGrid::CellGrid(const Bricks& bricks) : bricks_(bricks), signs_(signs_of(bricks)), crossings_(bricks.count) {
-    if (int64_t open = open_edges(bricks, signs_)) {
+CellGrid::CellGrid(const Layout& layout, std::vector<Signs> signs)
+    : layout_(layout), signs_(std::move(signs)), crossings_(layout.count) {
+    check(layout);
+    if (int64_t open = open_edges(layout, signs_)) {
         throw std::invalid_argument("not closed: " + std::to_string(open) + " sign changes leave the samples");
     }
-    places_.resize(bricks.count);
-    for (size_t row = 0; row < bricks.count; ++row) {
-        for (int k = 0; k < 3; ++k) places_[row][k] = bricks.ijk[3 * row + k] / kSide;
+    places_.resize(layout.count);
+    for (size_t row = 0; row < layout.count; ++row) {
+        for (int k = 0; k < 3; ++k) places_[row][k] = layout.ijk[3 * row + k] / kSide;
     }
-    tbb::parallel_for(size_t(0), bricks.count, [&](size_t i) {
+    if (!std::is_sorted(places_.begin(), places_.end())) throw std::invalid_argument("the bricks are not in order");
+    tbb::parallel_for(size_t(0), layout.count, [&](size_t i) {
         crossings_[i].base = find_crossings(corners_of(octant(i), signs_), crossings_[i]);
     });
     vertices_ = running_sum(crossings_, &Crossings::base, "vertices");
-    for (const Place& place : ghosts(bricks, signs_)) places_.push_back(place);
+    for (const Place& place : ghosts(layout, signs_)) places_.push_back(place);
+}
+
+// The first brick of a sorted range whose layer is not before this one.
+size_t CellGrid::lower_bound(size_t begin, size_t end, int layer) const {
+    auto before = [](const Place& place, int wanted) { return place[0] < wanted; };
+    return size_t(std::lower_bound(places_.begin() + int64_t(begin), places_.begin() + int64_t(end), layer, before) -
+                  places_.begin());
+}
+
+Span CellGrid::span(Layers layers) const {
+    size_t row = lower_bound(0, sampled(), layers.first), end = lower_bound(0, sampled(), layers.last);
+    size_t ghost = lower_bound(sampled(), size(), layers.first), ghost_end = lower_bound(sampled(), size(), layers.last);
+    return {row, end - row, ghost, ghost_end - ghost};
+}
+
+size_t CellGrid::crossings_before(int layer) const {
+    size_t row = lower_bound(0, sampled(), layer);
+    return row < sampled() ? crossings_[row].base : vertices_;
 }
 
 int64_t CellGrid::find(const Place& place, int x, int y, int z) const {
     Place wanted = {place[0] + brick_of(x), place[1] + brick_of(y), place[2] + brick_of(z)};
-    int32_t row = bricks_.at(wanted[0], wanted[1], wanted[2]);
+    int32_t row = layout_.at(wanted[0], wanted[1], wanted[2]);
     if (row >= 0) return row;
-    auto first = places_.begin() + int64_t(bricks_.count), found = std::lower_bound(first, places_.end(), wanted);
+    auto first = places_.begin() + int64_t(sampled()), found = std::lower_bound(first, places_.end(), wanted);
     return found != places_.end() && *found == wanted ? found - places_.begin() : -1;
 }
 

@@ -95,21 +95,35 @@ size_t running_sum(Items& items, Member member, const char* what) {
     return total;
 }
 
+// Bricks first, first + 1 ... last - 1 along x.
+struct Layers {
+    int first, last;
+};
+
+// The bricks of some layers: those with samples, then the ghosts.
+struct Span {
+    size_t row, rows, ghost, ghosts;
+
+    size_t size() const { return rows + ghosts; }
+    size_t brick(size_t k) const { return k < rows ? row + k : ghost + (k - rows); }
+    size_t place_of(size_t brick) const { return brick < ghost ? brick - row : rows + (brick - ghost); }
+};
+
 // The bricks that hold cells which the surface passes: those with samples, in order, then the ghosts, without samples,
-// which see a sampled brick across an edge or a corner with another sign there. Throws std::invalid_argument if a sign
-// change leaves the samples.
+// which see a sampled brick across an edge or a corner with another sign there. Throws std::invalid_argument if layout and
+// signs contradict each other or a sign change leaves the samples, std::length_error past 2^31 crossings.
 class CellGrid {
   public:
-    explicit CellGrid(const Bricks& bricks);
+    CellGrid(const Layout& layout, std::vector<Signs> signs);
 
     size_t size() const { return places_.size(); }
-    size_t sampled() const { return bricks_.count; }
+    size_t sampled() const { return layout_.count; }
     size_t vertices() const { return vertices_; }
-    const Bricks& bricks() const { return bricks_; }
+    const Layout& layout() const { return layout_; }
     const std::vector<Signs>& signs() const { return signs_; }
     const Place& place(size_t i) const { return places_[i]; }
     const Crossings& crossings(size_t i) const { return crossings_[i]; }
-    Octant octant(size_t i) const { return {bricks_, places_[i][0], places_[i][1], places_[i][2]}; }
+    Octant octant(size_t i) const { return {layout_, places_[i][0], places_[i][1], places_[i][2]}; }
 
     // Number of the brick with the cell at x, y, z relative to a place, -1 if the surface passes no cell of it.
     int64_t find(const Place& place, int x, int y, int z) const;
@@ -130,6 +144,11 @@ class CellGrid {
                 {place[0] * kSide + x + edge.dx, place[1] * kSide + y + edge.dy, place[2] * kSide + z + edge.dz}};
     }
 
+    Span span(Layers layers) const;
+
+    // How many crossings the bricks have that come before a layer.
+    size_t crossings_before(int layer) const;
+
     // Calls visit(edge) for the crossings that a brick with samples numbers, in order.
     template <class Visit>
     void for_each_own_edge(size_t i, const Visit& visit) const {
@@ -140,7 +159,7 @@ class CellGrid {
             for (int x = 0; x < kSide; ++x) {
                 for (Slab bits = own.bits[axis][x]; bits; bits &= bits - 1) {
                     int bit = __builtin_ctzll(bits);
-                    const int32_t* p = bricks_.ijk + 3 * i;
+                    const int32_t* p = layout_.ijk + 3 * i;
                     visit(CellEdge{vertex++, axis, {p[0] + x, p[1] + bit / 8, p[2] + bit % 8}});
                 }
             }
@@ -148,7 +167,9 @@ class CellGrid {
     }
 
   private:
-    Bricks bricks_;
+    size_t lower_bound(size_t begin, size_t end, int layer) const;
+
+    Layout layout_;
     std::vector<Signs> signs_;
     std::vector<Crossings> crossings_;
     std::vector<Place> places_;

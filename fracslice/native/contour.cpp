@@ -1,5 +1,5 @@
-// Four passes over the bricks, each brick by itself: which cells and faces have features; how many, and how many
-// triangles; then vertices and triangles at the places that the sums of the counts give.
+// Passes over the bricks, each brick by itself: which cells and faces have features; how many, and how many triangles; then
+// vertices and triangles at the places that the sums of the counts give.
 #include "contour.h"
 
 #include <tbb/parallel_for.h>
@@ -17,6 +17,7 @@ struct Features {
     std::array<Signs, 3> corners{};
     std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that slab
     std::vector<Vec3> points;                           // the tips, in the order of their cells
+    std::array<std::vector<Vec3>, 3> corner_points;     // the corners by axis, in the order of their cells
     size_t tip_base = 0, corner_base = 0, triangles = 0;
 };
 
@@ -32,39 +33,49 @@ int common_face(int e, int f) {
 
 class Contouring {
   public:
-    Contouring(const Bricks& bricks, const Hermite& data, const Placement& placement)
-        : cells_(bricks), data_(data), placement_(placement), margin_(placement.clamp), features_(cells_.size()) {
-        if (data.count != cells_.vertices()) {
-            throw std::invalid_argument("expected " + std::to_string(cells_.vertices()) + " crossings, found " +
+    Contouring(const CellGrid& cells, Layers layers, const Hermite& data, const Placement& placement)
+        : cells_(cells), layers_(layers), near_(cells.span({layers.first - 1, layers.last + 1})), data_(data),
+          placement_(placement), margin_(placement.clamp), first_datum_(cells.crossings_before(layers.first - 1)),
+          first_vertex_(cells.crossings_before(layers.first)), features_(near_.size()) {
+        size_t wanted = cells.crossings_before(layers.last + 2) - first_datum_;
+        if (data.count != wanted) {
+            throw std::invalid_argument("expected " + std::to_string(wanted) + " crossings, found " +
                                         std::to_string(data.count));
         }
     }
 
     Contour run() {
-        each([&](size_t i) { find_tips(i); });
-        each([&](size_t i) { find_corners(i); });
-        each([&](size_t i) { count(i); });
-        result_.crossings = cells_.vertices();
+        Span own = cells_.span(layers_), numbered = cells_.span({layers_.first, layers_.last + 1});
+        each(near_, [&](size_t i) { find_tips(i); });
+        each(numbered, [&](size_t i) { find_corners(i); });
+        each(own, [&](size_t i) { count(i); });
+        result_.crossings = cells_.crossings_before(layers_.last + 1) - first_vertex_;
         result_.corners = running_sum(features_, &Features::corner_base, "vertices");
         result_.tips = running_sum(features_, &Features::tip_base, "vertices");
         result_.triangles = {running_sum(features_, &Features::triangles, "triangles"), 3};
         size_t total = result_.crossings + result_.corners + result_.tips;
         if (total > kMostElements) throw std::length_error("the surface has more than 2^31 vertices");
         result_.vertices = {total, 3};
-        each([&](size_t i) { write(i); });
+        each(numbered, [&](size_t i) { write_vertices(i); });
+        each(own, [&](size_t i) { write_triangles(i); });
         return std::move(result_);
     }
 
   private:
     template <class Do>
-    void each(const Do& act) {
-        tbb::parallel_for(size_t(0), cells_.size(), act);
+    static void each(const Span& span, const Do& act) {
+        tbb::parallel_for(size_t(0), span.size(), [&](size_t k) { act(span.brick(k)); });
     }
+
+    Features& features(size_t i) { return features_[near_.place_of(i)]; }
+    const Features& features(size_t i) const { return features_[near_.place_of(i)]; }
+    size_t vertex(const CellEdge& edge) const { return edge.vertex - first_vertex_; }
 
     Crossing crossing(const CellEdge& edge) const {
         Crossing c{{double(edge.lower[0]), double(edge.lower[1]), double(edge.lower[2])}, {}};
-        c.point[edge.axis] += clamped(data_.t[edge.vertex]);
-        for (int k = 0; k < 3; ++k) c.normal[k] = data_.normals[3 * size_t(edge.vertex) + k];
+        size_t datum = edge.vertex - first_datum_;
+        c.point[edge.axis] += clamped(data_.t[datum]);
+        for (int k = 0; k < 3; ++k) c.normal[k] = data_.normals[3 * datum + k];
         return c;
     }
 
@@ -99,15 +110,15 @@ class Contouring {
             }
             Vec3 tip, lower = lower_corner(cells_.place(i), x, y, z);
             if (!bent || !feature_point(found.at.data(), found.count, lower, margin_, tip)) return;
-            features_[i].tips[x] |= Slab(1) << (y * 8 + z);
-            features_[i].points.push_back(tip);
+            features(i).tips[x] |= Slab(1) << (y * 8 + z);
+            features(i).points.push_back(tip);
         });
     }
 
     // Whether the cell at these coordinates, relative to brick i, has a tip; it may lie in a neighbour.
     bool has_tip(size_t i, int x, int y, int z) const {
         int64_t at = x >= 0 && y >= 0 && z >= 0 ? int64_t(i) : cells_.find(cells_.place(i), x, y, z);
-        return at >= 0 && features_[size_t(at)].tips[x & 7] >> ((y & 7) * 8 + (z & 7)) & 1;
+        return at >= 0 && features(size_t(at)).tips[x & 7] >> ((y & 7) * 8 + (z & 7)) & 1;
     }
 
     struct Corner {
@@ -121,7 +132,7 @@ class Contouring {
         x += axis == 0 ? up : 0, y += axis == 1 ? up : 0, z += axis == 2 ? up : 0;
         int64_t at = x < kSide && y < kSide && z < kSide ? int64_t(i) : cells_.find(cells_.place(i), x, y, z);
         if (at < 0) return {};
-        const Features& owner = features_[size_t(at)];
+        const Features& owner = features(size_t(at));
         int bit = (y & 7) * 8 + (z & 7);
         if (!(owner.corners[axis][x & 7] >> bit & 1)) return {};
         return {&owner, axis, x & 7, bit};
@@ -134,7 +145,7 @@ class Contouring {
 
     template <class Visit>
     void for_each_tip(size_t i, const Visit& visit) const {
-        const Signs& tips = features_[i].tips;
+        const Signs& tips = features(i).tips;
         Octant near = cells_.octant(i);
         auto corners = corners_of(near, cells_.signs());
         for (int x = 0; x < kSide; ++x) {
@@ -168,9 +179,20 @@ class Contouring {
                 Vec3 corner;
                 if (!has_tip(i, x - (axis == 0), y - (axis == 1), z - (axis == 2))) continue;
                 if (twice_in(found, 2 * axis) || !corner_in(found, cells_.place(i), x, y, z, axis, corner)) continue;
-                features_[i].corners[axis][x] |= Slab(1) << (y * 8 + z);
+                features(i).corners[axis][x] |= Slab(1) << (y * 8 + z);
+                features(i).corner_points[axis].push_back(corner);
             }
         });
+        number_corners(features(i));
+    }
+
+    static void number_corners(Features& own) {
+        for (int axis = 0; axis < 3; ++axis) {
+            for (int x = 0; x < kSide; ++x) {
+                own.rank[axis][x] = uint16_t(own.corner_base);
+                own.corner_base += size_t(__builtin_popcountll(own.corners[axis][x]));
+            }
+        }
     }
 
     // Whether the loop passes a face two times: then its corners could cross.
@@ -183,14 +205,8 @@ class Contouring {
     }
 
     void count(size_t i) {
-        Features& own = features_[i];
+        Features& own = features(i);
         own.tip_base = own.points.size();
-        for (int axis = 0; axis < 3; ++axis) {
-            for (int x = 0; x < kSide; ++x) {
-                own.rank[axis][x] = uint16_t(own.corner_base);
-                own.corner_base += size_t(__builtin_popcountll(own.corners[axis][x]));
-            }
-        }
         for_each_cell(corners_of(cells_.octant(i), cells_.signs()), [&](int x, int y, int z, uint8_t number) {
             if (!(own.tips[x] >> (y * 8 + z) & 1)) {
                 own.triangles += kCases[number].triangles;
@@ -207,19 +223,27 @@ class Contouring {
         }
     }
 
-    void write(size_t i) {
-        const Features& own = features_[i];
+    void write_vertices(size_t i) {
+        const Features& own = features(i);
+        cells_.for_each_own_edge(i, [&](const CellEdge& edge) { put(vertex(edge), crossing(edge).point); });
+        size_t at = result_.crossings + own.corner_base;
+        for (const auto& points : own.corner_points) {
+            for (const Vec3& point : points) put(at++, point);
+        }
+    }
+
+    void write_triangles(size_t i) {
+        const Features& own = features(i);
         int32_t* out = result_.triangles.data.get() + 3 * own.triangles;
         Octant near = cells_.octant(i);
         const Place& place = cells_.place(i);
-        cells_.for_each_own_edge(i, [&](const CellEdge& edge) { put(edge.vertex, crossing(edge).point); });
         size_t tip = result_.crossings + result_.corners + own.tip_base;
         for (size_t k = 0; k < own.points.size(); ++k) put(tip + k, own.points[k]);
         for_each_cell(corners_of(near, cells_.signs()), [&](int x, int y, int z, uint8_t number) {
             if (!(own.tips[x] >> (y * 8 + z) & 1)) {
                 const Case& cell = kCases[number];
                 for (int k = 0; k < 3 * cell.triangles; ++k) {
-                    *out++ = int32_t(cells_.edge(near, place, x, y, z, cell.corners[k]).vertex);
+                    *out++ = int32_t(vertex(cells_.edge(near, place, x, y, z, cell.corners[k])));
                 }
                 return;
             }
@@ -227,13 +251,13 @@ class Contouring {
         });
     }
 
-    int32_t* write_fan(size_t i, int x, int y, int z, const Loop& found, size_t tip, int32_t* out) {
+    int32_t* write_fan(size_t i, int x, int y, int z, const Loop& found, size_t tip, int32_t* out) const {
         auto triangle = [&](size_t a, size_t b) {
             *out++ = int32_t(a), *out++ = int32_t(b), *out++ = int32_t(tip);
         };
         for (int k = 0; k < found.count; ++k) {
             int next = (k + 1) % found.count, face = common_face(found.edges[k], found.edges[next]);
-            size_t a = found.where[k].vertex, b = found.where[next].vertex;
+            size_t a = vertex(found.where[k]), b = vertex(found.where[next]);
             Corner between = corner(i, x, y, z, face);
             if (!between.owner) {
                 triangle(a, b);
@@ -241,38 +265,39 @@ class Contouring {
             }
             size_t c = vertex(between);
             triangle(a, c), triangle(c, b);
-            Vec3 point;
-            if (face % 2 == 0 && corner_in(found, cells_.place(i), x, y, z, face / 2, point)) put(c, point);
         }
         return out;
     }
 
-    CellGrid cells_;
+    const CellGrid& cells_;
+    Layers layers_;
+    Span near_;
     Hermite data_;
     Placement placement_;
     double margin_;
+    size_t first_datum_, first_vertex_;
     std::vector<Features> features_;
     Contour result_{};
 };
 
 }  // namespace
 
-CrossedEdges crossed_edges(const Bricks& bricks) {
-    check(bricks);
-    CellGrid cells(bricks);
-    CrossedEdges found{{cells.vertices(), 3}, {cells.vertices(), 1}};
-    tbb::parallel_for(size_t(0), cells.sampled(), [&](size_t i) {
+CrossedEdges crossed_edges(const CellGrid& cells, Layers layers) {
+    Span span = cells.span(layers);
+    size_t first = cells.crossings_before(layers.first), count = cells.crossings_before(layers.last) - first;
+    CrossedEdges found{{count, 3}, {count, 1}};
+    tbb::parallel_for(span.row, span.row + span.rows, [&](size_t i) {
         cells.for_each_own_edge(i, [&](const CellEdge& edge) {
-            std::copy(edge.lower.begin(), edge.lower.end(), &found.lower.data[3 * size_t(edge.vertex)]);
-            found.axis.data[edge.vertex] = edge.axis;
+            size_t at = edge.vertex - first;
+            std::copy(edge.lower.begin(), edge.lower.end(), &found.lower.data[3 * at]);
+            found.axis.data[at] = edge.axis;
         });
     });
     return found;
 }
 
-Contour contour(const Bricks& bricks, const Hermite& data, const Placement& placement) {
-    check(bricks);
-    return Contouring(bricks, data, placement).run();
+Contour contour(const CellGrid& cells, Layers layers, const Hermite& data, const Placement& placement) {
+    return Contouring(cells, layers, data, placement).run();
 }
 
 }  // namespace fracslice

@@ -1,19 +1,21 @@
 #pragma once
 #include "feature.h"
+#include "cells.h"
 #include "marching_cubes.h"
 
 namespace fracslice {
 
-// The grid edges that the surface crosses, in the order of marching_cubes' vertices.
+// Grid edges that the surface crosses, in the order of marching_cubes' vertices.
 struct CrossedEdges {
     Array<int32_t> lower;  // [n, 3], their lower grid points ...
     Array<uint8_t> axis;   // [n], ... and directions
 };
 
-// Throws as marching_cubes does.
-CrossedEdges crossed_edges(const Bricks& bricks);
+// Those that the bricks of some layers number.
+CrossedEdges crossed_edges(const CellGrid& cells, Layers layers);
 
-// Where on its grid edge each vertex of marching_cubes, in its order, exactly lies, and the surface's unit normal there.
+// Where on its grid edge each of some crossings, in the order of crossed_edges, exactly lies, and the surface's unit normal
+// there.
 struct Hermite {
     const double* t;
     const double* normals;
@@ -38,8 +40,12 @@ struct Contour {
 // - The loop of such a cell is then a simple closed line on the surface of a convex body, the tip strictly inside it: a fan
 //   of such a loop around such a point never meets itself.
 //
-// Order and results follow from the arguments alone. Throws as marching_cubes does, and
-// std::invalid_argument if there are not as many t as vertices.
-Contour contour(const Bricks& bricks, const Hermite& data, const Placement& placement);
+// The surface is that in the cells of `layers`: pieces of neighbouring layers meet in equal points, and all pieces together
+// are the whole. The first vertices are the crossings numbered by the bricks of these layers and of the next one. data: the
+// crossings of these layers, of the one before and of the next two, for features take two layers to agree.
+//
+// Order and results follow from the arguments alone. Throws std::invalid_argument for other than so many crossings,
+// std::length_error past 2^31 vertices or triangles.
+Contour contour(const CellGrid& cells, Layers layers, const Hermite& data, const Placement& placement);
 
 }  // namespace fracslice

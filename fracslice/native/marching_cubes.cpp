@@ -36,7 +36,8 @@ constexpr std::array<Pattern, 256> kPatterns = make_patterns();
 
 class Extraction {
   public:
-    Extraction(const Bricks& bricks, const Placement& placement) : cells_(bricks), placement_(placement) {}
+    Extraction(const Bricks& bricks, const Placement& placement)
+        : bricks_(bricks), cells_(bricks, signs_of(bricks)), placement_(placement) {}
 
     Surface run() {
         std::vector<Count> counts(cells_.size());
@@ -63,13 +64,12 @@ class Extraction {
     };
 
     void write_vertices(size_t row, const Octant& near) {
-        const Bricks& bricks = cells_.bricks();
-        const float* values = bricks.values + row * kSamples;
+        const float* values = bricks_.values + row * kSamples;
         cells_.for_each_own_edge(row, [&](const CellEdge& edge) {
             int at = 0, step = 64 >> 3 * edge.axis;
-            for (int k = 0; k < 3; ++k) at = at * kSide + (edge.lower[k] - bricks.ijk[3 * row + k]);
+            for (int k = 0; k < 3; ++k) at = at * kSide + (edge.lower[k] - bricks_.ijk[3 * row + k]);
             bool leaves = (at / step) % kSide == kSide - 1;
-            const float* other = leaves ? bricks.values + size_t(near.rows[1 << edge.axis]) * kSamples : values;
+            const float* other = leaves ? bricks_.values + size_t(near.rows[1 << edge.axis]) * kSamples : values;
             write_vertex(edge, crossing(values[at], other[at + (leaves ? 1 - kSide : 1) * step]));
         });
     }
@@ -125,6 +125,7 @@ class Extraction {
         }
     }
 
+    Bricks bricks_;
     CellGrid cells_;
     Placement placement_;
     Surface surface_;
@@ -133,7 +134,6 @@ class Extraction {
 }  // namespace
 
 Surface marching_cubes(const Bricks& bricks, const Placement& placement) {
-    check(bricks);
     return Extraction(bricks, placement).run();
 }
 

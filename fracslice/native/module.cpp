@@ -25,23 +25,52 @@ nb::tuple bind_marching_cubes(const IjkArray& ijk, const ValuesArray& values, co
                           to_numpy(std::move(surface.lower), {n, 3}), to_numpy(std::move(surface.axis), {n}));
 }
 
-nb::tuple bind_crossed_edges(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index, int threads) {
-    Bricks bricks = view(ijk, values, index);
-    CrossedEdges found = unlocked(threads, [&] { return crossed_edges(bricks); });
-    size_t n = found.axis.rows;
-    return nb::make_tuple(to_numpy(std::move(found.lower), {n, 3}), to_numpy(std::move(found.axis), {n}));
-}
+// The cells of a surface, kept from one piece of it to the next together with the arrays they look into.
+class Cells {
+  public:
+    Cells(const IjkArray& ijk, const SignsArray& signs, const IndexArray& index, int threads)
+        : ijk_(ijk), index_(index), threads_(threads),
+          grid_(unlocked(threads, [&] { return CellGrid(layout(ijk, index), words(ijk, signs)); })) {}
 
-nb::tuple bind_contour(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index, const RootsArray& t,
-                       const NormalsArray& normals, const std::array<double, 3>& origin, double voxel, double clamp,
-                       int threads) {
-    Bricks bricks = view(ijk, values, index);
-    if (t.shape(0) != normals.shape(0)) throw nb::value_error("t and normals differ in length");
-    Hermite data{t.data(), normals.data(), t.shape(0)};
-    Contour surface = unlocked(threads, [&] { return contour(bricks, data, {origin, voxel, clamp}); });
-    size_t n = surface.vertices.rows, m = surface.triangles.rows;
-    return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
-                          surface.crossings, surface.corners);
+    nb::tuple crossed_edges(int first, int last) const {
+        CrossedEdges found = unlocked(threads_, [&] { return fracslice::crossed_edges(grid_, {first, last}); });
+        size_t n = found.axis.rows;
+        return nb::make_tuple(to_numpy(std::move(found.lower), {n, 3}), to_numpy(std::move(found.axis), {n}));
+    }
+
+    nb::tuple contour(int first, int last, const RootsArray& t, const NormalsArray& normals,
+                      const std::array<double, 3>& origin, double voxel, double clamp) const {
+        if (t.shape(0) != normals.shape(0)) throw nb::value_error("t and normals differ in length");
+        Hermite data{t.data(), normals.data(), t.shape(0)};
+        Contour surface = unlocked(
+            threads_, [&] { return fracslice::contour(grid_, {first, last}, data, {origin, voxel, clamp}); });
+        size_t n = surface.vertices.rows, m = surface.triangles.rows;
+        return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
+                              surface.crossings, surface.corners);
+    }
+
+    size_t crossings_before(int layer) const { return grid_.crossings_before(layer); }
+
+  private:
+    static std::vector<Signs> words(const IjkArray& ijk, const SignsArray& signs) {
+        if (ijk.shape(0) != signs.shape(0)) throw nb::value_error("ijk and signs differ in length");
+        std::vector<Signs> rows(signs.shape(0));
+        std::memcpy(rows.data(), signs.data(), rows.size() * sizeof(Signs));
+        return rows;
+    }
+
+    IjkArray ijk_;
+    IndexArray index_;
+    int threads_;
+    CellGrid grid_;
+};
+
+nb::object bind_signs(const ValuesArray& values, int threads) {
+    Bricks bricks{{nullptr, values.shape(0), nullptr, {}}, values.data()};
+    std::vector<Signs> signs = unlocked(threads, [&] { return signs_of(bricks); });
+    Array<uint8_t> bytes(signs.size(), sizeof(Signs));
+    std::memcpy(bytes.data.get(), signs.data(), signs.size() * sizeof(Signs));
+    return to_numpy(std::move(bytes), {signs.size(), kSide, kSide});
 }
 
 int64_t bind_open_edges(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index) {
@@ -58,9 +87,14 @@ NB_MODULE(_native, module) {
     using namespace nanobind::literals;
     module.def("marching_cubes", &fracslice::bind_marching_cubes, "ijk"_a, "values"_a, "index"_a, "origin"_a, "voxel"_a,
                "clamp"_a, "threads"_a = 0);
-    module.def("crossed_edges", &fracslice::bind_crossed_edges, "ijk"_a, "values"_a, "index"_a, "threads"_a = 0);
-    module.def("contour", &fracslice::bind_contour, "ijk"_a, "values"_a, "index"_a, "t"_a, "normals"_a, "origin"_a, "voxel"_a,
-               "clamp"_a, "threads"_a = 0);
+    module.def("signs", &fracslice::bind_signs, "values"_a, "threads"_a = 0);
     module.def("open_edges", &fracslice::bind_open_edges, "ijk"_a, "values"_a, "index"_a);
+    using fracslice::Cells;
+    nanobind::class_<Cells>(module, "Cells")
+        .def(nanobind::init<const fracslice::IjkArray&, const fracslice::SignsArray&, const fracslice::IndexArray&, int>(),
+             "ijk"_a, "signs"_a, "index"_a, "threads"_a = 0)
+        .def("crossed_edges", &Cells::crossed_edges, "first"_a, "last"_a)
+        .def("contour", &Cells::contour, "first"_a, "last"_a, "t"_a, "normals"_a, "origin"_a, "voxel"_a, "clamp"_a)
+        .def("crossings_before", &Cells::crossings_before, "layer"_a);
     fracslice::bind_grid(module);
 }

@@ -14,14 +14,19 @@ namespace nb = nanobind;
 
 using IjkArray = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using ValuesArray = nb::ndarray<const float, nb::shape<-1, kSamples>, nb::c_contig, nb::device::cpu>;
+using SignsArray = nb::ndarray<const uint8_t, nb::shape<-1, kSide, kSide>, nb::c_contig, nb::device::cpu>;
 using RootsArray = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using NormalsArray = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using IndexArray = nb::ndarray<const int32_t, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
+inline Layout layout(const IjkArray& ijk, const IndexArray& index) {
+    std::array<int, 3> size = {int(index.shape(0)), int(index.shape(1)), int(index.shape(2))};
+    return {ijk.data(), ijk.shape(0), index.data(), size};
+}
+
 inline Bricks view(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index) {
     if (ijk.shape(0) != values.shape(0)) throw nb::value_error("ijk and values differ in length");
-    std::array<int, 3> size = {int(index.shape(0)), int(index.shape(1)), int(index.shape(2))};
-    return {ijk.data(), values.data(), ijk.shape(0), index.data(), size};
+    return {layout(ijk, index), values.data()};
 }
 
 template <class T>

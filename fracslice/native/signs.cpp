@@ -41,14 +41,14 @@ int64_t across(const Signs& s, int axis, bool high, Slab sign) {
     return total;
 }
 
-int64_t open_edges_of_brick(const Bricks& bricks, const Signs& signs, size_t row) {
+int64_t open_edges_of_brick(const Layout& layout, const Signs& signs, size_t row) {
     int64_t total = 0;
     for (int axis = 0; axis < 3; ++axis) {
         for (int high = 0; high < 2; ++high) {
             std::array<int, 3> p;
-            for (int k = 0; k < 3; ++k) p[k] = bricks.ijk[3 * row + k] / kSide;
+            for (int k = 0; k < 3; ++k) p[k] = layout.ijk[3 * row + k] / kSide;
             p[axis] += high ? 1 : -1;
-            int32_t at = bricks.at(p[0], p[1], p[2]);
+            int32_t at = layout.at(p[0], p[1], p[2]);
             if (at < 0) total += across(signs, axis, high, constant(at));
         }
     }
@@ -56,14 +56,14 @@ int64_t open_edges_of_brick(const Bricks& bricks, const Signs& signs, size_t row
 }
 
 // Faces between two bricks without samples, counted at the inside one: all beyond it is inside, or without closure.
-int64_t open_faces(const Bricks& bricks, int x) {
+int64_t open_faces(const Layout& layout, int x) {
     int64_t total = 0;
-    for (int y = 0; y < bricks.size[1]; ++y) {
-        for (int z = 0; z < bricks.size[2]; ++z) {
-            if (bricks.at(x, y, z) != kInside) continue;
-            total += (bricks.at(x - 1, y, z) == kOutside) + (bricks.at(x + 1, y, z) == kOutside) +
-                     (bricks.at(x, y - 1, z) == kOutside) + (bricks.at(x, y + 1, z) == kOutside) +
-                     (bricks.at(x, y, z - 1) == kOutside) + (bricks.at(x, y, z + 1) == kOutside);
+    for (int y = 0; y < layout.size[1]; ++y) {
+        for (int z = 0; z < layout.size[2]; ++z) {
+            if (layout.at(x, y, z) != kInside) continue;
+            total += (layout.at(x - 1, y, z) == kOutside) + (layout.at(x + 1, y, z) == kOutside) +
+                     (layout.at(x, y - 1, z) == kOutside) + (layout.at(x, y + 1, z) == kOutside) +
+                     (layout.at(x, y, z - 1) == kOutside) + (layout.at(x, y, z + 1) == kOutside);
         }
     }
     return total;
@@ -82,17 +82,17 @@ int64_t sum(size_t n, const Count& count) {
 
 }  // namespace
 
-void check(const Bricks& bricks) {
-    size_t cells = size_t(bricks.size[0]) * bricks.size[1] * bricks.size[2], named = 0;
+void check(const Layout& layout) {
+    size_t cells = size_t(layout.size[0]) * layout.size[1] * layout.size[2], named = 0;
     for (size_t k = 0; k < cells; ++k) {
-        if (bricks.index[k] < kInside) throw std::invalid_argument("index holds a number below -2");
-        named += bricks.index[k] >= 0;
+        if (layout.index[k] < kInside) throw std::invalid_argument("index holds a number below -2");
+        named += layout.index[k] >= 0;
     }
-    if (named != bricks.count) throw std::invalid_argument("index does not name every brick once");
-    for (size_t row = 0; row < bricks.count; ++row) {
-        const int32_t* p = bricks.ijk + 3 * row;
+    if (named != layout.count) throw std::invalid_argument("index does not name every brick once");
+    for (size_t row = 0; row < layout.count; ++row) {
+        const int32_t* p = layout.ijk + 3 * row;
         bool aligned = p[0] >= 0 && p[1] >= 0 && p[2] >= 0 && !((p[0] | p[1] | p[2]) % kSide);
-        if (!aligned || bricks.at(p[0] / kSide, p[1] / kSide, p[2] / kSide) != int32_t(row)) {
+        if (!aligned || layout.at(p[0] / kSide, p[1] / kSide, p[2] / kSide) != int32_t(row)) {
             throw std::invalid_argument("brick " + std::to_string(row) + " is not where index says");
         }
     }
@@ -106,9 +106,9 @@ std::vector<Signs> signs_of(const Bricks& bricks) {
     return signs;
 }
 
-int64_t open_edges(const Bricks& bricks, const std::vector<Signs>& signs) {
-    return sum(bricks.count, [&](size_t row) { return open_edges_of_brick(bricks, signs[row], row); }) +
-           64 * sum(bricks.size[0], [&](size_t x) { return open_faces(bricks, int(x)); });
+int64_t open_edges(const Layout& layout, const std::vector<Signs>& signs) {
+    return sum(layout.count, [&](size_t row) { return open_edges_of_brick(layout, signs[row], row); }) +
+           64 * sum(layout.size[0], [&](size_t x) { return open_faces(layout, int(x)); });
 }
 
 std::array<Corners, kSide + 1> corners_of(const Octant& octant, const std::vector<Signs>& signs) {

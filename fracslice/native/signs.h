@@ -15,7 +15,7 @@ constexpr Slab kFirstY = 0xff, kFirstZ = 0x0101010101010101u;
 std::vector<Signs> signs_of(const Bricks& bricks);
 
 // How many grid edges with a sign change touch a point without a sample. Zero means that the surface is closed.
-int64_t open_edges(const Bricks& bricks, const std::vector<Signs>& signs);
+int64_t open_edges(const Layout& layout, const std::vector<Signs>& signs);
 
 inline Slab constant(int32_t at) { return at == kInside ? ~Slab(0) : Slab(0); }
 
@@ -29,8 +29,8 @@ inline Slab shift_z(Slab slab, Slab next) {
 struct Octant {
     std::array<int32_t, 8> rows;
 
-    Octant(const Bricks& bricks, int x, int y, int z) {
-        for (int k = 0; k < 8; ++k) rows[k] = bricks.at(x + (k & 1), y + (k >> 1 & 1), z + (k >> 2 & 1));
+    Octant(const Layout& layout, int x, int y, int z) {
+        for (int k = 0; k < 8; ++k) rows[k] = layout.at(x + (k & 1), y + (k >> 1 & 1), z + (k >> 2 & 1));
     }
 };
 

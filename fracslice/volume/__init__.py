@@ -9,21 +9,24 @@ from ..formulas.registry import Node
 from ..kernel import compile_scene
 from ..kernel.depth import resolve_depths
 from ..work import Work
-from .bricks import Bricks
+from .bricks import Bricks, SignBricks
 from .extent import Extent, extent
 from .lattice import Lattice
-from .sampler import sample
+from .sampler import sample, sample_signs
 
 __all__ = [
     "Bricks",
     "Extent",
     "Lattice",
     "Plan",
+    "SignBricks",
     "extent",
     "plan",
     "resolve_depths",
     "sample",
     "sample_scene",
+    "sample_scene_signs",
+    "sample_signs",
 ]
 
 
@@ -53,3 +56,9 @@ def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
     """Samples a planned scene around its surface. Raises `VolumeError`, `Cancelled`."""
     lattice = Lattice.around(planned.outer, planned.voxel)
     return sample(compile_scene(planned.root), planned.root.facts, lattice, work)
+
+
+def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
+    """As `sample_scene`, of each sample only its sign."""
+    lattice = Lattice.around(planned.outer, planned.voxel)
+    return sample_signs(compile_scene(planned.root), planned.root.facts, lattice, work)

@@ -63,8 +63,7 @@ def write_vdb(
 
 
 def read_vdb(path: str | os.PathLike[str], name: str = "") -> Bricks:
-    """The bricks of the float grid called `name` in a .vdb file, or of the first one. Raises `VolumeError`.
-    """
+    """The bricks of the float grid `name` in a .vdb file, or of the first one. Raises `VolumeError`."""
     from .._native import Grid
 
     try:

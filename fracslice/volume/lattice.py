@@ -25,8 +25,7 @@ class Lattice:
 
     @classmethod
     def around(cls, box: Box, voxel: float) -> Lattice:
-        """The lattice whose middle is the box' middle. Raises `VolumeError` if it would have too many points.
-        """
+        """The lattice around the box' middle. Raises `VolumeError` if it would have too many points."""
         if not (math.isfinite(voxel) and voxel > 0):
             raise VolumeError(f"voxel size {voxel!r}: expected a length > 0")
         counts = [math.ceil((s / voxel + 2 * PADDING + 1) / BRICK) for s in box.size]

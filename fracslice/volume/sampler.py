@@ -14,6 +14,7 @@ from there. All results depend on the field only, not on threads or order.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,7 +23,7 @@ from ..errors import VolumeError
 from ..formulas.registry import Facts
 from ..kernel import CpuKernel
 from ..work import Work, chunks
-from .bricks import INSIDE, OUTSIDE, Bricks
+from .bricks import INSIDE, OUTSIDE, Bricks, SignBricks
 from .lattice import BRICK, Lattice
 from .values import values_at
 
@@ -41,15 +42,29 @@ def sample(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None 
     kernel: the scene's float32 kernel. facts: the scene's facts, whose Lipschitz bound prunes. Raises
     `VolumeError` if there is no surface, or if it leaves the lattice; `Cancelled`.
     """
-    run = _Run(kernel, facts, lattice, work or Work())
-    state, outside = run.probe()
-    front = run.seeds(state, outside)
-    for turn in range(AUDITS):
-        run.explore(state, front)
-        front = run.audit(state, turn)
-        if not len(front):
-            break
-    return run.finished(state)
+    values: list[np.ndarray] = []
+
+    def keep(wave: np.ndarray) -> None:
+        values.append(wave)
+
+    run = _Run(kernel, facts, lattice, work or Work(), keep)
+    signs, order = run.signs()
+    return Bricks(
+        signs.origin,
+        signs.voxel,
+        signs.ijk,
+        _gathered(values, order),
+        signs.index,
+        evaluations=signs.evaluations,
+        repaired=signs.repaired,
+        audited=signs.audited,
+    )
+
+
+def sample_signs(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> SignBricks:
+    """The same bricks, in a 32nd of the memory: of each sample only its sign is kept."""
+    signs, _ = _Run(kernel, facts, lattice, work or Work(), None).signs()
+    return signs
 
 
 @dataclass
@@ -58,12 +73,23 @@ class _Run:
     facts: Facts
     lattice: Lattice
     work: Work
+    keep: Callable[[np.ndarray], None] | None
     evaluations: int = 0
     repaired: int = 0
     audited: int = 0
     corners: list[np.ndarray] = field(default_factory=list)
-    signs: list[np.ndarray] = field(default_factory=list)
-    values: list[np.ndarray] = field(default_factory=list)
+    bits: list[np.ndarray] = field(default_factory=list)
+
+    def signs(self) -> tuple[SignBricks, np.ndarray]:
+        """The sampled bricks that the surface needs, and which rows of all sampled ones these are."""
+        state, outside = self.probe()
+        front = self.seeds(state, outside)
+        for turn in range(AUDITS):
+            self.explore(state, front)
+            front = self.audit(state, turn)
+            if not len(front):
+                break
+        return self.finished(state)
 
     # --- top down -------------------------------------------------------------------------------------------
     def probe(self) -> tuple[np.ndarray, np.ndarray]:
@@ -120,7 +146,7 @@ class _Run:
             state[tuple(bare.T)] = EMPTY
             state[tuple(front.T)] = QUEUED
             signs = self.sampled(front)
-            self.signs.append(signs)
+            self.bits.append(signs)
             known = int((state == QUEUED).sum())
             self.work.progress("sampling", known / max(known + int((state == CANDIDATE).sum()), 1))
             front = np.concatenate([self.neighbours(state, front, signs), _around(state, bare)])
@@ -143,20 +169,21 @@ class _Run:
     def sampled(self, bricks: np.ndarray) -> np.ndarray:
         """Samples bricks; returns their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set where inside."""
         corners = np.ascontiguousarray(bricks * BRICK, np.int32)
-        values = np.empty((len(bricks), BRICK**3), np.float32)
+        values = np.empty((len(bricks) if self.keep else 0, BRICK**3), np.float32)
         signs = np.empty((len(bricks), 64), np.uint8)
 
         def task(part: slice) -> None:
-            out = values[part]
+            out = values[part] if self.keep else np.empty((part.stop - part.start, BRICK**3), np.float32)
             self.kernel.bricks(corners[part], self.lattice.origin, self.lattice.voxel, out)
             if np.isnan(out.max()):
                 np.nan_to_num(out, copy=False, nan=self.lattice.voxel)
             signs[part] = np.packbits(out < 0, axis=1, bitorder="little")
 
         self.work.map(task, chunks(len(bricks), CHUNK))
-        self.evaluations += values.size
+        self.evaluations += len(bricks) * BRICK**3
         self.corners.append(corners)
-        self.values.append(values)
+        if self.keep:
+            self.keep(values)
         return signs.reshape(-1, 8, 8)
 
     def neighbours(self, state: np.ndarray, bricks: np.ndarray, signs: np.ndarray) -> np.ndarray:
@@ -176,8 +203,7 @@ class _Run:
         return np.concatenate(found)
 
     def audit(self, state: np.ndarray, turn: int) -> np.ndarray:
-        """Bricks without samples that have a sample of the other sign than assumed; always the same points.
-        """
+        """Bricks without samples, with a sample of the other sign than assumed; always the same points."""
         rng = np.random.default_rng(turn)
         bare = state != QUEUED
         near = np.argwhere(bare & _beside(~bare, False))
@@ -192,26 +218,27 @@ class _Run:
         return np.unique(bricks[wrong], axis=0)
 
     # --- the result -----------------------------------------------------------------------------------------
-    def finished(self, state: np.ndarray) -> Bricks:
-        """The bricks that a crossing edge touches, in order."""
+    def finished(self, state: np.ndarray) -> tuple[SignBricks, np.ndarray]:
+        """The bricks that a crossing edge touches, in order, and their rows."""
         ijk = np.concatenate([np.empty((0, 3), np.int32), *self.corners])
-        signs = np.concatenate([np.empty((0, 8, 8), np.uint8), *self.signs])
+        signs = np.concatenate([np.empty((0, 8, 8), np.uint8), *self.bits])
         index = np.where((state == EMPTY), OUTSIDE, INSIDE).astype(np.int32)
         kept = self.crossed(ijk // BRICK, signs, index)
         if not kept.any():
             raise VolumeError("there is no surface: the scene is empty or smaller than a voxel")
         order = np.flatnonzero(kept)[np.lexsort(ijk[kept].T[::-1])]
         index[tuple(ijk[order].T // BRICK)] = np.arange(len(order))
-        return Bricks(
+        bricks = SignBricks(
             self.lattice.origin,
             self.lattice.voxel,
             np.ascontiguousarray(ijk[order]),
-            self.gathered(order),
+            signs[order],
             index,
             evaluations=self.evaluations,
             repaired=self.repaired,
             audited=self.audited,
         )
+        return bricks, order
 
     def crossed(self, bricks: np.ndarray, signs: np.ndarray, index: np.ndarray) -> np.ndarray:
         """Which sampled bricks have a sign change in them or to a neighbour; the others' sign is written to
@@ -231,16 +258,16 @@ class _Run:
             kept |= (other >= 0) & np.where(any_in, facing_out[other], facing_in[other])
         return kept
 
-    def gathered(self, order: np.ndarray) -> np.ndarray:
-        """The values of the sampled bricks in `order`; each wave is let go as soon as it is copied."""
-        out = np.empty((len(order), BRICK**3), np.float32)
-        start = 0
-        while self.values:
-            part = self.values.pop(0)
-            mine = np.flatnonzero((order >= start) & (order < start + len(part)))
-            out[mine] = part[order[mine] - start]
-            start += len(part)
-        return out
+
+def _gathered(waves: list[np.ndarray], order: np.ndarray) -> np.ndarray:
+    """The samples of the bricks in `order`; each wave is let go as soon as it is copied."""
+    out, start = np.empty((len(order), BRICK**3), np.float32), 0
+    while waves:
+        part = waves.pop(0)
+        mine = np.flatnonzero((order >= start) & (order < start + len(part)))
+        out[mine] = part[order[mine] - start]
+        start += len(part)
+    return out
 
 
 _FACES = [(axis, step) for axis in range(3) for step in (-1, 1)]
@@ -252,8 +279,7 @@ def _grid(*shape: int) -> np.ndarray:
 
 
 def _face(signs: np.ndarray, axis: int, step: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of sign bits [n, 8, 8]: whether the outermost layer on one side has inside samples, and outside ones.
-    """
+    """Of sign bits [n, 8, 8]: whether the outermost layer on a side has inside samples, and outside ones."""
     if axis == 2:
         bit = np.uint8(128 if step > 0 else 1)
         layer = signs & bit

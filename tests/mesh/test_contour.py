@@ -5,18 +5,19 @@ given.
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from fracslice._native import contour as build
-from fracslice._native import crossed_edges
+from fracslice._native import Cells
 from fracslice.errors import MeshError
 from fracslice.formulas import (
     Node,
     box,
     difference,
     julia,
+    mandelbulb,
     menger,
     octahedron,
     sphere,
@@ -27,7 +28,7 @@ from fracslice.formulas import (
 from fracslice.kernel import reference
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check
-from fracslice.mesh.extract import contour, extract
+from fracslice.mesh.extract import Piece, contour, contour_pieces, extract
 from fracslice.volume import Bricks, plan, sample_scene
 from fracslice.volume.crossings import refine_crossings
 from fracslice.work import Work
@@ -107,15 +108,18 @@ def noise(seed: int, size: int = 2) -> Bricks:
     return Bricks((0.0, 0.0, 0.0), 1.0, ijk, values, np.arange(len(ijk), dtype=np.int32).reshape((size,) * 3))
 
 
+def cells_of(bricks: Bricks) -> Cells:
+    return Cells(bricks.ijk, bricks.signs.signs, bricks.index)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_a_solid_for_any_crossings_and_normals(seed: int) -> None:
-    bricks, rng = noise(seed), np.random.default_rng(100 + seed)
-    arrays = bricks.ijk, bricks.values, bricks.index
-    n = len(crossed_edges(*arrays)[1])
+    cells, rng = cells_of(noise(seed)), np.random.default_rng(100 + seed)
+    n = len(cells.crossed_edges(-1, 2)[1])
     t = rng.choice([rng.uniform(0, 1, n), rng.integers(0, 2, n)])
     normals = rng.normal(size=(n, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    vertices, triangles, crossings, corners = build(*arrays, t, normals, (0.0, 0.0, 0.0), 1.0, 1e-3)
+    vertices, triangles, crossings, corners = cells.contour(-1, 2, t, normals, (0.0, 0.0, 0.0), 1.0, 1e-3)
     assert n == crossings and corners > 0 and len(vertices) > crossings + corners
     assert_solid(Mesh(vertices, triangles))
 
@@ -131,7 +135,7 @@ def test_threads_do_not_matter() -> None:
 def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
     planned = plan(torus(radius=1, tube=0.3), 64)
     bricks = sample_scene(planned)
-    lower, axis = crossed_edges(bricks.ijk, bricks.values, bricks.index)
+    lower, axis = cells_of(bricks).crossed_edges(0, len(bricks.index))
     exact = refine_crossings(planned.root, bricks.origin, bricks.voxel, lower, axis)
     points = np.array(bricks.origin) + bricks.voxel * (lower + exact.t[:, None] * np.eye(3)[axis])
     assert np.abs(reference(planned.root)(*points.T)).max() < 1e-7 * bricks.voxel
@@ -141,11 +145,37 @@ def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
 
 
 def test_the_wrong_number_of_crossings_is_refused() -> None:
-    bricks = noise(0)
     with pytest.raises(ValueError, match="crossings"):
-        build(
-            bricks.ijk, bricks.values, bricks.index, np.zeros(3), np.zeros((3, 3)), (0.0, 0.0, 0.0), 1.0, 1e-3
+        cells_of(noise(0)).contour(-1, 2, np.zeros(3), np.zeros((3, 3)), (0.0, 0.0, 0.0), 1.0, 1e-3)
+
+
+def test_bricks_out_of_order_are_refused() -> None:
+    bricks, index = noise(0), np.arange(8, dtype=np.int32)[::-1].reshape(2, 2, 2)
+    with pytest.raises(ValueError, match="order"):
+        cells_of(
+            replace(
+                bricks, ijk=bricks.ijk[::-1].copy(), values=bricks.values[::-1].copy(), index=index.copy()
+            )
         )
+
+
+@pytest.mark.parametrize("root", [difference(box(), sphere(radius=0.6)), mandelbulb(iterations=6)])
+@pytest.mark.parametrize("most", [1, 60])
+def test_pieces_are_the_whole_bit_by_bit(root: Node, most: int) -> None:
+    planned = plan(root, 48)
+    bricks = sample_scene(planned)
+    whole, pieces = contour(planned.root, bricks), list(contour_pieces(planned.root, bricks, most=most))
+    assert len(pieces) > 3
+    assert triangle_set(pieces) == triangle_set([Piece(whole, 0.0, np.empty(0))])
+    for one, other in itertools.pairwise(pieces):
+        low, high = one.mesh.vertices[:, 0].max(), other.mesh.vertices[:, 0].min()
+        assert low <= one.end + 1e-12 and high >= one.end - 1e-12
+        _, mine, theirs = np.intersect1d(one.crossings, other.crossings, return_indices=True)
+        assert (one.mesh.vertices[mine] == other.mesh.vertices[theirs])[one.crossings[mine] >= 0].all()
+
+
+def triangle_set(pieces: list[Piece]) -> list[bytes]:
+    return sorted(row.tobytes() for piece in pieces for row in piece.mesh.corners)
 
 
 def test_open_samples_are_refused() -> None:

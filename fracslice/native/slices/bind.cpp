@@ -1,0 +1,117 @@
+// The extension module fracslice._slices. Its Python face and its documentation are in ../../_slices.pyi.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+
+#include "squares.h"
+
+namespace nb = nanobind;
+
+namespace fracslice {
+namespace {
+
+// Machine code of a scene: void points(parameters, x, y, z, f, n).
+class Compiled : public Field {
+ public:
+    Compiled(uintptr_t code, uintptr_t parameters)
+        : code_(reinterpret_cast<Code>(code)), parameters_(reinterpret_cast<const void*>(parameters)) {}
+    void values(const float* x, const float* y, const float* z, float* f, size_t n) const override {
+        code_(parameters_, x, y, z, f, ptrdiff_t(n));
+    }
+
+ private:
+    using Code = void (*)(const void*, const float*, const float*, const float*, float*, ptrdiff_t);
+    Code code_;
+    const void* parameters_;
+};
+
+// A Python function of three float32 arrays that returns one.
+class Called : public Field {
+ public:
+    explicit Called(nb::callable function) : function_(std::move(function)) {}
+    void values(const float* x, const float* y, const float* z, float* f, size_t n) const override {
+        using In = nb::ndarray<nb::numpy, const float, nb::ndim<1>>;
+        nb::gil_scoped_acquire locked;
+        auto view = [n](const float* p) { return nb::cast(In(p, {n}, nb::handle()), nb::rv_policy::copy); };
+        nb::object result = function_(view(x), view(y), view(z));
+        auto out = nb::cast<nb::ndarray<const float, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(result);
+        if (out.shape(0) != n) throw nb::value_error("as many values as points were expected");
+        std::copy(out.data(), out.data() + n, f);
+    }
+
+ private:
+    nb::callable function_;
+};
+
+template <class T, class Row>
+nb::object owned(std::vector<Row>&& rows, std::initializer_list<size_t> shape) {
+    auto* kept = new std::vector<Row>(std::move(rows));
+    nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Row>*>(p); });
+    return nb::cast(nb::ndarray<nb::numpy, T>(reinterpret_cast<T*>(kept->data()), shape, owner));
+}
+
+using Bytes = nb::ndarray<uint8_t, nb::ndim<2>, nb::device::cpu>;
+
+nb::tuple bind_paint(const Slab& slab, int layer, const Bytes& image) {
+    Canvas canvas{image.data(), int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)};
+    Painted painted;
+    {
+        nb::gil_scoped_release released;
+        painted = paint(slab, layer, canvas);
+    }
+    return nb::make_tuple(painted.area, painted.partly);
+}
+
+nb::tuple bind_crossings(const Slab& slab, int layer) {
+    Crossings found;
+    {
+        nb::gil_scoped_release released;
+        found = crossings(slab, layer);
+    }
+    size_t n = found.edges.size();
+    return nb::make_tuple(owned<int32_t>(std::move(found.edges), {n, 4}), owned<double>(std::move(found.ends), {n, 2}));
+}
+
+nb::tuple bind_signs(const Slab& slab) {
+    size_t shape[3] = {size_t(slab.layers()), size_t(slab.rows() - 2) * kTile, size_t(slab.columns() - 2) * kTile};
+    std::vector<uint8_t> inside(shape[0] * shape[1] * shape[2]), known(inside.size());
+    for (size_t k = 0; k < shape[0]; ++k)
+        for (size_t r = 0; r < shape[1]; ++r)
+            for (size_t c = 0; c < shape[2]; ++c) {
+                int y = int(r / kTile) + 1, x = int(c / kTile) + 1, bit = int(kTile * (r % kTile) + c % kTile);
+                int32_t t = slab.at(int(k), y, x);
+                inside[(k * shape[1] + r) * shape[2] + c] = slab.word(int(k), y, x) >> bit & 1;
+                known[(k * shape[1] + r) * shape[2] + c] = t >= 0 ? slab.known[t] >> bit & 1 : 0;
+            }
+    auto wide = {shape[0], shape[1], shape[2]};
+    return nb::make_tuple(owned<uint8_t>(std::move(inside), wide), owned<uint8_t>(std::move(known), wide));
+}
+
+}  // namespace
+}  // namespace fracslice
+
+NB_MODULE(_slices, module) {
+    using namespace nanobind::literals;
+    using namespace fracslice;
+    nb::exception<std::domain_error>(module, "BorderError", PyExc_ValueError);
+    nb::class_<Field>(module, "Field");
+    nb::class_<Compiled, Field>(module, "Compiled").def(nb::init<uintptr_t, uintptr_t>(), "code"_a, "parameters"_a);
+    nb::class_<Called, Field>(module, "Called").def(nb::init<nb::callable>(), "function"_a);
+    nb::class_<Bounds>(module, "Bounds")
+        .def(nb::init<double, double, double, int, int, bool, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
+             "stop_inside"_a, "fractal"_a, "even"_a);
+    nb::class_<Slab>(module, "Slab")
+        .def("__init__",
+             [](Slab* self, std::array<double, 4> f, std::vector<double> z, int ny, int nx) {
+                 new (self) Slab({f[0], f[1], f[2], f[3]}, std::move(z), ny, nx);
+             },
+             "frame"_a, "z"_a, "ny"_a, "nx"_a)
+        .def("sample", &Slab::sample, "field"_a, "bounds"_a, nb::call_guard<nb::gil_scoped_release>())
+        .def_ro("evaluations", &Slab::evaluations)
+        .def("paint", &bind_paint, "layer"_a, "image"_a)
+        .def("crossings", &bind_crossings, "layer"_a)
+        .def("signs", &bind_signs);
+}

@@ -1,0 +1,342 @@
+#include "slab.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "bits.h"
+
+namespace fracslice {
+namespace {
+
+constexpr int kCoarsest = 8;  // tiles along a block of the first level
+constexpr size_t kBatch = 2048;
+
+// The middles of the blocks of 8, 4 and 2 samples of a tile.
+constexpr uint64_t middles(int size) {
+    uint64_t word = 0;
+    for (int y = size / 2; y < kTile; y += size)
+        for (int x = size / 2; x < kTile; x += size) word |= uint64_t(1) << (kTile * y + x);
+    return word;
+}
+constexpr uint64_t kMiddles[9] = {0, 0, middles(2), 0, middles(4), 0, 0, 0, middles(8)};
+
+}  // namespace
+
+Slab::Slab(const Frame& frame, std::vector<double> z, int ny, int nx)
+    : frame_(frame),
+      z_(std::move(z)),
+      ty_((ny + kTile - 1) / kTile + 2),
+      tx_((nx + kTile - 1) / kTile + 2),
+      where_(z_.size() * ty_ * tx_, kEmpty) {}
+
+void Slab::sample(const Field& field, const Bounds& bounds) {
+    coarse(field, bounds);
+    for (int size : {8, 4, 2}) finer(field, bounds, size);
+    mend();
+    close(field);
+    corners();
+    measure(field, bounds);
+}
+
+// where(i, column, row, z) sets the place of point i on the lattice; take(i, f) gets its value.
+template <class Where, class Take>
+void Slab::evaluate(const Field& field, size_t n, const Where& where, const Take& take) {
+    evaluations += int64_t(n);
+    alignas(64) float x[kBatch], y[kBatch], z[kBatch], f[kBatch];
+    for (size_t begin = 0; begin < n; begin += kBatch) {
+        size_t m = std::min(kBatch, n - begin), padded = (m + 63) / 64 * 64;
+        for (size_t i = 0; i < m; ++i) {
+            double column, row, height;
+            where(begin + i, column, row, height);
+            x[i] = float(frame_.x0 + frame_.dx * column);
+            y[i] = float(frame_.y0 + frame_.dy * row);
+            z[i] = float(height);
+        }
+        for (size_t i = m; i < padded; ++i) x[i] = x[0], y[i] = y[0], z[i] = z[0];
+        field.values(x, y, z, f, padded);
+        // What is not a number counts as outside.
+        for (size_t i = 0; i < m; ++i) take(begin + i, std::isnan(f[i]) ? float(frame_.dx) : f[i]);
+    }
+}
+
+// Of samples 64 * tile + bit.
+template <class Take>
+void Slab::evaluate(const Field& field, const std::vector<int64_t>& samples, const Take& take) {
+    auto where = [&](size_t i, double& column, double& row, double& height) {
+        const Place& p = place[samples[i] >> 6];
+        column = kTile * (p.x - 1) + (samples[i] & 7), row = kTile * (p.y - 1) + (samples[i] >> 3 & 7), height = z_[p.layer];
+    };
+    evaluate(field, samples.size(), where, [&](size_t i, float f) {
+        size_t t = samples[i] >> 6;
+        int bit = samples[i] & 63;
+        known[t] |= uint64_t(1) << bit;
+        values[t][bit] = f;
+        take(t, bit, f);
+    });
+}
+
+int32_t Slab::add(int layer, int y, int x) {
+    int32_t& here = where_[(size_t(layer) * ty_ + y) * tx_ + x];
+    inside.push_back(here == kFull ? kAll : 0);
+    known.push_back(0);
+    values.emplace_back();
+    place.push_back({layer, y, x});
+    return here = int32_t(place.size() - 1);
+}
+
+// --- top down ------------------------------------------------------------------------------------------------------------
+void Slab::coarse(const Field& field, const Bounds& bounds) {
+    std::vector<Block> blocks, cut;
+    for (int y = 1; y < ty_ - 1; y += kCoarsest)
+        for (int x = 1; x < tx_ - 1; x += kCoarsest) blocks.push_back({y, x, kCoarsest, 0, layers() - 1});
+    double width = std::hypot(frame_.dx, frame_.dy) * kTile / 2;
+    while (!blocks.empty() && blocks[0].size > 0) {
+        cut.clear();
+        auto middle = [&](size_t i, double& column, double& row, double& height) {
+            const Block& b = blocks[i];
+            column = (b.x - 1 + b.size / 2.0) * kTile, row = (b.y - 1 + b.size / 2.0) * kTile;
+            height = (z_[b.first] + z_[b.last]) / 2;
+        };
+        evaluate(field, blocks.size(), middle, [&](size_t i, float f) {
+            const Block& b = blocks[i];
+            double bound = b.size > 1 ? bounds.proven : f < 0 ? bounds.inside : bounds.outside;
+            if (std::fabs(f) > bound * std::hypot(width * b.size, (z_[b.last] - z_[b.first]) / 2)) {
+                if (f < 0) fill(b);
+                return;
+            }
+            if (b.size > 1) {
+                int half = b.size / 2;
+                for (int q = 0; q < 4; ++q) {
+                    int y = b.y + (q >> 1) * half, x = b.x + (q & 1) * half;
+                    if (y >= ty_ - 1 || x >= tx_ - 1) continue;
+                    int between = half > 1 ? b.last : (b.first + b.last) / 2;
+                    cut.push_back({y, x, half, b.first, between});
+                    if (between < b.last) cut.push_back({y, x, half, between + 1, b.last});
+                }
+            } else {
+                cut.push_back({b.y, b.x, 0, b.first, b.last});
+            }
+        });
+        std::swap(blocks, cut);
+    }
+    tiles(field, bounds, blocks);
+}
+
+void Slab::fill(const Block& block) {
+    for (int k = block.first; k <= block.last; ++k)
+        for (int y = block.y; y < std::min(block.y + block.size, ty_ - 1); ++y) {
+            int32_t* row = &where_[(size_t(k) * ty_ + y) * tx_];
+            std::fill(row + block.x, row + std::min(block.x + block.size, tx_ - 1), kFull);
+        }
+}
+
+// The middles of the tiles of each layer; a tile is made where its middle leaves open what is in it.
+void Slab::tiles(const Field& field, const Bounds& bounds, const std::vector<Block>& blocks) {
+    std::vector<Place> places;
+    for (const Block& b : blocks)
+        for (int k = b.first; k <= b.last; ++k) places.push_back({k, b.y, b.x});
+    std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+        return a.layer != b.layer ? a.layer < b.layer : a.y != b.y ? a.y < b.y : a.x < b.x;
+    });
+    constexpr int middle = kTile * kTile / 2 + kTile / 2;
+    double reach = std::hypot(frame_.dx, frame_.dy) * kTile / 2;
+    auto where = [&](size_t i, double& column, double& row, double& height) {
+        const Place& p = places[i];
+        column = (p.x - 0.5) * kTile, row = (p.y - 0.5) * kTile, height = z_[p.layer];
+    };
+    evaluate(field, places.size(), where, [&](size_t i, float f) {
+        const Place& p = places[i];
+        if (f < 0) where_[(size_t(p.layer) * ty_ + p.y) * tx_ + p.x] = kFull;
+        if (std::fabs(f) > (f < 0 ? bounds.inside : bounds.outside) * reach) return;
+        int32_t t = add(p.layer, p.y, p.x);
+        known[t] = uint64_t(1) << middle;
+        values[t][middle] = f;
+    });
+}
+
+// The middles of the quarters of each block of `size` whose own middle decides too little; their signs become the implied
+// ones of their quarters.
+void Slab::finer(const Field& field, const Bounds& bounds, int size) {
+    int half = size / 2, quarter = size / 4;
+    double reach = std::hypot(frame_.dx, frame_.dy) * size / 2;
+    double outside = bounds.outside * reach, inside_ = bounds.inside * reach;
+    std::vector<int64_t> samples;
+    for (size_t t = 0; t < count(); ++t) {
+        for (uint64_t probes = known[t] & kMiddles[size]; probes; probes &= probes - 1) {
+            int bit = lowest(probes);
+            float v = values[t][bit];
+            if (v < 0 ? -v > inside_ || size <= bounds.stop_inside : v > outside || size <= bounds.stop_outside) continue;
+            int first = bit - 9 * (half - quarter);
+            for (int p : {first, first + half, first + 8 * half, first + 9 * half})
+                if (!(known[t] >> p & 1)) samples.push_back(int64_t(64 * t + p));
+        }
+    }
+    evaluate(field, samples, [&](size_t t, int p, float f) {
+        uint64_t block = half > 1 ? block_mask(half, (p >> 3) - quarter, (p & 7) - quarter) & ~known[t] : 0;
+        block |= uint64_t(1) << p;
+        inside[t] = f < 0 ? inside[t] | block : inside[t] & ~block;
+    });
+}
+
+// --- outside in, and inside out --------------------------------------------------------------------------------------------
+// Tiles said to be full beside ones said to be empty, where a bound is wrong.
+void Slab::mend() {
+    for (int k = 0; k < layers(); ++k)
+        for (int y = 1; y < ty_ - 1; ++y)
+            for (int x = 1; x < tx_ - 1; ++x)
+                if (at(k, y, x) == kFull && (at(k, y - 1, x) == kEmpty || at(k, y + 1, x) == kEmpty ||
+                                             at(k, y, x - 1) == kEmpty || at(k, y, x + 1) == kEmpty))
+                    add(k, y, x);
+}
+
+void Slab::close(const Field& field) {
+    std::vector<int32_t> active(count());
+    for (size_t t = 0; t < count(); ++t) active[t] = int32_t(t);
+    std::vector<uint8_t> marked(count());
+    std::vector<int64_t> samples;
+    while (!active.empty()) {
+        samples.clear();
+        ask(active, marked, samples);
+        active.clear();
+        evaluate(field, samples, [&](size_t t, int bit, float f) {
+            uint64_t mask = uint64_t(1) << bit;
+            if ((f < 0) == bool(inside[t] & mask)) return;
+            inside[t] ^= mask;
+            const Place& p = place[t];
+            const int32_t* here = &where_[(size_t(p.layer) * ty_ + p.y) * tx_ + p.x];
+            for (int32_t o : {here[0], here[1], here[-1], here[tx_], here[-tx_]})
+                if (o >= 0 && !marked[o]) {
+                    marked[o] = 1;
+                    active.push_back(o);
+                }
+        });
+    }
+}
+
+// One wave of the closure: the implied samples that differ from a neighbour. Tiles made on the way become active.
+void Slab::ask(std::vector<int32_t>& active, std::vector<uint8_t>& marked, std::vector<int64_t>& samples) {
+    constexpr int dy[] = {0, 0, 1, -1}, dx[] = {1, -1, 0, 0};
+    constexpr uint64_t faces[] = {kLastColumn, kFirstColumn, kLastRow, kFirstRow};
+    for (size_t a = 0; a < active.size(); ++a) {
+        int32_t t = active[a];
+        marked[t] = 0;
+        Place p = place[t];
+        uint64_t s = inside[t], differing = 0;
+        for (int side = 0; side < 4; ++side) {
+            int y = p.y + dy[side], x = p.x + dx[side];
+            uint64_t other = word(p.layer, y, x);
+            uint64_t d = s ^ (side == 0   ? rights(s, other)
+                              : side == 1 ? lefts(s, other)
+                              : side == 2 ? uppers(s, other)
+                                          : lowers(s, other));
+            differing |= d;
+            uint64_t face = d & faces[side];
+            if (!face || at(p.layer, y, x) >= 0) continue;
+            if (y == 0 || x == 0 || y == ty_ - 1 || x == tx_ - 1) {
+                if (face & known[t]) throw std::domain_error("the solid reaches the border of the layers");
+                continue;
+            }
+            active.push_back(add(p.layer, y, x));
+            marked.push_back(0);
+        }
+        for (uint64_t need = differing & ~known[t]; need; need &= need - 1) samples.push_back(64 * int64_t(t) + lowest(need));
+    }
+}
+
+// Tiles of which the contour cuts nothing but the last cell, at the corner.
+void Slab::corners() {
+    for (size_t t = 0, n = count(); t < n; ++t) {
+        Place p = place[t];
+        int32_t there = at(p.layer, p.y - 1, p.x - 1);
+        if (there < 0 && (there == kFull) != bool(inside[t] & 1)) add(p.layer, p.y - 1, p.x - 1);
+    }
+}
+
+// --- where edges are crossed -----------------------------------------------------------------------------------------------
+// By linear interpolation; where inside values are of another scale than outside ones, after the field's value at the middle
+// of edges, see `halve`.
+void Slab::measure(const Field& field, const Bounds& bounds) {
+    cross.resize(count());
+    std::vector<std::vector<Edge>> edges(layers());
+    for (size_t t = 0; t < count(); ++t) {
+        const Place& p = place[t];
+        uint64_t s = inside[t];
+        uint64_t words[2] = {s ^ rights(s, word(p.layer, p.y, p.x + 1)), s ^ uppers(s, word(p.layer, p.y + 1, p.x))};
+        for (int up = 0; up < 2; ++up)
+            for (uint64_t w = words[up]; w; w &= w - 1) {
+                int bit = lowest(w);
+                float a = values[t][bit], b = value(p, int32_t(t), (bit >> 3) + up, (bit & 7) + 1 - up);
+                cross[t][64 * up + bit] = a / (a - b);
+                if (bounds.fractal) edges[p.layer].push_back({int32_t(t), uint8_t(64 * up + bit)});
+            }
+    }
+    if (bounds.fractal)
+        for (int k = 0; k < layers(); ++k) halve(field, bounds.even, edges[k], k);
+}
+
+Slab::Ends Slab::ends(const Edge& edge) const {
+    int up = edge.number >> 6, bit = edge.number & 63;
+    float a = values[edge.tile][bit], b = value(place[edge.tile], edge.tile, (bit >> 3) + up, (bit & 7) + 1 - up);
+    return {std::max(a, b), std::min(a, b), a >= b};
+}
+
+// Crossings after the values at the middles of edges.
+//
+// In an even field inside values are multiplied by the one factor with which as many crossings lie before the middle as do
+// in truth; then a quarter of the edges is enough to know it. In any other, the line goes through the middle and the end on
+// its own side, which is right for true distances.
+void Slab::halve(const Field& field, bool even, const std::vector<Edge>& edges, int layer) {
+    constexpr size_t few = 1024;
+    auto column = [&](const Edge& e) { return kTile * (place[e.tile].x - 1) + (e.number & 7); };
+    auto row = [&](const Edge& e) { return kTile * (place[e.tile].y - 1) + (e.number >> 3 & 7); };
+    std::vector<Edge> halved;
+    for (const Edge& e : edges) {
+        uint32_t at = uint32_t(column(e)) * 0x9E3779B1u + uint32_t(row(e)) * 0x85EBCA6Bu;
+        if (!even || edges.size() < few || at >> 30 == 0) halved.push_back(e);
+    }
+    std::vector<float> middle(halved.size());
+    auto where = [&](size_t i, double& x, double& y, double& z) {
+        const Edge& e = halved[i];
+        int up = e.number >> 6;
+        x = column(e) + 0.5 * (1 - up), y = row(e) + 0.5 * up, z = z_[layer];
+    };
+    evaluate(field, halved.size(), where, [&](size_t i, float f) { middle[i] = f; });
+    float scale = even ? inside_scale(halved, middle) : 1;
+    auto put = [&](const Edge& e, const Ends& v, float share) {
+        cross[e.tile][e.number] = v.leads_in ? share : 1 - share;
+    };
+    if (even)
+        for (const Edge& e : edges) {
+            Ends v = ends(e);
+            put(e, v, v.out / (v.out - scale * v.in));
+        }
+    for (size_t i = 0; i < halved.size(); ++i) {
+        Ends v = ends(halved[i]);
+        float m = middle[i], share;
+        if (even)
+            share = m < 0 ? 0.5f * v.out / (v.out - scale * m) : 0.5f + 0.5f * m / (m - scale * v.in);
+        else if (m < 0)
+            share = m > v.in ? std::max(0.5f + 0.5f * m / (m - v.in), 0.f) : 0.25f;
+        else
+            share = v.out > m ? std::min(0.5f * v.out / (v.out - m), 1.f) : 0.75f;
+        put(halved[i], v, share);
+    }
+}
+
+// How many times smaller inside values are: by the share of edges whose middle is inside.
+float Slab::inside_scale(const std::vector<Edge>& edges, const std::vector<float>& middle) const {
+    if (edges.empty()) return 1;
+    std::vector<float> quotients(edges.size());
+    size_t before = 0;
+    for (size_t i = 0; i < edges.size(); ++i) {
+        Ends v = ends(edges[i]);
+        quotients[i] = v.out / -v.in;
+        before += middle[i] < 0;
+    }
+    auto chosen = quotients.begin() + std::ptrdiff_t(std::min(before, edges.size() - 1));
+    std::nth_element(quotients.begin(), chosen, quotients.end());
+    return std::min(std::max(*chosen, 0.125f), 64.f);
+}
+
+}  // namespace fracslice

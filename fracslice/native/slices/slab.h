@@ -1,0 +1,121 @@
+// The samples around the contours of a few neighbouring layers, from the field.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace fracslice {
+
+constexpr int kTile = 8;
+constexpr int32_t kEmpty = -1, kFull = -2;
+constexpr uint64_t kAll = ~uint64_t(0);
+
+// What is sampled; may be called from many threads.
+class Field {
+ public:
+    virtual ~Field() = default;
+    // Values at n points, n a multiple of 64, the arrays contiguous.
+    virtual void values(const float* x, const float* y, const float* z, float* f, size_t n) const = 0;
+};
+
+// Where lattice points lie, scene units: x0 + dx * column, y0 + dy * row.
+struct Frame {
+    double x0, y0, dx, dy;
+};
+
+// How far a value reaches: a block is decided where |f| exceeds a bound times the distance to its farthest sample.
+struct Bounds {
+    double proven;           // for blocks of 16 pixels and more, and whole tiles if nothing better is known
+    double outside, inside;  // for tiles and what is in them, by the value's sign
+    int stop_outside, stop_inside;  // blocks of so many samples are not cut any more
+    bool fractal;            // values inside are of another scale than outside: crossings are measured, see `cross`
+    bool even;               // ... of one scale in the whole slab, so that a part of the crossings tells for all
+};
+
+struct Place {
+    int32_t layer, y, x;
+};
+
+// Tiles of 8 x 8 samples: two words of 64 bits, *inside* and *known*, and 64 values; bit 8 * row + column belongs to the
+// sample at (8 (x - 1) + column, 8 (y - 1) + row). The sign of a sample that is not known is implied by a probe near it.
+//
+// Top down, blocks of 64, 32 and 16 pixels over all layers, of 8 over half of them, then tiles of each layer, and in tiles
+// blocks of 4, 2 and 1; every probe from tiles down is a sample itself. Then closure: where two neighbours differ in sign
+// and one of them is only implied, it is evaluated, until no such pair is left. So every edge that the contour crosses has
+// two evaluated ends.
+class Slab {
+ public:
+    // ny, nx: lattice points. z: of the layers, scene units.
+    Slab(const Frame& frame, std::vector<double> z, int ny, int nx);
+
+    // Finds all tiles; once. Throws std::domain_error where the solid reaches the rim of the lattice.
+    void sample(const Field& field, const Bounds& bounds);
+
+    int layers() const { return int(z_.size()); }
+    int rows() const { return ty_; }      // of `where`, its rim included
+    int columns() const { return tx_; }
+    // The row of the tile at a place, or kEmpty or kFull where none is needed; the rim is empty.
+    int32_t at(int layer, int y, int x) const { return where_[(size_t(layer) * ty_ + y) * tx_ + x]; }
+    size_t count() const { return place.size(); }
+
+    // The inside word at a place, implied where there is no tile.
+    uint64_t word(int layer, int y, int x) const {
+        int32_t t = at(layer, y, x);
+        return t >= 0 ? inside[t] : t == kFull ? kAll : 0;
+    }
+
+    // The value of sample (row, column) of a tile, each 0 to 8; for evaluated samples.
+    float value(const Place& p, int32_t tile, int row, int column) const {
+        if (row < kTile && column < kTile) return values[tile][kTile * row + column];
+        int32_t other = at(p.layer, p.y + (row >> 3), p.x + (column >> 3));
+        return other >= 0 ? values[other][kTile * (row & 7) + (column & 7)] : 0.f;
+    }
+
+    std::vector<Place> place;
+    std::vector<uint64_t> inside, known;
+    std::vector<std::array<float, 64>> values;
+    // The share of the edge before its crossing: of the edge from each sample to its right, then of the one upwards.
+    std::vector<std::array<float, 128>> cross;
+    int64_t evaluations = 0;
+
+ private:
+    struct Block {
+        int y, x, size, first, last;
+    };
+    struct Edge {
+        int32_t tile;
+        uint8_t number;  // 64 * upwards + bit
+    };
+    // The values at a crossed edge's outer and inner end, and whether it begins outside.
+    struct Ends {
+        float out, in;
+        bool leads_in;
+    };
+
+    template <class Where, class Take>
+    void evaluate(const Field& field, size_t n, const Where& where, const Take& take);
+    template <class Take>
+    void evaluate(const Field& field, const std::vector<int64_t>& samples, const Take& take);
+
+    int32_t add(int layer, int y, int x);
+    void coarse(const Field& field, const Bounds& bounds);
+    void fill(const Block& block);
+    void tiles(const Field& field, const Bounds& bounds, const std::vector<Block>& blocks);
+    void finer(const Field& field, const Bounds& bounds, int size);
+    void mend();
+    void close(const Field& field);
+    void ask(std::vector<int32_t>& active, std::vector<uint8_t>& marked, std::vector<int64_t>& samples);
+    void corners();
+    void measure(const Field& field, const Bounds& bounds);
+    void halve(const Field& field, bool even, const std::vector<Edge>& edges, int layer);
+    float inside_scale(const std::vector<Edge>& edges, const std::vector<float>& middle) const;
+    Ends ends(const Edge& edge) const;
+
+    Frame frame_;
+    std::vector<double> z_;
+    int ty_, tx_;
+    std::vector<int32_t> where_;
+};
+
+}  // namespace fracslice

@@ -1,0 +1,153 @@
+#include "squares.h"
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+
+#include "bits.h"
+
+namespace fracslice {
+namespace {
+
+// The signs of the corners 0 to 3 of each cell of a tile; a cell has the bit of its corner 0.
+struct Corners {
+    uint64_t word[4];
+
+    Corners(const Slab& slab, int k, int y, int x, uint64_t s) {
+        uint64_t up = slab.word(k, y + 1, x), right = slab.word(k, y, x + 1), diagonal = slab.word(k, y + 1, x + 1);
+        uint64_t r = rights(s, right);
+        word[0] = s, word[1] = r, word[2] = uppers(r, rights(up, diagonal)), word[3] = uppers(s, up);
+    }
+    uint64_t whole() const { return word[0] & word[1] & word[2] & word[3]; }
+    uint64_t mixed() const { return (word[0] | word[1] | word[2] | word[3]) & ~whole(); }
+    int signs(int bit) const {
+        return int(word[0] >> bit & 1) | int(word[1] >> bit & 1) << 1 | int(word[2] >> bit & 1) << 2 | int(word[3] >> bit & 1) << 3;
+    }
+};
+
+// For each corner of a cell, and the edges after and before it, the share of the edge before its crossing as seen from the
+// corner; those of edges that are not crossed have no meaning.
+struct Shares {
+    float e[8];
+
+    Shares(const Slab& slab, const Place& p, int32_t t, int bit) {
+        int32_t right = (bit & 7) == 7 ? std::max(slab.at(p.layer, p.y, p.x + 1), 0) : t;
+        int32_t upper = bit >> 3 == 7 ? std::max(slab.at(p.layer, p.y + 1, p.x), 0) : t;
+        float e0 = slab.cross[t][bit], e3 = slab.cross[t][64 + bit];
+        float e1 = slab.cross[right][64 + (bit & 56) + ((bit + 1) & 7)], e2 = slab.cross[upper][(bit + 8) & 63];
+        e[0] = e0, e[1] = e3, e[2] = e1, e[3] = 1 - e0, e[4] = 1 - e2, e[5] = 1 - e1, e[6] = 1 - e3, e[7] = e2;
+    }
+    // Whether the inside corners q and q + 2 of an alternating cell are connected: if more of its border is inside.
+    bool joined(int q) const { return e[2 * q] + e[2 * q + 1] + e[2 * q + 4] + e[2 * q + 5] > 2; }
+    // The area of the triangle that the contour cuts off at a corner.
+    float cut(int q) const { return e[2 * q] * e[2 * q + 1] / 2; }
+    // The inside part of a mixed cell's area.
+    float area(int signs) const {
+        switch (signs) {
+            case 5: return joined(0) ? 1 - cut(1) - cut(3) : cut(0) + cut(2);
+            case 10: return joined(1) ? 1 - cut(2) - cut(0) : cut(1) + cut(3);
+            case 1: return cut(0);
+            case 2: return cut(1);
+            case 4: return cut(2);
+            case 8: return cut(3);
+            case 14: return 1 - cut(0);
+            case 13: return 1 - cut(1);
+            case 11: return 1 - cut(2);
+            case 7: return 1 - cut(3);
+            case 3: return (e[1] + e[2]) / 2;
+            case 6: return (e[3] + e[4]) / 2;
+            case 12: return (e[5] + e[6]) / 2;
+            default: return (e[7] + e[0]) / 2;
+        }
+    }
+};
+
+// Sets the pixels of a word of signs.
+void fill(const Canvas& canvas, uint64_t whole, int y0, int x0) {
+    for (int r = 0; r < std::min(kTile, canvas.rows - y0); ++r) {
+        uint8_t* row = canvas.data + (y0 + r) * canvas.down + x0 * canvas.across;
+        uint32_t line = uint32_t(whole >> kTile * r & 0xFF);
+        if (line == 0xFF && x0 + kTile <= canvas.columns && (canvas.across == 1 || canvas.across == -1))
+            std::memset(canvas.across > 0 ? row : row - 7, 255, kTile);
+        else
+            for (; line; line &= line - 1)
+                if (int c = lowest(line); x0 + c < canvas.columns) row[c * canvas.across] = 255;
+    }
+}
+
+// The outline of a cell's inside, counter-clockwise, leaves along one edge and comes back along another.
+void link(const Shares& shares, int signs, const int32_t* e, std::vector<Crossing>& edges) {
+    bool alone = (signs == 5 && !shares.joined(0)) || (signs == 10 && !shares.joined(1));
+    for (int q = 0; q < 4; ++q) {
+        int g = (q + 1) & 3;
+        if (!(signs >> q & 1) || signs >> g & 1) continue;
+        int to = alone ? (q + 3) & 3 : g;
+        while (!alone && !(signs >> ((to + 1) & 3) & 1)) to = (to + 1) & 3;
+        edges[e[q]].following = e[to];
+    }
+}
+
+}  // namespace
+
+Painted paint(const Slab& slab, int k, const Canvas& canvas) {
+    Painted painted{0, 0};
+    for (int y = 1; y < slab.rows() - 1; ++y)
+        for (int x = 1; x < slab.columns() - 1; ++x) {
+            int32_t t = slab.at(k, y, x);
+            int y0 = kTile * (y - 1), x0 = kTile * (x - 1);
+            if (t == kEmpty || y0 >= canvas.rows || x0 >= canvas.columns) continue;
+            Corners corners(slab, k, y, x, t >= 0 ? slab.inside[t] : kAll);
+            if (uint64_t whole = corners.whole()) {
+                painted.area += __builtin_popcountll(whole);
+                fill(canvas, whole, y0, x0);
+            }
+            for (uint64_t mixed = t >= 0 ? corners.mixed() : 0; mixed; mixed &= mixed - 1) {
+                int bit = lowest(mixed), r = y0 + (bit >> 3), c = x0 + (bit & 7);
+                if (r >= canvas.rows || c >= canvas.columns) continue;
+                float area = Shares(slab, {k, y, x}, t, bit).area(corners.signs(bit));
+                canvas.data[r * canvas.down + c * canvas.across] = uint8_t(255 * area + 0.5f);
+                painted.area += area;
+                ++painted.partly;
+            }
+        }
+    return painted;
+}
+
+Crossings crossings(const Slab& slab, int k) {
+    Crossings found;
+    std::unique_ptr<int32_t[]> ids(new int32_t[slab.count() * 128]);
+    for (int y = 1; y < slab.rows() - 1; ++y)
+        for (int x = 1; x < slab.columns() - 1; ++x) {
+            int32_t t = slab.at(k, y, x);
+            if (t < 0) continue;
+            uint64_t s = slab.inside[t];
+            uint64_t words[2] = {s ^ rights(s, slab.word(k, y, x + 1)), s ^ uppers(s, slab.word(k, y + 1, x))};
+            for (uint64_t w = words[0] | words[1]; w; w &= w - 1) {
+                int bit = lowest(w), r = bit >> 3, c = bit & 7;
+                for (int up = 0; up < 2; ++up) {
+                    if (!(words[up] >> bit & 1)) continue;
+                    ids[128 * size_t(t) + 64 * up + bit] = int32_t(found.edges.size());
+                    found.edges.push_back({kTile * (x - 1) + c, kTile * (y - 1) + r, up, -1});
+                    found.ends.push_back(slab.values[t][bit]);
+                    found.ends.push_back(slab.value({k, y, x}, t, r + up, c + 1 - up));
+                }
+            }
+        }
+    for (int y = 1; y < slab.rows() - 1; ++y)
+        for (int x = 1; x < slab.columns() - 1; ++x) {
+            int32_t t = slab.at(k, y, x);
+            if (t < 0) continue;
+            Corners corners(slab, k, y, x, slab.inside[t]);
+            for (uint64_t mixed = corners.mixed(); mixed; mixed &= mixed - 1) {
+                int bit = lowest(mixed);
+                int32_t right = (bit & 7) == 7 ? std::max(slab.at(k, y, x + 1), 0) : t;
+                int32_t upper = bit >> 3 == 7 ? std::max(slab.at(k, y + 1, x), 0) : t;
+                const int32_t e[4] = {ids[128 * size_t(t) + bit], ids[128 * size_t(right) + 64 + (bit & 56) + ((bit + 1) & 7)],
+                                      ids[128 * size_t(upper) + ((bit + 8) & 63)], ids[128 * size_t(t) + 64 + bit]};
+                link(Shares(slab, {k, y, x}, t, bit), corners.signs(bit), e, found.edges);
+            }
+        }
+    return found;
+}
+
+}  // namespace fracslice
