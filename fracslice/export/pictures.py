@@ -11,6 +11,7 @@ from fracslice.errors import ExportError
 from fracslice.export import png
 from fracslice.export.files import replacing
 from fracslice.export.jobs import SliceRun, add, resumable_zip
+from fracslice.slicing import Layer
 
 MOST_MEMBERS = 65_535
 
@@ -53,7 +54,10 @@ def _prepared(folder: Path, said: bytes) -> int:
 
 
 def _pictures(run: SliceRun, start: int) -> Iterator[bytes]:
-    return run.slicer.map(lambda layer: png.encode(run.screen.picture(layer)), range(start, run.layers))
+    def make(layer: Layer) -> bytes:
+        return png.encode(run.screen.picture(layer, png.canvas(*run.screen.shape)))
+
+    return run.slicer.map(make, range(start, run.layers))
 
 
 def write_sl1(run: SliceRun, path: str | Path) -> Path:

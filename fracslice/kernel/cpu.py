@@ -50,6 +50,15 @@ class CpuKernel:
         self._points(self._address(self._parameters), *(row.ctypes.data for row in coordinates), padded)
         return coordinates[3, :n].reshape(shape)
 
+    @property
+    def entry(self) -> tuple[int, int]:
+        """The addresses of `loops.POINTS` as compiled and of its parameters, for native code; they live as long
+        as the kernel.
+        """
+        code = ctypes.cast(self._points, ctypes.c_void_p).value  # type: ignore[arg-type]
+        assert code
+        return code, self._address(self._parameters)
+
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import marching
-from .slab import Field
+from .._slices import Slab
+from ..kernel import CpuKernel
+from .printable import Changed
 from .stack import Stack
-from .tiles import Tiles
 
 ROUNDS = 20
 PRECISE = 1e-3
@@ -51,23 +51,14 @@ class Contours:
         return float(self.areas.sum())
 
 
-def contours(tiles: Tiles, k: int, z: float, stack: Stack, exact: Field | None) -> Contours:
+def contours(slab: Slab, k: int, z: float, stack: Stack, exact: CpuKernel | Changed) -> Contours:
     """The contours of layer `k` of a slab, at height `z` (scene units).
 
-    exact: the float64 kernel that the crossings are refined with; None for linear interpolation.
+    exact: the float64 kernel that the crossings are refined with.
     """
-    words = tiles.where, tiles.inside, tiles.values
-    ids = np.full((tiles.count, 128), -1, np.int32)
-    size = marching.number_edges(*words, k, ids, np.empty((0, 3), np.int32), np.empty((0, 2)))
-    edges, ends = np.empty((size, 3), np.int32), np.empty((size, 2))
-    marching.number_edges(*words, k, ids, edges, ends)
-    following = np.empty(size, np.int32)
-    marching.link(tiles.where, tiles.inside, tiles.cross, k, ids, following)
-    order, starts = np.empty(size, np.int32), np.empty(size + 1, np.int32)
-    starts = starts[: marching.walk(following, order, starts) + 1]
-    along = ends[:, 0] / (ends[:, 0] - ends[:, 1])
-    if exact is not None:
-        along = refined(exact, edges, ends, z, stack.frame)
+    edges, ends = slab.crossings(k)
+    order, starts = _cycles(edges[:, 3])
+    along = refined(exact, edges, ends, z, stack.frame)
     # Never quite at an end: there several contours, or the parts of one, would meet.
     along = np.clip(along, PRECISE, 1 - PRECISE)
     points = edges[:, :2] + along[:, None] * np.eye(2)[edges[:, 2]]
@@ -75,7 +66,23 @@ def contours(tiles: Tiles, k: int, z: float, stack: Stack, exact: Field | None) 
     return _nested(points, order, starts, edges, ends[:, 0] < 0)
 
 
-def refined(kernel: Field, edges: np.ndarray, ends: np.ndarray, z: float, frame: np.ndarray) -> np.ndarray:
+def _cycles(following: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The cycles of a permutation, each from its lowest number on: order [n], starts [m + 1]."""
+    steps, seen, order, starts = following.tolist(), bytearray(len(following)), [], [0]
+    for first in range(len(steps)):
+        at = first
+        while not seen[at]:
+            seen[at] = 1
+            order.append(at)
+            at = steps[at]
+        if len(order) > starts[-1]:
+            starts.append(len(order))
+    return np.array(order, np.int32), np.array(starts, np.int32)
+
+
+def refined(
+    kernel: CpuKernel | Changed, edges: np.ndarray, ends: np.ndarray, z: float, frame: np.ndarray
+) -> np.ndarray:
     """Where on its edge each crossing lies, 0 to 1, to `PRECISE`: false position with the Illinois rule
     (Dowell and Jarratt 1971), all edges at once; those that are done are left out.
     """

@@ -12,17 +12,18 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..kernel import compile_scene
+from .._slices import Slab
+from ..kernel import CpuKernel, compile_scene
 from ..work import Work
-from . import marching
 from .contours import Contours, contours
 from .printable import Changed, facts_of
-from .slab import Field, Sampler
+from .slab import Sampler
 from .stack import Stack
-from .tiles import Tiles
 
 SLAB = 8
 """Layers that are computed together."""
+
+Kernel = CpuKernel | Changed
 
 T = TypeVar("T")
 
@@ -34,9 +35,9 @@ class Layer:
     stack: Stack
     index: int
     evaluations: float
-    tiles: Tiles
+    slab: Slab
     place: int
-    exact: Field
+    exact: Kernel
 
     @property
     def top(self) -> float:
@@ -48,36 +49,39 @@ class Layer:
         """mm."""
         return float(self.stack.heights[self.index])
 
-    @cached_property
-    def _painted(self) -> tuple[np.ndarray, float, int]:
-        (ny, nx), tiles = self.stack.shape, self.tiles
-        words = np.zeros((ny, -(-nx // 8)), np.uint64)
-        area, partly = marching.paint(tiles.where, tiles.inside, tiles.cross, self.place, words)
-        return words.view(np.uint8)[:, :nx], area, partly
+    def paint(self, image: np.ndarray) -> None:
+        """Writes how much of each pixel is inside to an image of zeros, uint8 [ny, nx] of any strides, 255 for
+        wholly; row 0 is the front (lowest y).
 
-    @property
-    def coverage(self) -> np.ndarray:
-        """How much of each pixel is inside, uint8 [ny, nx], 255 wholly; row 0 is the front (lowest y).
-
-        The area that the polygon through the crossings of the pixel's sides cuts from it. Crossings are
-        interpolated, for fields with weak insides from three values, for others from two.
+        The area that the polygon through the crossings of the pixel's sides cuts from it.
         """
-        return self._painted[0]
+        self._painted = self.slab.paint(self.place, image)
+
+    @cached_property
+    def _painted(self) -> tuple[float, int]:
+        return self.slab.paint(self.place, np.zeros(self.stack.shape, np.uint8))
+
+    @cached_property
+    def coverage(self) -> np.ndarray:
+        """The painted image, uint8 [ny, nx]."""
+        image = np.zeros(self.stack.shape, np.uint8)
+        self.paint(image)
+        return image
 
     @property
     def area(self) -> float:
         """mm^2, of the coverage before it is rounded."""
-        return self._painted[1] * self.stack.pixel[0] * self.stack.pixel[1]
+        return self._painted[0] * self.stack.pixel[0] * self.stack.pixel[1]
 
     @property
     def boundary(self) -> int:
         """The number of pixels that the contour cuts."""
-        return self._painted[2]
+        return self._painted[1]
 
     @cached_property
     def contours(self) -> Contours:
         """Polygons, each crossing within 0.001 pixels of the zero set."""
-        return contours(self.tiles, self.place, float(self.stack.z[self.index]), self.stack, self.exact)
+        return contours(self.slab, self.place, float(self.stack.z[self.index]), self.stack, self.exact)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,16 +101,19 @@ class Slicer:
         terms = self.stack.terms
         exact = Changed(compile_scene(root, "float64"), terms)
         kernel = Changed(compile_scene(root), terms) if terms else compile_scene(root)
-        sampler = Sampler(kernel, facts_of(self.stack), self.stack.frame, (shape[0] + 1, shape[1] + 1))
+        lattice = shape[0] + 1, shape[1] + 1
+        sampler = Sampler(kernel, root, facts_of(self.stack), self.stack.frame, lattice)
         chosen = range(len(self.stack.z)) if layers is None else layers
 
         def slab(group: list[int]) -> list[T]:
             self.work.check()
-            tiles, spent = sampler.sample(self.stack.z[group])
+            first = group[0] // SLAB * SLAB
+            found = sampler.sample(self.stack.z[first : first + SLAB], [index - first for index in group])
+            spent = found.evaluations / len(group)
             made = []
-            for place, index in enumerate(group):
+            for index in group:
                 self.work.check()
-                made.append(make(Layer(self.stack, index, spent / len(group), tiles, place, exact)))
+                made.append(make(Layer(self.stack, index, spent, found, index - first, exact)))
             return made
 
         groups = [list(g) for _, g in groupby(chosen, lambda index: index // SLAB)]

@@ -46,38 +46,53 @@ class Screen:
         across, along = self.printer.pixels
         return (across, along) if self.printer.portrait else (along, across)
 
-    def picture(self, layer: Layer) -> np.ndarray:
-        """uint8 [rows, columns], as the file wants it: the first row at the top."""
-        image = layer.coverage
+    def picture(self, layer: Layer, image: np.ndarray | None = None) -> np.ndarray:
+        """uint8 [rows, columns], as the file wants it: the first row at the top. Painted on `image` if there is
+        one, zeros of that shape and any strides.
+        """
+        image = np.zeros(self.shape, np.uint8) if image is None else image
+        bed, mine = self._bed(image), self._place
         if self.compensation:
-            image = compensated(image, self.compensation, self.stack.pixel)
+            bed[mine.on_bed] = compensated(layer.coverage, self.compensation, self.stack.pixel)[mine.of_layer]
+        elif mine.cropped:
+            bed[mine.on_bed] = layer.coverage[mine.of_layer]
+        else:
+            layer.paint(bed[mine.on_bed])
         if self.gamma != 1:
-            image = self._levels[image]
-        return self._oriented(self._placed(image) if self.printer else image)
+            bed[mine.on_bed] = self._levels[bed[mine.on_bed]]
+        return image
 
     @cached_property
     def _levels(self) -> np.ndarray:
         return np.rint(255 * (np.arange(256) / 255) ** self.gamma).astype(np.uint8)
 
-    def _placed(self, image: np.ndarray) -> np.ndarray:
+    @cached_property
+    def _place(self) -> _Window:
         """The object in the middle of the bed; the window may be a few empty pixels larger than the bed."""
-        assert self.printer
-        whole = np.zeros(self.printer.pixels[::-1], np.uint8)
-        inner, outer = [], []
-        for mine, bed in zip(image.shape, whole.shape, strict=True):
-            first = (bed - mine) // 2
-            inner.append(slice(max(-first, 0), max(-first, 0) + min(mine, bed)))
-            outer.append(slice(max(first, 0), max(first, 0) + min(mine, bed)))
-        whole[tuple(outer)] = image[tuple(inner)]
-        return whole
+        bed = self.printer.pixels[::-1] if self.printer else self.stack.shape
+        on_bed, of_layer = [], []
+        for mine, room in zip(self.stack.shape, bed, strict=True):
+            first, count = (room - mine) // 2, min(mine, room)
+            on_bed.append(slice(max(first, 0), max(first, 0) + count))
+            of_layer.append(slice(max(-first, 0), max(-first, 0) + count))
+        return _Window((on_bed[0], on_bed[1]), (of_layer[0], of_layer[1]), any(s.start for s in of_layer))
 
-    def _oriented(self, image: np.ndarray) -> np.ndarray:
+    def _bed(self, image: np.ndarray) -> np.ndarray:
+        """A picture as seen from above, row 0 at the front: a view."""
         portrait = bool(self.printer and self.printer.portrait)
         mirror = self.mirror if self.mirror is not None else bool(self.printer and self.printer.mirror)
         if portrait:
-            turned = image.T[::-1]
-            return np.ascontiguousarray(turned if mirror else turned[:, ::-1])
-        return np.ascontiguousarray(image[::-1, ::-1] if mirror else image[::-1])
+            return image[::-1].T if mirror else image[::-1, ::-1].T
+        return image[::-1, ::-1] if mirror else image[::-1]
+
+
+@dataclass(frozen=True)
+class _Window:
+    """Where a layer lies on the bed: rows and columns of the bed, and which of the layer's they show."""
+
+    on_bed: tuple[slice, slice]
+    of_layer: tuple[slice, slice]
+    cropped: bool
 
 
 def check_fits(stack: Stack, printer: Printer) -> None:

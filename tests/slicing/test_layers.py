@@ -16,7 +16,6 @@ from fracslice.formulas.registry import Facts
 from fracslice.kernel import compile_scene
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.slab import Sampler
-from fracslice.slicing.tiles import INSIDE, Tiles
 from fracslice.work import Work
 from tests.examples import EXAMPLES
 
@@ -33,19 +32,13 @@ def all_of(stack: Stack, make: Callable[[Layer], Any], threads: int = 2) -> list
 
 def sampler_of(stack: Stack, facts: Facts | None = None) -> Sampler:
     shape = (stack.shape[0] + 1, stack.shape[1] + 1)
-    return Sampler(compile_scene(stack.root), facts or stack.root.facts, stack.frame, shape)
+    return Sampler(compile_scene(stack.root), stack.root, facts or stack.root.facts, stack.frame, shape)
 
 
-def unfolded(tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
+def signs(sampler: Sampler, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Inside and known, bool [layers, y, x], of all samples."""
-    inside = np.repeat(np.repeat(tiles.where == INSIDE, 8, 1), 8, 2)
-    known = np.zeros_like(inside)
-    for row in range(tiles.count):
-        k, y, x = tiles.place[row]
-        part = np.s_[k, 8 * y : 8 * y + 8, 8 * x : 8 * x + 8]
-        for out, words in ((inside, tiles.inside), (known, tiles.known)):
-            out[part] = np.unpackbits(words[row : row + 1].view(np.uint8), bitorder="little").reshape(8, 8)
-    return inside[:, 8:-8, 8:-8], known[:, 8:-8, 8:-8]
+    inside, known = sampler.sample(z).signs()
+    return inside > 0, known > 0
 
 
 def dense(stack: Stack, z: np.ndarray, like: np.ndarray) -> np.ndarray:
@@ -65,7 +58,7 @@ def open_edges(inside: np.ndarray, known: np.ndarray) -> int:
 def test_closed_and_equal_to_dense_sampling(name: str) -> None:
     stack = stack_of(EXAMPLES[name])
     z = stack.z[len(stack.z) // 3 :][:8]
-    inside, known = unfolded(sampler_of(stack).sample(z)[0])
+    inside, known = signs(sampler_of(stack), z)
     assert open_edges(inside, known) == 0
     differing = int((inside != dense(stack, z, inside)).sum())
     # What differs can only be specks of a fractal, smaller than what its layers are probed for.
@@ -76,7 +69,7 @@ def test_a_bound_that_lies_leaves_no_open_contour() -> None:
     root = union(sphere(radius=0.7), box(size=(2.0, 0.2, 0.2)))
     stack = stack_of(root)
     z = stack.z[8:16]
-    inside, known = unfolded(sampler_of(stack, Facts(root.facts.box, 1 / 3, False)).sample(z)[0])
+    inside, known = signs(sampler_of(stack, Facts(root.facts.box, 1 / 3, False)), z)
     assert open_edges(inside, known) == 0
 
 

@@ -105,10 +105,10 @@ NB_MODULE(_slices, module) {
              "stop_inside"_a, "fractal"_a, "even"_a);
     nb::class_<Slab>(module, "Slab")
         .def("__init__",
-             [](Slab* self, std::array<double, 4> f, std::vector<double> z, int ny, int nx) {
-                 new (self) Slab({f[0], f[1], f[2], f[3]}, std::move(z), ny, nx);
+             [](Slab* self, std::array<double, 4> f, std::vector<double> z, std::vector<int> layers, int ny, int nx) {
+                 new (self) Slab({f[0], f[1], f[2], f[3]}, std::move(z), std::move(layers), ny, nx);
              },
-             "frame"_a, "z"_a, "ny"_a, "nx"_a)
+             "frame"_a, "z"_a, "layers"_a, "ny"_a, "nx"_a)
         .def("sample", &Slab::sample, "field"_a, "bounds"_a, nb::call_guard<nb::gil_scoped_release>())
         .def_ro("evaluations", &Slab::evaluations)
         .def("paint", &bind_paint, "layer"_a, "image"_a)

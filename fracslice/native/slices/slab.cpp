@@ -23,9 +23,10 @@ constexpr uint64_t kMiddles[9] = {0, 0, middles(2), 0, middles(4), 0, 0, 0, midd
 
 }  // namespace
 
-Slab::Slab(const Frame& frame, std::vector<double> z, int ny, int nx)
+Slab::Slab(const Frame& frame, std::vector<double> z, std::vector<int> wanted, int ny, int nx)
     : frame_(frame),
       z_(std::move(z)),
+      wanted_(std::move(wanted)),
       ty_((ny + kTile - 1) / kTile + 2),
       tx_((nx + kTile - 1) / kTile + 2),
       where_(z_.size() * ty_ * tx_, kEmpty) {}
@@ -134,11 +135,9 @@ void Slab::fill(const Block& block) {
 // The middles of the tiles of each layer; a tile is made where its middle leaves open what is in it.
 void Slab::tiles(const Field& field, const Bounds& bounds, const std::vector<Block>& blocks) {
     std::vector<Place> places;
-    for (const Block& b : blocks)
-        for (int k = b.first; k <= b.last; ++k) places.push_back({k, b.y, b.x});
-    std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
-        return a.layer != b.layer ? a.layer < b.layer : a.y != b.y ? a.y < b.y : a.x < b.x;
-    });
+    for (int k : wanted_)
+        for (const Block& b : blocks)
+            if (b.first <= k && k <= b.last) places.push_back({k, b.y, b.x});
     constexpr int middle = kTile * kTile / 2 + kTile / 2;
     double reach = std::hypot(frame_.dx, frame_.dy) * kTile / 2;
     auto where = [&](size_t i, double& column, double& row, double& height) {
@@ -182,7 +181,7 @@ void Slab::finer(const Field& field, const Bounds& bounds, int size) {
 // --- outside in, and inside out --------------------------------------------------------------------------------------------
 // Tiles said to be full beside ones said to be empty, where a bound is wrong.
 void Slab::mend() {
-    for (int k = 0; k < layers(); ++k)
+    for (int k : wanted_)
         for (int y = 1; y < ty_ - 1; ++y)
             for (int x = 1; x < tx_ - 1; ++x)
                 if (at(k, y, x) == kFull && (at(k, y - 1, x) == kEmpty || at(k, y + 1, x) == kEmpty ||
@@ -267,18 +266,14 @@ void Slab::measure(const Field& field, const Bounds& bounds) {
             for (uint64_t w = words[up]; w; w &= w - 1) {
                 int bit = lowest(w);
                 float a = values[t][bit], b = value(p, int32_t(t), (bit >> 3) + up, (bit & 7) + 1 - up);
-                cross[t][64 * up + bit] = a / (a - b);
-                if (bounds.fractal) edges[p.layer].push_back({int32_t(t), uint8_t(64 * up + bit)});
+                if (bounds.fractal)
+                    edges[p.layer].push_back({int32_t(t), 64 * up + bit, a, b});
+                else
+                    cross[t][64 * up + bit] = a / (a - b);
             }
     }
     if (bounds.fractal)
         for (int k = 0; k < layers(); ++k) halve(field, bounds.even, edges[k], k);
-}
-
-Slab::Ends Slab::ends(const Edge& edge) const {
-    int up = edge.number >> 6, bit = edge.number & 63;
-    float a = values[edge.tile][bit], b = value(place[edge.tile], edge.tile, (bit >> 3) + up, (bit & 7) + 1 - up);
-    return {std::max(a, b), std::min(a, b), a >= b};
 }
 
 // Crossings after the values at the middles of edges.
@@ -302,36 +297,35 @@ void Slab::halve(const Field& field, bool even, const std::vector<Edge>& edges, 
         x = column(e) + 0.5 * (1 - up), y = row(e) + 0.5 * up, z = z_[layer];
     };
     evaluate(field, halved.size(), where, [&](size_t i, float f) { middle[i] = f; });
-    float scale = even ? inside_scale(halved, middle) : 1;
-    auto put = [&](const Edge& e, const Ends& v, float share) {
-        cross[e.tile][e.number] = v.leads_in ? share : 1 - share;
-    };
-    if (even)
-        for (const Edge& e : edges) {
-            Ends v = ends(e);
-            put(e, v, v.out / (v.out - scale * v.in));
+    // The share of the edge from its outer end.
+    auto put = [&](const Edge& e, float share) { cross[e.tile][e.number] = e.first > e.second ? share : 1 - share; };
+    if (even) {
+        float scale = inside_scale(halved, middle);
+        for (const Edge& e : edges) put(e, e.out() / (e.out() - scale * e.in()));
+        for (size_t i = 0; i < halved.size(); ++i) {
+            const Edge& e = halved[i];
+            float m = middle[i], in = scale * e.in();
+            put(e, m < 0 ? 0.5f * e.out() / (e.out() - scale * m) : 0.5f + 0.5f * m / (m - in));
         }
-    for (size_t i = 0; i < halved.size(); ++i) {
-        Ends v = ends(halved[i]);
-        float m = middle[i], share;
-        if (even)
-            share = m < 0 ? 0.5f * v.out / (v.out - scale * m) : 0.5f + 0.5f * m / (m - scale * v.in);
-        else if (m < 0)
-            share = m > v.in ? std::max(0.5f + 0.5f * m / (m - v.in), 0.f) : 0.25f;
-        else
-            share = v.out > m ? std::min(0.5f * v.out / (v.out - m), 1.f) : 0.75f;
-        put(halved[i], v, share);
+    } else {
+        for (size_t i = 0; i < halved.size(); ++i) {
+            const Edge& e = halved[i];
+            float m = middle[i], in = e.in(), out = e.out();
+            if (m < 0)
+                put(e, m > in ? std::max(0.5f + 0.5f * m / (m - in), 0.f) : 0.25f);
+            else
+                put(e, out > m ? std::min(0.5f * out / (out - m), 1.f) : 0.75f);
+        }
     }
 }
 
-// How many times smaller inside values are: by the share of edges whose middle is inside.
-float Slab::inside_scale(const std::vector<Edge>& edges, const std::vector<float>& middle) const {
+// How many times smaller inside values are than outside ones: by the share of edges whose middle is inside.
+float Slab::inside_scale(const std::vector<Edge>& edges, const std::vector<float>& middle) {
     if (edges.empty()) return 1;
     std::vector<float> quotients(edges.size());
     size_t before = 0;
     for (size_t i = 0; i < edges.size(); ++i) {
-        Ends v = ends(edges[i]);
-        quotients[i] = v.out / -v.in;
+        quotients[i] = edges[i].out() / -edges[i].in();
         before += middle[i] < 0;
     }
     auto chosen = quotients.begin() + std::ptrdiff_t(std::min(before, edges.size() - 1));

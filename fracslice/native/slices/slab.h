@@ -3,6 +3,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 namespace fracslice {
@@ -33,6 +35,23 @@ struct Bounds {
     bool even;               // ... of one scale in the whole slab, so that a part of the crossings tells for all
 };
 
+// A vector whose new elements are left uninitialised.
+template <class T>
+struct Uninitialised : std::allocator<T> {
+    template <class U>
+    struct rebind {
+        using other = Uninitialised<U>;
+    };
+    template <class U>
+    void construct(U*) noexcept {}
+    template <class U, class... A>
+    void construct(U* p, A&&... a) {
+        ::new (static_cast<void*>(p)) U(std::forward<A>(a)...);
+    }
+};
+template <class T>
+using Rows = std::vector<T, Uninitialised<T>>;
+
 struct Place {
     int32_t layer, y, x;
 };
@@ -46,8 +65,9 @@ struct Place {
 // two evaluated ends.
 class Slab {
  public:
-    // ny, nx: lattice points. z: of the layers, scene units.
-    Slab(const Frame& frame, std::vector<double> z, int ny, int nx);
+    // ny, nx: lattice points. z: of the layers, scene units. wanted: those that are sampled; their samples do not depend on
+    // which others are.
+    Slab(const Frame& frame, std::vector<double> z, std::vector<int> wanted, int ny, int nx);
 
     // Finds all tiles; once. Throws std::domain_error where the solid reaches the rim of the lattice.
     void sample(const Field& field, const Bounds& bounds);
@@ -74,23 +94,22 @@ class Slab {
 
     std::vector<Place> place;
     std::vector<uint64_t> inside, known;
-    std::vector<std::array<float, 64>> values;
+    Rows<std::array<float, 64>> values;
     // The share of the edge before its crossing: of the edge from each sample to its right, then of the one upwards.
-    std::vector<std::array<float, 128>> cross;
+    Rows<std::array<float, 128>> cross;
     int64_t evaluations = 0;
 
  private:
     struct Block {
         int y, x, size, first, last;
     };
+    // A crossed edge: of which sample, to its right or (64 more) upwards, and the values at its ends.
     struct Edge {
-        int32_t tile;
-        uint8_t number;  // 64 * upwards + bit
-    };
-    // The values at a crossed edge's outer and inner end, and whether it begins outside.
-    struct Ends {
-        float out, in;
-        bool leads_in;
+        int32_t tile, number;
+        float first, second;
+
+        float out() const { return first > second ? first : second; }
+        float in() const { return first > second ? second : first; }
     };
 
     template <class Where, class Take>
@@ -109,11 +128,11 @@ class Slab {
     void corners();
     void measure(const Field& field, const Bounds& bounds);
     void halve(const Field& field, bool even, const std::vector<Edge>& edges, int layer);
-    float inside_scale(const std::vector<Edge>& edges, const std::vector<float>& middle) const;
-    Ends ends(const Edge& edge) const;
+    static float inside_scale(const std::vector<Edge>& edges, const std::vector<float>& middle);
 
     Frame frame_;
     std::vector<double> z_;
+    std::vector<int> wanted_;  // ascending
     int ty_, tx_;
     std::vector<int32_t> where_;
 };

@@ -25,41 +25,43 @@ struct Corners {
     }
 };
 
-// For each corner of a cell, and the edges after and before it, the share of the edge before its crossing as seen from the
-// corner; those of edges that are not crossed have no meaning.
-struct Shares {
-    float e[8];
-
-    Shares(const Slab& slab, const Place& p, int32_t t, int bit) {
-        int32_t right = (bit & 7) == 7 ? std::max(slab.at(p.layer, p.y, p.x + 1), 0) : t;
-        int32_t upper = bit >> 3 == 7 ? std::max(slab.at(p.layer, p.y + 1, p.x), 0) : t;
-        float e0 = slab.cross[t][bit], e3 = slab.cross[t][64 + bit];
-        float e1 = slab.cross[right][64 + (bit & 56) + ((bit + 1) & 7)], e2 = slab.cross[upper][(bit + 8) & 63];
-        e[0] = e0, e[1] = e3, e[2] = e1, e[3] = 1 - e0, e[4] = 1 - e2, e[5] = 1 - e1, e[6] = 1 - e3, e[7] = e2;
+// Where the edges of a mixed cell are crossed; those that are not crossed have no meaning.
+class Cell {
+ public:
+    Cell(const Slab& slab, const Place& p, int32_t t, int bit) : cross_(slab.cross.data()), t_(t), bit_(bit) {
+        right_ = (bit & 7) == 7 ? std::max(slab.at(p.layer, p.y, p.x + 1), 0) : t;
+        upper_ = bit >> 3 == 7 ? std::max(slab.at(p.layer, p.y + 1, p.x), 0) : t;
     }
     // Whether the inside corners q and q + 2 of an alternating cell are connected: if more of its border is inside.
-    bool joined(int q) const { return e[2 * q] + e[2 * q + 1] + e[2 * q + 4] + e[2 * q + 5] > 2; }
-    // The area of the triangle that the contour cuts off at a corner.
-    float cut(int q) const { return e[2 * q] * e[2 * q + 1] / 2; }
-    // The inside part of a mixed cell's area.
+    bool joined(int q) const {
+        float more = lower() + left() - upper() - right();
+        return q == 0 ? more > 0 : more < 0;
+    }
+    // The inside part of the cell's area.
     float area(int signs) const {
         switch (signs) {
-            case 5: return joined(0) ? 1 - cut(1) - cut(3) : cut(0) + cut(2);
-            case 10: return joined(1) ? 1 - cut(2) - cut(0) : cut(1) + cut(3);
-            case 1: return cut(0);
-            case 2: return cut(1);
-            case 4: return cut(2);
-            case 8: return cut(3);
-            case 14: return 1 - cut(0);
-            case 13: return 1 - cut(1);
-            case 11: return 1 - cut(2);
-            case 7: return 1 - cut(3);
-            case 3: return (e[1] + e[2]) / 2;
-            case 6: return (e[3] + e[4]) / 2;
-            case 12: return (e[5] + e[6]) / 2;
-            default: return (e[7] + e[0]) / 2;
+            case 1: return lower() * left() / 2;
+            case 2: return (1 - lower()) * right() / 2;
+            case 4: return (1 - upper()) * (1 - right()) / 2;
+            case 8: return upper() * (1 - left()) / 2;
+            case 3: return (left() + right()) / 2;
+            case 9: return (lower() + upper()) / 2;
+            case 5: return joined(0) ? 1 - area(2) - area(8) : area(1) + area(4);
+            case 10: return joined(1) ? 1 - area(1) - area(4) : area(2) + area(8);
+            default: return 1 - area(15 - signs);
         }
     }
+
+ private:
+    // The share of an edge before its crossing, from the left or from below.
+    float lower() const { return cross_[t_][bit_]; }
+    float left() const { return cross_[t_][64 + bit_]; }
+    float right() const { return cross_[right_][64 + (bit_ & 56) + ((bit_ + 1) & 7)]; }
+    float upper() const { return cross_[upper_][(bit_ + 8) & 63]; }
+
+    const std::array<float, 128>* cross_;
+    int32_t t_, right_, upper_;
+    int bit_;
 };
 
 // Sets the pixels of a word of signs.
@@ -76,8 +78,8 @@ void fill(const Canvas& canvas, uint64_t whole, int y0, int x0) {
 }
 
 // The outline of a cell's inside, counter-clockwise, leaves along one edge and comes back along another.
-void link(const Shares& shares, int signs, const int32_t* e, std::vector<Crossing>& edges) {
-    bool alone = (signs == 5 && !shares.joined(0)) || (signs == 10 && !shares.joined(1));
+void link(const Cell& cell, int signs, const int32_t* e, std::vector<Crossing>& edges) {
+    bool alone = (signs == 5 && !cell.joined(0)) || (signs == 10 && !cell.joined(1));
     for (int q = 0; q < 4; ++q) {
         int g = (q + 1) & 3;
         if (!(signs >> q & 1) || signs >> g & 1) continue;
@@ -104,7 +106,7 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
             for (uint64_t mixed = t >= 0 ? corners.mixed() : 0; mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed), r = y0 + (bit >> 3), c = x0 + (bit & 7);
                 if (r >= canvas.rows || c >= canvas.columns) continue;
-                float area = Shares(slab, {k, y, x}, t, bit).area(corners.signs(bit));
+                float area = Cell(slab, {k, y, x}, t, bit).area(corners.signs(bit));
                 canvas.data[r * canvas.down + c * canvas.across] = uint8_t(255 * area + 0.5f);
                 painted.area += area;
                 ++painted.partly;
@@ -144,7 +146,7 @@ Crossings crossings(const Slab& slab, int k) {
                 int32_t upper = bit >> 3 == 7 ? std::max(slab.at(k, y + 1, x), 0) : t;
                 const int32_t e[4] = {ids[128 * size_t(t) + bit], ids[128 * size_t(right) + 64 + (bit & 56) + ((bit + 1) & 7)],
                                       ids[128 * size_t(upper) + ((bit + 8) & 63)], ids[128 * size_t(t) + 64 + bit]};
-                link(Shares(slab, {k, y, x}, t, bit), corners.signs(bit), e, found.edges);
+                link(Cell(slab, {k, y, x}, t, bit), corners.signs(bit), e, found.edges);
             }
         }
     return found;

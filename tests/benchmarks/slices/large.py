@@ -42,7 +42,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
 
         def write(layer: Layer) -> None:
-            (Path(folder) / f"{layer.index}.png").write_bytes(png.encode(screen.picture(layer)))
+            (Path(folder) / f"{layer.index}.png").write_bytes(png.encode(screen.picture(layer, png.canvas(*screen.shape))))
 
         list(Slicer(stack).map(write, [total // 2]))
         whole = seconds(lambda: list(Slicer(stack).map(write, chosen)))
