@@ -11,6 +11,7 @@ from ..formulas import get, names
 from ..formulas.parameters import REQUIRED, Parameter
 from ..formulas.registry import Formula
 from .lengths import Length
+from .printing import Print
 from .view import PARTS, Part
 
 
@@ -18,7 +19,7 @@ from .view import PARTS, Part
 class Section:
     """`<scene>` or an element directly under it; described like a `Formula`, so that it reads like one.
 
-    part: the record it becomes, if it is about pictures. many: whether there may be several.
+    part: the record it becomes, if it is about pictures or printing. many: whether there may be several.
     """
 
     name: str
@@ -62,11 +63,16 @@ SOLID = Section(
     MappingProxyType({"size": Length(REQUIRED, "the longest side of the finished object")}),
     (1, None),
 )
-PICTURE = [
-    Section(part.element, part.__doc__ or "", MappingProxyType(part.kinds()), part=part, many=part.many)
-    for part in PARTS
-]
-SECTIONS = {section.name: section for section in (SOLID, *PICTURE)}
+
+
+def _section(part: type[Part]) -> Section:
+    parameters = MappingProxyType(part.kinds())
+    return Section(part.element, part.__doc__ or "", parameters, part=part, many=part.many)
+
+
+PRINT = _section(Print)
+PICTURE = [_section(part) for part in PARTS]
+SECTIONS = {section.name: section for section in (SOLID, PRINT, *PICTURE)}
 
 
 def formulas() -> list[Formula]:

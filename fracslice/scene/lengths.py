@@ -30,11 +30,15 @@ def parse_length(value: str | float, what: str = "length") -> float:
 
 @dataclass(frozen=True)
 class Length:
-    """A parameter that is a length; its value is in mm."""
+    """A parameter that is a length; its value is in mm. zero: whether it may be 0, for none."""
 
     default: Any
     doc: str
-    expects: str = EXPECTS
+    zero: bool = False
+
+    @property
+    def expects(self) -> str:
+        return f"0, or {EXPECTS}" if self.zero else EXPECTS
 
     def read(self, text: str) -> float:
         match = _LENGTH.fullmatch(text)
@@ -44,6 +48,8 @@ class Length:
 
     def check(self, value: Any) -> float:
         numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if self.zero and numeric and value == 0:
+            return 0.0
         if not numeric or not math.isfinite(value) or not SMALLEST <= value <= LARGEST:
             raise ValueError(self.expects)
         return float(value)

@@ -13,6 +13,7 @@ from ..errors import SceneError
 from ..formulas import Node, get
 from ..formulas.parameters import AUTO
 from .lengths import parse_length
+from .printing import Print
 from .view import View
 
 DEEPEST = 100
@@ -23,10 +24,10 @@ TOO_DEEP = f"is nested too deeply: expected at most {DEEPEST} elements inside ea
 
 @dataclass(frozen=True)
 class Scene:
-    """One solid, how large to make it, and how to look at it.
+    """One solid, how large to make it, what makes it printable, and how to look at it.
 
     root: the tree of formulas. size_mm: the longest side of the finished object. name: a label, not content.
-    view: for pictures; meshes do not depend on it.
+    printing: what meshes and slices differ in from the root. view: for pictures; meshes do not depend on it.
     Raises `SceneError` for a tree that makes no sense as a whole: a twist of something unbounded, say.
     """
 
@@ -34,6 +35,7 @@ class Scene:
     size_mm: float
     name: str = field(default="scene", compare=False)
     view: View = field(default_factory=View)
+    printing: Print = field(default_factory=Print)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size_mm", parse_length(self.size_mm, "size"))
@@ -58,7 +60,13 @@ class Scene:
         return changed(self, settings)
 
 
-def scene(*elements: Node, size: str | float, name: str = "scene", view: View | None = None) -> Scene:
+def scene(
+    *elements: Node,
+    size: str | float,
+    name: str = "scene",
+    view: View | None = None,
+    printing: Print | None = None,
+) -> Scene:
     """A scene of one or more elements; several are a union.
 
     >>> from fracslice.formulas import sphere, transform
@@ -69,7 +77,7 @@ def scene(*elements: Node, size: str | float, name: str = "scene", view: View | 
     if not elements:
         raise SceneError("a scene needs at least one element")
     root = elements[0] if len(elements) == 1 else get("union")(*elements)
-    return Scene(root, parse_length(size, "size"), name, view or View())
+    return Scene(root, parse_length(size, "size"), name, view or View(), printing or Print())
 
 
 def _refuse_too_deep(root: Node) -> None:

@@ -19,6 +19,7 @@ from ..formulas.parameters import REQUIRED
 from .layout import SCENE, SECTIONS, SOLID, Element, Section, formulas
 from .model import DEEPEST, TOO_DEEP, Scene, computing, scene
 from .nearest import hint
+from .printing import Print
 from .view import Part, View
 
 LARGEST_FILE = 16 << 20
@@ -47,7 +48,9 @@ def _scene(data: bytes, source: str, name: str) -> Scene:
         raise SceneError(f"{source}: expected a scene, the file is empty")
     builder = _Builder(source)
     solid = builder.sections(data)[SOLID.name]
-    return scene(*solid.children, size=solid.values["size"], name=name, view=View.of(builder.parts))
+    printing = next((part for part in builder.parts if isinstance(part, Print)), Print())
+    view = View.of(part for part in builder.parts if not isinstance(part, Print))
+    return scene(*solid.children, size=solid.values["size"], name=name, view=view, printing=printing)
 
 
 @dataclass

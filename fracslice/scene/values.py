@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import SceneError
 from ..formulas import Node
-from .layout import PICTURE, SECTIONS, SOLID, Element
+from .layout import PICTURE, PRINT, SECTIONS, SOLID, Element
 from .model import Scene
 from .nearest import hint
 from .view import View
@@ -62,6 +62,8 @@ def _parsed(source: str) -> Setting:
 def _changed(scene: Scene, setting: Setting) -> Scene:
     if setting.element == SOLID.name:
         return replace(scene, size_mm=setting.value(SOLID))
+    if setting.element == PRINT.name:
+        return replace(scene, printing=replace(scene.printing, **{setting.attribute: setting.value(PRINT)}))
     if setting.element in (section.name for section in PICTURE):
         return replace(scene, view=_relit(scene.view, setting))
     present = Counter(node.formula.name for node in scene.root.walk())

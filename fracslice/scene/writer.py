@@ -9,6 +9,7 @@ from xml.sax.saxutils import quoteattr
 from ..formulas import Node
 from .layout import SCENE, SECTIONS, SOLID, VERSION, Element
 from .model import Scene
+from .printing import Print
 
 
 def to_xml(scene: Scene) -> str:
@@ -21,7 +22,8 @@ def _lines(scene: Scene) -> Iterator[str]:
     yield f"  <{SOLID.name}{_attributes(SOLID, {'size': scene.size_mm})}>"
     yield from _element(scene.root, "    ")
     yield f"  </{SOLID.name}>"
-    for part in scene.view.parts:
+    printing = () if scene.printing == Print() else (scene.printing,)
+    for part in (*printing, *scene.view.parts):
         section = SECTIONS[part.element]
         values = {name: getattr(part, name) for name in section.parameters}
         yield f"  <{section.name}{_attributes(section, values)}/>"

@@ -1,0 +1,44 @@
+# ruff: noqa: RUF009 -- `described` makes a field, as dataclasses.field does
+"""How a scene is made printable: the record behind `<print>`, which the flags of the commands fill as well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..formulas.parameters import Choice
+from .lengths import Length
+from .view import Part, described
+
+
+def _length(doc: str, default: float = 0.0) -> Length:
+    return Length(default, doc, zero=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Print(Part):
+    """What is changed so that the object prints, in this order.
+
+    Lengths are of the finished object: a millimetre is a millimetre, whatever the field says. `size` is that
+    of the object before anything is cut off or added.
+    """
+
+    element = "print"
+    cavities: str = described(Choice("keep", "hollows that nothing reaches stay or are filled", ("keep", "fill")))
+    keep: str = described(Choice("all", "all bodies stay, or the largest alone", ("all", "largest")))
+    bridge: float = described(_length("loose bodies are joined where they are nearest, by struts this thick"))
+    gap: float = described(_length("gaps up to this width are closed"))
+    thickness: float = described(_length("what is thinner is thickened to this"))
+    hollow: float = described(_length("the object is hollowed out, leaving walls this thick"))
+    drain: float = described(_length("diameter of the two holes that let the resin out of the hollow", 3.0))
+    base: float = described(_length("so much is cut off at the bottom, to stand flat"))
+    raft: float = described(_length("the object stands on a plate of this height"))
+
+    def validate(self) -> None:
+        if self.keep == "largest" and self.bridge:
+            raise self.fail("keep and bridge: expected one of them; where one body stays, none is loose")
+
+    @property
+    def sampled(self) -> bool:
+        """Whether distances must be measured for it."""
+        parts = self.keep != "all" or self.cavities != "keep"
+        return parts or any((self.bridge, self.gap, self.thickness, self.hollow))
