@@ -1,5 +1,5 @@
-"""C++ parts of fracslice: the samples around the contours of a few neighbouring layers, and marching squares on
-them. Callers use `fracslice.slicing`.
+"""C++ parts of fracslice: the samples around the contours of a few neighbouring layers, and marching squares
+on them. Callers use `fracslice.slicing`.
 
 Long calls let other threads run.
 """
@@ -31,13 +31,13 @@ class Called(Field):
     ) -> None: ...
 
 class Bounds:
-    """How far values reach: a block is decided where |f| exceeds a bound times the distance from its middle to
-    its farthest sample.
+    """How far values reach: a block is decided where |f| exceeds a bound times the distance from its middle
+    to its farthest sample.
 
     proven: for blocks of 16 pixels and more. outside, inside: for blocks of 8, 4 and 2 pixels, by the sign of
     their middle. stop_outside, stop_inside: blocks of so many pixels are not cut any more. fractal: inside
-    values are of another scale than outside ones, so crossings are measured; even: of one scale everywhere, so
-    that a part of the crossings tells for all.
+    values are of another scale than outside ones, so crossings are measured; even: of one scale everywhere,
+    so that a part of the crossings tells for all.
     """
 
     def __init__(
@@ -54,8 +54,8 @@ class Bounds:
 class Slab:
     """The samples of layers on a lattice of ny x nx points at (x0 + dx i, y0 + dy j).
 
-    frame: (x0, y0, dx, dy). z: heights of neighbouring layers. All in scene units. layers: numbers of those that
-    are sampled, ascending; their samples do not depend on which others are.
+    frame: (x0, y0, dx, dy). z: heights of neighbouring layers. All in scene units. layers: numbers of those
+    that are sampled, ascending; their samples do not depend on which others are.
     """
 
     def __init__(
@@ -74,13 +74,14 @@ class Slab:
         """Writes the coverage of a layer's pixels to a zeroed image of any strides, 255 wholly inside, row 0
         lowest.
 
-        Returns the inside area in pixels, before it is rounded, and the number of pixels that the contour cuts.
+        Returns the inside area in pixels, before it is rounded, and the number of pixels that the contour
+        cuts.
         """
 
     def crossings(self, layer: int) -> tuple[NDArray[int32], NDArray[float64]]:
-        """The crossed edges of a layer, row by row of tiles: int32 [n, 4], column, row and direction (0 right,
-        1 up) of each and the number of the one that follows on its contour, the inside to the left; and the
-        values at both ends, float64 [n, 2].
+        """The crossed edges of a layer, row by row of tiles: int32 [n, 4], column, row and direction (0
+        right, 1 up) of each and the number of the one that follows on its contour, the inside to the left;
+        and the values at both ends, float64 [n, 2].
         """
 
     def signs(self) -> tuple[NDArray[uint8], NDArray[uint8]]:

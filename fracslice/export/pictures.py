@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 from fracslice.errors import ExportError
 from fracslice.export import png
 from fracslice.export.files import replacing
-from fracslice.export.jobs import SliceRun, add, resumable_zip
+from fracslice.export.jobs import SliceRun, add, reason, resumable_zip
 from fracslice.slicing import Layer
 
 MOST_MEMBERS = 65_535
@@ -25,9 +24,16 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
     folder = Path(path)
     said = run.describe()
     start = _prepared(folder, said)
-    for index, data in enumerate(_pictures(run, start), start):
-        with replacing(folder / f"{index:05d}.png") as file:
-            file.write(data)
+
+    def write(layer: Layer) -> None:
+        # Not renamed into place, nor forced to the disk one by one: a remainder is read before it is gone on with.
+        try:
+            (folder / f"{layer.index:05d}.png").write_bytes(_encoded(run, layer))
+        except OSError as error:
+            raise ExportError(f"{folder}: {reason(error)}") from error
+
+    for _ in run.slicer.map(write, range(start, run.layers)):
+        pass
     with replacing(folder / "manifest.json") as file:
         file.write(said)
     (folder / "job.json").unlink()
@@ -53,11 +59,8 @@ def _prepared(folder: Path, said: bytes) -> int:
     return index
 
 
-def _pictures(run: SliceRun, start: int) -> Iterator[bytes]:
-    def make(layer: Layer) -> bytes:
-        return png.encode(run.screen.picture(layer, png.canvas(*run.screen.shape)))
-
-    return run.slicer.map(make, range(start, run.layers))
+def _encoded(run: SliceRun, layer: Layer) -> bytes:
+    return png.encode(run.screen.picture(layer, png.canvas(*run.screen.shape)))
 
 
 def write_sl1(run: SliceRun, path: str | Path) -> Path:
@@ -81,7 +84,8 @@ def write_sl1(run: SliceRun, path: str | Path) -> Path:
             add(archive, "fracslice.json", run.describe())
             add(archive, "prusaslicer.ini", _ini(_settings(run)))
         start = sum(1 for n in done if n.endswith(".png"))
-        for index, data in enumerate(_pictures(run, start), start):
+        pictures = run.slicer.map(lambda layer: _encoded(run, layer), range(start, run.layers))
+        for index, data in enumerate(pictures, start):
             add(archive, f"{name}{index:05d}.png", data)
     return target
 

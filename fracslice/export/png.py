@@ -34,7 +34,7 @@ def encode(image: np.ndarray) -> bytes:
     rows, columns = image.shape
     filtered = image.base
     if filtered is None or not _is_canvas(image, filtered):
-        filtered = canvas(rows, columns).base
+        filtered = np.zeros((rows, columns + 1), np.uint8)
         filtered[:, 1:] = image
     head = struct.pack(">IIBBBBB", columns, rows, 8, 0, 0, 0, 0)
     parts = ((b"IHDR", head), (b"IDAT", isal_zlib.compress(filtered, LEVEL)), (b"IEND", b""))

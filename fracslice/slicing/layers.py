@@ -50,8 +50,8 @@ class Layer:
         return float(self.stack.heights[self.index])
 
     def paint(self, image: np.ndarray) -> None:
-        """Writes how much of each pixel is inside to an image of zeros, uint8 [ny, nx] of any strides, 255 for
-        wholly; row 0 is the front (lowest y).
+        """Writes how much of each pixel is inside to an image of zeros, uint8 [ny, nx] of any strides, 255
+        for wholly; row 0 is the front (lowest y).
 
         The area that the polygon through the crossings of the pixel's sides cuts from it.
         """

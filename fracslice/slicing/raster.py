@@ -47,8 +47,8 @@ class Screen:
         return (across, along) if self.printer.portrait else (along, across)
 
     def picture(self, layer: Layer, image: np.ndarray | None = None) -> np.ndarray:
-        """uint8 [rows, columns], as the file wants it: the first row at the top. Painted on `image` if there is
-        one, zeros of that shape and any strides.
+        """uint8 [rows, columns], as the file wants it: the first row at the top. Painted on `image` if there
+        is one, zeros of that shape and any strides.
         """
         image = np.zeros(self.shape, np.uint8) if image is None else image
         bed, mine = self._bed(image), self._place

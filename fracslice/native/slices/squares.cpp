@@ -13,8 +13,8 @@ namespace {
 struct Corners {
     uint64_t word[4];
 
-    Corners(const Slab& slab, int k, int y, int x, uint64_t s) {
-        uint64_t up = slab.word(k, y + 1, x), right = slab.word(k, y, x + 1), diagonal = slab.word(k, y + 1, x + 1);
+    Corners(const Slab& slab, int k, int y, int x) {
+        uint64_t s = slab.word(k, y, x), up = slab.word(k, y + 1, x), right = slab.word(k, y, x + 1), diagonal = slab.word(k, y + 1, x + 1);
         uint64_t r = rights(s, right);
         word[0] = s, word[1] = r, word[2] = uppers(r, rights(up, diagonal)), word[3] = uppers(s, up);
     }
@@ -64,17 +64,21 @@ class Cell {
     int bit_;
 };
 
+// Sets a span of pixels of one row.
+void fill(const Canvas& canvas, int y, int x, int n) {
+    uint8_t* first = canvas.data + y * canvas.down + x * canvas.across;
+    if (canvas.across == 1 || canvas.across == -1)
+        std::memset(canvas.across > 0 ? first : first - (n - 1), 255, size_t(n));
+    else
+        for (int i = 0; i < n; ++i) first[i * canvas.across] = 255;
+}
+
 // Sets the pixels of a word of signs.
-void fill(const Canvas& canvas, uint64_t whole, int y0, int x0) {
-    for (int r = 0; r < std::min(kTile, canvas.rows - y0); ++r) {
-        uint8_t* row = canvas.data + (y0 + r) * canvas.down + x0 * canvas.across;
-        uint32_t line = uint32_t(whole >> kTile * r & 0xFF);
-        if (line == 0xFF && x0 + kTile <= canvas.columns && (canvas.across == 1 || canvas.across == -1))
-            std::memset(canvas.across > 0 ? row : row - 7, 255, kTile);
-        else
-            for (; line; line &= line - 1)
-                if (int c = lowest(line); x0 + c < canvas.columns) row[c * canvas.across] = 255;
-    }
+void fill(const Canvas& canvas, int y0, int x0, uint64_t whole) {
+    for (int r = 0; r < std::min(kTile, canvas.rows - y0); ++r)
+        for (uint32_t line = uint32_t(whole >> kTile * r & 0xFF); line; line &= line - 1)
+            if (int x = x0 + lowest(line); x < canvas.columns)
+                canvas.data[(y0 + r) * canvas.down + x * canvas.across] = 255;
 }
 
 // The outline of a cell's inside, counter-clockwise, leaves along one edge and comes back along another.
@@ -93,16 +97,28 @@ void link(const Cell& cell, int signs, const int32_t* e, std::vector<Crossing>& 
 
 Painted paint(const Slab& slab, int k, const Canvas& canvas) {
     Painted painted{0, 0};
-    for (int y = 1; y < slab.rows() - 1; ++y)
-        for (int x = 1; x < slab.columns() - 1; ++x) {
+    for (int y = 1; y < slab.rows() - 1; ++y) {
+        int y0 = kTile * (y - 1), full = 0;  // tiles before this one that are full
+        if (y0 >= canvas.rows) break;
+        for (int x = 1; x < slab.columns(); ++x) {
             int32_t t = slab.at(k, y, x);
-            int y0 = kTile * (y - 1), x0 = kTile * (x - 1);
-            if (t == kEmpty || y0 >= canvas.rows || x0 >= canvas.columns) continue;
-            Corners corners(slab, k, y, x, t >= 0 ? slab.inside[t] : kAll);
-            if (uint64_t whole = corners.whole()) {
-                painted.area += __builtin_popcountll(whole);
-                fill(canvas, whole, y0, x0);
+            int x0 = kTile * (x - 1);
+            bool empty = t == kEmpty || x0 >= canvas.columns;
+            Corners corners(slab, k, y, empty ? 0 : x);
+            uint64_t whole = empty ? 0 : corners.whole();
+            if (whole == kAll) {
+                ++full;
+                continue;
             }
+            if (full) {
+                int first = x0 - kTile * full, n = std::min(x0, canvas.columns) - first;
+                for (int r = y0; r < std::min(y0 + kTile, canvas.rows); ++r) fill(canvas, r, first, n);
+                painted.area += kTile * kTile * double(full);
+                full = 0;
+            }
+            if (empty) continue;
+            painted.area += __builtin_popcountll(whole);
+            fill(canvas, y0, x0, whole);
             for (uint64_t mixed = t >= 0 ? corners.mixed() : 0; mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed), r = y0 + (bit >> 3), c = x0 + (bit & 7);
                 if (r >= canvas.rows || c >= canvas.columns) continue;
@@ -112,6 +128,7 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
                 ++painted.partly;
             }
         }
+    }
     return painted;
 }
 
@@ -139,7 +156,7 @@ Crossings crossings(const Slab& slab, int k) {
         for (int x = 1; x < slab.columns() - 1; ++x) {
             int32_t t = slab.at(k, y, x);
             if (t < 0) continue;
-            Corners corners(slab, k, y, x, slab.inside[t]);
+            Corners corners(slab, k, y, x);
             for (uint64_t mixed = corners.mixed(); mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed);
                 int32_t right = (bit & 7) == 7 ? std::max(slab.at(k, y, x + 1), 0) : t;
