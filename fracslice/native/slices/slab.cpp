@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 
 #include "bits.h"
@@ -19,6 +20,8 @@ constexpr uint64_t middles(int size) {
         for (int x = size / 2; x < kTile; x += size) word |= uint64_t(1) << (kTile * y + x);
     return word;
 }
+uint16_t share_of(float share) { return uint16_t(share * kWhole + 0.5f); }
+
 constexpr uint64_t kMiddles[9] = {0, 0, middles(2), 0, middles(4), 0, 0, 0, middles(8)};
 
 }  // namespace
@@ -32,12 +35,17 @@ Slab::Slab(const Frame& frame, std::vector<double> z, std::vector<int> wanted, i
       where_(z_.size() * ty_ * tx_, kEmpty) {}
 
 void Slab::sample(const Field& field, const Bounds& bounds) {
-    coarse(field, bounds);
-    for (int size : {8, 4, 2}) finer(field, bounds, size);
-    mend();
-    close(field);
-    corners();
-    measure(field, bounds);
+    std::vector<Block> blocks = coarse(field, bounds);
+    // Layer by layer, so that what is worked on stays near.
+    for (int k : wanted_) {
+        first_ = count();
+        tiles(field, bounds, blocks, k);
+        for (int size : {8, 4, 2}) finer(field, bounds, size);
+        mend(k);
+        close(field);
+        corners();
+        measure(field, bounds);
+    }
 }
 
 // where(i, column, row, z) sets the place of point i on the lattice; take(i, f) gets its value.
@@ -87,7 +95,7 @@ int32_t Slab::add(int layer, int y, int x) {
 }
 
 // --- top down ------------------------------------------------------------------------------------------------------------
-void Slab::coarse(const Field& field, const Bounds& bounds) {
+std::vector<Slab::Block> Slab::coarse(const Field& field, const Bounds& bounds) {
     std::vector<Block> blocks, cut;
     for (int y = 1; y < ty_ - 1; y += kCoarsest)
         for (int x = 1; x < tx_ - 1; x += kCoarsest) blocks.push_back({y, x, kCoarsest, 0, layers() - 1});
@@ -121,7 +129,7 @@ void Slab::coarse(const Field& field, const Bounds& bounds) {
         });
         std::swap(blocks, cut);
     }
-    tiles(field, bounds, blocks);
+    return blocks;
 }
 
 void Slab::fill(const Block& block) {
@@ -132,12 +140,11 @@ void Slab::fill(const Block& block) {
         }
 }
 
-// The middles of the tiles of each layer; a tile is made where its middle leaves open what is in it.
-void Slab::tiles(const Field& field, const Bounds& bounds, const std::vector<Block>& blocks) {
+// The middles of the tiles of a layer; a tile is made where its middle leaves open what is in it.
+void Slab::tiles(const Field& field, const Bounds& bounds, const std::vector<Block>& blocks, int layer) {
     std::vector<Place> places;
-    for (int k : wanted_)
-        for (const Block& b : blocks)
-            if (b.first <= k && k <= b.last) places.push_back({k, b.y, b.x});
+    for (const Block& b : blocks)
+        if (b.first <= layer && layer <= b.last) places.push_back({layer, b.y, b.x});
     constexpr int middle = kTile * kTile / 2 + kTile / 2;
     double reach = std::hypot(frame_.dx, frame_.dy) * kTile / 2;
     auto where = [&](size_t i, double& column, double& row, double& height) {
@@ -161,7 +168,7 @@ void Slab::finer(const Field& field, const Bounds& bounds, int size) {
     double reach = std::hypot(frame_.dx, frame_.dy) * size / 2;
     double outside = bounds.outside * reach, inside_ = bounds.inside * reach;
     std::vector<int64_t> samples;
-    for (size_t t = 0; t < count(); ++t) {
+    for (size_t t = first_; t < count(); ++t) {
         for (uint64_t probes = known[t] & kMiddles[size]; probes; probes &= probes - 1) {
             int bit = lowest(probes);
             float v = values[t][bit];
@@ -180,19 +187,18 @@ void Slab::finer(const Field& field, const Bounds& bounds, int size) {
 
 // --- outside in, and inside out --------------------------------------------------------------------------------------------
 // Tiles said to be full beside ones said to be empty, where a bound is wrong.
-void Slab::mend() {
-    for (int k : wanted_)
-        for (int y = 1; y < ty_ - 1; ++y)
-            for (int x = 1; x < tx_ - 1; ++x)
-                if (at(k, y, x) == kFull && (at(k, y - 1, x) == kEmpty || at(k, y + 1, x) == kEmpty ||
-                                             at(k, y, x - 1) == kEmpty || at(k, y, x + 1) == kEmpty))
-                    add(k, y, x);
+void Slab::mend(int layer) {
+    for (int y = 1; y < ty_ - 1; ++y)
+        for (int x = 1; x < tx_ - 1; ++x)
+            if (at(layer, y, x) == kFull && (at(layer, y - 1, x) == kEmpty || at(layer, y + 1, x) == kEmpty ||
+                                             at(layer, y, x - 1) == kEmpty || at(layer, y, x + 1) == kEmpty))
+                add(layer, y, x);
 }
 
 void Slab::close(const Field& field) {
-    std::vector<int32_t> active(count());
-    for (size_t t = 0; t < count(); ++t) active[t] = int32_t(t);
-    std::vector<uint8_t> marked(count());
+    std::vector<int32_t> active(count() - first_);
+    std::iota(active.begin(), active.end(), int32_t(first_));
+    std::vector<uint8_t> marked(count() - first_);  // tiles that are in `active`, from the layer's first on
     std::vector<int64_t> samples;
     while (!active.empty()) {
         samples.clear();
@@ -205,8 +211,8 @@ void Slab::close(const Field& field) {
             const Place& p = place[t];
             const int32_t* here = &where_[(size_t(p.layer) * ty_ + p.y) * tx_ + p.x];
             for (int32_t o : {here[0], here[1], here[-1], here[tx_], here[-tx_]})
-                if (o >= 0 && !marked[o]) {
-                    marked[o] = 1;
+                if (o >= 0 && !marked[o - first_]) {
+                    marked[o - first_] = 1;
                     active.push_back(o);
                 }
         });
@@ -219,7 +225,7 @@ void Slab::ask(std::vector<int32_t>& active, std::vector<uint8_t>& marked, std::
     constexpr uint64_t faces[] = {kLastColumn, kFirstColumn, kLastRow, kFirstRow};
     for (size_t a = 0; a < active.size(); ++a) {
         int32_t t = active[a];
-        marked[t] = 0;
+        marked[t - first_] = 0;
         Place p = place[t];
         uint64_t s = inside[t], differing = 0;
         for (int side = 0; side < 4; ++side) {
@@ -245,7 +251,7 @@ void Slab::ask(std::vector<int32_t>& active, std::vector<uint8_t>& marked, std::
 
 // Tiles of which the contour cuts nothing but the last cell, at the corner.
 void Slab::corners() {
-    for (size_t t = 0, n = count(); t < n; ++t) {
+    for (size_t t = first_, n = count(); t < n; ++t) {
         Place p = place[t];
         int32_t there = at(p.layer, p.y - 1, p.x - 1);
         if (there < 0 && (there == kFull) != bool(inside[t] & 1)) add(p.layer, p.y - 1, p.x - 1);
@@ -257,8 +263,8 @@ void Slab::corners() {
 // of edges, see `halve`.
 void Slab::measure(const Field& field, const Bounds& bounds) {
     cross.resize(count());
-    std::vector<std::vector<Edge>> edges(layers());
-    for (size_t t = 0; t < count(); ++t) {
+    std::vector<Edge> edges;
+    for (size_t t = first_; t < count(); ++t) {
         const Place& p = place[t];
         uint64_t s = inside[t];
         uint64_t words[2] = {s ^ rights(s, word(p.layer, p.y, p.x + 1)), s ^ uppers(s, word(p.layer, p.y + 1, p.x))};
@@ -267,13 +273,12 @@ void Slab::measure(const Field& field, const Bounds& bounds) {
                 int bit = lowest(w);
                 float a = values[t][bit], b = value(p, int32_t(t), (bit >> 3) + up, (bit & 7) + 1 - up);
                 if (bounds.fractal)
-                    edges[p.layer].push_back({int32_t(t), 64 * up + bit, a, b});
+                    edges.push_back({int32_t(t), 64 * up + bit, a, b});
                 else
-                    cross[t][64 * up + bit] = a / (a - b);
+                    cross[t][64 * up + bit] = share_of(a / (a - b));
             }
     }
-    if (bounds.fractal)
-        for (int k = 0; k < layers(); ++k) halve(field, bounds.even, edges[k], k);
+    if (bounds.fractal) halve(field, bounds.even, edges);
 }
 
 // Crossings after the values at the middles of edges.
@@ -281,7 +286,7 @@ void Slab::measure(const Field& field, const Bounds& bounds) {
 // In an even field inside values are multiplied by the one factor with which as many crossings lie before the middle as do
 // in truth; then a quarter of the edges is enough to know it. In any other, the line goes through the middle and the end on
 // its own side, which is right for true distances.
-void Slab::halve(const Field& field, bool even, const std::vector<Edge>& edges, int layer) {
+void Slab::halve(const Field& field, bool even, const std::vector<Edge>& edges) {
     constexpr size_t few = 1024;
     auto column = [&](const Edge& e) { return kTile * (place[e.tile].x - 1) + (e.number & 7); };
     auto row = [&](const Edge& e) { return kTile * (place[e.tile].y - 1) + (e.number >> 3 & 7); };
@@ -294,11 +299,11 @@ void Slab::halve(const Field& field, bool even, const std::vector<Edge>& edges, 
     auto where = [&](size_t i, double& x, double& y, double& z) {
         const Edge& e = halved[i];
         int up = e.number >> 6;
-        x = column(e) + 0.5 * (1 - up), y = row(e) + 0.5 * up, z = z_[layer];
+        x = column(e) + 0.5 * (1 - up), y = row(e) + 0.5 * up, z = z_[place[e.tile].layer];
     };
     evaluate(field, halved.size(), where, [&](size_t i, float f) { middle[i] = f; });
     // The share of the edge from its outer end.
-    auto put = [&](const Edge& e, float share) { cross[e.tile][e.number] = e.first > e.second ? share : 1 - share; };
+    auto put = [&](const Edge& e, float share) { cross[e.tile][e.number] = share_of(e.first > e.second ? share : 1 - share); };
     if (even) {
         float scale = inside_scale(halved, middle);
         for (const Edge& e : edges) put(e, e.out() / (e.out() - scale * e.in()));

@@ -11,6 +11,7 @@ namespace fracslice {
 
 constexpr int kTile = 8;
 constexpr int32_t kEmpty = -1, kFull = -2;
+constexpr float kWhole = 32768;
 constexpr uint64_t kAll = ~uint64_t(0);
 
 // What is sampled; may be called from many threads.
@@ -95,8 +96,9 @@ class Slab {
     std::vector<Place> place;
     std::vector<uint64_t> inside, known;
     Rows<std::array<float, 64>> values;
-    // The share of the edge before its crossing: of the edge from each sample to its right, then of the one upwards.
-    Rows<std::array<float, 128>> cross;
+    // The share of the edge before its crossing, of `kWhole`: of the edge from each sample to its right, then of the one
+    // upwards.
+    Rows<std::array<uint16_t, 128>> cross;
     int64_t evaluations = 0;
 
  private:
@@ -118,21 +120,22 @@ class Slab {
     void evaluate(const Field& field, const std::vector<int64_t>& samples, const Take& take);
 
     int32_t add(int layer, int y, int x);
-    void coarse(const Field& field, const Bounds& bounds);
+    std::vector<Block> coarse(const Field& field, const Bounds& bounds);
     void fill(const Block& block);
-    void tiles(const Field& field, const Bounds& bounds, const std::vector<Block>& blocks);
+    void tiles(const Field& field, const Bounds& bounds, const std::vector<Block>& blocks, int layer);
     void finer(const Field& field, const Bounds& bounds, int size);
-    void mend();
+    void mend(int layer);
     void close(const Field& field);
     void ask(std::vector<int32_t>& active, std::vector<uint8_t>& marked, std::vector<int64_t>& samples);
     void corners();
     void measure(const Field& field, const Bounds& bounds);
-    void halve(const Field& field, bool even, const std::vector<Edge>& edges, int layer);
+    void halve(const Field& field, bool even, const std::vector<Edge>& edges);
     static float inside_scale(const std::vector<Edge>& edges, const std::vector<float>& middle);
 
     Frame frame_;
     std::vector<double> z_;
     std::vector<int> wanted_;  // ascending
+    size_t first_ = 0;         // tile of the layer that is sampled
     int ty_, tx_;
     std::vector<int32_t> where_;
 };

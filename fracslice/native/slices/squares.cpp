@@ -54,12 +54,12 @@ class Cell {
 
  private:
     // The share of an edge before its crossing, from the left or from below.
-    float lower() const { return cross_[t_][bit_]; }
-    float left() const { return cross_[t_][64 + bit_]; }
-    float right() const { return cross_[right_][64 + (bit_ & 56) + ((bit_ + 1) & 7)]; }
-    float upper() const { return cross_[upper_][(bit_ + 8) & 63]; }
+    float lower() const { return cross_[t_][bit_] / kWhole; }
+    float left() const { return cross_[t_][64 + bit_] / kWhole; }
+    float right() const { return cross_[right_][64 + (bit_ & 56) + ((bit_ + 1) & 7)] / kWhole; }
+    float upper() const { return cross_[upper_][(bit_ + 8) & 63] / kWhole; }
 
-    const std::array<float, 128>* cross_;
+    const std::array<uint16_t, 128>* cross_;
     int32_t t_, right_, upper_;
     int bit_;
 };
