@@ -61,6 +61,21 @@ _sharp_when_zero(intersection, hard_intersection)
 _sharp_when_zero(difference, hard_difference)
 
 
+def _slope(node: Node) -> float:
+    """Minimum, maximum and their quadratic seams weigh the gradients with weights whose sum is 1: L = max.
+
+    A seam follows level sets other than the surface, where the field of an escape-time fractal is steeper
+    than its bound says. How much is measured (`docs/accuracy.md`): for one such field, and for several.
+    """
+    fields = [child.facts for child in node.children]
+    weak = sum(f.weak for f in fields) if node["smooth"] >= SMALLEST else 0
+    return max(f.lipschitz for f in fields) * (1.0, 1.25, 3.0)[min(weak, 2)]
+
+
+for _blend in (union, intersection, difference):
+    _blend.slope(_slope)
+
+
 @union.bounds
 def _(node: Node) -> Box:
     seams = len(node.children) - 1

@@ -20,6 +20,15 @@ JUMP = 1e4
 """E^p: how large |w| gets in the step past the escape circle; 1/JUMP is the relative jump of the field there.
 """
 
+CORE = 0.5
+"""The least |w|^2 that the derivative is taken at where a set falls apart.
+
+Koebe's theorem wants a connected set. Where the critical point 0 escapes, the potential has critical points
+outside the set, one at each preimage of 0; G' vanishes there and the quotient grows without limit. With D
+the distance from w^2 + c to its set, that of w is at least sqrt(|w|^2 + D) - |w|, which D / (2 |w|) overshoots
+where |w|^2 is small against D, and D / (2 sqrt(CORE)) does not.
+"""
+
 
 def potential_distance(r2, slope, level, first_level, last_level):  # type: ignore[no-untyped-def]
     """Signed distance estimate from an orbit's last radius.
@@ -29,7 +38,8 @@ def potential_distance(r2, slope, level, first_level, last_level):  # type: igno
     last_level: the same for n = 0 and n = N.
 
     The largest, not the last: inside, an attracting orbit lets the derivative decay and the quotient grow
-    without limit. There ``0.1 / slope`` keeps it below the distance to the surface.
+    without limit. There ``0.1 / slope`` keeps it below the distance to the surface nearly always;
+    deep sets have exceptions, so nothing may rely on it (`registry.Facts`).
     """
     r2 = minimum(maximum(r2, 1e-4), 1e30)
     slope = minimum(slope, 1e30)
@@ -46,4 +56,3 @@ def levels(power: float, iterations: int, bailout: float) -> tuple[float, float,
     last = math.log(bailout)
     escape = max(bailout, JUMP ** (1 / power))
     return last / power**steps, last, escape * escape
-

@@ -34,7 +34,7 @@ def menger(x, y, z, level):  # type: ignore[no-untyped-def]
         rz = absolute(1.0 - 6.0 * qz)
         cross = minimum(maximum(rx, ry), minimum(maximum(ry, rz), maximum(rz, rx)))
         orbit(4.0 * (qx * qx + qy * qy + qz * qz), (cross - 1.0) * cell > d)
-        d = maximum((cross - 1.0) * cell, d)  # in this order d stays where a point is too far to have a cell
+        d = maximum(d, (cross - 1.0) * cell)
         scale = scale * 3.0
         cell = cell * (1.0 / 3.0)
     return d

@@ -37,12 +37,10 @@ class Facts:
     """What is known of a field without evaluating it.
 
     box: encloses all points where the field is negative, in the node's own coordinates.
-    lipschitz: L such that the distance from p to the surface is at least ``|f(p)| / L``. For all formulas but
-    the
-        escape-time ones it is more: ``|f(p) - f(q)| <= L |p - q|``.
-    weak: True if inside values are much smaller than the distance to the surface (escape-time fractals), so
-    that the
-        inside cannot be recognised from afar.
+    lipschitz: L such that ``|f(p) - f(q)| <= L |p - q|``. Of a weak field only: a point outside is at least
+    ``f(p) / L`` away from the surface.
+    weak: True if there is an escape-time fractal in it. Its inside values are much smaller than the distance
+    to the surface, and bound nothing: the inside cannot be recognised from afar.
     """
 
     box: Box

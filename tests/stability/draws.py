@@ -1,0 +1,73 @@
+"""Scenes with other numbers: every parameter of every element drawn again from its declared range."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fracslice.errors import FracsliceError
+from fracslice.formulas import Node
+from fracslice.formulas.parameters import AUTO, Count, Number, Vector
+
+DEEPEST = 12
+"""Depths beyond it change nothing that a grid can show."""
+
+TRIES = 200
+
+
+def drawn(root: Node, rng: np.random.Generator, spread: float = 1.0) -> Node:
+    """The scene with other parameters.
+
+    Where a range has two ends, anywhere in it (evenly in the logarithm if it spans decades); else up to
+    2^spread times larger or smaller, and moved by as much where zero is allowed. What its formulas refuse
+    together is drawn again.
+    """
+    for _ in range(TRIES):
+        try:
+            found = _drawn(root, rng, spread)
+            _ = [(node.facts, node.changed(**_known(node)).arguments) for node in found.walk()]
+            return found
+        except (FracsliceError, ArithmeticError):
+            continue
+    raise AssertionError(f"{root}: no other parameters are possible")
+
+
+def _known(node: Node) -> dict[str, int]:
+    return {name: 1 for name, value in node.values.items() if isinstance(value, str) and value == AUTO}
+
+
+def _drawn(node: Node, rng: np.random.Generator, spread: float) -> Node:
+    values = {
+        name: _value(kind, node[name], rng, spread)
+        for name, kind in node.formula.parameters.items()
+        if node[name] is not None and node.formula.name != "material"
+    }
+    return node.changed(tuple(_drawn(child, rng, spread) for child in node.children), **values)
+
+
+def _value(kind: Any, value: Any, rng: np.random.Generator, spread: float) -> Any:
+    if isinstance(kind, Count):
+        return value if value == AUTO else int(rng.integers(kind.least, min(kind.most, DEEPEST) + 1))
+    if isinstance(kind, Number):
+        return _number(kind, value, rng, spread)
+    if isinstance(kind, Vector):
+        if kind.whole:
+            return tuple(int(rng.integers(1, 5)) if v else 0 for v in value)
+        return tuple(_number(kind, v, rng, spread) for v in value)
+    return value
+
+
+def _number(kind: Number | Vector, value: float, rng: np.random.Generator, spread: float) -> float:
+    low, high = max(kind.above, kind.least), min(kind.below, kind.most)
+    if math.isfinite(low) and math.isfinite(high):
+        if low > 0 and high > 100 * low:
+            drawn = low * (high / low) ** rng.uniform()
+        else:
+            drawn = rng.uniform(low, high)
+        return float(round(drawn) if float(value).is_integer() and rng.uniform() < 0.5 else drawn)
+    factor = 2 ** rng.uniform(-spread, spread)
+    if value == 0:
+        return float(max(low, rng.normal() * 0.2 * spread))
+    return float(value * factor)

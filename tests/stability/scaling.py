@@ -1,0 +1,64 @@
+"""A scene made larger or smaller in its own parameters: lengths times a factor, curvatures divided by it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fracslice.formulas import Node, transform
+
+LENGTHS: dict[str, tuple[str, ...]] = {
+    "sphere": ("radius",),
+    "box": ("size", "round"),
+    "torus": ("radius", "tube"),
+    "cylinder": ("radius", "height"),
+    "capsule": ("from", "to", "radius"),
+    "cone": ("radius", "height"),
+    "plane": ("offset",),
+    "octahedron": ("radius",),
+    "union": ("smooth",),
+    "intersection": ("smooth",),
+    "difference": ("smooth",),
+    "shell": ("thickness",),
+    "offset": ("distance",),
+    "bounds": ("min", "max"),
+    "repeat": ("period",),
+    "mirror": (),
+    "material": (),
+    "transform": (),
+    "twist": (),
+    "bend": (),
+}
+"""The parameters of each formula that are lengths. A fractal has none: it is scaled by a transform."""
+
+
+def scaled(root: Node, factor: float) -> Node:
+    """The same object `factor` times as large: ``scaled(f)(factor p) = factor f(p)``."""
+    if not root.children and root.formula.name not in LENGTHS:
+        return transform(root, scale=(factor,))
+    children = tuple(scaled(child, factor) for child in root.children)
+    values = {name: _times(root[name], factor) for name in LENGTHS[root.formula.name]}
+    return root.changed(children, **values, **_others(root, factor))
+
+
+def _others(root: Node, factor: float) -> dict[str, object]:
+    """What is not simply a length: angles per length, and the moving part of a transform."""
+    if root.formula.name in ("twist", "bend"):
+        return {"degrees": root["degrees"] / factor}
+    if root.formula.name == "transform":
+        found: dict[str, object] = {"translate": _times(root["translate"], factor)}
+        if root["matrix"]:
+            found["matrix"] = tuple(v * (factor if i % 4 == 3 else 1.0) for i, v in enumerate(root["matrix"]))
+        return found
+    return {}
+
+
+def _times(value: object, factor: float) -> object:
+    return tuple(v * factor for v in value) if isinstance(value, tuple) else value * factor  # type: ignore[operator]
+
+
+def placed(root: Node, factor: float) -> Node:
+    """The same object `factor` times as large, by a transform around all of it."""
+    return transform(root, scale=(factor,))
+
+
+WAYS: dict[str, Callable[[Node, float], Node]] = {"parameters": scaled, "transform": placed}
