@@ -24,9 +24,9 @@ CORE = 0.5
 """The least |w|^2 that the derivative is taken at where a set falls apart.
 
 Koebe's theorem wants a connected set. Where the critical point 0 escapes, the potential has critical points
-outside the set, one at each preimage of 0; G' vanishes there and the quotient grows without limit. With D
-the distance from w^2 + c to its set, that of w is at least sqrt(|w|^2 + D) - |w|, which D / (2 |w|) overshoots
-where |w|^2 is small against D, and D / (2 sqrt(CORE)) does not.
+outside the set, one at each preimage of 0; G' vanishes there and the quotient grows without limit. With D the
+distance from w^2 + c to its set, that of w is at least sqrt(|w|^2 + D) - |w|. Where |w|^2 is small against D,
+D / (2 |w|) overshoots it, and D / (2 sqrt(CORE)) does not.
 """
 
 

@@ -101,9 +101,10 @@ class _Run:
         while True:
             f = self.centres(cells, size)
             reach = self.reach(size * BRICK)
-            for cell in cells[f < -reach]:
+            full = (f < -reach) & (not self.facts.weak)
+            for cell in cells[full]:
                 state[tuple(slice(c, c + size) for c in cell)] = FULL
-            near = ~(np.abs(f) > reach)
+            near = ~((f > reach) | full)
             cells, f = cells[near], f[near]
             if size == 1:
                 break
