@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +16,12 @@ from .summary import summary
 from .working import working
 
 if TYPE_CHECKING:
-    from fracslice.job import Result
+    from fracslice.job import MeshJob, Result
+    from fracslice.report import Report
+    from fracslice.scene import Scene
+    from fracslice.work import Work
 
-GRID = ".vdb"
+GRID, STL = ".vdb", ".stl"
 
 
 @click.command()
@@ -45,20 +47,51 @@ def mesh(
 ) -> int:
     """Make a printable mesh of SCENE, and say what it is.
 
-    Exits with 1 if the mesh has defects that a slicer would stumble over; it is written all the same.
+    Exits with 1 if the mesh has defects that a slicer would stumble over; it is written all the same. A mesh
+    that does not fit in memory is made piece after piece if it goes to an .stl file.
     """
-    from fracslice.job import make_mesh
+    from fracslice.errors import TooLargeError
 
     check_outputs(output, report, picture)
-    scene = load_scene(source, settings)
+    scene, job = load_scene(source, settings), job_of(**options)
     with working(threads, quiet) as work:
-        result = make_mesh(scene, job_of(**options), work)
-        work.check()
-        for path in written(result, output, report, picture):
-            work.progress(f"wrote {path.name}", 1.0)
+        try:
+            told = made(scene, job, output, picture, work)
+        except TooLargeError:
+            if Path(output).suffix.lower() != STL or picture is not None:
+                raise
+            told = streamed(scene, job, output, work)
+        if report is not None:
+            write_report(told, report)
     if not quiet:
-        click.echo(summary(output, result.report))
-    return 1 if result.report.problems else 0
+        click.echo(summary(output, told))
+    return 1 if told.problems else 0
+
+
+def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> Report:
+    """Makes the mesh in memory and writes the files that are wanted."""
+    from fracslice.job import make_mesh
+
+    result = make_mesh(scene, job, work)
+    work.check()
+    if Path(output).suffix.lower() == GRID:
+        write_grid(result, output, metadata(scene))
+    else:
+        from fracslice.export import write
+
+        write(result.mesh, output, metadata(scene))
+    if picture is not None:
+        from fracslice.viewer import picture as draw
+
+        draw(result.mesh, picture)
+    return result.report
+
+
+def streamed(scene: Scene, job: MeshJob, output: str, work: Work) -> Report:
+    """Writes a mesh that does not fit in memory, piece after piece."""
+    from fracslice.streaming import stream_mesh
+
+    return stream_mesh(scene, output, job, work, metadata(scene))
 
 
 def check_outputs(output: str, report: str | None, picture: str | None) -> None:
@@ -75,39 +108,26 @@ def check_outputs(output: str, report: str | None, picture: str | None) -> None:
             check_target(target)
 
 
-def write_grid(result: Result, path: str) -> Path:
+def write_grid(result: Result, path: str, about: dict[str, str]) -> None:
     """Writes the samples, in mm, as an OpenVDB file."""
     from fracslice.export import replacing
     from fracslice.volume.grid import write_vdb
 
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, replacing(path) as file:
         whole = Path(folder) / f"grid{GRID}"
-        write_vdb(result.bricks_mm, whole, metadata(result))
+        write_vdb(result.bricks_mm, whole, about)
         with whole.open("rb") as grid:
             shutil.copyfileobj(grid, file)
-    return Path(path)
 
 
-def metadata(result: Result) -> dict[str, str]:
+def write_report(report: Report, path: str) -> None:
+    """Writes the numbers as JSON."""
+    from fracslice.export import replacing
+
+    with replacing(path) as file:
+        file.write((json.dumps(report.as_dict(), indent=2) + "\n").encode())
+
+
+def metadata(scene: Scene) -> dict[str, str]:
     """What files are told about themselves."""
-    return {"Title": result.report.scene, "scene_hash": result.report.scene_hash}
-
-
-def written(result: Result, output: str, report: str | None, picture: str | None) -> Iterator[Path]:
-    """Writes the files that are wanted, one after the other."""
-    if Path(output).suffix.lower() == GRID:
-        yield write_grid(result, output)
-    else:
-        from fracslice.export import write
-
-        yield write(result.mesh, output, metadata(result))
-    if report is not None:
-        from fracslice.export import replacing
-
-        with replacing(report) as file:
-            file.write((json.dumps(result.report.as_dict(), indent=2) + "\n").encode())
-        yield Path(report)
-    if picture is not None:
-        from fracslice.viewer import picture as draw
-
-        yield draw(result.mesh, picture)
+    return {"Title": scene.name, "scene_hash": scene.hash}

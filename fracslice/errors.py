@@ -17,6 +17,10 @@ class VolumeError(FracsliceError):
     """A volume cannot be sampled, read or written."""
 
 
+class TooLargeError(VolumeError):
+    """A job needs more memory than there is."""
+
+
 class MeshError(FracsliceError):
     """A mesh cannot be built, read or made into a solid."""
 

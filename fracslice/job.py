@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from .errors import SceneError, VolumeError
+from .errors import SceneError, TooLargeError
 from .memory import available_bytes, peak_rss_mb
 from .report import Report, SurfaceError, version
 from .scene import Scene, parse_length
@@ -68,6 +68,13 @@ class MeshJob:
     def size(self, scene: Scene) -> float:
         """The longest side in mm."""
         return scene.size_mm if self.size_mm is None else self.size_mm
+
+    def dust(self, volume: float) -> float:
+        """The volume below which a body of an object of `volume` is dropped, mm3."""
+        dust = DUST * volume if self.dust_mm3 is None else self.dust_mm3
+        if dust > volume:
+            raise SceneError(f"dust {dust:.4g}mm3: expected at most the volume of the object, {volume:.4g}mm3")
+        return dust
 
     def voxels(self, scene: Scene) -> float:
         """How many voxels the longest side has."""
@@ -155,7 +162,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
 
 
 def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Work) -> None:
-    """Raises `VolumeError`, naming a voxel that fits, if the mesh would take more memory than there is.
+    """Raises `TooLargeError`, naming a voxel that fits, if the mesh would take more memory than there is.
 
     The number of bricks grows like a power of the resolution, about the surface's dimension; two coarse
     samplings show it. Coarse jobs are not looked at: they always fit.
@@ -172,7 +179,7 @@ def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Wor
     free = available_bytes()
     if needed > free:
         fits = size / voxels * (needed / free) ** (1 / dimension)
-        raise VolumeError(
+        raise TooLargeError(
             f"a voxel of {size / voxels:.3g}mm needs about {needed / 1e9:.1f} GB of memory, "
             f"and {free / 1e9:.1f} GB are free; a voxel of {fits * 1.02:.3g}mm fits"
         )
@@ -186,10 +193,9 @@ def _finished(raw: Mesh, what: MeshJob, size: float) -> tuple[Mesh, Removed, Pla
 
     scale = size / float(raw.size.max())
     volume = raw.volume * scale**3
-    dust = DUST * volume if what.dust_mm3 is None else what.dust_mm3
-    if dust > volume:
-        raise SceneError(f"dust {dust:.4g}mm3: expected at most the volume of the object, {volume:.4g}mm3")
-    kept, removed = select(raw.scaled(scale), keep=what.keep, dust_mm3=dust, cavities=what.cavities)
+    kept, removed = select(
+        raw.scaled(scale), keep=what.keep, dust_mm3=what.dust(volume), cavities=what.cavities
+    )
     scale *= _growth(kept, what.base_mm, size)
     mesh = kept.scaled(scale * float(raw.size.max()) / size)
     if what.base_mm > 0:

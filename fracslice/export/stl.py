@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
 from typing import BinaryIO
 
 import numpy as np
@@ -16,14 +17,27 @@ BLOCK = 1 << 18
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
     """Write a mesh in mm."""
-    count = len(mesh.triangles)
-    if count >= 2**32:
-        raise ExportError(f"STL cannot hold {count} triangles")
+    write_pieces([mesh], file, metadata)
+
+
+def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, str]) -> None:
+    """Write a mesh in mm that comes in pieces, one in memory at a time; `file` must be able to seek."""
+    start, count = file.tell(), 0
     header = f"binary STL, units: mm, {metadata['Application']}".encode("ascii", "replace")
-    file.write(header[:80].ljust(80))
+    file.write(header[:80].ljust(80) + bytes(4))
+    for mesh in meshes:
+        _write_triangles(mesh, file)
+        count += len(mesh.triangles)
+        if count >= 2**32:
+            raise ExportError("STL cannot hold more than 4294967295 triangles")
+    file.seek(start + 80)
     file.write(np.uint32(count).astype("<u4").tobytes())
+    file.seek(0, os.SEEK_END)
+
+
+def _write_triangles(mesh: Mesh, file: BinaryIO) -> None:
     vertices = mesh.vertices.astype(np.float32)
-    for begin in range(0, count, BLOCK):
+    for begin in range(0, len(mesh.triangles), BLOCK):
         corners = vertices[mesh.triangles[begin : begin + BLOCK]]
         records = np.zeros(len(corners), TRIANGLE)
         records["corners"] = corners

@@ -105,7 +105,7 @@ def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
         oriented=not (link.misoriented_edges or misplaced),
         self_intersections=int(crossing.sum()),
         degenerate_triangles=int((normals == 0).sum()),
-        duplicate_triangles=_duplicates(whole.triangles[crossing]),
+        duplicate_triangles=duplicates(whole.triangles[crossing]),
         open_edges=link.open_edges,
         nonmanifold_edges=link.crowded_edges,
         nonmanifold_vertices=link.extra_fans,
@@ -129,7 +129,7 @@ def _misplaced(mesh: Mesh, labels: NDArray[np.int32], volumes: NDArray[np.float6
     return int((nesting(mesh, labels, volumes, tree).winding != (volumes < 0)).sum())
 
 
-def _duplicates(triangles: NDArray[np.int32]) -> int:
+def duplicates(triangles: NDArray[np.int32]) -> int:
     """How many triangles have the three corners of an earlier one, in whatever order."""
     return len(triangles) - len(np.unique(np.sort(triangles, axis=1), axis=0))
 

@@ -21,16 +21,26 @@ def clean(mesh: Mesh) -> Mesh:
     1999). What cannot be helped stays, for `check` to report. Equal positions are welded last. Raises
     MeshError as `rounded` does.
     """
+    return rounded(mended(mesh))
+
+
+def mended(mesh: Mesh, low: float = -np.inf, high: float = np.inf) -> Mesh:
+    """The mesh before it is rounded, with the triangles taken out that rounding would flatten or turn over.
+
+    Only those whose largest x is in [low, high): elsewhere the surface may be cut open.
+    """
     points = float32_points(mesh).astype(np.float64)
     agreement = np.einsum("ij,ij->i", Mesh(points, mesh.triangles).normals, mesh.normals)
-    bad = set(np.flatnonzero(agreement <= 0).tolist())
+    suspects = np.flatnonzero(agreement <= 0)
+    top = mesh.vertices[mesh.triangles[suspects], 0].max(axis=1)
+    bad = set(suspects[(low <= top) & (top < high)].tolist())
     if not bad:
-        return rounded(mesh)
+        return mesh
     surface = _Surface(points, mesh.triangles, bad)
     for _ in range(PASSES):
         for triangle in sorted(bad):
             surface.mend(triangle)
-    return rounded(Mesh(points, surface.triangles[surface.alive]))
+    return Mesh(mesh.vertices, surface.triangles[surface.alive])
 
 
 class _Surface:

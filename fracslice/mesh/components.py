@@ -76,9 +76,17 @@ def select(
     A cavity goes with its body, and a body in a cavity with the filling. Raises MeshError when nothing would
     be left, or the mesh has a shell that is inside out.
     """
+    found = shells(mesh)
+    staying, removed = choose(found, keep=keep, dust_mm3=dust_mm3, cavities=cavities)
+    return (mesh if staying.all() else mesh.selected(staying[found.labels])), removed
+
+
+def choose(
+    found: Shells, *, keep: str = "all", dust_mm3: float = 0.0, cavities: str = "keep"
+) -> tuple[NDArray[np.bool_], Removed]:
+    """Which shells `select` would keep, bool [s]. Raises as it does."""
     if keep not in ("all", "largest") or cavities not in ("keep", "fill"):
         raise ValueError(f"no such choice: keep={keep!r}, cavities={cavities!r}")
-    found = shells(mesh)
     hollow = found.volumes < 0
     material = found.volumes if cavities == "fill" else found.solid_volumes
     stays = ~hollow & (material >= dust_mm3)
@@ -97,5 +105,4 @@ def select(
         cavities=int((hollow & ~open_cavities).sum()),
         filled_mm3=float(-found.volumes[filled].sum()),
     )
-    staying = stays | open_cavities
-    return (mesh if staying.all() else mesh.selected(staying[found.labels])), removed
+    return stays | open_cavities, removed

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..formulas.registry import Node
+from ..kernel import Field
 from ..volume.bricks import Bricks, SignBricks
 from ..volume.crossings import Crossings, refine_crossings
 from ..volume.lattice import BRICK
@@ -37,7 +38,7 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
     return Mesh(vertices, triangles)
 
 
-def contour(root: Node, bricks: Bricks | SignBricks, work: Work | None = None) -> Mesh:
+def contour(root: Node | Field, bricks: Bricks | SignBricks, work: Work | None = None) -> Mesh:
     """The exact surface of a scene, in scene units, its edges and corners sharp.
 
     root: the scene that `bricks` were sampled from. Every vertex on a grid edge is moved along it to the zero
@@ -65,7 +66,7 @@ class Piece:
 
 
 def contour_pieces(
-    root: Node, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
+    root: Node | Field, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
 ) -> Iterator[Piece]:
     """The same surface, piece after piece along x, each of about `most` bricks: memory for one at a time."""
     from .._native import Cells

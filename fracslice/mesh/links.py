@@ -31,7 +31,13 @@ def links(triangles: NDArray[np.int32], vertices: int) -> Links:
     triangles: int32 [m, 3], each with three different indices below `vertices`. O(m), or O(m log d) at
     vertices of degree d.
     """
-    return Links(*(int(n) for n in _links(triangles, *corners_by_vertex(triangles, vertices))))
+    *ends, fans = edge_ends(triangles, np.ones(vertices, dtype=np.bool_))
+    return Links(*(n // 2 for n in ends), fans)
+
+
+def edge_ends(triangles: NDArray[np.int32], counted: NDArray[np.bool_]) -> Links:
+    """The same counts at some vertices only, bool [vertices]; of edges, their ends there."""
+    return Links(*(int(n) for n in _links(triangles, counted, *corners_by_vertex(triangles, len(counted)))))
 
 
 def parts(triangles: NDArray[np.int32], vertices: int) -> tuple[NDArray[np.int32], int]:
@@ -93,7 +99,8 @@ def corners_by_vertex(triangles, vertices):
 
 
 @njit(cache=True, nogil=True)
-def _links(triangles, start, corner):
+def _links(triangles, counted, start, corner):
+    """The counts of `Links`; edges are counted at both ends."""
     edges, opened, crowded, misoriented, extra_fans = 0, 0, 0, 0, 0
     widest = 1
     for v in range(len(start) - 1):
@@ -102,7 +109,7 @@ def _links(triangles, start, corner):
     fan = np.empty(widest, np.int64)
     for v in range(len(start) - 1):
         degree = start[v + 1] - start[v]
-        if degree == 0:
+        if degree == 0 or not counted[v]:
             continue
         _set_spokes(triangles, corner, start[v], degree, spokes, fan)
         fans, i = degree, 0
@@ -110,13 +117,12 @@ def _links(triangles, start, corner):
             neighbour, j, outward = spokes[i] // (2 * degree), i, 0
             while j < 2 * degree and spokes[j] // (2 * degree) == neighbour:
                 outward += 1 - spokes[j] % 2
-                fans -= _unite(fan, spokes[i] % (2 * degree) // 2, spokes[j] % (2 * degree) // 2)
+                fans -= unite(fan, spokes[i] % (2 * degree) // 2, spokes[j] % (2 * degree) // 2)
                 j += 1
-            if neighbour > v:
-                edges += 1
-                opened += j - i == 1
-                crowded += j - i > 2
-                misoriented += j - i > 1 and 2 * outward != j - i
+            edges += 1
+            opened += j - i == 1
+            crowded += j - i > 2
+            misoriented += j - i > 1 and 2 * outward != j - i
             i = j
         extra_fans += fans - 1
     return edges, opened, crowded, misoriented, extra_fans
@@ -142,7 +148,7 @@ def _set_spokes(triangles, corner, begin, degree, spokes, fan):
 
 
 @njit(cache=True, nogil=True)
-def _unite(parent, a, b):
+def unite(parent, a, b):
     """Join two sets; 1 if they were apart."""
     while parent[a] != a:
         parent[a] = parent[parent[a]]
@@ -160,8 +166,8 @@ def _unite(parent, a, b):
 def _parts(triangles, vertices):
     parent = np.arange(vertices)
     for t in range(len(triangles)):
-        _unite(parent, triangles[t, 0], triangles[t, 1])
-        _unite(parent, triangles[t, 0], triangles[t, 2])
+        unite(parent, triangles[t, 0], triangles[t, 1])
+        unite(parent, triangles[t, 0], triangles[t, 2])
     for v in range(vertices):
         parent[v] = parent[parent[v]]
     number = np.full(vertices, -1, np.int32)

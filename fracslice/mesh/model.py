@@ -50,11 +50,18 @@ class Mesh:
         return float(np.linalg.norm(self.normals, axis=1).sum() / 2)
 
     @property
+    def cones(self) -> NDArray[np.float64]:
+        """Signed volume between each triangle and the origin, float64 [m]: on a closed mesh they add up to its
+        own.
+        """
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        volumes: NDArray[np.float64] = np.einsum("ij,ij->i", _cross(a, b), c) / 6
+        return volumes
+
+    @property
     def volume(self) -> float:
         """Signed volume: positive when the triangles look outwards (divergence theorem)."""
-        centred = self.vertices - self.bounds.mean(axis=0)
-        a, b, c = (centred[self.triangles[:, k]] for k in range(3))
-        return float(np.einsum("ij,ij->", _cross(a, b), c) / 6)
+        return float(self.translated(-self.bounds.mean(axis=0)).cones.sum())
 
     def translated(self, offset: tuple[float, float, float] | NDArray[np.float64]) -> Mesh:
         """A copy moved by `offset`."""

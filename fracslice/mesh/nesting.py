@@ -25,19 +25,25 @@ class Nesting(NamedTuple):
 
 
 def nesting(
-    mesh: Mesh, labels: NDArray[np.int32], volumes: NDArray[np.float64], tree: Tree | None = None
+    mesh: Mesh,
+    labels: NDArray[np.int32],
+    volumes: NDArray[np.float64],
+    tree: Tree | None = None,
+    first: NDArray[np.int64] | None = None,
 ) -> Nesting:
     """Where each closed shell of a mesh lies.
 
     labels: int32 [m], the shell of each triangle; volumes: float64 [s], signed. A ray from one vertex of each
     shell goes up and adds the winding of every triangle it passes; edges and vertices on the ray count once
-    (half-open edges).
+    (half-open edges). first: int64 [s], that vertex, if it matters which; -1 for a shell not to be looked at.
+    The mesh need only be whole where these rays pass.
     """
     count = len(volumes)
     if count < 2:
         return Nesting(np.zeros(count, np.int64), np.full(count, -1, np.int64))
-    first = np.zeros(count, np.int64)
-    first[labels[::-1]] = mesh.triangles[::-1, 0]
+    if first is None:
+        first = np.zeros(count, np.int64)
+        first[labels[::-1]] = mesh.triangles[::-1, 0]
     sizes = np.abs(volumes)
     return Nesting(*_nesting(mesh.vertices, mesh.triangles, labels, sizes, first, *(tree or build(mesh))))
 
@@ -49,6 +55,8 @@ def _nesting(vertices, triangles, labels, sizes, first, order, low, high):
     around = np.zeros(len(first), np.int64)
     seen = np.empty(len(first), np.int64)
     for shell in range(len(first)):
+        if first[shell] < 0:
+            continue
         count = _around(vertices, triangles, labels, first[shell], order, low, high, around, seen)
         for i in range(count):
             other = seen[i]

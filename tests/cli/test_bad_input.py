@@ -128,7 +128,7 @@ def test_command_lines(arguments, message, folder, capfd):
 
 def test_a_voxel_count_that_does_not_fit_in_memory(folder, capfd, monkeypatch):
     monkeypatch.setattr("fracslice.job.available_bytes", lambda: 1 << 30)
-    line = refused(capfd, folder, "mesh", "ball.xml", "-o", "out/x.stl", "--resolution", "16000")
+    line = refused(capfd, folder, "mesh", "ball.xml", "-o", "out/x.3mf", "--resolution", "4000")
     assert "GB of memory" in line
     assert line.endswith("mm fits")
 

@@ -1,0 +1,129 @@
+"""The shells of a surface that comes in pieces: what the whole must be known for, found without having it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .components import Shells
+from .extract import Piece
+from .model import Mesh
+
+
+class Survey:
+    """Adds up pieces, in turn. Labels are those of parts of pieces, numbered from the first piece on, until
+    `join` tells which of them are one shell.
+    """
+
+    def __init__(self) -> None:
+        self.cones: list[NDArray[np.float64]] = []
+        self.areas: list[NDArray[np.float64]] = []
+        self.low: list[NDArray[np.float64]] = []
+        self.high: list[NDArray[np.float64]] = []
+        self.same: list[NDArray[np.int64]] = []
+        self.count = 0
+        self.border: tuple[NDArray[np.int64], NDArray[np.int64]] = (np.empty(0, int), np.empty(0, int))
+
+    def add(self, piece: Piece) -> NDArray[np.int64]:
+        """Takes in a piece. Returns the label of each of its triangles, int64 [m]."""
+        from .links import parts
+
+        mesh = piece.mesh
+        local, count = parts(mesh.triangles, len(mesh.vertices))
+        labels = local.astype(np.int64) + self.count
+        of_vertex = np.empty(len(mesh.vertices), np.int64)
+        of_vertex[mesh.triangles] = labels[:, None]
+        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+        np.minimum.at(low, of_vertex - self.count, mesh.vertices)
+        np.maximum.at(high, of_vertex - self.count, mesh.vertices)
+        cones, areas = _cones(mesh, local, low)
+        self.cones.append(cones)
+        self.areas.append(areas)
+        self.low.append(low)
+        self.high.append(high)
+        self._join_to_last(piece.crossings, of_vertex)
+        self.count += count
+        return labels
+
+    def _join_to_last(self, crossings: NDArray[np.int64], labels: NDArray[np.int64]) -> None:
+        """Parts that share a crossing with the piece before are one; the surface passes no seam without."""
+        numbers, before = self.border
+        own = crossings >= 0
+        _, theirs, mine = np.intersect1d(numbers, crossings[own], assume_unique=True, return_indices=True)
+        pairs = np.stack([before[theirs], labels[own][mine]], axis=1)
+        self.same.append(np.unique(pairs, axis=0))
+        self.border = crossings[own], labels[own]
+
+    def shells(self) -> WholeShells:
+        """What all pieces together are made of."""
+        of_label, count = self._united()
+        lows, areas = np.concatenate(self.low), np.concatenate(self.areas)
+        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+        np.minimum.at(low, of_label, lows)
+        np.maximum.at(high, of_label, np.concatenate(self.high))
+        # Cones over the corner of a part, moved to the corner of its shell.
+        cones = np.concatenate(self.cones) + np.einsum("ij,ij->i", lows - low[of_label], areas) / 3
+        volumes = np.bincount(of_label, cones, minlength=count)
+        return WholeShells(of_label, volumes, low, high)
+
+    def _united(self) -> tuple[NDArray[np.int32], int]:
+        """The shell of each label."""
+        from .links import unite
+
+        parent = np.arange(self.count)
+        for a, b in np.concatenate(self.same).tolist():
+            unite(parent, a, b)
+        while (parent != parent[parent]).any():
+            parent = parent[parent]
+        roots, shell = np.unique(parent, return_inverse=True)
+        return shell.astype(np.int32), len(roots)
+
+
+@dataclass(frozen=True, eq=False)
+class WholeShells:
+    """of_label: int32, the shell of each label; volumes: float64 [s], signed; low, high: float64 [s, 3]."""
+
+    of_label: NDArray[np.int32]
+    volumes: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    def nested(self, pieces: Iterable[tuple[Mesh, NDArray[np.int64]]]) -> tuple[Shells, int]:
+        """Which shell is in which, and how many are where they should not be.
+
+        pieces: the same once more, with their labels. Each shell is looked up from where its x is least: that
+        point lies within a cell, so that a ray across x from it stays in one piece.
+        """
+        from .nesting import nesting
+
+        count = len(self.volumes)
+        parent, winding = np.full(count, -1, np.int64), np.zeros(count, np.int64)
+        for mesh, labels in pieces if count > 1 else ():
+            shell = self.of_label[labels]
+            first = np.full(count, -1, np.int64)
+            of_vertex = np.empty(len(mesh.vertices), np.int64)
+            of_vertex[mesh.triangles] = shell[:, None]
+            here = np.flatnonzero(mesh.vertices[:, 0] == self.low[of_vertex, 0])
+            first[of_vertex[here]] = here
+            if (first >= 0).any():
+                found = nesting(mesh, shell, self.volumes, first=first)
+                parent = np.where(first >= 0, found.parent, parent)
+                winding = np.where(first >= 0, found.winding, winding)
+        misplaced = int((winding != (self.volumes < 0)).sum())
+        return Shells(np.empty(0, np.int32), self.volumes, parent), misplaced
+
+
+def _cones(
+    mesh: Mesh, labels: NDArray[np.int32], tips: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of each part, float64 [s]: the signed volume between its triangles and a tip near by, [s, 3], so that
+    dust keeps its digits; and the sum of its normals, each as long as its triangle's area, [s, 3].
+    """
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] - tips[labels] for k in range(3))
+    count, normals = len(tips), np.cross(b - a, c - a) / 2
+    cones = np.bincount(labels, np.einsum("ij,ij->i", a, normals), minlength=count) / 3
+    areas = [np.bincount(labels, normals[:, k], minlength=count) for k in range(3)]
+    return cones, np.stack(areas, axis=1)

@@ -1,0 +1,161 @@
+"""A mesh that is larger than memory: sampled, meshed, cleaned, checked and written piece after piece.
+
+Twice over the surface. First its pieces are made and laid aside in a folder beside the target, while their
+shells are added up; then, the whole's size and its dust being known, they are brought to size and written.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import SceneError
+from .export.files import check_target, replacing
+from .export.stl import write_pieces
+from .job import Clock, MeshJob
+from .memory import peak_rss_mb
+from .report import Report, SurfaceError, version
+from .scene import Scene
+from .work import Work
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
+    from .mesh.check import MeshReport
+    from .mesh.extract import Piece
+    from .mesh.survey import WholeShells
+    from .volume import Plan
+
+BRICKS = 1 << 13
+"""In a piece: half a gigabyte at most, in all its stages."""
+
+MOST_ERRORS = 1 << 22
+"""How many vertices are measured, evenly spread over the surface."""
+
+
+def stream_mesh(
+    scene: Scene,
+    path: str | Path,
+    what: MeshJob | None = None,
+    work: Work | None = None,
+    metadata: Mapping[str, str] | None = None,
+) -> Report:
+    """Makes what `make_mesh` makes and writes it to the STL file `path`; memory is that of a piece.
+
+    Nothing is left of an STL that is not whole. The folder of `path` must have room for it twice. Raises
+    `SceneError`, `VolumeError`, `MeshError`, `ExportError` or `Cancelled`, and `SceneError` for a base to be
+    cut: that needs the whole mesh.
+    """
+    what, work = what or MeshJob(), work or Work()
+    if what.base_mm > 0:
+        raise SceneError(f"base {what.base_mm:g}mm: cannot be cut off a mesh that does not fit in memory")
+    from .export import application
+    from .mesh.extract import contour_pieces
+    from .mesh.survey import Survey
+    from .volume import plan, sample_scene_signs
+
+    folder, clock, survey = check_target(path).parent, Clock(work), Survey()
+    with clock("planning"):
+        planned = plan(scene.root, what.voxels(scene), work)
+    with clock("sampling"):
+        signs = sample_scene_signs(planned, work)
+    with tempfile.TemporaryDirectory(prefix=".fracslice-", dir=folder) as aside:
+        pieces = Pieces(Path(aside))
+        with clock("meshing"):
+            for piece in contour_pieces(planned.root, signs, work, BRICKS):
+                pieces.add(piece, survey.add(piece))
+                work.progress("meshing", min((piece.end - planned.outer.lo[0]) / planned.outer.size[0], 1.0))
+        with clock("finishing"), replacing(path) as file:
+            finish = _Finish(planned, pieces, survey.shells(), what, what.size(scene), work)
+            known = {"Application": application()} | dict(metadata or {})
+            write_pieces(finish.meshes(MOST_ERRORS / (40 * len(signs))), file, known)
+    return Report(
+        scene=scene.name,
+        scene_hash=scene.hash,
+        version=version(),
+        size_mm=what.size(scene),
+        voxel_mm=finish.voxel,
+        mesh=finish.checked(),
+        removed=finish.removed,
+        surface_error_mm=finish.surface_error(),
+        evaluations=signs.evaluations,
+        bricks=len(signs),
+        seconds=clock.seconds,
+        peak_rss_mb=peak_rss_mb(),
+    )
+
+
+@dataclass
+class Pieces:
+    """Pieces of a mesh in files of a folder, with the label of each triangle."""
+
+    folder: Path
+    ends: list[float] = field(default_factory=list)
+
+    def add(self, piece: Piece, labels: np.ndarray) -> None:
+        path = self.folder / f"{len(self.ends)}.npz"
+        np.savez(path, vertices=piece.mesh.vertices, triangles=piece.mesh.triangles, labels=labels)
+        self.ends.append(piece.end)
+
+    def __iter__(self) -> Iterator[tuple[Mesh, np.ndarray]]:
+        from .mesh import Mesh
+
+        for number in range(len(self.ends)):
+            with np.load(self.folder / f"{number}.npz") as arrays:
+                yield Mesh(arrays["vertices"], arrays["triangles"]), arrays["labels"]
+
+
+class _Finish:
+    """The second time over the surface: what stays of it, where it is to be, what it is like."""
+
+    def __init__(
+        self, planned: Plan, pieces: Pieces, whole: WholeShells, what: MeshJob, size: float, work: Work
+    ) -> None:
+        from .mesh.components import choose
+        from .mesh.window import Window
+
+        self.planned, self.pieces, self.whole, self.work = planned, pieces, whole, work
+        longest = float((whole.high.max(axis=0) - whole.low.min(axis=0)).max())
+        unit = (size / longest) ** 3
+        dust = what.dust(float(whole.volumes.sum()) * unit)
+        shells, self.misplaced = whole.nested(pieces)
+        sized = replace(shells, volumes=shells.volumes * unit)
+        self.stays, self.removed = choose(sized, keep=what.keep, dust_mm3=dust, cavities=what.cavities)
+        low, high = whole.low[self.stays].min(axis=0), whole.high[self.stays].max(axis=0)
+        self.scale = size / float((high - low).max())
+        self.offset = -self.scale * np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
+        self.voxel = planned.voxel * self.scale
+        self.window = Window(self.voxel, work.threads)
+        self.errors: list[np.ndarray] = []
+
+    def meshes(self, share: float) -> Iterator[Mesh]:
+        """The finished triangles, piece after piece, in mm; the errors of a share of their vertices are kept."""
+        last, stride = len(self.pieces.ends) - 1, max(1, round(1 / share))
+        for number, (mesh, labels) in enumerate(self.pieces):
+            self.work.check()
+            self.work.progress("finishing", number / len(self.pieces.ends))
+            stays = self.stays[self.whole.of_label[labels]]
+            kept = mesh.selected(stays).scaled(self.scale).translated(self.offset)
+            end = self.scale * self.pieces.ends[number] + float(self.offset[0])
+            done = self.window.add(kept, end if number < last else np.inf)
+            self._measure(done.vertices[::stride])
+            yield done
+
+    def _measure(self, vertices: np.ndarray) -> None:
+        from .volume.accuracy import surface_error
+
+        points = (vertices - self.offset) / self.scale
+        self.errors.append(surface_error(self.planned.root, points, self.planned.voxel, self.work))
+
+    def surface_error(self) -> SurfaceError:
+        mm = self.scale * np.concatenate(self.errors)
+        return SurfaceError(float(mm.mean()), float(np.quantile(mm, 0.99)), float(mm.max()))
+
+    def checked(self) -> MeshReport:
+        hollow = self.whole.volumes < 0
+        bodies, cavities = int((self.stays & ~hollow).sum()), int((self.stays & hollow).sum())
+        return self.window.report(bodies, cavities, self.misplaced)
