@@ -73,7 +73,7 @@ class MeshJob:
         """The volume below which a body of an object of `volume` is dropped, mm3."""
         dust = DUST * volume if self.dust_mm3 is None else self.dust_mm3
         if dust > volume:
-            raise SceneError(f"dust {dust:.4g}mm3: expected at most the volume of the object, {volume:.4g}mm3")
+            raise SceneError(f"dust {dust:.4g}mm3: expected at most the object's volume, {volume:.4g}mm3")
         return dust
 
     def voxels(self, scene: Scene) -> float:

@@ -133,7 +133,7 @@ class _Finish:
         self.errors: list[np.ndarray] = []
 
     def meshes(self, share: float) -> Iterator[Mesh]:
-        """The finished triangles, piece after piece, in mm; the errors of a share of their vertices are kept."""
+        """The finished triangles, piece after piece, in mm; errors are kept of a share of their vertices."""
         last, stride = len(self.pieces.ends) - 1, max(1, round(1 / share))
         for number, (mesh, labels) in enumerate(self.pieces):
             self.work.check()

@@ -73,7 +73,7 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
 
     planned = plan(menger(level=2), 40)
     signs = sample_scene_signs(planned)
-    whole = [p.mesh for p in contour_pieces(planned.root, signs, most=10**6)][0]
+    whole = next(p.mesh for p in contour_pieces(planned.root, signs, most=10**6))
     lost = np.random.default_rng(1).random(len(whole.triangles)) < 0.01
     centres = {tuple(c) for c in whole.corners[lost].mean(axis=1).tolist()}
     window, passed = Window(planned.voxel), 0

@@ -31,8 +31,9 @@ def links(triangles: NDArray[np.int32], vertices: int) -> Links:
     triangles: int32 [m, 3], each with three different indices below `vertices`. O(m), or O(m log d) at
     vertices of degree d.
     """
-    *ends, fans = edge_ends(triangles, np.ones(vertices, dtype=np.bool_))
-    return Links(*(n // 2 for n in ends), fans)
+    ends = edge_ends(triangles, np.ones(vertices, dtype=np.bool_))
+    edges, opened, crowded, misoriented = (n // 2 for n in ends[:4])
+    return Links(edges, opened, crowded, misoriented, ends.extra_fans)
 
 
 def edge_ends(triangles: NDArray[np.int32], counted: NDArray[np.bool_]) -> Links:

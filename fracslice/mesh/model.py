@@ -51,9 +51,7 @@ class Mesh:
 
     @property
     def cones(self) -> NDArray[np.float64]:
-        """Signed volume between each triangle and the origin, float64 [m]: on a closed mesh they add up to its
-        own.
-        """
+        """Signed volume between each triangle and the origin, float64 [m]; their sum is a closed mesh's."""
         a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
         volumes: NDArray[np.float64] = np.einsum("ij,ij->i", _cross(a, b), c) / 6
         return volumes

@@ -66,14 +66,14 @@ class Survey:
         np.maximum.at(high, of_label, np.concatenate(self.high))
         # Cones over the corner of a part, moved to the corner of its shell.
         cones = np.concatenate(self.cones) + np.einsum("ij,ij->i", lows - low[of_label], areas) / 3
-        volumes = np.bincount(of_label, cones, minlength=count)
+        volumes = np.bincount(of_label, cones, minlength=count).astype(np.float64)
         return WholeShells(of_label, volumes, low, high)
 
     def _united(self) -> tuple[NDArray[np.int32], int]:
         """The shell of each label."""
         from .links import unite
 
-        parent = np.arange(self.count)
+        parent: NDArray[np.int64] = np.arange(self.count)
         for a, b in np.concatenate(self.same).tolist():
             unite(parent, a, b)
         while (parent != parent[parent]).any():
