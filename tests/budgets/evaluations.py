@@ -1,0 +1,54 @@
+"""How often the field is evaluated: by the sampler, along rays, and in slices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fracslice.formulas import Node
+from fracslice.kernel import compile_scene
+from fracslice.render import Renderer
+from fracslice.scene.view import Camera, Light, Shading, View
+from fracslice.slicing import SliceJob, Slicer, plan_stack
+from fracslice.volume import Lattice, sample
+from fracslice.work import Work
+
+from .workloads import WORKLOADS
+
+VOXELS = 128
+PIXELS, LAYERS = 256, 8
+FRAME = (160, 120)
+CAMERA = Camera(eye=(1.9, -2.3, 1.2), fov=50)
+
+
+def evaluations() -> dict[str, float]:
+    """By workload: evaluations per kept sample, per pixel that a contour cuts, and per ray that hits."""
+    found = {}
+    for name, root in WORKLOADS.items():
+        found[f"{name}: evaluations per kept sample, {VOXELS} voxels"] = per_sample(root)
+        found[f"{name}: evaluations per cut pixel, {PIXELS} pixels"] = per_pixel(root)
+        found[f"{name}: steps per ray that hits"] = per_ray(root)
+    return found
+
+
+def per_sample(root: Node) -> float:
+    box = root.facts.box
+    bricks = sample(compile_scene(root), root.facts, Lattice.around(box, max(box.size) / VOXELS))
+    return bricks.evaluations / bricks.values.size
+
+
+def per_pixel(root: Node) -> float:
+    stack = plan_stack(root, SliceJob(size=PIXELS / 5, layer=0.4, pixel=(0.2, 0.2)))
+    middle = len(stack.z) // (2 * LAYERS) * LAYERS
+    layers = Slicer(stack, Work(threads=1)).map(
+        lambda layer: (layer.evaluations, layer.boundary), range(middle, middle + LAYERS)
+    )
+    spent, cut = np.sum(list(layers), axis=0)
+    return float(spent / cut)
+
+
+def per_ray(root: Node) -> float:
+    """By the picture of steps, which is exp(-steps / 50) where a ray hits and bluish where none does."""
+    view = View(camera=CAMERA, lights=(Light(shadows="no"),), shading=Shading(mode="steps"))
+    *_, last = Renderer(root, view, FRAME, Work(threads=1)).passes(samples=1)
+    hit = last.image[..., 0] == last.image[..., 2]
+    return float(-50 * np.log(last.image[hit, 0].astype(np.float64)).mean())
