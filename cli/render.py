@@ -104,9 +104,8 @@ def render(
         last = renderer.seen()
     save(output, last, scene, bits)
     if not quiet:
-        height, width, _ = last.image.shape
         click.echo(
-            f"{output}: {width} x {height} pixels, {shown(last)}, "
+            f"{output}: {renderer.width} x {renderer.height} pixels, {shown(last)}, "
             f"{renderer.setting.precision}, {renderer.device}"
         )
 
@@ -127,7 +126,7 @@ def shown(done: Pass) -> str:
 
 
 def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
-    return done.number / ((samples or renderer.setting.view.film.samples) + 1)
+    return min(done.samples / (samples or renderer.setting.view.film.samples), 1.0)
 
 
 def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:
@@ -151,4 +150,4 @@ def save_state(renderer: Renderer, path: str) -> None:
     from fracslice.export import replacing
 
     with replacing(path) as file:
-        renderer.accumulator.save(file)
+        renderer.save(file)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from .accumulator import Accumulator
+from .accumulator import Accumulator, HostAccumulator
 from .film import develop
 from .progressive import Pass, Renderer
 
-__all__ = ["Accumulator", "Pass", "Renderer", "develop"]
+__all__ = ["Accumulator", "HostAccumulator", "Pass", "Renderer", "develop"]

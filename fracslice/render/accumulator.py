@@ -2,33 +2,81 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO, Protocol
 
 import numpy as np
 
 from ..errors import RenderError
+from ..scene.view import Film
+from .cpu import ordered
+from .film import develop
 from .waves import CHANNELS
 
 TRUSTED = 8
 """Samples that a pixel has before its spread is believed."""
+COARSE = 4
+"""The first pass looks at every fourth pixel of every fourth row, unless it is told otherwise."""
+NEARLY = 0.999
+"""The largest of some numbers is not below so much of their mean, however that is rounded."""
+
+
+class Accumulator(Protocol):
+    """A picture in the making, wherever its sums are.
+
+    passes: how many are in it. coarse: the pixels between those of the first.
+    """
+
+    passes: int
+    coarse: int
+
+    def wanted(self, most: int, tolerance: float) -> tuple[Any, int]:
+        """The pixels of the next pass, as the tracer takes them, and how many they are.
+
+        First a grid, then the rest, then all that have fewer than TRUSTED samples. From then on a pixel
+        that has 2^k samples gets as many again, but not beyond `most`, if its error or a neighbour's is
+        above the tolerance, and if that takes at least as much of the error from the picture as it does on
+        average in such pixels: most samples go where there is most to gain (Mitchell 1987, "Generating
+        Antialiased Images at Low Sampling Densities", for the idea), and a net of samples that was begun is
+        completed.
+        """
+
+    def receive(self, add: Callable[[Any], None]) -> None:
+        """Lets a pass be added to the sums. If it raises anything, the picture stays as it was."""
+
+    def statistics(self) -> tuple[float, float]:
+        """Samples of a pixel, on average, and the root mean square of the pixels' standard errors, as shown;
+        infinite below 2 samples."""
+
+    def shown(self, film: Film, mode: str) -> np.ndarray:
+        """The picture as screens show it: uint8 [height, width, 3], sRGB."""
+
+    def host(self) -> HostAccumulator:
+        """The same picture in the computer's memory."""
 
 
 @dataclass(eq=False)
-class Accumulator:
-    """sums: [height * width, 6] of the kernel's float type, see `waves.CHANNELS`. passes: how many are in
-    it. key: of what it is a picture; only the same scene, view, size and precision can go on with it."""
+class HostAccumulator:
+    """sums: [height * width, 6] of the kernel's float type, see `waves.CHANNELS`."""
 
     width: int
     height: int
     sums: np.ndarray
-    key: str
     passes: int = 0
+    coarse: int = COARSE
 
     @classmethod
-    def empty(cls, width: int, height: int, dtype: np.dtype, key: str) -> Accumulator:
-        return cls(width, height, np.zeros((width * height, CHANNELS), dtype), key)
+    def empty(cls, width: int, height: int, dtype: np.dtype, coarse: int = COARSE) -> HostAccumulator:
+        return cls(width, height, np.zeros((width * height, CHANNELS), dtype), coarse=coarse)
+
+    @classmethod
+    def of(cls, other: HostAccumulator) -> HostAccumulator:
+        return other
+
+    def host(self) -> HostAccumulator:
+        return self
 
     @property
     def counts(self) -> np.ndarray:
@@ -39,42 +87,80 @@ class Accumulator:
         """The picture so far: float32 [height, width, 3], linear light; black where there is no sample."""
         counts = self.sums[:, 5:6]
         colours = (self.sums[:, :3] / np.maximum(counts, 1)).reshape(self.height, self.width, 3)
+        if self.passes == 1:
+            y, x = np.mgrid[: self.height, : self.width] // self.coarse * self.coarse
+            colours = colours[y, x]
         return np.asarray(colours, np.float32)
 
-    def errors(self) -> np.ndarray:
-        """The standard error of each pixel's brightness, as shown: float32 [height, width]; infinite below 2
-        samples."""
+    def shown(self, film: Film, mode: str) -> np.ndarray:
+        return levels(develop(self.mean(), film, mode))
+
+    def statistics(self) -> tuple[float, float]:
+        squares = self.squares() if self.passes > 2 else np.array([np.inf])
+        known = squares[np.isfinite(squares)]
+        error = float(np.sqrt(known.mean())) if known.size else float("inf")
+        return float(self.counts.mean(dtype=np.float64)), error
+
+    def squares(self) -> np.ndarray:
+        """The squared standard error of each pixel's brightness, as shown: float64 [height, width]; infinite
+        below 2 samples."""
         n = self.sums[:, 5].astype(np.float64)
         mean = self.sums[:, 3] / np.maximum(n, 1)
         spread = np.maximum(self.sums[:, 4] / np.maximum(n, 1) - mean * mean, 0)
-        error = np.where(n < 2, np.inf, np.sqrt(spread / np.maximum(n - 1, 1)))
-        return np.asarray(error.reshape(self.height, self.width), np.float32)
+        squares = np.where(n < 2, np.inf, spread / np.maximum(n - 1, 1))
+        return np.asarray(squares.reshape(self.height, self.width))
 
-    def unfinished(self, tolerance: float) -> np.ndarray:
-        """Whether a pixel's error or a neighbour's is above the tolerance, or its samples too few: bool
-        [height, width]."""
-        error = self.errors()
-        error[self.counts < TRUSTED] = np.inf
-        padded = np.pad(error, 1, mode="edge")
-        worst = np.max(
-            [padded[j : j + self.height, i : i + self.width] for j in range(3) for i in range(3)], 0
-        )
-        return np.asarray(worst > tolerance)
+    def wanted(self, most: int, tolerance: float) -> tuple[np.ndarray, int]:
+        if self.passes == 0:
+            mask = np.zeros((self.height, self.width), bool)
+            mask[:: self.coarse, :: self.coarse] = True
+        elif self.passes == 1:
+            mask = self.counts == 0
+        else:
+            mask = self._pressing(most, tolerance)
+        order = ordered(self.width, self.height)
+        pixels = order[mask[order >> 16, order & 65535]]
+        return pixels, len(pixels)
 
-    def save(self, file: BinaryIO) -> None:
-        """Writes it as an .npz file, from which rendering goes on as if it had not stopped."""
-        shape = np.array([self.width, self.height, self.passes])
-        np.savez(file, sums=self.sums, shape=shape, key=np.array(self.key))
+    def _pressing(self, most: int, tolerance: float) -> np.ndarray:
+        from scipy.ndimage import maximum_filter
+
+        n = self.counts.astype(np.int32)
+        squares = np.where(n < TRUSTED, np.inf, self.squares())
+        worst = maximum_filter(squares, 3, mode="nearest")
+        unfinished = (n < most) & (worst > tolerance * tolerance)
+        whole = (n & (n - 1) == 0) & np.isfinite(worst)
+        gain = np.where(whole, worst / np.maximum(n, 1), np.inf)
+        deciding = gain[unfinished & whole]
+        least = NEARLY * deciding.mean() if deciding.size else 0.0
+        return np.asarray(unfinished & (gain >= least))
+
+    def receive(self, add: Callable[[Any], None]) -> None:
+        sums = self.sums.copy()
+        add(sums)
+        self.sums = sums
+        self.passes += 1
+
+    def save(self, file: BinaryIO, key: str) -> None:
+        """Writes it as an .npz file, from which rendering goes on as if it had not stopped. key: of what it
+        is a picture."""
+        shape = np.array([self.width, self.height, self.passes, self.coarse])
+        np.savez(file, sums=self.sums, shape=shape, key=np.array(key))
 
     @classmethod
-    def load(cls, path: str | Path, key: str) -> Accumulator:
+    def load(cls, path: str | Path, key: str) -> HostAccumulator:
         """Reads what `save` wrote. Raises `RenderError` if it is of another picture, or no such file."""
         try:
             with np.load(path, allow_pickle=False) as stored:
-                width, height, passes = map(int, stored["shape"])
-                found = cls(width, height, np.ascontiguousarray(stored["sums"]), str(stored["key"]), passes)
+                width, height, passes, coarse = map(int, stored["shape"])
+                sums, found = np.ascontiguousarray(stored["sums"]), str(stored["key"])
         except (OSError, ValueError, KeyError) as error:
             raise RenderError(f"{path}: expected a picture in the making: {error}") from None
-        if found.key != key or found.sums.shape != (width * height, CHANNELS):
+        if found != key or sums.shape != (width * height, CHANNELS):
             raise RenderError(f"{path}: is of another scene, view, size or version")
-        return found
+        return cls(width, height, sums, passes, coarse)
+
+
+def levels(shown: np.ndarray) -> np.ndarray:
+    """sRGB in [0, 1] as uint8."""
+    return np.asarray(shown * np.float32(255) + np.float32(0.5), np.uint8)

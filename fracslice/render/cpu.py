@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import threading
+from functools import lru_cache
 
 import numpy as np
 
 from ..kernel.cpu import lane_count, load_functions
 from ..work import Work
 from .linking import Frame
-from .sobol import point
+from .sequence import points
 from .waves import loops, workspace
 
 TILE = 2048
@@ -30,6 +31,7 @@ class CpuTracer:
         functions = load_functions(linked, bits, self.lanes, entries)
         self._tile, self._cones = functions["tile"], functions.get("cones")
         self._own = threading.local()
+        self._points = np.empty((0, frame.samples), np.int32)
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
@@ -48,23 +50,22 @@ class CpuTracer:
 
         def task(part: np.ndarray) -> None:
             m, space, who = self._room(part)
-            cones(
-                *_addresses(self._parameters, self._starts, who, space), len(part), m, self.blocks, limit
-            )
+            cones(*_addresses(self._parameters, self._starts, who, space), len(part), m, self.blocks, limit)
 
         work.map(task, np.array_split(ids, max(1, len(ids) // 512)))
 
-    def add(self, sums: np.ndarray, pixels: np.ndarray, index: int, limit: int, work: Work) -> None:
-        """Adds sample `index` to each of the pixels.
+    def add(self, sums: np.ndarray, pixels: np.ndarray, most: int, limit: int, work: Work) -> None:
+        """Adds to each of the pixels its next sample: the one whose index is how many it has.
 
         sums: [height * width, 6], changed in place. pixels: int32 ``y << 16 | x``, each once, in the order of
-        `ordered`.
+        `ordered`; none has more than `most` samples.
         """
-        q = point(index, self.frame.samples)
+        if len(self._points) <= most:
+            self._points = points(2 * most + 64, self.frame.samples)
 
         def task(part: np.ndarray) -> None:
             m, space, who = self._room(part)
-            places = _addresses(self._parameters, q, self._starts, space, who, sums)
+            places = _addresses(self._parameters, self._points, self._starts, space, who, sums)
             self._tile(*places, len(part), m, self.width, limit, self.blocks)
 
         work.map(task, [pixels[i : i + TILE] for i in range(0, len(pixels), TILE)])
@@ -79,11 +80,14 @@ class CpuTracer:
         return m, self._own.space, self._own.who
 
 
+@lru_cache(maxsize=4)
 def ordered(width: int, height: int) -> np.ndarray:
     """All pixels, int32 ``y << 16 | x``, so that a packet's are neighbours: rows of blocks, in a block 8 x 4
-    pixels."""
+    pixels. Read-only."""
     y, x = np.divmod(np.arange(width * height, dtype=np.int32), np.int32(width))
-    return (y << 16 | x)[np.lexsort((x, y, x // 8, y // 4, x // 64, y // 32))]
+    pixels = (y << 16 | x)[np.lexsort((x, y, x // 8, y // 4, x // 64, y // 32))]
+    pixels.setflags(write=False)
+    return pixels
 
 
 def _addresses(*arrays: np.ndarray) -> list[int]:

@@ -12,10 +12,7 @@ from ..work import Work
 from .cpu import BLOCK
 from .cuda_loops import loops
 from .linking import Frame
-from .sobol import point
-
-AHEAD = 64
-"""Sobol points that are sent to the GPU at once."""
+from .sequence import points
 
 
 class CudaTracer:
@@ -26,11 +23,12 @@ class CudaTracer:
         self.dtype, self.width, self.height = dtype, width, height
         self._precision: Precision = "float32" if dtype == np.float32 else "float64"
         self._loops = load_loops(frame.linked, self._precision, loops(frame, BLOCK))
+        self._points = np.empty((0, frame.samples), np.int32)
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
         """Takes the numbers of another frame of the same source: another camera, another depth."""
-        self.frame, self._first = frame, -1
+        self.frame = frame
         self._parameters = parameters(frame.linked, self._precision)
         self.blocks = -(-self.width // BLOCK)
         self._starts = self._cuda.to_device(np.zeros(self.blocks * -(-self.height // BLOCK), self.dtype))
@@ -41,22 +39,15 @@ class CudaTracer:
             given = (self._parameters, self._starts, self.blocks, self.dtype.type(limit))
             launched(self._loops.cones, self._starts.size, *given)
 
-    def add(self, sums: np.ndarray, pixels: np.ndarray, index: int, limit: int, work: Work) -> None:
-        """Adds sample `index` to each of the pixels.
+    def add(self, sums: Any, pixels: Any, most: int, limit: int, work: Work) -> None:
+        """Adds to each of the pixels its next sample: the one whose index is how many it has.
 
-        sums: [height * width, 6], changed in place. pixels: int32 ``y << 16 | x``, each once.
+        sums: [height * width, 6] and pixels: int32 ``y << 16 | x``, each once, those below zero left out;
+        on the GPU. No pixel has more than `most` samples. Copies nothing back and does not wait for the
+        GPU.
         """
         work.check()
-        placed = self._cuda.to_device(sums)
-        self.add_on_device(placed, self._cuda.to_device(pixels), index, limit)
-        placed.copy_to_host(sums)
-
-    def add_on_device(self, sums: Any, pixels: Any, index: int, limit: int) -> None:
-        """`add` on arrays of the GPU. Copies neither and does not wait for the GPU."""
-        first = index - index % AHEAD
-        if first != self._first:
-            points = np.array([point(i, self.frame.samples) for i in range(first, first + AHEAD)])
-            self._first, self._points = first, self._cuda.to_device(points)
+        if len(self._points) <= most:
+            self._points = self._cuda.to_device(points(2 * most + 64, self.frame.samples))
         film = (pixels, sums, self.width, self.dtype.type(limit), self.blocks)
-        sample = (self._points, index - first, self._starts)
-        launched(self._loops.tile, pixels.size, self._parameters, *sample, *film)
+        launched(self._loops.tile, pixels.size, self._parameters, self._points, self._starts, *film)

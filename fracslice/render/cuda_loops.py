@@ -11,12 +11,13 @@ from .linking import Frame
 
 TILE = """
 @kernel
-def tile(P, Q, q, S, pixels, A, width, limit, blocks):
+def tile(P, Q, S, pixels, A, width, limit, blocks):
     k = cuda.grid(1)
-    if k < pixels.size:
+    if k < pixels.size and pixels[k] >= 0:
         pixel = whole(pixels[k])
         column = pixel & 65535
         row = pixel >> 16
+        q = whole(A[row * width + column, 5])
         px = real(column) + centred(whole(Q[q, 0]), pixel, 0)
         py = real(row) + centred(whole(Q[q, 1]), pixel, 1)
         ox, oy, oz, dx, dy, dz = camera_ray(px, py, $lens, P)
@@ -66,7 +67,8 @@ def gather(A, a, r, g, b):
 def tamed(c):
     return minimum(maximum(c, real(0.0)), real(1e4)) if c == c else real(0.0)
 """
-"""Adds one sample to each pixel, at point q of Q; no NaN, no infinity, no negative light."""
+"""Adds to each pixel, those below zero left out, its next sample, the point of Q whose index is how many it
+has; no NaN, no infinity, no negative light."""
 
 ONWARD = """
             tr, tg, tb = tr * er, tg * eg, tb * eb

@@ -6,28 +6,26 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ..errors import RenderError
 from ..formulas.registry import Node
-from ..scene.view import Camera, View
+from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import Accumulator
-from .cpu import BLOCK, CpuTracer, ordered
+from .accumulator import COARSE, Accumulator, HostAccumulator
+from .cpu import BLOCK, CpuTracer
 from .linking import Frame, link_frame, optics
 from .setting import Setting, settle
 
-if TYPE_CHECKING:
-    from .cuda import CudaTracer
-
-COARSE = 4
-"""The first pass looks at every fourth pixel of every fourth row."""
 STEPS, GROWTH, GROWN = 160, 10, 16
 """Steps of a ray in the first pass; how often as many after GROWN passes, in equal steps between."""
+PREVIEWS = (2, 4, 8)
+"""How coarse the first pass from a moved camera may be."""
 TOLERANCE = 0.002
 """A pixel has converged when its brightness, as shown, is known to half a level of 256."""
 
@@ -36,17 +34,37 @@ TOLERANCE = 0.002
 class Pass:
     """The picture after one more pass.
 
-    image: float32 [height, width, 3], linear light. number: of the pass, from 1. samples: per pixel, on
-    average. error: the root mean square of the pixels' standard errors, as shown. active: the part of the
-    pixels that this pass was about. rate: samples a second.
+    number: of the pass, from 1. samples: per pixel, on average. error: the root mean square of the pixels'
+    standard errors, as shown. active: the part of the pixels that this pass was about. rate: samples a
+    second.
     """
 
-    image: np.ndarray
     number: int
     samples: float
     error: float
     active: float
     rate: float
+    film: Film = field(repr=False)
+    mode: str = field(repr=False)
+    source: Accumulator = field(repr=False)
+
+    @cached_property
+    def image(self) -> np.ndarray:
+        """float32 [height, width, 3], linear light. Raises `RenderError` if there was another pass since."""
+        return self._current().host().mean()
+
+    @cached_property
+    def shown(self) -> np.ndarray:
+        """uint8 [height, width, 3], sRGB, as the film says. Raises `RenderError` if there was another pass
+        since."""
+        return self._current().shown(self.film, self.mode)
+
+    def _current(self) -> Accumulator:
+        if self.source.passes != self.number:
+            raise RenderError(
+                f"pass {self.number}: its picture is gone, pass {self.source.passes} is over it"
+            )
+        return self.source
 
 
 def chosen(device: str) -> str:
@@ -62,12 +80,14 @@ def chosen(device: str) -> str:
     return "cpu" if reason else "cuda"
 
 
-def _tracer(device: str) -> Callable[..., CpuTracer | CudaTracer]:
+def _machinery(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator], Accumulator]]:
+    """What traces, and what keeps the sums."""
     if device == "cpu":
-        return CpuTracer
+        return CpuTracer, HostAccumulator.of
     from .cuda import CudaTracer
+    from .cuda_accumulator import CudaAccumulator
 
-    return CudaTracer
+    return CudaTracer, CudaAccumulator.of
 
 
 class Renderer:
@@ -90,11 +110,15 @@ class Renderer:
         self.work = work or Work()
         self.device = chosen(device)
         self.setting = settle(root, view, (self.width, self.height))
-        dtype = np.dtype(self.setting.precision)
-        self.tracer = _tracer(self.device)(self._frame(0), dtype, self.width, self.height)
-        self.accumulator = Accumulator.empty(self.width, self.height, dtype, self.key)
-        self._order = ordered(self.width, self.height)
-        self._aimed: Node | None = None
+        self.dtype = np.dtype(self.setting.precision)
+        tracer, self._kept = _machinery(self.device)
+        self.tracer = tracer(self._frame(0), self.dtype, self.width, self.height)
+        self.accumulator = self._empty(COARSE)
+        self._aimed: tuple[Node, bool] | None = None
+        self._rate = 0.0
+
+    def _empty(self, coarse: int) -> Accumulator:
+        return self._kept(HostAccumulator.empty(self.width, self.height, self.dtype, coarse))
 
     @property
     def key(self) -> str:
@@ -104,75 +128,78 @@ class Renderer:
         text = "".join(n.source + repr(n.parameters.tolist()) for n in numbers)
         return hashlib.sha256(f"{self.width} {self.height} {what.precision} {text}".encode()).hexdigest()[:20]
 
-    def look(self, camera: Camera) -> None:
+    def look(self, camera: Camera, within: float | None = None) -> None:
         """Begins the picture anew from elsewhere; depths and precision stay as they are.
 
-        For steps so short that they suit; a new renderer finds them again. The eye must be outside the solid.
+        For steps so short that they suit; a new renderer finds them again. The eye must be outside the
+        solid. within: seconds that the first pass may take, going by the passes so far; it is as fine as
+        that allows.
         """
         what = self.setting
         seen = optics(camera, (self.width, self.height), what.roots[-1], what.optics.least)
         self.setting = replace(what, camera=camera, optics=seen)
         self._aimed = None
-        self.accumulator = Accumulator.empty(self.width, self.height, self.accumulator.sums.dtype, self.key)
+        self.accumulator = self._empty(COARSE if within is None else self._affordable(within))
+
+    def _affordable(self, within: float) -> int:
+        """How coarse the first pass has to be."""
+        for coarse in PREVIEWS:
+            if self.width * self.height <= coarse * coarse * self._rate * within:
+                return coarse
+        return PREVIEWS[-1]
+
+    def save(self, file: BinaryIO) -> None:
+        """Writes the picture as it is, so that `resume` goes on with it."""
+        self.accumulator.host().save(file, self.key)
 
     def resume(self, path: str | Path) -> None:
-        """Goes on with a file that `accumulator.save` wrote. Raises `RenderError` if it is of another
-        picture."""
-        self.accumulator = Accumulator.load(path, self.key)
+        """Goes on with a file that `save` wrote. Raises `RenderError` if it is of another picture."""
+        self.accumulator = self._kept(HostAccumulator.load(path, self.key))
 
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
         """Yields the picture after every pass, until all pixels have so many samples or are within the
         tolerance.
 
-        The first pass has one sample in 16 pixels, the second one in every pixel. Raises `Cancelled`; what
-        was complete before stays valid.
+        The first pass has one sample in 16 pixels, the second one in all others; which pixels later ones are
+        about, `Accumulator.wanted` says. Raises `Cancelled`; what was complete before stays valid.
         """
         most = self.setting.view.film.samples if samples is None else samples
-        while self.accumulator.passes < most + 1:
-            pixels = self._wanted(tolerance)
-            if not len(pixels):
+        while True:
+            pixels, count = self.accumulator.wanted(most, tolerance)
+            if not count:
                 return
-            yield self._pass(pixels)
+            yield self._pass(pixels, count)
 
-    def _wanted(self, tolerance: float) -> np.ndarray:
-        """The pixels of the next pass, in order."""
-        number, x, y = self.accumulator.passes, self._order & 65535, self._order >> 16
-        if number > 1:
-            wanted = self.accumulator.unfinished(tolerance)[y, x]
-        else:
-            wanted = ((x % COARSE == 0) & (y % COARSE == 0)) == (number == 0)
-        return np.asarray(self._order[wanted])
-
-    def _pass(self, pixels: np.ndarray) -> Pass:
+    def _pass(self, pixels: Any, count: int) -> Pass:
         number = self.accumulator.passes
         limit = STEPS + STEPS * (GROWTH - 1) * min(number, GROWN) // GROWN
-        self._aim(number, limit)
         start = time.perf_counter()
-        sums = self.accumulator.sums.copy()
-        self.tracer.add(sums, pixels, max(number - 1, 0), limit, self.work)
-        self.accumulator.sums = sums
-        self.accumulator.passes += 1
-        return self.seen(len(pixels), len(pixels) / (time.perf_counter() - start))
+        self._aim(number, limit)
+        self.accumulator.receive(lambda sums: self.tracer.add(sums, pixels, number, limit, self.work))
+        samples, error = self.accumulator.statistics()
+        self._rate = count / (time.perf_counter() - start)
+        return self._seen(samples, error, count, self._rate)
 
     def _aim(self, number: int, limit: int) -> None:
-        """Points the tracer at the tree of this pass, and looks ahead once for each."""
-        root = self.setting.root(number)
-        if root is not self._aimed:
+        """Points the tracer at the tree of this pass, and looks ahead once for each, where a block of
+        pixels has more than one ray."""
+        ahead = number > 0 or self.accumulator.coarse < BLOCK
+        aimed = self.setting.root(number), ahead
+        if aimed != self._aimed:
             self.tracer.aim(self._frame(number))
-            self.tracer.look_ahead(limit, self.work)
-            self._aimed = root
+            if ahead:
+                self.tracer.look_ahead(limit, self.work)
+            self._aimed = aimed
 
     def _frame(self, number: int) -> Frame:
         what = self.setting
         return link_frame(what.root(number), what.view, what.camera, what.optics, BLOCK)
 
-    def seen(self, traced: int = 0, rate: float = 0.0) -> Pass:
-        """The picture as it is, after a pass over so many pixels."""
-        found, image = self.accumulator, self.accumulator.mean()
-        if found.passes == 1:
-            y, x = np.mgrid[: self.height, : self.width] // COARSE * COARSE
-            image = image[y, x]
-        errors = found.errors()
-        known = errors[np.isfinite(errors)]
-        error = float(np.sqrt(np.mean(known.astype(np.float64) ** 2))) if known.size else float("inf")
-        return Pass(image, found.passes, float(found.counts.mean()), error, traced / errors.size, rate)
+    def seen(self) -> Pass:
+        """The picture as it is."""
+        return self._seen(*self.accumulator.statistics(), 0, 0.0)
+
+    def _seen(self, samples: float, error: float, traced: int, rate: float) -> Pass:
+        view, kept = self.setting.view, self.accumulator
+        active = traced / (self.width * self.height)
+        return Pass(kept.passes, samples, error, active, rate, view.film, view.shading.mode, kept)

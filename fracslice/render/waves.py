@@ -124,15 +124,17 @@ def begin(W, m, P):
 """The rays through the points (px, py) of the film, from where they enter the scene's box."""
 
 DRAW = """
-def draw(W, Q, I, n, m):
+def draw(W, Q, I, A, n, m, width):
     for k in range(m):
         pixel = I[WIDTH + min(k, n - 1)]
-        W[$px + k] = (pixel & 65535) + centred(Q[0], pixel, 0)
-        W[$py + k] = (pixel >> 16) + centred(Q[1], pixel, 1)
+        q = $drawn * int(A[6 * ((pixel >> 16) * width + (pixel & 65535)) + 5])
+        W[$px + k] = (pixel & 65535) + centred(Q[q], pixel, 0)
+        W[$py + k] = (pixel >> 16) + centred(Q[q + 1], pixel, 1)
         for d in range(2, $drawn):
-            W[($rows - 2 + d) * m + k] = sample(Q[d], pixel, d)
+            W[($rows - 2 + d) * m + k] = sample(Q[q + d], pixel, d)
 """
-"""All random numbers of n pixels, ``y << 16 | x`` each; rows beyond n repeat the last pixel."""
+"""All random numbers of the next sample of n pixels, ``y << 16 | x`` each; rows beyond n repeat the last
+pixel."""
 
 SHADE = """
 def shade(W, m, first, P):
@@ -218,7 +220,7 @@ def gather(W, I, A, n, m, width):
 
 TILE = """
 def tile(P, Q, S, W, I, A, n, m, width, limit, blocks):
-    draw(W, Q, I, n, m)
+    draw(W, Q, I, A, n, m, width)
     begin(W, m, P)
     for k in range(n):
         pixel = I[WIDTH + k]

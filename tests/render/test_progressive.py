@@ -64,7 +64,7 @@ def test_resuming_changes_no_bit(tmp_path: Path) -> None:
         if done.number == 5:
             break
     with open(tmp_path / "state.npz", "wb") as file:
-        of.accumulator.save(file)
+        of.save(file)
     again = renderer()
     again.resume(tmp_path / "state.npz")
     assert again.accumulator.passes == 5
@@ -73,7 +73,7 @@ def test_resuming_changes_no_bit(tmp_path: Path) -> None:
 
 def test_a_state_of_another_picture_is_refused(tmp_path: Path) -> None:
     with open(tmp_path / "state.npz", "wb") as file:
-        renderer().accumulator.save(file)
+        renderer().save(file)
     other = Renderer(ROOT, VIEW, (34, 50), Work(threads=1), "cpu")
     with pytest.raises(RenderError, match="another scene"):
         other.resume(tmp_path / "state.npz")
@@ -94,7 +94,7 @@ def test_cancelling_keeps_what_was_complete() -> None:
     assert (of.accumulator.sums == before).all()
     work.cancel.clear()
     buffer = io.BytesIO()
-    of.accumulator.save(buffer)
+    of.save(buffer)
     assert len(buffer.getvalue()) > before.nbytes
 
 

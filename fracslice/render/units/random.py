@@ -22,7 +22,7 @@ def hashed(a):  # type: ignore[no-untyped-def]
 
 def scrambled(a, seed):  # type: ignore[no-untyped-def]
     """Owen's scrambling of a number whose bits come reversed; they leave in order. See
-    `fracslice.render.sobol`."""
+    `fracslice.render.sequence`."""
     a = (a ^ (a * 0x3D20ADEA)) & 0xFFFFFFFF
     a = (a + seed) & 0xFFFFFFFF
     a = (a * ((seed >> 16) | 1)) & 0xFFFFFFFF
@@ -32,7 +32,7 @@ def scrambled(a, seed):  # type: ignore[no-untyped-def]
 
 
 def sample(a, pixel, dimension):  # type: ignore[no-untyped-def]
-    """Number `dimension` of a Sobol point, scrambled for a pixel: a float in [0, 1)."""
+    """Number `dimension` of a point of the sequence, scrambled for a pixel: a float in [0, 1)."""
     seed = hashed((pixel * 64 + dimension) & 0xFFFFFFFF)
     return (scrambled(a & 0xFFFFFFFF, seed) >> 8) * 5.9604644775390625e-08
 

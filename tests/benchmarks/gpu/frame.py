@@ -24,6 +24,8 @@ from . import native
 from .sampling import best
 
 WIDTH, HEIGHT, LIMIT = 1920, 1080, 256
+ROUNDS = 256
+"""More samples than a pixel gets here."""
 SINGLE = np.dtype(np.float32)
 
 
@@ -129,12 +131,13 @@ def main() -> None:
     tracer = CudaTracer(seen, SINGLE, WIDTH, HEIGHT)
     placed = numba_cuda.to_device(pixels)
     sums = numba_cuda.to_device(np.zeros((WIDTH * HEIGHT, 6), SINGLE))
-    tracer.add_on_device(sums, placed, 0, LIMIT)
+    work = Work(1)
+    tracer.add(sums, placed, 0, LIMIT, work)
     picture = sums.copy_to_host()
     timed: dict[str, Callable[[], None]] = {
-        "frame": lambda: tracer.add_on_device(sums, placed, 0, LIMIT),
-        "cones": lambda: tracer.look_ahead(LIMIT, Work(1)),
-        "frame after cones": lambda: tracer.add_on_device(sums, placed, 0, LIMIT),
+        "frame": lambda: tracer.add(sums, placed, ROUNDS, LIMIT, work),
+        "cones": lambda: tracer.look_ahead(LIMIT, work),
+        "frame after cones": lambda: tracer.add(sums, placed, ROUNDS, LIMIT, work),
     }
     for name, run in timed.items():
         print(f"fracslice {name:<20} {best(run, 50):.3f} ms")
