@@ -27,6 +27,14 @@ constexpr std::array<Edge, 12> make_edges() {
 }
 constexpr std::array<Edge, 12> kEdges = make_edges();
 
+// Numbers of the vertices around a brick's cells: by axis, then by x, y, z of the lower end, 0 to 8.
+constexpr int kReach = kSide + 1;
+using Numbers = std::array<uint32_t, 3 * kReach * kReach * kReach>;
+
+constexpr size_t number_at(int axis, int x, int y, int z) {
+    return size_t(((axis * kReach + x) * kReach + y) * kReach + z);
+}
+
 // Where a brick's crossings are numbered: by axis, then by x, then by bit.
 struct Crossings {
     std::array<Signs, 3> bits;
@@ -128,20 +136,15 @@ class CellGrid {
     // Number of the brick with the cell at x, y, z relative to a place, -1 if the surface passes no cell of it.
     int64_t find(const Place& place, int x, int y, int z) const;
 
-    // The vertex on edge e of the cell x, y, z of a brick.
-    uint32_t vertex(const Octant& near, int x, int y, int z, int e) const {
+    // The numbers of a brick's own crossings and of those on its neighbours' near sides; the rest is not written.
+    void collect(const Octant& near, Numbers& numbers) const;
+
+    // The crossing on edge e of the cell x, y, z of the brick at `place`.
+    static CellEdge edge(const Numbers& numbers, const Place& place, int x, int y, int z, int e) {
         const Edge& edge = kEdges[e];
         int ex = x + edge.dx, ey = y + edge.dy, ez = z + edge.dz;
-        const Crossings& owner = crossings_[size_t(near.rows[ex / 8 + ey / 8 * 2 + ez / 8 * 4])];
-        Slab before = (Slab(1) << (ey % 8 * 8 + ez % 8)) - 1;
-        return uint32_t(owner.base) + owner.rank[edge.axis][ex % 8] +
-               uint32_t(__builtin_popcountll(owner.bits[edge.axis][ex % 8] & before));
-    }
-
-    CellEdge edge(const Octant& near, const Place& place, int x, int y, int z, int e) const {
-        const Edge& edge = kEdges[e];
-        return {vertex(near, x, y, z, e), edge.axis,
-                {place[0] * kSide + x + edge.dx, place[1] * kSide + y + edge.dy, place[2] * kSide + z + edge.dz}};
+        return {numbers[number_at(edge.axis, ex, ey, ez)], edge.axis,
+                {place[0] * kSide + ex, place[1] * kSide + ey, place[2] * kSide + ez}};
     }
 
     Span span(Layers layers) const;

@@ -22,14 +22,46 @@ struct Features {
 };
 
 // The face that two edges share: axis*2 + (0 lower, 1 upper).
-int common_face(int e, int f) {
+constexpr int8_t common_face(int e, int f) {
     const Edge &a = kEdges[e], &b = kEdges[f];
     const int pa[3] = {a.dx, a.dy, a.dz}, pb[3] = {b.dx, b.dy, b.dz};
     for (int axis = 0; axis < 3; ++axis) {
-        if (axis != a.axis && axis != b.axis && pa[axis] == pb[axis]) return 2 * axis + pa[axis];
+        if (axis != a.axis && axis != b.axis && pa[axis] == pb[axis]) return int8_t(2 * axis + pa[axis]);
     }
     return -1;
 }
+
+// The faces that a case's loop passes, one after each crossing, and which of them it passes more than once.
+struct Faces {
+    std::array<int8_t, sizeof(Case::loop)> after{};
+    uint8_t twice = 0;
+};
+
+constexpr std::array<Faces, 256> make_faces() {
+    std::array<Faces, 256> faces{};
+    for (int c = 0; c < 256; ++c) {
+        int count = kCases[c].loop_length, seen = 0;
+        for (int k = 0; k < count; ++k) {
+            int face = common_face(kCases[c].loop[k], kCases[c].loop[(k + 1) % count]);
+            faces[c].after[k] = int8_t(face);
+            faces[c].twice |= uint8_t(seen & 1 << face);
+            seen |= 1 << face;
+        }
+    }
+    return faces;
+}
+constexpr std::array<Faces, 256> kFaces = make_faces();
+
+// A brick with what the cells in it look at.
+struct Near {
+    Octant octant;
+    std::array<Corners, kSide + 1> corners;
+    Numbers numbers;
+
+    Near(const CellGrid& cells, size_t i) : octant(cells.octant(i)), corners(corners_of(octant, cells.signs())) {
+        cells.collect(octant, numbers);
+    }
+};
 
 class Contouring {
   public:
@@ -81,35 +113,23 @@ class Contouring {
 
     double clamped(double t) const { return t > margin_ ? (t < 1 - margin_ ? t : 1 - margin_) : margin_; }
 
-    // A cell's loop of crossings, where it has exactly one.
-    struct Loop {
-        int count = 0;
-        const uint8_t* edges = nullptr;
-        std::array<CellEdge, 12> where;
-        std::array<Crossing, 12> at;
-    };
-
-    Loop loop(const Octant& near, const Place& place, int x, int y, int z, uint8_t number) const {
-        Loop found;
-        found.count = kCases[number].loop_length;
-        found.edges = kCases[number].loop;
-        for (int k = 0; k < found.count; ++k) {
-            found.where[k] = cells_.edge(near, place, x, y, z, found.edges[k]);
-            found.at[k] = crossing(found.where[k]);
-        }
-        return found;
+    Crossing crossing(const Near& near, const Place& place, int x, int y, int z, int e) const {
+        return crossing(CellGrid::edge(near.numbers, place, x, y, z, e));
     }
 
     void find_tips(size_t i) {
-        Octant near = cells_.octant(i);
-        for_each_cell(corners_of(near, cells_.signs()), [&](int x, int y, int z, uint8_t number) {
-            Loop found = loop(near, cells_.place(i), x, y, z, number);
+        const Near near(cells_, i);
+        const Place& place = cells_.place(i);
+        for_each_cell(near.corners, [&](int x, int y, int z, uint8_t number) {
+            const Case& cell = kCases[number];
+            std::array<Crossing, sizeof(Case::loop)> loop;
             bool bent = false;
-            for (int a = 0; a < found.count; ++a) {
-                for (int b = a + 1; b < found.count; ++b) bent |= sharp(found.at[a], found.at[b]);
+            for (int a = 0; a < cell.loop_length; ++a) {
+                loop[a] = crossing(near, place, x, y, z, cell.loop[a]);
+                for (int b = 0; b < a; ++b) bent |= sharp(loop[a], loop[b]);
             }
-            Vec3 tip, lower = lower_corner(cells_.place(i), x, y, z);
-            if (!bent || !feature_point(found.at.data(), found.count, lower, margin_, tip)) return;
+            Vec3 tip;
+            if (!bent || !feature_point(loop.data(), cell.loop_length, lower_corner(place, x, y, z), margin_, tip)) return;
             features(i).tips[x] |= Slab(1) << (y * 8 + z);
             features(i).points.push_back(tip);
         });
@@ -144,27 +164,27 @@ class Contouring {
     }
 
     template <class Visit>
-    void for_each_tip(size_t i, const Visit& visit) const {
+    void for_each_tip(const Near& near, size_t i, const Visit& visit) const {
         const Signs& tips = features(i).tips;
-        Octant near = cells_.octant(i);
-        auto corners = corners_of(near, cells_.signs());
         for (int x = 0; x < kSide; ++x) {
             for (Slab bits = tips[x]; bits; bits &= bits - 1) {
                 int y = __builtin_ctzll(bits) / 8, z = __builtin_ctzll(bits) % 8;
-                uint8_t number = uint8_t(cases_of_row(corners[x], corners[x + 1], y) >> 8 * z);
-                visit(x, y, z, loop(near, cells_.place(i), x, y, z, number));
+                visit(x, y, z, uint8_t(cases_of_row(near.corners[x], near.corners[x + 1], y) >> 8 * z));
             }
         }
     }
 
-    // The crossings k and k + 1 of a loop that are joined in its lower face along `axis`, if they have a corner there.
-    bool corner_in(const Loop& found, const Place& place, int x, int y, int z, int axis, Vec3& corner) const {
-        Vec3 lower = lower_corner(place, x, y, z);
-        for (int k = 0; k < found.count; ++k) {
-            int next = (k + 1) % found.count;
-            if (common_face(found.edges[k], found.edges[next]) != 2 * axis) continue;
-            const Crossing &a = found.at[k], &b = found.at[next];
-            if (sharp(a, b) && face_corner(a, b, axis, lower, margin_, corner)) return true;
+    // The corner of the trace in a cell's lower face along `axis`, if there is one. A face that the loop passes twice has
+    // none: two could cross.
+    bool corner_in(const Near& near, const Place& place, int x, int y, int z, uint8_t number, int axis, Vec3& corner) const {
+        const Case& cell = kCases[number];
+        const Faces& faces = kFaces[number];
+        if (faces.twice >> 2 * axis & 1) return false;
+        for (int k = 0; k < cell.loop_length; ++k) {
+            if (faces.after[k] != 2 * axis) continue;
+            Crossing a = crossing(near, place, x, y, z, cell.loop[k]);
+            Crossing b = crossing(near, place, x, y, z, cell.loop[(k + 1) % cell.loop_length]);
+            return sharp(a, b) && face_corner(a, b, axis, lower_corner(place, x, y, z), margin_, corner);
         }
         return false;
     }
@@ -174,11 +194,12 @@ class Contouring {
     }
 
     void find_corners(size_t i) {
-        for_each_tip(i, [&](int x, int y, int z, const Loop& found) {
+        const Near near(cells_, i);
+        for_each_tip(near, i, [&](int x, int y, int z, uint8_t number) {
             for (int axis = 0; axis < 3; ++axis) {
                 Vec3 corner;
                 if (!has_tip(i, x - (axis == 0), y - (axis == 1), z - (axis == 2))) continue;
-                if (twice_in(found, 2 * axis) || !corner_in(found, cells_.place(i), x, y, z, axis, corner)) continue;
+                if (!corner_in(near, cells_.place(i), x, y, z, number, axis, corner)) continue;
                 features(i).corners[axis][x] |= Slab(1) << (y * 8 + z);
                 features(i).corner_points[axis].push_back(corner);
             }
@@ -193,15 +214,6 @@ class Contouring {
                 own.corner_base += size_t(__builtin_popcountll(own.corners[axis][x]));
             }
         }
-    }
-
-    // Whether the loop passes a face two times: then its corners could cross.
-    static bool twice_in(const Loop& found, int face) {
-        int times = 0;
-        for (int k = 0; k < found.count; ++k) {
-            times += common_face(found.edges[k], found.edges[(k + 1) % found.count]) == face;
-        }
-        return times > 1;
     }
 
     void count(size_t i) {
@@ -235,30 +247,32 @@ class Contouring {
     void write_triangles(size_t i) {
         const Features& own = features(i);
         int32_t* out = result_.triangles.data.get() + 3 * own.triangles;
-        Octant near = cells_.octant(i);
-        const Place& place = cells_.place(i);
+        const Near near(cells_, i);
         size_t tip = result_.crossings + result_.corners + own.tip_base;
         for (size_t k = 0; k < own.points.size(); ++k) put(tip + k, own.points[k]);
-        for_each_cell(corners_of(near, cells_.signs()), [&](int x, int y, int z, uint8_t number) {
-            if (!(own.tips[x] >> (y * 8 + z) & 1)) {
-                const Case& cell = kCases[number];
-                for (int k = 0; k < 3 * cell.triangles; ++k) {
-                    *out++ = int32_t(vertex(cells_.edge(near, place, x, y, z, cell.corners[k])));
-                }
+        for_each_cell(near.corners, [&](int x, int y, int z, uint8_t number) {
+            auto at = [&](int e) {
+                const Edge& edge = kEdges[e];
+                return near.numbers[number_at(edge.axis, x + edge.dx, y + edge.dy, z + edge.dz)] - first_vertex_;
+            };
+            if (own.tips[x] >> (y * 8 + z) & 1) {
+                out = write_fan(i, x, y, z, number, at, tip++, out);
                 return;
             }
-            out = write_fan(i, x, y, z, loop(near, place, x, y, z, number), tip++, out);
+            const Case& cell = kCases[number];
+            for (int k = 0; k < 3 * cell.triangles; ++k) *out++ = int32_t(at(cell.corners[k]));
         });
     }
 
-    int32_t* write_fan(size_t i, int x, int y, int z, const Loop& found, size_t tip, int32_t* out) const {
+    template <class VertexAt>
+    int32_t* write_fan(size_t i, int x, int y, int z, uint8_t number, const VertexAt& at, size_t tip, int32_t* out) const {
         auto triangle = [&](size_t a, size_t b) {
             *out++ = int32_t(a), *out++ = int32_t(b), *out++ = int32_t(tip);
         };
-        for (int k = 0; k < found.count; ++k) {
-            int next = (k + 1) % found.count, face = common_face(found.edges[k], found.edges[next]);
-            size_t a = vertex(found.where[k]), b = vertex(found.where[next]);
-            Corner between = corner(i, x, y, z, face);
+        const Case& cell = kCases[number];
+        for (int k = 0; k < cell.loop_length; ++k) {
+            size_t a = at(cell.loop[k]), b = at(cell.loop[(k + 1) % cell.loop_length]);
+            Corner between = corner(i, x, y, z, kFaces[number].after[k]);
             if (!between.owner) {
                 triangle(a, b);
                 continue;

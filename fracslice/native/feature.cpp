@@ -10,10 +10,13 @@ using Matrix = std::array<Vec3, 3>;
 // Eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations (1846).
 void eigen(Matrix a, Vec3& values, Matrix& vectors) {
     vectors = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
-    for (int sweep = 0; sweep < 8; ++sweep) {
+    bool turned = true;
+    for (int sweep = 0; sweep < 8 && turned; ++sweep) {
+        turned = false;
         for (int p = 0; p < 2; ++p) {
             for (int q = p + 1; q < 3; ++q) {
                 if (std::abs(a[p][q]) < 1e-15) continue;
+                turned = true;
                 double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
                 double t = std::copysign(1.0, theta) / (std::abs(theta) + std::sqrt(theta * theta + 1));
                 double c = 1 / std::sqrt(t * t + 1), s = t * c;

@@ -9,12 +9,6 @@
 namespace fracslice {
 namespace {
 
-// Numbers of the vertices around a brick's cells: by axis, then by x, y, z of the lower end, 0 to 8.
-constexpr int kReach = kSide + 1;
-using Numbers = std::array<uint32_t, 3 * kReach * kReach * kReach>;
-
-constexpr int number_at(int axis, int x, int y, int z) { return ((axis * kReach + x) * kReach + y) * kReach + z; }
-
 // The case table with, for each corner of a triangle, where Numbers holds it for the cell at 0, 0, 0.
 struct Pattern {
     uint8_t triangles;
@@ -92,37 +86,12 @@ class Extraction {
 
     void write_triangles(const Octant& near, int32_t* out) const {
         Numbers numbers;
-        collect(near, numbers);
+        cells_.collect(near, numbers);
         for_each_cell(corners_of(near, cells_.signs()), [&](int x, int y, int z, uint8_t number) {
             const Pattern& pattern = kPatterns[number];
-            const uint32_t* cell = &numbers[size_t(number_at(0, x, y, z))];
+            const uint32_t* cell = &numbers[number_at(0, x, y, z)];
             for (int k = 0; k < 3 * pattern.triangles; ++k) *out++ = int32_t(cell[pattern.corners[k]]);
         });
-    }
-
-    // The numbers of a brick's own crossings and of those on its neighbours' near sides.
-    void collect(const Octant& near, Numbers& numbers) const {
-        for (int k = 0; k < 8; ++k) {
-            if (near.rows[k] < 0) continue;
-            const Crossings& owner = cells_.crossings(size_t(near.rows[k]));
-            Slab seen = (k & 2 ? kFirstY : ~Slab(0)) & (k & 4 ? kFirstZ : ~Slab(0));
-            for (int axis = 0; axis < 3; ++axis) {
-                for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) {
-                    int corner = number_at(axis, x + (k & 1) * 8, (k & 2) * 4, (k & 4) * 2);
-                    number(owner, axis, x, seen, &numbers[size_t(corner)]);
-                }
-            }
-        }
-    }
-
-    static void number(const Crossings& owner, int axis, int x, Slab seen, uint32_t* numbers) {
-        Slab all = owner.bits[axis][x];
-        uint32_t first = uint32_t(owner.base) + owner.rank[axis][x];
-        for (Slab bits = all & seen; bits; bits &= bits - 1) {
-            int bit = __builtin_ctzll(bits);
-            Slab before = (Slab(1) << bit) - 1;
-            numbers[bit / 8 * kReach + bit % 8] = first + uint32_t(__builtin_popcountll(all & before));
-        }
     }
 
     Bricks bricks_;
