@@ -34,10 +34,11 @@ class Bounds:
     """How far values reach: a block is decided where |f| exceeds a bound times the distance from its middle
     to its farthest sample.
 
-    proven: for blocks of 16 pixels and more. outside, inside: for blocks of 8, 4 and 2 pixels, by the sign of
-    their middle. stop_outside, stop_inside: blocks of so many pixels are not cut any more. fractal: inside
-    values are of another scale than outside ones, so crossings are measured; even: of one scale everywhere,
-    so that a part of the crossings tells for all.
+    proven: for blocks over several layers. outside, inside: within a layer, by the sign of the middle.
+    stop_outside, stop_inside: blocks of so many pixels are not cut any more. fractal: inside values are of
+    another scale than outside ones, so crossings are measured; even: of one scale everywhere, so that a part
+    of the crossings tells for all, and the bound outside follows the steepness of the field, from `outside`
+    up to `proven`.
     """
 
     def __init__(

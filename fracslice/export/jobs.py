@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import BinaryIO
 
 from fracslice.errors import ExportError
 from fracslice.export.files import _reason as reason
-from fracslice.export.files import check_target
+from fracslice.export.files import check_target, replacing
 from fracslice.slicing import Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
@@ -61,6 +62,36 @@ class SliceRun:
             ],
         }
         return json.dumps(said, indent=1).encode()
+
+
+JOB = "job.json"
+"""What an unfinished folder says of itself."""
+
+
+def resumable_folder(
+    folder: Path, said: bytes, name: Callable[[int], str], is_whole: Callable[[bytes], bool]
+) -> int:
+    """Makes the folder of a job, or finds how many layers of it an interrupted one left; they must be whole.
+
+    name: of each layer's file. Raises ExportError for a folder with anything else in it.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+        names = set(os.listdir(folder))
+        if not names:
+            with replacing(folder / JOB) as file:
+                file.write(said)
+            return 0
+        if JOB not in names or (folder / JOB).read_bytes() != said:
+            raise ExportError(
+                f"{folder}: the folder is not empty, and what is in it is not this job interrupted"
+            )
+        index = 0
+        while name(index) in names and is_whole((folder / name(index)).read_bytes()):
+            index += 1
+        return index
+    except OSError as error:
+        raise ExportError(f"{folder}: {reason(error)}") from error
 
 
 @contextmanager

@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import json
-import os
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from fracslice.errors import ExportError
 from fracslice.export.files import replacing
-from fracslice.export.jobs import SliceRun
+from fracslice.export.jobs import JOB, SliceRun, reason, resumable_folder
+from fracslice.export.journal import journal
 from fracslice.slicing import Contours, Layer
 
 MICRON = 0.001
 """The unit of the Common Layer Interface files, mm."""
 
 
-def _streamed(path: str | Path, head: bytes, parts: Iterator[bytes], tail: bytes) -> Path:
-    with replacing(path) as file:
-        file.write(head)
-        for part in parts:
-            file.write(part)
-        file.write(tail)
+def _streamed(
+    run: SliceRun, path: str | Path, head: bytes, make: Callable[[Layer], bytes], tail: bytes
+) -> Path:
+    with journal(path, head + run.describe()) as kept:
+        for layer in run.slicer.map(make, range(kept.count, run.layers)):
+            kept.append(layer)
+        with replacing(path) as file:
+            file.write(head)
+            file.writelines(kept)
+            file.write(tail)
     return Path(path)
 
 
@@ -63,25 +67,30 @@ def _head(run: SliceRun, namespaces: str = "") -> str:
 
 
 def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
-    """A folder with an SVG file for each layer, one path with all contours, in mm. The folder must be new
-    or empty.
+    """A folder with an SVG file for each layer, one path with all contours, in mm.
+
+    An interrupted job goes on, as in `pictures.write_folder`.
     """
     folder = Path(path)
-    try:
-        folder.mkdir(exist_ok=True)
-        if os.listdir(folder):
-            raise ExportError(f"{folder}: the folder is not empty")
-    except OSError as error:
-        raise ExportError(f"{folder}: {error.strerror}") from error
+
+    name = "{:05d}.svg".format
+    start = resumable_folder(folder, run.describe(), name, lambda data: data.endswith(b"</svg>\n"))
 
     def make(layer: Layer) -> bytes:
         found = layer.contours
         d = " ".join("M" + _pairs(_down(run, found[i]), "%.4f,%.4f", " ") + "z" for i in range(len(found)))
-        return f'{_head(run)}<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
+        title = f"<title>top {layer.top:.6g} mm, height {layer.height:.6g} mm</title>"
+        return f'{_head(run)}{title}\n<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
 
-    for index, data in enumerate(run.slicer.map(make)):
-        with replacing(folder / f"{index:05d}.svg") as file:
-            file.write(data)
+    def write(layer: Layer) -> None:
+        try:
+            (folder / name(layer.index)).write_bytes(make(layer))
+        except OSError as error:
+            raise ExportError(f"{folder}: {reason(error)}") from error
+
+    for _ in run.slicer.map(write, range(start, run.layers)):
+        pass
+    (folder / JOB).unlink()
     return folder
 
 
@@ -98,21 +107,19 @@ def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
         return ("\n".join([*lines, "</g>"]) + "\n").encode()
 
     head = _head(run, ' xmlns:slic3r="http://slic3r.org/namespaces/slic3r"')
-    return _streamed(path, head.encode(), run.slicer.map(make), b"</svg>\n")
+    return _streamed(run, path, head.encode(), make, b"</svg>\n")
 
 
 # --- Common Layer Interface, version 2.0 (1994)
 # --------------------------------------------------------------------
 def write_cli(run: SliceRun, path: str | Path) -> Path:
     """The Common Layer Interface as text."""
-    return _streamed(
-        path, _cli_head(run, "ASCII") + b"$$GEOMETRYSTART\n", run.slicer.map(_cli_text), b"$$GEOMETRYEND\n"
-    )
+    return _streamed(run, path, _cli_head(run, "ASCII") + b"$$GEOMETRYSTART\n", _cli_text, b"$$GEOMETRYEND\n")
 
 
 def write_cli_binary(run: SliceRun, path: str | Path) -> Path:
     """The Common Layer Interface in binary: long layer and polyline commands."""
-    return _streamed(path, _cli_head(run, "BINARY").rstrip(b"\n"), run.slicer.map(_cli_bytes), b"")
+    return _streamed(run, path, _cli_head(run, "BINARY").rstrip(b"\n"), _cli_bytes, b"")
 
 
 def _cli_head(run: SliceRun, kind: str) -> bytes:
@@ -169,7 +176,7 @@ def write_json(run: SliceRun, path: str | Path) -> Path:
         begin = f'{comma}\n{{"top": {layer.top:.6g}, "height": {layer.height:.6g}'
         return f'{begin}, "contours": [{rings}]}}'.encode()
 
-    return _streamed(path, opening.encode(), run.slicer.map(make), b"\n]}\n")
+    return _streamed(run, path, opening.encode(), make, b"\n]}\n")
 
 
 WRITERS: dict[str, Callable[[SliceRun, str | Path], Path]] = {

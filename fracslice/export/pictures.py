@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 
 from fracslice.errors import ExportError
 from fracslice.export import png
 from fracslice.export.files import replacing
-from fracslice.export.jobs import SliceRun, add, reason, resumable_zip
+from fracslice.export.jobs import JOB, SliceRun, add, reason, resumable_folder, resumable_zip
 from fracslice.slicing import Layer
 
 MOST_MEMBERS = 65_535
@@ -23,10 +22,10 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
     """
     folder = Path(path)
     said = run.describe()
-    start = _prepared(folder, said)
+    start = resumable_folder(folder, said, "{:05d}.png".format, png.is_whole)
 
     def write(layer: Layer) -> None:
-        # Not renamed into place, nor forced to the disk one by one: a remainder is read before it is gone on with.
+        # Not renamed into place, nor forced to the disk one by one: a remainder is read before it is used.
         try:
             (folder / f"{layer.index:05d}.png").write_bytes(_encoded(run, layer))
         except OSError as error:
@@ -36,27 +35,8 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
         pass
     with replacing(folder / "manifest.json") as file:
         file.write(said)
-    (folder / "job.json").unlink()
+    (folder / JOB).unlink()
     return folder
-
-
-def _prepared(folder: Path, said: bytes) -> int:
-    """Makes the folder, or finds how many layers of this job it has."""
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise ExportError(f"{folder}: {error.strerror}") from error
-    names = set(os.listdir(folder))
-    if not names:
-        with replacing(folder / "job.json") as file:
-            file.write(said)
-        return 0
-    if "job.json" not in names or (folder / "job.json").read_bytes() != said:
-        raise ExportError(f"{folder}: the folder is not empty, and what is in it is not this job interrupted")
-    index = 0
-    while f"{index:05d}.png" in names and png.is_whole((folder / f"{index:05d}.png").read_bytes()):
-        index += 1
-    return index
 
 
 def _encoded(run: SliceRun, layer: Layer) -> bytes:
@@ -75,7 +55,7 @@ def write_sl1(run: SliceRun, path: str | Path) -> Path:
         raise ExportError(f"{path}: an SL1 archive needs a printer")
     heights = run.stack.heights
     if heights.max() - heights.min() > 1e-9:
-        raise ExportError(f"{path}: an SL1 archive has layers of one height")
+        raise ExportError(f"{path}: an SL1 archive has layers of one height; others take a range of heights")
     if run.layers >= MOST_MEMBERS:
         raise ExportError(f"{path}: {run.layers} layers are too many for an archive")
     name = target.stem

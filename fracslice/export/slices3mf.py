@@ -9,6 +9,7 @@ import numpy as np
 
 from fracslice.export.files import replacing
 from fracslice.export.jobs import SliceRun
+from fracslice.export.journal import journal
 from fracslice.export.text import rows
 from fracslice.export.threemf import RELATIONS, TYPES
 from fracslice.slicing import Layer
@@ -41,18 +42,20 @@ def write_3mf(run: SliceRun, path: str | Path) -> Path:
     """The slice stack of one object, streamed. The mesh has "low resolution": its box, which the extension
     allows where the slices are what is printed.
     """
-    with (
-        replacing(path) as file,
-        zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive,
-    ):
-        for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS)):
-            with archive.open(name, "w") as part:
-                part.write(text.encode())
-        with archive.open("3D/3dmodel.model", "w", force_zip64=run.layers > 1000) as part:
-            part.write(HEAD.encode())
-            for slice_ in run.slicer.map(lambda layer: _slice(run, layer)):
-                part.write(slice_)
-            part.write(f"</s:slicestack>\n{_object(run)}".encode())
+    with journal(path, b"3mf" + run.describe()) as kept:
+        for slice_ in run.slicer.map(lambda layer: _slice(run, layer), range(kept.count, run.layers)):
+            kept.append(slice_)
+        with (
+            replacing(path) as file,
+            zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive,
+        ):
+            for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS)):
+                with archive.open(name, "w") as part:
+                    part.write(text.encode())
+            with archive.open("3D/3dmodel.model", "w", force_zip64=run.layers > 1000) as part:
+                part.write(HEAD.encode())
+                part.writelines(kept)
+                part.write(f"</s:slicestack>\n{_object(run)}".encode())
     return Path(path)
 
 

@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kCoarsest = 8;  // tiles along a block of the first level
 constexpr size_t kBatch = 2048;
+constexpr double kSteep = 0.7;
 
 // The middles of the blocks of 8, 4 and 2 samples of a tile.
 constexpr uint64_t middles(int size) {
@@ -90,6 +91,7 @@ int32_t Slab::add(int layer, int y, int x) {
     inside.push_back(here == kFull ? kAll : 0);
     known.push_back(0);
     values.emplace_back();
+    outside_.push_back(0);
     place.push_back({layer, y, x});
     return here = int32_t(place.size() - 1);
 }
@@ -109,8 +111,7 @@ std::vector<Slab::Block> Slab::coarse(const Field& field, const Bounds& bounds) 
         };
         evaluate(field, blocks.size(), middle, [&](size_t i, float f) {
             const Block& b = blocks[i];
-            double bound = b.size > 1 ? bounds.proven : f < 0 ? bounds.inside : bounds.outside;
-            if (std::fabs(f) > bound * std::hypot(width * b.size, (z_[b.last] - z_[b.first]) / 2)) {
+            if (std::fabs(f) > bounds.proven * std::hypot(width * b.size, (z_[b.last] - z_[b.first]) / 2)) {
                 if (f < 0) fill(b);
                 return;
             }
@@ -151,14 +152,33 @@ void Slab::tiles(const Field& field, const Bounds& bounds, const std::vector<Blo
         const Place& p = places[i];
         column = (p.x - 0.5) * kTile, row = (p.y - 0.5) * kTile, height = z_[p.layer];
     };
+    std::vector<float> middles(size_t(ty_) * tx_, NAN);
     evaluate(field, places.size(), where, [&](size_t i, float f) {
-        const Place& p = places[i];
-        if (f < 0) where_[(size_t(p.layer) * ty_ + p.y) * tx_ + p.x] = kFull;
-        if (std::fabs(f) > (f < 0 ? bounds.inside : bounds.outside) * reach) return;
-        int32_t t = add(p.layer, p.y, p.x);
-        known[t] = uint64_t(1) << middle;
-        values[t][middle] = f;
+        middles[size_t(places[i].y) * tx_ + places[i].x] = f;
+        if (f < 0) where_[(size_t(layer) * ty_ + places[i].y) * tx_ + places[i].x] = kFull;
     });
+    for (const Place& p : places) {
+        const float* f = &middles[size_t(p.y) * tx_ + p.x];
+        double outside = bounds.even ? likely(bounds, f) : bounds.outside;
+        if (std::fabs(*f) > (*f < 0 ? bounds.inside : outside) * reach) continue;
+        int32_t t = add(layer, p.y, p.x);
+        known[t] = uint64_t(1) << middle;
+        values[t][middle] = *f;
+        outside_[t] = float(outside);
+    }
+}
+
+// The bound for outside values around a tile's middle in an even field: how steep it is, within the layer, between it and
+// those beside it; a part of that, for the steepest way is seldom the one to the contour.
+double Slab::likely(const Bounds& bounds, const float* middle) const {
+    double steep[2] = {-1, -1}, step[2] = {kTile * frame_.dx, kTile * frame_.dy};
+    for (int axis = 0; axis < 2; ++axis)
+        for (int side : {-1, 1}) {
+            float other = middle[side * (axis ? tx_ : 1)];
+            if (!std::isnan(other)) steep[axis] = std::max(steep[axis], std::fabs(*middle - other) / step[axis]);
+        }
+    if (steep[0] < 0 || steep[1] < 0) return bounds.proven;
+    return std::min(std::max(kSteep * std::hypot(steep[0], steep[1]), bounds.outside), bounds.proven);
 }
 
 // The middles of the quarters of each block of `size` whose own middle decides too little; their signs become the implied
@@ -166,13 +186,14 @@ void Slab::tiles(const Field& field, const Bounds& bounds, const std::vector<Blo
 void Slab::finer(const Field& field, const Bounds& bounds, int size) {
     int half = size / 2, quarter = size / 4;
     double reach = std::hypot(frame_.dx, frame_.dy) * size / 2;
-    double outside = bounds.outside * reach, inside_ = bounds.inside * reach;
     std::vector<int64_t> samples;
     for (size_t t = first_; t < count(); ++t) {
         for (uint64_t probes = known[t] & kMiddles[size]; probes; probes &= probes - 1) {
             int bit = lowest(probes);
             float v = values[t][bit];
-            if (v < 0 ? -v > inside_ || size <= bounds.stop_inside : v > outside || size <= bounds.stop_outside) continue;
+            if (v < 0 ? -v > bounds.inside * reach || size <= bounds.stop_inside
+                      : v > outside_[t] * reach || size <= bounds.stop_outside)
+                continue;
             int first = bit - 9 * (half - quarter);
             for (int p : {first, first + half, first + 8 * half, first + 9 * half})
                 if (!(known[t] >> p & 1)) samples.push_back(int64_t(64 * t + p));
@@ -284,7 +305,7 @@ void Slab::measure(const Field& field, const Bounds& bounds) {
 // Crossings after the values at the middles of edges.
 //
 // In an even field inside values are multiplied by the one factor with which as many crossings lie before the middle as do
-// in truth; then a quarter of the edges is enough to know it. In any other, the line goes through the middle and the end on
+// in truth; then an eighth of the edges is enough to know it. In any other, the line goes through the middle and the end on
 // its own side, which is right for true distances.
 void Slab::halve(const Field& field, bool even, const std::vector<Edge>& edges) {
     constexpr size_t few = 1024;
@@ -293,7 +314,7 @@ void Slab::halve(const Field& field, bool even, const std::vector<Edge>& edges) 
     std::vector<Edge> halved;
     for (const Edge& e : edges) {
         uint32_t at = uint32_t(column(e)) * 0x9E3779B1u + uint32_t(row(e)) * 0x85EBCA6Bu;
-        if (!even || edges.size() < few || at >> 30 == 0) halved.push_back(e);
+        if (!even || edges.size() < few || at >> 29 == 0) halved.push_back(e);
     }
     std::vector<float> middle(halved.size());
     auto where = [&](size_t i, double& x, double& y, double& z) {

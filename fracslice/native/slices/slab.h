@@ -123,6 +123,7 @@ class Slab {
     std::vector<Block> coarse(const Field& field, const Bounds& bounds);
     void fill(const Block& block);
     void tiles(const Field& field, const Bounds& bounds, const std::vector<Block>& blocks, int layer);
+    double likely(const Bounds& bounds, const float* middle) const;
     void finer(const Field& field, const Bounds& bounds, int size);
     void mend(int layer);
     void close(const Field& field);
@@ -135,6 +136,7 @@ class Slab {
     Frame frame_;
     std::vector<double> z_;
     std::vector<int> wanted_;  // ascending
+    std::vector<float> outside_;  // of each tile, the bound for outside values in it
     size_t first_ = 0;         // tile of the layer that is sampled
     int ty_, tx_;
     std::vector<int32_t> where_;

@@ -1,0 +1,81 @@
+"""Layers as high as the slope of the surface allows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import SliceError
+from ..work import Work
+from .layers import Layer, Slicer
+from .stack import Stack
+
+ACROSS = 128
+"""Pixels along the longer side, of the layers that slopes are measured on."""
+
+SHARE = 0.9
+"""Of a layer's outline that is not steeper than its slope; the rest of a rough outline is left out."""
+
+
+def adapted(stack: Stack, most: float, work: Work | None = None) -> Stack:
+    """The stack with layers put together, up to `most` mm high, where the surface is steep.
+
+    Dolenc and Maekelae 1994, "Slicing procedures for layered manufacturing techniques": a layer of height t
+    leaves steps whose cusps stand t |n| from the surface, n the vertical part of its unit normal. Layers grow
+    while that is at most the height of one planned layer. The same for any number of threads. Raises
+    `SliceError` if `most` is below the planned height.
+    """
+    least = float(stack.heights[0])
+    if not least <= most < float("inf"):
+        raise SliceError(
+            f"layers of {least:g} to {most:g} mm: expected a range from the lowest to the highest"
+        )
+    slopes = list(Slicer(_coarse(stack), work or Work()).map(_slope))
+    ends = _ends(np.array(slopes), int(most / least * (1 + 1e-9)))
+    tops = stack.tops[ends]
+    bottoms = np.concatenate([[0.0], tops[:-1]])
+    z = stack.z[0] + ((tops + bottoms) / 2 - least / 2) / stack.scale
+    return replace(stack, tops=tops, z=z)
+
+
+def _ends(slopes: np.ndarray, most: int) -> list[int]:
+    """The last planned layer of each, at most `most` of them together."""
+    ends, count, steepest = [], 0, 0.0
+    for index, slope in enumerate(slopes.tolist()):
+        if count and (count == most or (count + 1) * max(steepest, slope) > 1):
+            ends.append(index - 1)
+            count, steepest = 0, 0.0
+        count, steepest = count + 1, max(steepest, slope)
+    return [*ends, len(slopes) - 1]
+
+
+def _coarse(stack: Stack) -> Stack:
+    """The same layers on a coarser lattice."""
+    ny, nx = stack.shape
+    times = max(max(ny, nx) // ACROSS, 1)
+    pixel = stack.pixel[0] * times, stack.pixel[1] * times
+    return replace(stack, pixel=pixel, shape=(-(-ny // times), -(-nx // times)))
+
+
+def _slope(layer: Layer) -> float:
+    """The vertical part of the normal along a layer's outline, 0 to 1, measured over the layer's height."""
+    edges, ends = layer.slab.crossings(layer.place)
+    if not len(edges):
+        return 0.0
+    stack = layer.stack
+    share = (ends[:, 0] / (ends[:, 0] - ends[:, 1]))[:, None]
+    x, y = (stack.frame[:2] + stack.frame[2:] * (edges[:, :2] + share * np.eye(2)[edges[:, 2]])).T
+    z = np.full(len(x), stack.z[layer.index])
+    half = layer.height / stack.scale / 2
+    at = layer.exact.points
+    gradient = np.array(
+        [
+            at(x + half, y, z) - at(x - half, y, z),
+            at(x, y + half, z) - at(x, y - half, z),
+            at(x, y, z + half) - at(x, y, z - half),
+        ]
+    )
+    length = np.linalg.norm(gradient, axis=0)
+    vertical = np.abs(gradient[2]) / np.where(length > 0, length, 1.0)
+    return float(np.quantile(vertical, SHARE))
