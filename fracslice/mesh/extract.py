@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..errors import MeshError
 from ..formulas.registry import Node
-from ..kernel import Field
+from ..kernel import Compilable
 from ..volume.bricks import Bricks, SignBricks
 from ..volume.crossings import Crossings, refine_crossings
 from ..volume.lattice import BRICK
@@ -38,7 +39,7 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
     return Mesh(vertices, triangles)
 
 
-def contour(root: Node | Field, bricks: Bricks | SignBricks, work: Work | None = None) -> Mesh:
+def contour(root: Node | Compilable, bricks: Bricks | SignBricks, work: Work | None = None) -> Mesh:
     """The exact surface of a scene, in scene units, its edges and corners sharp.
 
     root: the scene that `bricks` were sampled from. Every vertex on a grid edge is moved along it to the zero
@@ -66,7 +67,7 @@ class Piece:
 
 
 def contour_pieces(
-    root: Node | Field, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
+    root: Node | Compilable, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
 ) -> Iterator[Piece]:
     """The same surface, piece after piece along x, each of about `most` bricks: memory for one at a time."""
     from .._native import Cells
@@ -90,8 +91,8 @@ def contour_pieces(
         vertices, triangles, count, _ = _called(
             cells.contour, first, last, known.t, known.normals, *placement
         )
-        low, high = _room(vertices[count:], signs)
-        vertices[count:] = settle(root, vertices[count:], low, high, signs.voxel, work)
+        room = partial(_room, bricks=signs)
+        vertices[count:] = settle(root, vertices[count:], room, signs.voxel, work)
         numbers = np.full(len(vertices), -1, np.int64)
         numbers[:count] = cells.crossings_before(first) + np.arange(count)
         used = np.zeros(len(vertices), bool)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..formulas.registry import Node
+from ..kernel import Compilable, Kernel, compile_scene
 from ..kernel.cpu import lane_count, load_functions
 from ..kernel.linker import link
 from ..kernel.loops import Loop
@@ -23,6 +24,7 @@ CROSSINGS = Loop(
 def crossings(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, n):
     small = FRAME[0]
     reach = FRAME[1]
+    near = FRAME[2]
     for i in range(0, n, WIDTH):
         x = load(X, i)
         y = load(Y, i)
@@ -36,21 +38,26 @@ def crossings(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, n):
         b = a + 1.0
         t = where((fa < 0.0) & (fb < 0.0), where(fa > fb, a, b), where(fa < fb, a, b))
         open = ((fa < 0.0) & (fb >= 0.0)) | ((fa >= 0.0) & (fb < 0.0))
+        u = fa / (fa - fb)
         for step in range(40):
             if not any_of(open):
                 break
-            mid = 0.5 * (a + b)
-            u = mid
-            if step % 3 != 2:
-                u = minimum(maximum((a * fb - b * fa) / (fb - fa), a), b)
-            f = field(x + u * dx, y + u * dy, z + u * dz, P)
-            left = ((f < 0.0) & (fa < 0.0)) | ((f >= 0.0) & (fa >= 0.0))
-            t = where(open, u, t)
-            a = where(left, u, a)
-            fb = where(left, 0.5 * fb, f)
-            b = where(left, b, u)
-            fa = where(left, f, 0.5 * fa)
-            open = open & (absolute(f) > small) & (b - a > 1e-13)
+            t = where(open, a + u * (b - a), t)
+            f = field(x + t * dx, y + t * dy, z + t * dz, P)
+            same = ((f < 0.0) & (fa < 0.0)) | ((f >= 0.0) & (fa >= 0.0))
+            c = where(same, a, b)
+            fc = where(same, fa, fb)
+            b = where(same, b, a)
+            fb = where(same, fb, fa)
+            a = t
+            fa = f
+            place = (a - b) / (c - b)
+            share = (fa - fb) / (fc - fb)
+            bent = (share * share < place) & ((1.0 - share) * (1.0 - share) < 1.0 - place)
+            u = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+            least = 0.5 * near / absolute(b - a)
+            u = minimum(maximum(where(bent, u, 0.5), least), 1.0 - least)
+            open = open & (absolute(f) > small) & (absolute(b - a) > near)
         store(T, i, t)
         x = x + t * dx
         y = y + t * dy
@@ -69,12 +76,16 @@ def crossings(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, n):
         store(NZ, i, gz * over)
 """,
 )
-"""Illinois' false position (Dowell and Jarratt 1971), each third step a bisection; normals by tetrahedral
-differences.
+"""Inverse quadratic interpolation wherever it is safe, else bisection (Chandrupatla 1997, "A new hybrid
+quadratic/bisection algorithm for finding the zero of a nonlinear function without using derivatives"), from
+the secant's point on; normals by tetrahedral differences.
 """
 
 PRECISION = 1e-8
-"""A root is where |f| is this part of a voxel."""
+"""A root is where |f| is this part of a voxel ..."""
+
+BRACKET = 1e-7
+"""... or known to this part of an edge, where the field jumps or nearly does."""
 
 REACH = 1e-4
 """The differences' step, in voxels."""
@@ -91,7 +102,7 @@ class Crossings:
 
 
 def refine_crossings(
-    root: Node,
+    root: Node | Compilable,
     origin: tuple[float, float, float],
     voxel: float,
     ijk: np.ndarray,
@@ -103,12 +114,14 @@ def refine_crossings(
     ijk: int32 [n, 3], the lower grid point of each edge; axis: uint8 [n]. Where the float64 field does not
     change its sign (it is smaller than float32 can tell at one end) t is that end.
     """
+    if not isinstance(root, Node):
+        return _by_points(root, np.asarray(origin) + voxel * ijk, axis, voxel, work or Work())
     linked = link(root)
     width = lane_count(64)
     run = load_functions(linked, 64, width, (CROSSINGS,))["crossings"]
     n = len(ijk)
     t, normals = np.empty(n), np.empty((n, 3))
-    frame = np.array([PRECISION * voxel, REACH * voxel])
+    frame = np.array([PRECISION * voxel, REACH * voxel, BRACKET])
     parameters = np.ascontiguousarray(linked.parameters)
     start = np.asarray(origin)[:, None]
 
@@ -122,3 +135,44 @@ def refine_crossings(
 
     (work or Work()).map(task, chunks(n, 1 << 13))
     return Crossings(t, normals)
+
+
+def _by_points(root: Compilable, lower: np.ndarray, axis: np.ndarray, voxel: float, work: Work) -> Crossings:
+    """The same for a field without a loop of its own. lower: float64 [n, 3], the edges' lower ends."""
+    kernel = compile_scene(root, "float64")
+    t, normals = np.empty(len(lower)), np.empty((len(lower), 3))
+
+    def task(part: slice) -> None:
+        start, along = lower[part].T, voxel * np.eye(3)[:, axis[part]]
+        t[part] = _roots(kernel, start, along, PRECISION * voxel)
+        at, e = start + t[part] * along, REACH * voxel
+        corners = [kernel.points(*(at + e * np.array(way)[:, None])) for way in _TETRAHEDRON]
+        slope = sum(np.multiply.outer(way, f) for way, f in zip(_TETRAHEDRON, corners, strict=True))
+        normals[part] = (slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-100)).T
+
+    work.map(task, chunks(len(lower), 1 << 13))
+    return Crossings(t, normals)
+
+
+_TETRAHEDRON = ((1, -1, -1), (-1, -1, 1), (-1, 1, -1), (1, 1, 1))
+
+
+def _roots(kernel: Kernel, start: np.ndarray, along: np.ndarray, small: float) -> np.ndarray:
+    """Where the field changes its sign between start and start + along, [3, n], as a share."""
+    a, b = np.zeros(start.shape[1]), np.ones(start.shape[1])
+    fa, fb = kernel.points(*start), kernel.points(*(start + along))
+    t = np.where((fa < 0) == (fa < fb), b, a)
+    rows = np.flatnonzero((fa < 0) != (fb < 0))
+    a, b, fa, fb = a[rows], b[rows], fa[rows], fb[rows]
+    for step in range(40):
+        if not len(rows):
+            break
+        u = (a + b) / 2 if step % 3 == 2 else np.clip((a * fb - b * fa) / (fb - fa), a, b)
+        f = kernel.points(*(start[:, rows] + u * along[:, rows]))
+        t[rows] = u
+        left = (f < 0) == (fa < 0)
+        a, b = np.where(left, u, a), np.where(left, b, u)
+        fa, fb = np.where(left, f, fa / 2), np.where(left, fb / 2, f)
+        open_ = (np.abs(f) > small) & (b - a > 1e-13)
+        rows, a, b, fa, fb = rows[open_], a[open_], b[open_], fa[open_], fb[open_]
+    return t
