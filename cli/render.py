@@ -46,7 +46,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 @click.command()
 @click.argument("source", metavar="SCENE")
 @click.option(
-    "-o", "--output", required=True, metavar="FILE", help="A .png file, or .tif for linear 32-bit floats."
+    "-o", "--output", required=True, metavar="FILE", help="A .png file, or .exr or .tif for linear floats."
 )
 @click.option(
     "--samples", type=click.IntRange(1, 1_000_000), metavar="N", help="The most samples of a pixel."

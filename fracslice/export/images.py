@@ -1,4 +1,4 @@
-"""Pictures: PNG of 8 or 16 bits with text in it, TIFF of 32-bit floats. Written whole or not at all."""
+"""Pictures: PNG of 8 or 16 bits, OpenEXR and TIFF of floats, text in all. Written whole or not at all."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import struct
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from fracslice.errors import ExportError
 from fracslice.export.files import replacing
 
-IMAGES = (".png", ".tif", ".tiff")
+IMAGES = (".png", ".exr", ".tif", ".tiff")
 
 
 def check_image(path: str | Path) -> str:
@@ -34,10 +35,10 @@ def write_image(
     """Writes a picture to a file of the kind its name ends in.
 
     shown: float32 [height, width, 3], sRGB in [0, 1], for PNG of `bits` 8 or 16; text: keywords and what they
-    say, in the file. light: float32 of the same shape, linear, for TIFF. Raises ExportError.
+    say, in the file. light: float32 of the same shape, linear, for OpenEXR and TIFF. Raises ExportError.
     """
-    said = text or {}
-    data = png(shown, bits, said) if check_image(path) == ".png" else tiff(light, said)
+    said, ending = text or {}, check_image(path)
+    data = png(shown, bits, said) if ending == ".png" else (exr if ending == ".exr" else tiff)(light, said)
     with replacing(path) as file:
         file.write(data)
     return Path(path)
@@ -74,6 +75,19 @@ def _filtered(rows: np.ndarray, pixel: int) -> np.ndarray:
 
 def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def exr(light: np.ndarray, text: Mapping[str, str]) -> bytes:
+    """An OpenEXR file (Academy Software Foundation): 32-bit floats of red, green and blue, compressed without
+    loss."""
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **text}
+    with TemporaryDirectory() as folder:  # the library writes to names only
+        path = Path(folder) / "picture.exr"
+        with OpenEXR.File(header, {"RGB": np.ascontiguousarray(light, np.float32)}) as file:
+            file.write(str(path))
+        return path.read_bytes()
 
 
 def tiff(light: np.ndarray, text: Mapping[str, str]) -> bytes:

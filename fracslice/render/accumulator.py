@@ -127,13 +127,11 @@ class HostAccumulator:
 
         n = self.counts.astype(np.int32)
         squares = np.where(n < TRUSTED, np.inf, self.squares())
-        worst = maximum_filter(squares, 3, mode="nearest")
-        unfinished = (n < most) & (worst > tolerance * tolerance)
-        whole = (n & (n - 1) == 0) & np.isfinite(worst)
-        gain = np.where(whole, worst / np.maximum(n, 1), np.inf)
-        deciding = gain[unfinished & whole]
-        least = NEARLY * deciding.mean() if deciding.size else 0.0
-        return np.asarray(unfinished & (gain >= least))
+        unfinished = (n < most) & (maximum_filter(squares, 3, mode="nearest") > tolerance * tolerance)
+        gain = maximum_filter(squares / n, 3, mode="nearest")
+        begun = (n & (n - 1)) != 0
+        known = gain[unfinished]
+        return np.asarray(unfinished & (begun | (gain >= NEARLY * known.mean() if known.size else False)))
 
     def receive(self, add: Callable[[Any], None]) -> None:
         sums = self.sums.copy()

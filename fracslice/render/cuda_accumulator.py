@@ -48,28 +48,28 @@ def measure(A, E, T):
 def judge(A, E, G, T, width, trusted, most, tolerance):
     b = cuda.grid(1)
     if b < T.shape[0]:
-        total, deciding = real(0), real(0)
+        total, unfinished = real(0), real(0)
         height = E.size // width
         k = b
         while k < E.size:
             row = k // width
             column = k - row * width
-            worst = real(0)
+            worst, gain = real(0), real(0)
             for y in range(max(row - 1, 0), min(row + 2, height)):
                 for x in range(max(column - 1, 0), min(column + 2, width)):
                     near = y * width + x
-                    worst = maximum(worst, E[near] if A[near, 5] >= trusted else real(1e30))
+                    square = E[near] if A[near, 5] >= trusted else real(1e30)
+                    worst = maximum(worst, square)
+                    gain = maximum(gain, divide(square, A[near, 5]))
             n = whole(A[k, 5])
             G[k] = real(-1)
             if A[k, 5] < most and worst > tolerance:
-                G[k] = real(1e30)
-                if n & (n - 1) == 0 and worst < real(1e29):
-                    G[k] = divide(worst, real(n))
-                    total += G[k]
-                    deciding += real(1)
+                total += gain
+                unfinished += real(1)
+                G[k] = gain if n & (n - 1) == 0 else real(1e30)
             k += T.shape[0]
         T[b, 0] = total
-        T[b, 1] = deciding
+        T[b, 1] = unfinished
 
 
 @kernel
@@ -177,8 +177,8 @@ class CudaAccumulator:
         real = self.dtype.type
         judged = (self.sums, self._squares, self._gains, self._parts, self.width)
         limits = (real(TRUSTED), real(most), real(tolerance * tolerance))
-        total, deciding, _ = self._summed(self._loops.judge, *judged, *limits)
-        least = real(NEARLY * total / deciding if deciding else 0.0)
+        total, unfinished, _ = self._summed(self._loops.judge, *judged, *limits)
+        least = real(NEARLY * total / unfinished if unfinished else 0.0)
         chosen = (self._gains, self._order, self._pixels, self._parts, self.width, least)
         return self._pixels, int(self._summed(self._loops.choose, *chosen)[0])
 

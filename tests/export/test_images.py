@@ -47,6 +47,21 @@ def test_tiff_holds_the_light_as_floats(tmp_path: Path) -> None:
     assert (found == light).all()
 
 
+def test_exr_holds_the_light_as_floats_and_the_text(tmp_path: Path) -> None:
+    import OpenEXR
+
+    light = SHOWN * 1000
+    write_image(tmp_path / "a.exr", SHOWN, light, text={"scene_hash": "abc", "Title": "größer"})
+    with OpenEXR.File(str(tmp_path / "a.exr")) as file:
+        assert (file.channels()["RGB"].pixels == light).all()
+        assert file.header()["scene_hash"] == "abc"
+        assert file.header()["Title"] == "größer"
+
+
+def test_an_ending_in_capitals_is_the_same(tmp_path: Path) -> None:
+    assert write_image(tmp_path / "a.EXR", SHOWN, SHOWN).stat().st_size > 100
+
+
 def test_smooth_pictures_make_small_files() -> None:
     assert len(png(SMOOTH, 8, {})) < SMOOTH.size / 8
 

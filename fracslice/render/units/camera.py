@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import cos, sin, sqrt
+from .lights import disc
 from .normal import normalised
 
 
@@ -29,9 +29,7 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):  
     bx, by, bz = down
     rx, ry, rz = right
     ux, uy, uz = up
-    r = sqrt(lens_u)
-    a = r * cos(6.283185307179586 * lens_v)
-    b = r * sin(6.283185307179586 * lens_v)
+    a, b = disc(lens_u, lens_v)
     sx = a * rx + b * ux
     sy = a * ry + b * uy
     sz = a * rz + b * uz
