@@ -20,7 +20,10 @@ from .vocabulary import absolute, any_of, floor, maximum, minimum
     max=Vector(REQUIRED, "the corner with the largest coordinates"),
 )
 def bounds(child, x, y, z, centre, half, margin):  # type: ignore[no-untyped-def]
-    """What is inside a box; the element is not looked at far from it, however much of it there is."""
+    """What is inside a box; the element is not looked at far from it, however much of it there is.
+
+    L = max of 1, which is the box', and the element's.
+    """
     cx, cy, cz = centre
     hx, hy, hz = half
     d = maximum(absolute(x - cx) - hx, maximum(absolute(y - cy) - hy, absolute(z - cz) - hz))
@@ -58,6 +61,7 @@ def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-d
     """The element grown or shrunk; exact where its field is a distance.
 
     A field that underestimates distances would grow further than it should; it is cut off at the grown box.
+    L = the element's, at least 1, the box'; four times that around an escape-time fractal (measured).
     """
     cx, cy, cz = centre
     hx, hy, hz = half
@@ -109,7 +113,8 @@ def repeat(child, x, y, z, period, first, last, centre, half, middle, reach, gap
     """Copies on a lattice. Every copy that can be the nearest is looked at, so cell borders are right.
 
     Copies further than `gap` are not; the value never exceeds it inside the lattice, so that leaving one out
-    is not seen. A copy's value is at least the distance to its box, for the same reason.
+    is not seen. A copy's value is at least the distance to its box, for the same reason. L = max of 1 and
+    the element's: all that is left out is larger than `gap`, and minima keep the bound.
     """
     px, py, pz = period
     fx, fy, fz = first

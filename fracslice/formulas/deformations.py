@@ -21,8 +21,9 @@ def twist(child, x, y, z, rate, radius, margin, along_x, along_y):  # type: igno
     """Turned about an axis, further the further along it (Barr 1984, "Global and Local Deformations of Solid
     Primitives").
 
-    At radius rho space is sheared by s = rate rho, which stretches by (s + sqrt(s^2 + 4)) / 2. The bound is
-    taken at 5/4 of the element's own radius; beyond, the value is the distance to the cylinder around it.
+    At radius rho space is sheared by s = rate rho, which stretches by (s + sqrt(s^2 + 4)) / 2. With that at
+    5/4 of the element's own radius, L = the product of it and the element's. Beyond, the value is the distance
+    to the cylinder around it.
     """
     if along_x:
         a, b, t = y, z, x
@@ -92,9 +93,9 @@ def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, mar
     """A straight axis made an arc (Barr 1984, "Global and Local Deformations of Solid Primitives").
 
     In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is looked
-    at in theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; the bound is taken at
-    half the smallest radius the element reaches. Nearer than that, and near the cut opposite to it, the value
-    is a distance to the sector that holds the element.
+    at in theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; at half the smallest
+    radius r that the element reaches, L = 2 / (curvature r) times the element's. Nearer than that, and near
+    the cut opposite to it, the value is a distance to the sector that holds the element.
     """
     if along_x:
         a, b, t = y, side * z, x

@@ -29,7 +29,10 @@ from .registry import Node, warp
     ),
 )
 def material(child, x, y, z):  # type: ignore[no-untyped-def]
-    """What the element inside looks like in pictures. A material further inside takes precedence."""
+    """What the element inside looks like in pictures. A material further inside takes precedence.
+
+    It is not in the field: L = the element's.
+    """
     return child(x, y, z)
 
 

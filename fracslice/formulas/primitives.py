@@ -15,7 +15,7 @@ from .vocabulary import absolute, maximum, minimum, sqrt, where
 
 @shape(radius=Number(1.0, "the radius", above=0))
 def sphere(x, y, z, radius):  # type: ignore[no-untyped-def]
-    """A sphere around the origin."""
+    """A sphere around the origin. L = 1: a distance."""
     return sqrt(x * x + y * y + z * z) - radius
 
 
@@ -29,7 +29,7 @@ def _(node: Node) -> Box:
     round=Number(0.0, "radius of the rounded edges and corners, within the size", least=0),
 )
 def box(x, y, z, half, round):  # type: ignore[no-untyped-def]
-    """A box around the origin, its edges sharp or rounded."""
+    """A box around the origin, its edges sharp or rounded. L = 1: a distance."""
     hx, hy, hz = half
     qx = absolute(x) - hx
     qy = absolute(y) - hy
@@ -63,7 +63,7 @@ def _(node: Node) -> Box:
     tube=Number(0.25, "radius of the tube", above=0),
 )
 def torus(x, y, z, radius, tube):  # type: ignore[no-untyped-def]
-    """A torus around the z axis."""
+    """A torus around the z axis. L = 1: a distance."""
     q = sqrt(x * x + y * y) - radius
     return sqrt(q * q + z * z) - tube
 
@@ -79,7 +79,7 @@ def _(node: Node) -> Box:
     height=Number(1.0, "the height along z, centred at the origin", above=0),
 )
 def cylinder(x, y, z, radius, half):  # type: ignore[no-untyped-def]
-    """A cylinder along the z axis, with flat ends."""
+    """A cylinder along the z axis, with flat ends. L = 1: a distance."""
     q = sqrt(x * x + y * y) - radius
     h = absolute(z) - half
     oq = maximum(q, 0.0)
@@ -106,7 +106,7 @@ _CAPSULE: dict[str, Any] = {
 
 @shape(**_CAPSULE)
 def capsule(x, y, z, start, along, scale, radius):  # type: ignore[no-untyped-def]
-    """All points within the radius of a segment."""
+    """All points within the radius of a segment. L = 1: a distance."""
     sx, sy, sz = start
     ax, ay, az = along
     px = x - sx
@@ -141,7 +141,7 @@ def _(node: Node) -> Box:
     height=Number(1.0, "from the base up to the tip along z, centred at the origin", above=0),
 )
 def cone(x, y, z, radius, half, scale):  # type: ignore[no-untyped-def]
-    """A cone along the z axis, its tip up."""
+    """A cone along the z axis, its tip up. L = 1: a distance."""
     # In the half plane (q, z): the distance to the base segment and to the side, the sign from both.
     q = sqrt(x * x + y * y)
     base = maximum(q - radius, 0.0)
@@ -170,7 +170,7 @@ def _(node: Node) -> Box:
     offset=Number(0.0, "distance of the plane from the origin along the normal"),
 )
 def plane(x, y, z, normal, offset):  # type: ignore[no-untyped-def]
-    """The half space behind a plane."""
+    """The half space behind a plane. L = 1: a distance."""
     nx, ny, nz = normal
     return x * nx + y * ny + z * nz - offset
 
@@ -193,7 +193,7 @@ def _(node: Node) -> Box:
 
 @shape(radius=Number(1.0, "from the centre to each of the six corners", above=0))
 def octahedron(x, y, z, radius):  # type: ignore[no-untyped-def]
-    """A regular octahedron around the origin."""
+    """A regular octahedron around the origin. L = 1: a distance."""
     ax = absolute(x)
     ay = absolute(y)
     az = absolute(z)

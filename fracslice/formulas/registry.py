@@ -109,8 +109,7 @@ class Formula:
         return self._hook("slope", hook)
 
     def arguments(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
-        """The function's arguments after the points or values, where they are not the parameters themselves.
-        """
+        """The function's arguments after points or values, where they are not the parameters themselves."""
         return self._hook("arguments", hook)
 
     def select(self, hook: Callable[[Node], Callable[..., Any]]) -> Callable[[Node], Callable[..., Any]]:
@@ -136,8 +135,7 @@ class Formula:
 
 @dataclass(frozen=True)
 class Node:
-    """A formula with its parameters and children: one element of a scene. Immutable; `place` is "file:line".
-    """
+    """A formula with its parameters and children: one element of a scene. `place` is "file:line"."""
 
     formula: Formula
     values: Mapping[str, Any]

@@ -25,7 +25,7 @@ def transform(child, x, y, z, inverse, shrink):  # type: ignore[no-untyped-def]
     """Scaled, then rotated, then moved.
 
     The child's field is multiplied by the smallest stretch of the map, its smallest singular value: f never
-    grows faster than the child's, and is a distance where the scale is uniform.
+    grows faster than the child's (L = the child's), and is a distance where the scale is uniform.
     """
     a, b, c, d, e, f, g, h, i, tx, ty, tz = inverse
     return shrink * child(
@@ -114,7 +114,10 @@ def _(node: Node) -> Box:
     )
 )
 def mirror(child, x, y, z, along_x, along_y):  # type: ignore[no-untyped-def]
-    """The half of the element on the axis' positive side, and its mirror image."""
+    """The half of the element on the axis' positive side, and its mirror image.
+
+    L = the element's: folding brings points no further apart.
+    """
     if along_x:
         x = absolute(x)
     elif along_y:

@@ -11,8 +11,10 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Sequence
 
-from fracslice.formulas import Node
+from fracslice.kernel.linker import Linked, link
+from fracslice.kernel.loops import POINTS, Loop
 
 CPU, FEATURES = "skylake-avx512", "+avx512f,+avx512bw,+avx512cd,+avx512dq,+avx512vl,+avx2,+fma,+bmi,+bmi2"
 LANES = {32: 32, 64: 16}
@@ -25,16 +27,19 @@ def instructions() -> dict[str, int]:
     """By workload and float width: instructions of the kernel's hot loop and of all of it."""
     given = {**os.environ, "NUMBA_CPU_NAME": CPU, "NUMBA_CPU_FEATURES": FEATURES}
     run = subprocess.run(
-        [sys.executable, "-m", __name__], env=given, capture_output=True, text=True, check=True
+        [sys.executable, "-m", "tests.budgets.instructions"],
+        env=given,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     found: dict[str, int] = json.loads(run.stdout)
     return found
 
 
-def assembly(root: Node, bits: int) -> list[str]:
-    """The lines of the kernel's loop over points: labels and instructions."""
-    from fracslice.kernel import compiler, link
-    from fracslice.kernel.loops import POINTS
+def assembly(linked: Linked, bits: int, loops: Sequence[Loop] = (POINTS,)) -> list[str]:
+    """The lines of a scene's loops: labels and instructions."""
+    from fracslice.kernel import compiler
 
     class Text:
         """In the place of LLVM's target machine: gives assembly where an object file is asked for."""
@@ -48,7 +53,7 @@ def assembly(root: Node, bits: int) -> list[str]:
     machine, compiler._machine = compiler._machine, Text
     try:
         target = compiler.Target(bits, LANES[bits], CPU, FEATURES)
-        text = compiler.compile_object(link(root), target, (POINTS,)).decode()
+        text = compiler.compile_object(linked, target, loops).decode()
     finally:
         compiler._machine = machine
     return [line for line in text.splitlines() if _LABEL.match(line) or re.match(r"^\t[a-z]", line)]
@@ -83,7 +88,7 @@ def main() -> None:
     found = {}
     for name, root in WORKLOADS.items():
         for bits in LANES:
-            hot, whole = sizes(assembly(root, bits))
+            hot, whole = sizes(assembly(link(root), bits))
             found[f"{name}: instructions of the hot loop, float{bits}"] = hot
             found[f"{name}: instructions of the kernel, float{bits}"] = whole
     print(json.dumps(found))

@@ -1,4 +1,4 @@
-"""Evaluations and instructions stay within `budgets.json`, which `python -m tests.budgets --record` writes."""
+"""Evaluations and instructions stay within `budgets.json`; `python -m tests.budgets --record` writes it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from fracslice.formulas import sphere, union
+from fracslice.kernel import link
 
 from .evaluations import evaluations, per_sample
 from .instructions import assembly, instructions, sizes
@@ -51,5 +52,7 @@ def test_counts_grow_with_what_is_counted() -> None:
 def test_instructions_are_counted_in_the_innermost_loop() -> None:
     text = ["f:", "\tmov", "A:", "\tadd", "B:", "\tmul", "\tmul", "\tjne\t.B", "\tjne\t.A", "\tret"]
     assert sizes([line.replace("A:", ".A:").replace("B:", ".B:") for line in text]) == (3, 7)
-    once, twice = (sizes(assembly(root, 32))[1] for root in (sphere(), union(sphere(), sphere(radius=2))))
+    once, twice = (
+        sizes(assembly(link(root), 32))[1] for root in (sphere(), union(sphere(), sphere(radius=2)))
+    )
     assert twice > once + 4

@@ -20,8 +20,8 @@ TRIES = 200
 def drawn(root: Node, rng: np.random.Generator, spread: float = 1.0) -> Node:
     """The scene with other parameters.
 
-    Where a range has two ends, anywhere in it (evenly in the logarithm if it spans decades); else up to
-    2^spread times larger or smaller, and moved by as much where zero is allowed. What its formulas refuse
+    Where a range has two ends, half of the time anywhere in it (evenly in the logarithm if it spans decades);
+    else up to 2^spread times larger or smaller, or near zero where it was zero. What its formulas refuse
     together is drawn again.
     """
     for _ in range(TRIES):
@@ -61,13 +61,12 @@ def _value(kind: Any, value: Any, rng: np.random.Generator, spread: float) -> An
 
 def _number(kind: Number | Vector, value: float, rng: np.random.Generator, spread: float) -> float:
     low, high = max(kind.above, kind.least), min(kind.below, kind.most)
-    if math.isfinite(low) and math.isfinite(high):
+    if math.isfinite(low) and math.isfinite(high) and rng.uniform() < 0.5:
         if low > 0 and high > 100 * low:
-            drawn = low * (high / low) ** rng.uniform()
+            anywhere = low * (high / low) ** rng.uniform()
         else:
-            drawn = rng.uniform(low, high)
-        return float(round(drawn) if float(value).is_integer() and rng.uniform() < 0.5 else drawn)
-    factor = 2 ** rng.uniform(-spread, spread)
+            anywhere = rng.uniform(low, high)
+        return float(round(anywhere) if float(value).is_integer() else anywhere)
     if value == 0:
         return float(max(low, rng.normal() * 0.2 * spread))
-    return float(value * factor)
+    return float(value * 2 ** rng.uniform(-spread, spread))

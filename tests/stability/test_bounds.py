@@ -1,0 +1,58 @@
+"""The bounds that formulas state, at few points; `tests.benchmarks.stability.bounds` tries 10^7."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import Node, get, julia, mandelbulb, names, offset, shell, sphere, union
+from tests.examples import EXAMPLES
+
+from .bounds import verdict
+from .draws import drawn
+
+TORN = {"mandelbulb 7.5"}
+"""Not bounded: a power that is not whole tears space."""
+
+HARD: dict[str, Node] = {
+    "Julia set in pieces": julia(iterations=12, c=(0.3, 0.5, 0.4, 0)),
+    "shipped Julia set": julia(iterations=12, c=(-0.291, -0.399, 0.339, 0.437)),
+    "shipped top": mandelbulb(iterations=6, julia=(0, 0, 0.75)),
+    "Mandelbulb Julia set in pieces": mandelbulb(iterations=6, julia=(1, 0, 0)),
+    "power 5": mandelbulb(iterations=6, power=5, julia=(0.62, 0.33, 0.2)),
+    "power 32": mandelbulb(iterations=6, power=32),
+    "offset": offset(mandelbulb(iterations=5), distance=0.05),
+    "hollow offset": shell(offset(mandelbulb(iterations=5), distance=0.1), thickness=0.05),
+    "seam of two": union(mandelbulb(iterations=5), julia(iterations=8), smooth=0.3),
+}
+"""Where bounds were once exceeded."""
+
+
+@pytest.mark.parametrize("name", sorted(set(EXAMPLES) - TORN))
+def test_the_bound_holds(name: str) -> None:
+    assert verdict(EXAMPLES[name], 50_000).violations == 0
+
+
+@pytest.mark.parametrize("name", sorted(set(EXAMPLES) - TORN))
+def test_the_bound_holds_with_other_numbers(name: str) -> None:
+    root = drawn(EXAMPLES[name], np.random.default_rng(2), 0.5)
+    assert verdict(root, 50_000).violations == 0
+
+
+@pytest.mark.parametrize("name", HARD)
+def test_the_bound_holds_where_it_did_not(name: str) -> None:
+    found = verdict(HARD[name], 200_000, seed=1)
+    assert found.violations == 0 and found.points > 100_000
+
+
+def test_a_bound_that_is_too_small_is_found() -> None:
+    for root, bound in ((sphere(), 0.999), (julia(iterations=10), 0.6)):
+        wrong = root.changed()
+        wrong.__dict__["facts"] = type(root.facts)(root.facts.box, bound, root.facts.weak)
+        found = verdict(wrong, 200_000)
+        assert found.violations > 0 and found.worst > 1 and len(found.where) == 3
+
+
+def test_every_formula_says_where_its_bound_is_from() -> None:
+    silent = [name for name in names() if "L = " not in get(name).doc]
+    assert silent == []

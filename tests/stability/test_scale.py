@@ -1,0 +1,43 @@
+"""A scene a million times smaller or larger is the same object: the same bricks, the same mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import Node
+from fracslice.mesh.extract import contour
+from fracslice.scene import library, read
+from fracslice.volume import plan, sample_scene
+
+from .scaling import WAYS
+
+VOXELS = 40.0
+
+
+@pytest.mark.parametrize(("way", "factor"), [("parameters", 1e-6), ("transform", 1e6)])
+@pytest.mark.parametrize("name", library.names())
+def test_same_bricks(name: str, way: str, factor: float) -> None:
+    root = read(library.path(name)).root
+    own, other = (plan(r, VOXELS) for r in (root, WAYS[way](root, factor)))
+    a, b = sample_scene(own), sample_scene(other)
+    assert np.array_equal(a.index, b.index) and np.array_equal(a.ijk, b.ijk)
+    assert np.array_equal(a.values < 0, b.values < 0)
+    np.testing.assert_allclose(b.values / factor, a.values, rtol=0, atol=1e-4 * own.voxel)
+    assert np.isclose(other.voxel, factor * own.voxel, rtol=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+@pytest.mark.parametrize("name", ["mandelbulb", "quaternion-julia", "menger-ball"])
+def test_same_mesh(name: str, factor: float) -> None:
+    root = read(library.path(name)).root
+    a, b = (mesh_of(r) for r in (root, WAYS["parameters"](root, factor)))
+    assert np.array_equal(a[1], b[1])
+    voxel = np.ptp(a[0], axis=0).max() / VOXELS
+    np.testing.assert_allclose(b[0] / factor, a[0], rtol=0, atol=1e-4 * voxel)
+
+
+def mesh_of(root: Node) -> tuple[np.ndarray, np.ndarray]:
+    planned = plan(root, VOXELS)
+    mesh = contour(planned.root, sample_scene(planned))
+    return mesh.vertices, mesh.triangles
