@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from .inputs import is_model, load_model, load_scene
-from .options import job_of, job_options, length, quiet_option, set_option, threads_option
-from .slice import check_print, print_options
+from .options import job_of, job_options, length, print_options, quiet_option, set_option, threads_option
+from .slice import check_print, heights
 from .summary import found, summary
 from .working import working
 
@@ -17,7 +17,7 @@ from .working import working
 @click.command()
 @click.argument("source", metavar="MODEL|SCENE")
 @click.option("--json", "as_json", is_flag=True, help="All numbers, as JSON.")
-@click.option("--layer", callback=length, metavar="LENGTH", help="Check a resin print's layers, this high.")
+@click.option("--layer", callback=heights, metavar="LENGTH[..LENGTH]", help="Check layers, so high.")
 @click.option("--pixel", callback=length, metavar="LENGTH", help="With --layer; the printer's, or 0.05mm.")
 @click.option("--printer", "machine", metavar="NAME", help="With --layer: whose bed it has to fit.")
 @click.option("--picture", metavar="FILE.png", help="With --layer: draw the worst layers.")
@@ -53,7 +53,7 @@ def check(
     else:
         scene = load_scene(source, settings)
         with working(threads, quiet) as work:
-            report = make_mesh(scene, job_of(**options), work).report
+            report = make_mesh(scene, job_of(scene, **options), work).report
         numbers, line, problems = report.as_dict(), summary(source, report), report.problems
     click.echo(json.dumps(numbers, indent=2) if as_json else line)
     return 1 if problems else 0

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .inputs import load_scene
-from .options import job_of, job_options, quiet_option, set_option, threads_option
+from .options import job_of, job_options, print_options, quiet_option, set_option, threads_option
 from .summary import summary
 from .working import working
 
@@ -29,6 +29,7 @@ GRID, STL = ".vdb", ".stl"
 @click.option(
     "-o", "--output", required=True, metavar="FILE", help="An .stl, .3mf, .ply, .obj, .glb or .vdb file."
 )
+@print_options
 @job_options
 @set_option
 @click.option("--report", metavar="FILE.json", help="Write the numbers that prove what was made.")
@@ -53,12 +54,13 @@ def mesh(
     from fracslice.errors import TooLargeError
 
     check_outputs(output, report, picture)
-    scene, job = load_scene(source, settings), job_of(**options)
+    scene = load_scene(source, settings)
+    job = job_of(scene, **options)
     with working(threads, quiet) as work:
         try:
             told = made(scene, job, output, picture, work)
         except TooLargeError:
-            if Path(output).suffix.lower() != STL or picture is not None:
+            if Path(output).suffix.lower() != STL or picture is not None or job.simplify_mm is not None:
                 raise
             told = streamed(scene, job, output, work)
         if report is not None:

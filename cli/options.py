@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,6 +14,7 @@ from fracslice.errors import SceneError
 
 if TYPE_CHECKING:
     from fracslice.job import MeshJob
+    from fracslice.scene import Print, Scene
 
 
 def length(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
@@ -50,7 +52,6 @@ _JOB = [
         metavar="N",
         help="How fine, as voxels along the longest side; 256 if neither is given.",
     ),
-    click.option("--keep", type=click.Choice(["all", "largest"]), default="all", help="All bodies, or one."),
     click.option(
         "--dust",
         type=float,
@@ -59,15 +60,50 @@ _JOB = [
         help="Drop bodies with less; 1e-5 of the whole by default.",
     ),
     click.option(
-        "--cavities",
-        type=click.Choice(["keep", "fill"]),
-        default="keep",
-        help="Sealed hollows stay or are filled.",
-    ),
-    click.option(
-        "--base", callback=length, metavar="LENGTH", help="Cut off this much at the bottom, to stand flat."
+        "--simplify",
+        callback=length,
+        metavar="LENGTH",
+        help="Fewer triangles, nowhere farther off than this, such as 0.02mm.",
     ),
 ]
+
+
+def print_value(context: click.Context, option: click.Parameter, text: str | None) -> Any:
+    """What an attribute of `<print>` would be with this text."""
+    from fracslice.scene import Print
+
+    try:
+        return None if text is None else Print.kinds()[str(option.name)].read(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: expected {error}") from None
+
+
+def print_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """What makes the object printable: adds the options that `printing_of` takes."""
+    for name, metavar, text in reversed(_PRINT):
+        command = click.option(f"--{name}", callback=print_value, metavar=metavar, help=text)(command)
+    return command
+
+
+_PRINT = [
+    ("cavities", "keep|fill", "Sealed hollows stay or are filled."),
+    ("keep", "all|largest", "All bodies, or one."),
+    ("bridge", "LENGTH", "Join loose bodies by struts this thick."),
+    ("gap", "LENGTH", "Close gaps up to this width."),
+    ("thickness", "LENGTH", "Thicken what is thinner."),
+    ("hollow", "LENGTH", "Hollow it out; walls of this thickness."),
+    ("drain", "LENGTH", "Drain holes of a hollow, 3mm by default; 0: none."),
+    ("base", "LENGTH", "Cut off this much at the bottom, to stand flat."),
+    ("raft", "LENGTH", "Stand it on a plate of this height."),
+]
+"""The attributes of `<print>`; each option overrides the scene's."""
+
+
+def printing_of(scene: Scene, options: dict[str, Any]) -> Print:
+    """What the scene says, overridden by the options that are given."""
+    names = [name for name, *_ in _PRINT]
+    return replace(scene.printing, **{n: options[n] for n in names if options[n] is not None})
+
 
 set_option = click.option(
     "--set",
@@ -86,7 +122,9 @@ threads_option = click.option(
 quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress, no summary.")
 
 
-def job_of(size: float | None, voxel: float | None, resolution: int | None, **others: Any) -> MeshJob:
+def job_of(
+    scene: Scene, size: float | None, voxel: float | None, resolution: int | None, **others: Any
+) -> MeshJob:
     """The job that the options ask for."""
     from fracslice.job import MeshJob
 
@@ -94,8 +132,7 @@ def job_of(size: float | None, voxel: float | None, resolution: int | None, **ot
         size_mm=size,
         voxel_mm=voxel,
         resolution=resolution,
-        keep=others["keep"],
         dust_mm3=others["dust"],
-        cavities=others["cavities"],
-        base_mm=others["base"] or 0.0,
+        printing=printing_of(scene, others),
+        simplify_mm=others["simplify"],
     )

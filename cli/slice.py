@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .inputs import load_scene
-from .options import length, quiet_option, set_option, threads_option
+from .options import length, print_options, printing_of, quiet_option, set_option, threads_option
 from .working import working
 
 if TYPE_CHECKING:
@@ -33,23 +32,16 @@ def signed_length(context: click.Context, option: click.Parameter, text: str) ->
     return -size if text.strip().startswith("-") else size
 
 
-def print_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """How the object is made printable: adds the options that `stack_of` takes."""
-    for option in reversed(_PRINT):
-        command = option(command)
-    return command
-
-
-_PRINT = [
-    click.option(
-        "--hollow", callback=length, metavar="LENGTH", help="Hollow it out; walls of this thickness."
-    ),
-    click.option(
-        "--drain", callback=signed_length, default="3mm", metavar="LENGTH", help="Drain holes; 0: none."
-    ),
-    click.option("--close-gaps", callback=length, metavar="LENGTH", help="Close gaps up to this width."),
-    click.option("--raft", callback=length, metavar="LENGTH", help="Stand it on a plate of this height."),
-]
+def heights(
+    context: click.Context, option: click.Parameter, text: str | None
+) -> tuple[float, float | None] | None:
+    """A layer height in mm, or the lowest and the highest of adaptive layers."""
+    if text is None:
+        return None
+    low, _, high = text.partition("..")
+    least = length(context, option, low)
+    assert least is not None
+    return least, length(context, option, high) if ".." in text else None
 
 
 @click.command("slice")
@@ -60,7 +52,11 @@ _PRINT = [
 @click.option("--format", "form", metavar="NAME", help="png, sl1, 3mf, svg, slic3r, cli, cli-binary or json.")
 @click.option("--size", callback=length, metavar="LENGTH", help="The longest side, such as 80mm.")
 @click.option(
-    "--layer", callback=length, default=LAYER, metavar="LENGTH", help="Layer height; 0.05mm by default."
+    "--layer",
+    callback=heights,
+    default=LAYER,
+    metavar="LENGTH[..LENGTH]",
+    help="Layer height, 0.05mm by default; or a range, 0.05mm..0.2mm: thick where the surface is steep.",
 )
 @click.option("--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's, or 0.05mm.")
 @click.option(
@@ -86,10 +82,6 @@ _PRINT = [
 @click.option(
     "--preview", metavar="FILE", help="A contact sheet (.png) or an animation (.webp) of the layers."
 )
-@click.option("--keep", type=click.Choice(["all", "largest"]), default="all", help="All bodies, or one.")
-@click.option(
-    "--base", callback=length, metavar="LENGTH", help="Cut off this much at the bottom, to stand flat."
-)
 @print_options
 @set_option
 @threads_option
@@ -105,7 +97,7 @@ def slice_(
 ) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
-    An interrupted job goes on when it is started again (PNG folders and SL1 archives).
+    An interrupted job goes on when it is started again.
     """
     from fracslice.export import check_target
     from fracslice.export.jobs import SliceRun
@@ -160,21 +152,17 @@ def job(scene: Scene, machine: Printer | None, options: dict[str, Any]) -> Slice
         raise click.UsageError("--pixel and --printer: expected one of them")
     given = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
     up = tuple(options.get("up") or (0.0, 0.0, 1.0))
-    size, base, raft = options["size"] or scene.size_mm, options["base"] or 0.0, options["raft"] or 0.0
-    return SliceJob(size, options["layer"], given, up, base, raft)
+    size = options["size"] or scene.size_mm
+    return SliceJob(size, options["layer"][0], given, up, printing_of(scene, options))
 
 
 def stack_of(scene: Scene, machine: Printer | None, options: dict[str, Any], work: Work) -> Stack:
     """The layers that are wanted, of the object made printable."""
-    from fracslice.slicing import Changes, changed, plan_stack
+    from fracslice.slicing import adapted, plan_stack
 
-    changes = Changes(
-        wall=options["hollow"] or 0.0,
-        drain=options["drain"],
-        gap=options["close_gaps"] or 0.0,
-        largest=options["keep"] == "largest",
-    )
-    return changed(plan_stack(scene.root, job(scene, machine, options), work), changes, work)
+    stack = plan_stack(scene.root, job(scene, machine, options), work)
+    most = options["layer"][1]
+    return stack if most is None else adapted(stack, most, work)
 
 
 def write_preview(stack: Stack, path: str, work: Work) -> None:

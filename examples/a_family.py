@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from fracslice import MeshJob, make_mesh, read, write
-from fracslice.scene import library
+from fracslice.scene import Print, library
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
@@ -15,7 +15,7 @@ if __name__ == "__main__":
     bulb = read(library.path("mandelbulb"))
     for power in range(2, 10):
         member = bulb.with_values([f"mandelbulb.power={power}", "solid.size=3cm"])
-        result = make_mesh(member, MeshJob(resolution=resolution, keep="largest"))
+        result = make_mesh(member, MeshJob(resolution=resolution, printing=Print(keep="largest")))
         write(result.mesh, folder / f"mandelbulb-{power}.stl")
         volume = result.report.mesh.volume_mm3
         print(f"power {power}: {volume:.0f} mm3, {result.report.mesh.triangles} triangles")

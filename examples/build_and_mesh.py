@@ -8,7 +8,7 @@ import sys
 
 from fracslice import MeshJob, Work, make_mesh, write
 from fracslice.formulas import difference, mandelbulb, plane, shell, sphere, torus, transform, union
-from fracslice.scene import scene
+from fracslice.scene import Print, scene
 
 bauble = scene(
     union(
@@ -31,6 +31,6 @@ def show(stage: str, done: float) -> None:
 if __name__ == "__main__":
     target = sys.argv[1] if len(sys.argv) > 1 else "bauble.3mf"
     resolution = float(sys.argv[2]) if len(sys.argv) > 2 else 256
-    result = make_mesh(bauble, MeshJob(resolution=resolution, keep="largest"), Work(progress=show))
+    result = make_mesh(bauble, MeshJob(resolution=resolution, printing=Print(keep="largest")), Work(progress=show))
     write(result.mesh, target, {"Title": bauble.name})
     print(json.dumps(result.report.as_dict(), indent=2))

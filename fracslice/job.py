@@ -7,14 +7,14 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .errors import SceneError, TooLargeError
 from .memory import available_bytes, peak_rss_mb
 from .report import Report, SurfaceError, version
-from .scene import Scene, parse_length
+from .scene import Print, Scene, parse_length
 from .work import Work
 
 if TYPE_CHECKING:
@@ -39,35 +39,41 @@ class MeshJob:
     """What to make of a scene.
 
     size_mm: the longest side, if not what the scene says. voxel_mm or resolution (voxels along the longest
-    side): how fine; 256 along the longest side if neither is given. keep: every body, or the largest alone.
-    dust_mm3: bodies with less material are dropped; if not given, those under 1e-5 of the whole.
-    cavities: sealed hollows stay or are filled. base_mm: so much is cut off at the bottom, for the object to
-    stand on. Raises `SceneError` for values that cannot be.
+    side): how fine; 256 along the longest side if neither is given. dust_mm3: bodies with less material are
+    dropped; if not given, those under 1e-5 of the whole. printing: what makes it printable, if not what the
+    scene says. simplify_mm: fewer triangles, nowhere farther than this from all of them. Raises `SceneError`
+    for values that cannot be.
     """
 
     size_mm: float | None = None
     voxel_mm: float | None = None
     resolution: float | None = None
-    keep: Literal["all", "largest"] = "all"
     dust_mm3: float | None = None
-    cavities: Literal["keep", "fill"] = "keep"
-    base_mm: float = 0.0
+    printing: Print | None = None
+    simplify_mm: float | None = None
 
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:
             raise SceneError("voxel and resolution: expected one of them")
-        for name, length in (("size", self.size_mm), ("voxel", self.voxel_mm)):
+        for name, length in (
+            ("size", self.size_mm),
+            ("voxel", self.voxel_mm),
+            ("simplify", self.simplify_mm),
+        ):
             if length is not None:
                 parse_length(length, name)
         if self.resolution is not None and not COARSEST <= self.resolution <= FINEST:
             raise SceneError(f"resolution {self.resolution:g}: expected {COARSEST} to {FINEST}")
-        for name, value in (("dust", self.dust_mm3 or 0.0), ("base", self.base_mm)):
-            if not 0 <= value < float("inf"):
-                raise SceneError(f"{name} {value:g}: expected a finite number >= 0")
+        if not 0 <= (self.dust_mm3 or 0.0) < float("inf"):
+            raise SceneError(f"dust {self.dust_mm3:g}: expected a finite number >= 0")
 
     def size(self, scene: Scene) -> float:
         """The longest side in mm."""
         return scene.size_mm if self.size_mm is None else self.size_mm
+
+    def how(self, scene: Scene) -> Print:
+        """What makes it printable."""
+        return scene.printing if self.printing is None else self.printing
 
     def dust(self, volume: float) -> float:
         """The volume below which a body of an object of `volume` is dropped, mm3."""
@@ -130,20 +136,30 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     voxels, clock = what.voxels(scene), Clock(work)
     from .mesh.check import check
     from .mesh.extract import contour
+    from .mesh.simplify import simplify
+    from .printing import printable
     from .volume import plan, sample_scene
 
+    how = what.how(scene)
     with clock("planning"):
         refuse_what_does_not_fit(scene, voxels, what.size(scene), work)
-        planned = plan(scene.root, voxels, work)
+        planned, scale = plan(scene.root, voxels, work), None
+    if not how.whole:
+        with clock("changing"):
+            planned, scale = printable(planned, what.size(scene), how, work)
     with clock("sampling"):
         bricks = sample_scene(planned, work)
     with clock("meshing"):
         raw = contour(planned.root, bricks, work)
     with clock("finishing"):
-        mesh, removed, place = _finished(raw, what, what.size(scene))
+        mesh, removed, place = _finished(raw, what, how, what.size(scene), scale)
+    simplified = None
+    if what.simplify_mm is not None:
+        with clock("simplifying"):
+            mesh, simplified = simplify(mesh, what.simplify_mm, work)
     with clock("checking"):
         checked = check(mesh, threads=work.threads)
-        error = _surface_error(planned, mesh, place, what.base_mm > 0, work)
+        error = _surface_error(planned, mesh, place, work)
     report = Report(
         scene=scene.name,
         scene_hash=scene.hash,
@@ -157,6 +173,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         bricks=len(bricks),
         seconds=clock.seconds,
         peak_rss_mb=peak_rss_mb(),
+        simplified=simplified,
     )
     return Result(mesh, report, bricks, place)
 
@@ -185,52 +202,32 @@ def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Wor
         )
 
 
-def _finished(raw: Mesh, what: MeshJob, size: float) -> tuple[Mesh, Removed, Placement]:
-    """The mesh that is wanted, in mm on the bed, as a file will hold it."""
+def _finished(
+    raw: Mesh, what: MeshJob, how: Print, size: float, scale: float | None
+) -> tuple[Mesh, Removed, Placement]:
+    """The mesh that is wanted, in mm on the bed, as a file will hold it. scale: mm per scene unit; without
+    one, what stays is made to be of that size.
+    """
     from .mesh.clean import clean
     from .mesh.components import select
-    from .mesh.solid import cut_base, place_on_bed
+    from .mesh.solid import place_on_bed
 
-    scale = size / float(raw.size.max())
-    volume = raw.volume * scale**3
-    kept, removed = select(
-        raw.scaled(scale), keep=what.keep, dust_mm3=what.dust(volume), cavities=what.cavities
-    )
-    scale *= _growth(kept, what.base_mm, size)
-    mesh = kept.scaled(scale * float(raw.size.max()) / size)
-    if what.base_mm > 0:
-        mesh = cut_base(mesh, what.base_mm)
-    exact = size / float(mesh.size.max())
-    mesh = mesh.scaled(exact)
+    rough = scale or size / float(raw.size.max())
+    dust = what.dust(raw.volume * rough**3)
+    cavities = how.cavities if how.whole else "keep"  # a hollow is one, too
+    kept, removed = select(raw.scaled(rough), keep=how.keep, dust_mm3=dust, cavities=cavities)
+    exact = 1.0 if scale else size / float(kept.size.max())
+    mesh = kept.scaled(exact)
     placed = place_on_bed(mesh)
     x, y, z = (placed.bounds[0] - mesh.bounds[0]).tolist()
-    return clean(placed), removed, Placement(scale * exact, (x, y, z))
+    return clean(placed), removed, Placement(rough * exact, (x, y, z))
 
 
-def _growth(mesh: Mesh, base: float, size: float) -> float:
-    """The factor that makes the longest side `size` once `base` mm have been cut off the bottom.
-
-    What is cut shrinks the object, so that it has to be larger to begin with, so that less of it is cut:
-    repeated, it settles within a few rounds.
-    """
-    points, (low, high) = mesh.vertices, mesh.bounds
-    factor = size / float((high - low).max())
-    for _ in range(8 if base > 0 else 0):
-        floor = low[2] + base / factor
-        left = points[points[:, 2] >= floor]
-        if not len(left):
-            raise SceneError(f"base {base:g}mm: leaves nothing of the object")
-        width = left[:, :2].max(axis=0) - left[:, :2].min(axis=0)
-        factor = size / max(*width.tolist(), float(high[2] - floor))
-    return factor
-
-
-def _surface_error(planned: Plan, mesh: Mesh, place: Placement, cut: bool, work: Work) -> SurfaceError:
-    """Measured at the vertices of the finished mesh; those of a cut base are left out."""
+def _surface_error(planned: Plan, mesh: Mesh, place: Placement, work: Work) -> SurfaceError:
+    """Measured at the vertices of the finished mesh."""
     from .volume.accuracy import surface_error
 
-    points = mesh.vertices[mesh.vertices[:, 2] > 0] if cut else mesh.vertices
-    points = (points - np.array(place.offset)) / place.scale
+    points = (mesh.vertices - np.array(place.offset)) / place.scale
     mm = place.scale * surface_error(planned.root, points, planned.voxel, work)
     return SurfaceError(float(mm.mean()), float(np.quantile(mm, 0.99)), float(mm.max()))
 

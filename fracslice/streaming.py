@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import SceneError
 from .export.files import check_target, replacing
 from .export.stl import write_pieces
 from .job import Clock, MeshJob
 from .memory import peak_rss_mb
 from .report import Report, SurfaceError, version
-from .scene import Scene
+from .scene import Print, Scene
 from .work import Work
 
 if TYPE_CHECKING:
@@ -51,8 +50,9 @@ def stream_mesh(
     cut: that needs the whole mesh.
     """
     what, work = what or MeshJob(), work or Work()
-    if what.base_mm > 0:
-        raise SceneError(f"base {what.base_mm:g}mm: cannot be cut off a mesh that does not fit in memory")
+    how = what.how(scene)
+    if not how.whole:
+        raise how.fail("cannot change a mesh that does not fit in memory, other than by keep and cavities")
     from .export import application
     from .mesh.extract import contour_pieces
     from .mesh.survey import Survey
@@ -70,7 +70,9 @@ def stream_mesh(
                 pieces.add(piece, survey.add(piece))
                 work.progress("meshing", min((piece.end - planned.outer.lo[0]) / planned.outer.size[0], 1.0))
         with clock("finishing"), replacing(path) as file:
-            finish = _Finish(planned, pieces, survey.shells(), what, what.size(scene), work)
+            finish = _Finish(
+                planned, pieces, survey.shells(), replace(what, printing=how), what.size(scene), work
+            )
             known = {"Application": application()} | dict(metadata or {})
             write_pieces(finish.meshes(MOST_ERRORS / (40 * len(signs))), file, known)
     return Report(
@@ -124,7 +126,8 @@ class _Finish:
         dust = what.dust(float(whole.volumes.sum()) * unit)
         shells, self.misplaced = whole.nested(pieces)
         sized = replace(shells, volumes=shells.volumes * unit)
-        self.stays, self.removed = choose(sized, keep=what.keep, dust_mm3=dust, cavities=what.cavities)
+        how = what.printing or Print()
+        self.stays, self.removed = choose(sized, keep=how.keep, dust_mm3=dust, cavities=how.cavities)
         low, high = whole.low[self.stays].min(axis=0), whole.high[self.stays].max(axis=0)
         self.scale = size / float((high - low).max())
         self.offset = -self.scale * np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])

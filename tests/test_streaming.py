@@ -14,7 +14,7 @@ from fracslice.errors import Cancelled, ExportError, SceneError
 from fracslice.export import write
 from fracslice.formulas import box, difference, mandelbulb, menger, sphere, transform, union
 from fracslice.mesh.reading import read_mesh
-from fracslice.scene import Scene, scene
+from fracslice.scene import Print, Scene, scene
 from fracslice.streaming import stream_mesh
 from fracslice.work import Work
 
@@ -35,8 +35,8 @@ SCENES = {
 }
 JOBS = {
     "plain": MeshJob(resolution=64),
-    "largest": MeshJob(resolution=48, keep="largest"),
-    "filled": MeshJob(resolution=48, cavities="fill"),
+    "largest": MeshJob(resolution=48, printing=Print(keep="largest")),
+    "filled": MeshJob(resolution=48, printing=Print(cavities="fill")),
     "dust": MeshJob(resolution=48, dust_mm3=900),
 }
 
@@ -90,8 +90,8 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_what_needs_the_whole_is_refused_before_any_work(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="base 2mm: cannot be cut off a mesh that does not fit in memory"):
-        stream_mesh(SCENES["corners"], tmp_path / "x.stl", MeshJob(base_mm=2))
+    with pytest.raises(SceneError, match="<print> cannot change a mesh that does not fit in memory"):
+        stream_mesh(SCENES["corners"], tmp_path / "x.stl", MeshJob(printing=Print(base=2)))
     with pytest.raises(ExportError, match="does not exist"):
         stream_mesh(SCENES["corners"], tmp_path / "missing" / "x.stl")
 

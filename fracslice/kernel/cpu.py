@@ -14,22 +14,44 @@ from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Protocol, overload
 
 import numpy as np
 
-from ..formulas.registry import Node
+from ..formulas.registry import Facts, Node
 from .linker import Linked, link
 from .loops import BRICKS, POINTS, Loop
 
 Precision = Literal["float32", "float64"]
 
 
+class Kernel(Protocol):
+    """A field that can be evaluated, with the methods of `CpuKernel`."""
+
+    @property
+    def dtype(self) -> np.dtype: ...
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray, /) -> np.ndarray: ...
+
+    def bricks(
+        self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray, /
+    ) -> None: ...
+
+
+class Compilable(Protocol):
+    """What stands where the root of a scene does, though it is more than a tree of formulas."""
+
+    @property
+    def facts(self) -> Facts: ...
+
+    def compiled(self, precision: Precision, /) -> Kernel: ...
+
+
 class CpuKernel:
     """The compiled field of one scene. Safe to call from many threads at once."""
 
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
-        self.dtype = np.dtype(precision)
+        self.dtype: np.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
         self._parameters = linked.parameters.astype(self.dtype)
         functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (POINTS, BRICKS))
@@ -52,8 +74,8 @@ class CpuKernel:
 
     @property
     def entry(self) -> tuple[int, int]:
-        """The addresses of `loops.POINTS` as compiled and of its parameters, for native code; they live as long
-        as the kernel.
+        """The addresses of `loops.POINTS` as compiled and of its parameters, for native code; they live as
+        long as the kernel.
         """
         code = ctypes.cast(self._points, ctypes.c_void_p).value  # type: ignore[arg-type]
         assert code
@@ -95,8 +117,14 @@ def _kernel(source: str, parameters: bytes, precision: Precision) -> CpuKernel:
     return CpuKernel(Linked(source, np.frombuffer(parameters)), precision)
 
 
-def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
-    """The kernel of a scene tree whose depths are resolved. Raises `KernelError`."""
+@overload
+def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel: ...
+@overload
+def compile_scene(root: Node | Compilable, precision: Precision = "float32") -> Kernel: ...
+def compile_scene(root: Node | Compilable, precision: Precision = "float32") -> Kernel:
+    """The kernel of a scene tree whose depths are resolved, or of another field. Raises `KernelError`."""
+    if not isinstance(root, Node):
+        return root.compiled(precision)
     linked = link(root)
     return _kernel(linked.source, linked.parameters.tobytes(), precision)
 

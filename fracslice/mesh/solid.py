@@ -1,4 +1,4 @@
-"""Meshes as solids: proof by manifold3d, flat base, place on the bed."""
+"""Meshes as solids: proof by manifold3d, place on the bed."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from fracslice.mesh.model import Mesh
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
+
+FLAT = 1e-6
+"""Of the mesh's size: what is not higher than this above the bed lies on it, so that a flat base is flat."""
 
 _REASONS = {
     "NonFiniteVertex": "a coordinate is not a finite number",
@@ -37,34 +40,9 @@ def to_manifold(mesh: Mesh) -> Manifold:
     return solid
 
 
-def from_manifold(solid: Manifold) -> Mesh:
-    """The boundary of a manifold3d solid; raises MeshError when it is empty or in error."""
-    status = solid.status().name
-    if status != "NoError":
-        raise MeshError(f"the solid could not be built: {_REASONS.get(status, status)}")
-    if solid.is_empty():
-        raise MeshError("the solid is empty")
-    boundary = solid.to_mesh64()
-    return Mesh(
-        np.ascontiguousarray(boundary.vert_properties[:, :3]),
-        np.ascontiguousarray(boundary.tri_verts, dtype=np.int32),
-    )
-
-
-def cut_base(mesh: Mesh, height: float) -> Mesh:
-    """Cut off what lies less than `height` mm above the lowest point, so that the solid stands flat.
-
-    Raises MeshError if the mesh is not a solid or nothing is left.
-    """
-    low, high = mesh.bounds[:, 2]
-    if not 0 <= height < high - low:
-        raise MeshError(
-            f"a base cut of {height:g} mm does not leave anything of a solid {high - low:g} mm high"
-        )
-    return from_manifold(to_manifold(mesh).trim_by_plane((0.0, 0.0, 1.0), low + height))
-
-
 def place_on_bed(mesh: Mesh) -> Mesh:
     """Move the mesh to stand on z = 0 with the middle of its bounds over the origin."""
     low, high = mesh.bounds
-    return mesh.translated((-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]))
+    placed = mesh.translated((-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]))
+    placed.vertices[placed.vertices[:, 2] < FLAT * (high - low).max(), 2] = 0
+    return placed

@@ -1,9 +1,9 @@
-# ruff: noqa: RUF009 -- `described` makes a field, as dataclasses.field does
-"""How a scene is made printable: the record behind `<print>`, which the flags of the commands fill as well."""
+"""How a scene is made printable: the record behind `<print>`, which the commands' flags fill as well."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from ..formulas.parameters import Choice
 from .lengths import Length
@@ -18,13 +18,17 @@ def _length(doc: str, default: float = 0.0) -> Length:
 class Print(Part):
     """What is changed so that the object prints, in this order.
 
-    Lengths are of the finished object: a millimetre is a millimetre, whatever the field says. `size` is that
-    of the object before anything is cut off or added.
+    Lengths are of the finished object: a millimetre is a millimetre, whatever the field says. The size of
+    the solid is that of the bodies that stay, before anything is cut off them or added.
     """
 
     element = "print"
-    cavities: str = described(Choice("keep", "hollows that nothing reaches stay or are filled", ("keep", "fill")))
-    keep: str = described(Choice("all", "all bodies stay, or the largest alone", ("all", "largest")))
+    cavities: Literal["keep", "fill"] = described(
+        Choice("keep", "hollows that nothing reaches stay or are filled", ("keep", "fill"))
+    )
+    keep: Literal["all", "largest"] = described(
+        Choice("all", "all bodies stay, or the largest alone", ("all", "largest"))
+    )
     bridge: float = described(_length("loose bodies are joined where they are nearest, by struts this thick"))
     gap: float = described(_length("gaps up to this width are closed"))
     thickness: float = described(_length("what is thinner is thickened to this"))
@@ -38,7 +42,6 @@ class Print(Part):
             raise self.fail("keep and bridge: expected one of them; where one body stays, none is loose")
 
     @property
-    def sampled(self) -> bool:
-        """Whether distances must be measured for it."""
-        parts = self.keep != "all" or self.cavities != "keep"
-        return parts or any((self.bridge, self.gap, self.thickness, self.hollow))
+    def whole(self) -> bool:
+        """Whether bodies and cavities stay or go as a whole, and nothing else is changed."""
+        return not any((self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft))

@@ -1,8 +1,8 @@
 """From a field to a printer's layers, with no mesh between."""
 
+from .adaptive import adapted
 from .contours import Contours
 from .layers import Layer, Slicer
-from .printable import Changes, changed
 from .stack import SliceJob, Stack, plan_stack
 
-__all__ = ["Changes", "Contours", "Layer", "SliceJob", "Slicer", "Stack", "changed", "plan_stack"]
+__all__ = ["Contours", "Layer", "SliceJob", "Slicer", "Stack", "adapted", "plan_stack"]

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._slices import Slab
-from ..kernel import CpuKernel
-from .printable import Changed
+from ..kernel import Kernel
+from .corners import corners
+from .slab import is_fractal
 from .stack import Stack
 
 ROUNDS = 20
@@ -18,7 +19,8 @@ PRECISE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Contours:
-    """Closed polygons, outer ones counter-clockwise, holes clockwise; no two meet.
+    """Closed polygons, outer ones counter-clockwise, holes clockwise; no two meet. Their points are the
+    crossings of the pixel lattice, and between those the sharp corners.
 
     points: float64 [n, 2], mm from the middle of the object's box, x to the right and y to the back.
     starts: int32 [m + 1]: polygon i has the points ``starts[i]:starts[i + 1]``, the first not repeated.
@@ -51,7 +53,7 @@ class Contours:
         return float(self.areas.sum())
 
 
-def contours(slab: Slab, k: int, z: float, stack: Stack, exact: CpuKernel | Changed) -> Contours:
+def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Contours:
     """The contours of layer `k` of a slab, at height `z` (scene units).
 
     exact: the float64 kernel that the crossings are refined with.
@@ -62,8 +64,11 @@ def contours(slab: Slab, k: int, z: float, stack: Stack, exact: CpuKernel | Chan
     # Never quite at an end: there several contours, or the parts of one, would meet.
     along = np.clip(along, PRECISE, 1 - PRECISE)
     points = edges[:, :2] + along[:, None] * np.eye(2)[edges[:, 2]]
-    points = (points - np.array(stack.shape[::-1]) / 2) * stack.pixel
-    return _nested(points, order, starts, edges, ends[:, 0] < 0)
+    sharp = np.full_like(points, np.nan)
+    if len(points) and not is_fractal(stack.root):
+        sharp = corners(points, edges, exact, z, stack.frame)
+    places = (np.stack([points, sharp], 1) - np.array(stack.shape[::-1]) / 2) * stack.pixel
+    return _nested(places, order, starts, edges, ends[:, 0] < 0)
 
 
 def _cycles(following: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -80,9 +85,7 @@ def _cycles(following: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(order, np.int32), np.array(starts, np.int32)
 
 
-def refined(
-    kernel: CpuKernel | Changed, edges: np.ndarray, ends: np.ndarray, z: float, frame: np.ndarray
-) -> np.ndarray:
+def refined(kernel: Kernel, edges: np.ndarray, ends: np.ndarray, z: float, frame: np.ndarray) -> np.ndarray:
     """Where on its edge each crossing lies, 0 to 1, to `PRECISE`: false position with the Illinois rule
     (Dowell and Jarratt 1971), all edges at once; those that are done are left out.
     """
@@ -115,6 +118,8 @@ def _nested(
 ) -> Contours:
     """Contours in the order of their lowest, leftmost crossing of a row of samples, each with its parent.
 
+    points: float64 [n, 2, 2], of each crossing and of the corner after it, NaN for none.
+
     The crossing left of that one in its row tells: it is on the parent, or on a sibling, by whether the
     solid begins or ends there (as in Suzuki and Abe 1985, "Topological structural analysis of digitized
     binary images").
@@ -137,6 +142,8 @@ def _nested(
         beside = new[loop[rows[at - 1]]]
         parent[i] = beside if is_hole[beside] != is_hole[i] else parent[beside]
     pieces = [order[starts[i] : starts[i + 1]] for i in loops[turn]]
-    lengths = np.array([len(p) for p in pieces], np.int32)
-    taken = np.concatenate(pieces) if pieces else order
-    return Contours(points[taken], np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32), parent)
+    taken = points[np.concatenate(pieces)] if pieces else points
+    real = ~np.isnan(taken[..., 0])
+    before = np.concatenate([[0], np.cumsum(real.sum(1))])
+    ends = np.concatenate([[0], np.cumsum([len(p) for p in pieces])]).astype(int)
+    return Contours(taken[real], before[ends].astype(np.int32), parent)

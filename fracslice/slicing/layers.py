@@ -13,17 +13,15 @@ from typing import TypeVar
 import numpy as np
 
 from .._slices import Slab
-from ..kernel import CpuKernel, compile_scene
+from ..kernel import Kernel, compile_scene
 from ..work import Work
 from .contours import Contours, contours
-from .printable import Changed, facts_of
 from .slab import Sampler
 from .stack import Stack
 
 SLAB = 8
 """Layers that are computed together."""
 
-Kernel = CpuKernel | Changed
 
 T = TypeVar("T")
 
@@ -98,11 +96,9 @@ class Slicer:
         at a time. Raises `SliceError`, `Cancelled`, or what `make` raises.
         """
         root, shape = self.stack.root, self.stack.shape
-        terms = self.stack.terms
-        exact = Changed(compile_scene(root, "float64"), terms)
-        kernel = Changed(compile_scene(root), terms) if terms else compile_scene(root)
+        exact = compile_scene(root, "float64")
         lattice = shape[0] + 1, shape[1] + 1
-        sampler = Sampler(kernel, root, facts_of(self.stack), self.stack.frame, lattice)
+        sampler = Sampler(compile_scene(root), root, root.facts, self.stack.frame, lattice)
         chosen = range(len(self.stack.z)) if layers is None else layers
 
         def slab(group: list[int]) -> list[T]:

@@ -6,13 +6,13 @@ dropped where ``|f| > bound * reach`` at their middle says that no sample in the
 left is closed: where two neighbours differ in sign and one of them is only implied by a probe, it is
 evaluated. Every probe within a layer is a sample itself, so nothing is evaluated twice.
 
-From 16 pixels up the bound is the formula's own, which is proven or measured with a margin. It is far from
-what escape-time fractals do: their values are a fifth of the distance outside and a fiftieth inside (means on
-Mandelbulbs and Julia sets), and going down to single pixels by it would cost more than the contours. In a
-scene of nothing else the smaller blocks are dropped by the likely reach instead, `LIKELY`; what is lost,
-specks of a pixel or two, is below 0.1 % of the area (tests/slicing/test_layers.py). Where a scene mixes them
-with other shapes, probing ends at blocks of `STOP` pixels instead, and parts smaller than that which touch no
-probe are not found.
+From 8 pixels up over several layers the bound is the formula's own, which is proven or measured with a
+margin. It is far from what escape-time fractals do: their values are a fifth of the distance outside and a
+fiftieth inside (means on Mandelbulbs and Julia sets), and going down to single pixels by it would cost more
+than the contours. In a scene of nothing else the blocks within a layer are dropped by how steep the field is
+there, but not below `LIKELY`; what is lost, specks of a pixel or two, is below 0.1 % of the area
+(tests/slicing/test_layers.py). Where a scene mixes them with other shapes, probing ends at blocks of `STOP`
+pixels instead, and parts smaller than that which touch no probe are not found.
 """
 
 from __future__ import annotations
@@ -25,11 +25,10 @@ import numpy as np
 from .._slices import BorderError, Bounds, Called, Compiled, Field, Slab
 from ..errors import SliceError
 from ..formulas.registry import Facts, Node
-from ..kernel import CpuKernel
-from .printable import Changed
+from ..kernel import Compilable, CpuKernel, Kernel
 
 LIKELY = 0.075, 0.01
-"""Of the bound of a fractal, outside and inside."""
+"""The least bounds within a layer of a fractal, outside and inside, as shares of its own."""
 
 STOP = 2, 4
 """Pixels, outside and inside."""
@@ -39,12 +38,12 @@ STOP = 2, 4
 class Sampler:
     """Samples slabs of a stack; may be used from many threads.
 
-    kernel: of `root`, float32, perhaps with changes. frame: (x0, y0, dx, dy) of the lattice, scene units.
+    kernel: of `root`, float32. frame: (x0, y0, dx, dy) of the lattice, scene units.
     shape: lattice points (ny, nx).
     """
 
-    kernel: CpuKernel | Changed
-    root: Node
+    kernel: Kernel
+    root: Node | Compilable
     facts: Facts
     frame: np.ndarray
     shape: tuple[int, int]
@@ -71,9 +70,14 @@ class Sampler:
     @cached_property
     def _bounds(self) -> Bounds:
         bound, weak = self.facts.lipschitz, self.facts.weak
-        shapes = [node.formula for node in self.root.walk() if node.formula.kind == "shape"]
-        even = weak and isinstance(self.kernel, CpuKernel) and all(shape.weak for shape in shapes)
+        even = weak and is_fractal(self.root)
         if even:
             return Bounds(bound, bound * LIKELY[0], bound * LIKELY[1], 1, 1, True, True)
         stop = STOP if weak else (1, 1)
         return Bounds(bound, bound, bound, *stop, weak, False)
+
+
+def is_fractal(root: Node | Compilable) -> bool:
+    """Whether a scene is of nothing but escape-time fractals."""
+    shapes = [n.formula for n in root.walk() if n.formula.kind == "shape"] if isinstance(root, Node) else []
+    return bool(shapes) and all(shape.weak for shape in shapes)

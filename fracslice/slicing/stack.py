@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..errors import SliceError
-from ..formulas import bounds, box, transform, union
+from ..formulas import transform
 from ..formulas.box import Box
 from ..formulas.registry import Node
+from ..kernel import Compilable
+from ..printing import printable
+from ..scene import Print
 from ..volume import plan
 from ..work import Work
-
-if TYPE_CHECKING:
-    from .printable import Term
 
 MOST_LAYERS = 100_000
 MOST_PIXELS = 65_536
@@ -27,17 +26,15 @@ class SliceJob:
     """What to cut, lengths in mm.
 
     size: the object's longest side, before anything is cut off or added. layer: layer height. pixel: width
-    and height of a pixel. up: the direction of the scene that is up in the print. base: so much is cut off
-    the bottom. raft: the height of a plate under the object, half of it around its lowest part. Raises
-    `SliceError` for values that cannot be.
+    and height of a pixel. up: the direction of the scene that is up in the print. printing: what makes it
+    printable. Raises `SliceError` for values that cannot be.
     """
 
     size: float
     layer: float = 0.05
     pixel: tuple[float, float] = (0.05, 0.05)
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    base: float = 0.0
-    raft: float = 0.0
+    printing: Print = field(default_factory=Print)
 
     def __post_init__(self) -> None:
         for name, value in (("size", self.size), ("layer", self.layer), ("pixel", min(self.pixel))):
@@ -47,9 +44,6 @@ class SliceJob:
             raise SliceError(f"a layer of {self.layer:g} mm is as high as the object: {self.size:g} mm")
         if max(self.pixel) >= self.size:
             raise SliceError(f"a pixel of {max(self.pixel):g} mm is as large as the object: {self.size:g} mm")
-        for name, value in (("base", self.base), ("raft", self.raft)):
-            if not 0 <= value < self.size:
-                raise SliceError(f"{name} {value:g} mm: expected less than the object's size")
         if not np.linalg.norm(self.up) > 0:
             raise SliceError("up: expected a direction other than 0 0 0")
 
@@ -65,7 +59,7 @@ class Stack:
     size in mm.
     """
 
-    root: Node
+    root: Node | Compilable
     scale: float
     corner: tuple[float, float]
     pixel: tuple[float, float]
@@ -74,7 +68,6 @@ class Stack:
     tops: np.ndarray
     size: tuple[float, float, float]
     outer: Box
-    terms: tuple[Term, ...] = ()
 
     @property
     def heights(self) -> np.ndarray:
@@ -94,8 +87,8 @@ def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
     """
     turned = _turned(root, job.up)
     planned = plan(turned, job.size / min(job.pixel), work)
-    scale = job.size / max(planned.box.size)
-    node, found, outer = _standing(planned.root, planned.box, planned.outer, job, scale)
+    planned, scale = printable(planned, job.size, job.printing, work)
+    found, outer = planned.box, planned.outer
     mm = tuple(s * scale for s in found.size)
     shape, corner = [0, 0], [0.0, 0.0]
     for axis in range(2):
@@ -107,28 +100,7 @@ def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
         raise SliceError(f"{shape[1]} x {shape[0]} pixels: at most {MOST_PIXELS} along a side")
     z = found.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
-    return Stack(node, scale, at, job.pixel, (shape[0], shape[1]), z, tops, size, outer)
-
-
-def _standing(root: Node, found: Box, outer: Box, job: SliceJob, scale: float) -> tuple[Node, Box, Box]:
-    """The scene with its bottom cut off and a raft under it, its box, and a box that encloses it.
-
-    The raft reaches a tenth of the longest side beyond the object, and half its height into it.
-    """
-    (x0, y0, z0), (x1, y1, z1) = found.lo, found.hi
-    if job.base:
-        z0 += job.base / scale
-        root = bounds(root, min=(outer.lo[0], outer.lo[1], z0), max=outer.hi)
-        outer = Box((outer.lo[0], outer.lo[1], z0), outer.hi)
-    if job.raft:
-        height, rim = job.raft / scale, max(found.size) / 10
-        low = (x0 - rim, y0 - rim, z0 - height / 2)
-        raft = Box(low, (x1 + rim, y1 + rim, z0 + height / 2))
-        root = union(root, transform(box(size=raft.size), translate=raft.centre))
-        found, outer = Box((x0, y0, z0), (x1, y1, z1)) | raft, outer | raft
-    else:
-        found = Box((x0, y0, z0), (x1, y1, z1))
-    return root, found, outer
+    return Stack(planned.root, scale, at, job.pixel, (shape[0], shape[1]), z, tops, size, outer)
 
 
 def _tops(height: float, layer: float) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..formulas.box import Box
 from ..formulas.registry import Node
-from ..kernel import compile_scene
+from ..kernel import Compilable, compile_scene
 from ..kernel.depth import resolve_depths
 from ..work import Work
 from .bricks import Bricks, SignBricks
@@ -35,7 +35,7 @@ class Plan:
     """What is about to be sampled: the scene with all depths known, the object's box, a box that surely
     encloses it, and the voxel, all in scene units."""
 
-    root: Node
+    root: Node | Compilable
     box: Box
     outer: Box
     voxel: float

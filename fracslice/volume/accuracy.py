@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..formulas.registry import Node
-from ..kernel import compile_scene
+from ..kernel import Compilable, compile_scene
 from ..work import Work, chunks
 
 REACH = 1e-4
 """The step of the differences, in voxels."""
 
 
-def surface_error(root: Node, points: np.ndarray, voxel: float, work: Work | None = None) -> np.ndarray:
+def surface_error(
+    root: Node | Compilable, points: np.ndarray, voxel: float, work: Work | None = None
+) -> np.ndarray:
     """Distances of points from the zero set to first order, ``|f| / |grad f|``.
 
     points: float [n, 3], scene units; voxel: scene units. Returns float64 [n], scene units, at most a voxel

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import VolumeError
 from ..formulas.box import Box
 from ..formulas.registry import Facts
-from ..kernel import CpuKernel
+from ..kernel import Kernel
 from ..work import Work
 from .values import values_at
 
@@ -18,7 +18,7 @@ FIRST = 16
 
 LEVELS = 9
 GROWTHS = 6
-MOST = 100_000
+MOST = 1_000_000
 """Cells of the last level. A flat face has ever more of them; then its place is known a little less exactly.
 """
 
@@ -31,7 +31,7 @@ class Extent:
     outer: Box
 
 
-def extent(kernel: CpuKernel, facts: Facts, work: Work | None = None) -> Extent:
+def extent(kernel: Kernel, facts: Facts, work: Work | None = None) -> Extent:
     """The box of the points where the field is negative, its faces to about 1/4000 of the longest side; 1/500
     if flat.
 
@@ -54,7 +54,7 @@ def extent(kernel: CpuKernel, facts: Facts, work: Work | None = None) -> Extent:
     raise VolumeError("the object has no end that could be found; put <bounds> around it")
 
 
-def _search(kernel: CpuKernel, facts: Facts, box: Box, work: Work) -> Extent | None:
+def _search(kernel: Kernel, facts: Facts, box: Box, work: Work) -> Extent | None:
     """The object's extent within `box`; None if it reaches into the cells on the border."""
     longest = max(box.size) or 1.0
     half = np.maximum(np.array(box.size), longest * 1e-3) / 2 * FIRST / (FIRST - 2)

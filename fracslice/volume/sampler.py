@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import VolumeError
 from ..formulas.registry import Facts
-from ..kernel import CpuKernel
+from ..kernel import Kernel
 from ..work import Work, chunks
 from .bricks import INSIDE, OUTSIDE, Bricks, SignBricks
 from .lattice import BRICK, Lattice
@@ -36,7 +36,7 @@ AUDITS = 8
 FAR_AUDITS = 1 << 15
 
 
-def sample(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> Bricks:
+def sample(kernel: Kernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> Bricks:
     """Samples a scene's field around its surface.
 
     kernel: the scene's float32 kernel. facts: the scene's facts, whose Lipschitz bound prunes. Raises
@@ -61,7 +61,7 @@ def sample(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None 
     )
 
 
-def sample_signs(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> SignBricks:
+def sample_signs(kernel: Kernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> SignBricks:
     """The same bricks, in a 32nd of the memory: of each sample only its sign is kept."""
     signs, _ = _Run(kernel, facts, lattice, work or Work(), None).signs()
     return signs
@@ -69,7 +69,7 @@ def sample_signs(kernel: CpuKernel, facts: Facts, lattice: Lattice, work: Work |
 
 @dataclass
 class _Run:
-    kernel: CpuKernel
+    kernel: Kernel
     facts: Facts
     lattice: Lattice
     work: Work

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernel import CpuKernel
+from ..kernel import Kernel
 from ..work import Work, chunks
 
 CHUNK = 1 << 14
 
 
-def values_at(kernel: CpuKernel, points: np.ndarray, work: Work) -> np.ndarray:
+def values_at(kernel: Kernel, points: np.ndarray, work: Work) -> np.ndarray:
     """Field values [n] in the kernel's dtype at points [3, n], scene units. Raises `Cancelled`."""
     f = np.empty(points.shape[1], kernel.dtype)
 

@@ -1,8 +1,6 @@
-"""Meshes as solids: manifold3d's word, the flat base, the place on the bed, rounding and cleaning."""
+"""Meshes as solids: manifold3d's word, the place on the bed, rounding and cleaning."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from fracslice.mesh import Mesh
 from fracslice.mesh.check import check
 from fracslice.mesh.clean import clean
 from fracslice.mesh.rounding import rounded
-from fracslice.mesh.solid import cut_base, from_manifold, place_on_bed, to_manifold
+from fracslice.mesh.solid import place_on_bed, to_manifold
 
 from .shapes import GOOD, cube, sphere, with_flipped, without
 
@@ -22,7 +20,6 @@ def test_manifold3d_takes_good_meshes_as_they_are(name: str) -> None:
     mesh = GOOD[name]()
     solid = to_manifold(mesh)
     assert solid.num_tri() == len(mesh.triangles)
-    assert from_manifold(solid).volume == pytest.approx(mesh.volume, rel=1e-12)
 
 
 @pytest.mark.parametrize("spoil", [without, with_flipped])
@@ -31,25 +28,15 @@ def test_manifold3d_refuses_in_plain_words(spoil) -> None:  # type: ignore[no-un
         to_manifold(spoil(sphere(), 7))
 
 
-def test_base_cut_stands_flat_on_the_bed() -> None:
-    ball = sphere(10, at=(5, 6, 7), level=5)
-    cut = place_on_bed(cut_base(ball, 4))
-    report = check(clean(cut))
-    assert report.printable
-    (x0, y0, z0), (x1, y1, z1) = report.bbox_mm
-    assert z0 == 0
-    assert z1 == pytest.approx(16, abs=1e-3)
-    assert (x0 + x1, y0 + y1) == pytest.approx((0, 0), abs=1e-5)
-    flat = cut.corners[(cut.corners[:, :, 2] == 0).all(axis=1)]
-    area = np.linalg.norm(np.cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]), axis=1).sum() / 2
-    assert area == pytest.approx(math.pi * (10**2 - 6**2), rel=0.01)
-    assert report.volume_mm3 == pytest.approx(ball.volume - math.pi * 4**2 * (10 - 4 / 3), rel=2e-3)
-
-
-@pytest.mark.parametrize("height", [-1, 20, math.nan])
-def test_base_cut_that_makes_no_sense(height: float) -> None:
-    with pytest.raises(MeshError, match="base cut"):
-        cut_base(sphere(10), height)
+def test_a_mesh_is_put_on_the_bed() -> None:
+    placed = place_on_bed(sphere(10, at=(5, 6, 7)))
+    low, high = placed.bounds
+    assert low[2] == 0
+    assert low[:2] + high[:2] == pytest.approx((0, 0), abs=1e-9)
+    lifted = placed.vertices + [0, 0, 1e-6] * (np.arange(len(placed.vertices))[:, None] % 2)
+    assert np.array_equal(
+        place_on_bed(Mesh(lifted, placed.triangles)).vertices[:, 2] == 0, lifted[:, 2] < 1e-5
+    )
 
 
 def test_rounding_is_done_once() -> None:

@@ -123,7 +123,7 @@ def test_wrong_sizes(size):
         (
             "<scene version='1'><box/></scene>",
             "f.xml:1: <box> cannot stand here; "
-            "expected <camera>, <film>, <fog>, <light>, <shading> or <solid>",
+            "expected <camera>, <film>, <fog>, <light>, <print>, <shading> or <solid>",
         ),
         (
             "<scene version='1'><solid><box/></solid></scene>",

@@ -1,0 +1,99 @@
+"""A scene with changes. Its own field stays what it is, exact; others beside it say where to take away, to
+add or to stay within.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from typing import Literal
+
+import numpy as np
+
+from ..formulas import Box, Node, difference, intersection, union
+from ..formulas.registry import Facts
+from ..kernel import Compilable, Kernel, compile_scene
+from ..kernel.cpu import Precision
+from .samples import LIPSCHITZ, Samples
+
+Does = Literal["cut", "add", "keep"]
+_FOLDED = {"cut": difference, "add": union, "keep": intersection}
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """A field, and what it does: "cut" takes its inside away, "add" adds it, "keep" leaves only what is in
+    it.
+    """
+
+    shape: Node | Samples
+    does: Does
+
+
+@dataclass(frozen=True, eq=False)
+class Altered:
+    """A field, and what is done to it, one after the other.
+
+    It stands where a root does: it has facts, and `compile_scene` makes a kernel of it.
+    """
+
+    root: Node | Compilable
+    terms: tuple[Term, ...]
+
+    @cached_property
+    def facts(self) -> Facts:
+        """Of all together; the box encloses what is added."""
+        added = [_box(term) for term in self.terms if term.does == "add"]
+        slopes = [t.shape.facts.lipschitz if isinstance(t.shape, Node) else LIPSCHITZ for t in self.terms]
+        own = self.root.facts
+        box = reduce(Box.__or__, added, own.box)
+        return Facts(box, max(own.lipschitz, *slopes), own.weak)
+
+    def compiled(self, precision: Precision) -> Composite:
+        """Its kernel."""
+        parts = [
+            compile_scene(t.shape, precision) if isinstance(t.shape, Node) else t.shape for t in self.terms
+        ]
+        steps = tuple(zip(parts, (t.does for t in self.terms), strict=True))
+        return Composite(compile_scene(self.root, precision), steps)
+
+
+def _box(term: Term) -> Box:
+    return term.shape.facts.box if isinstance(term.shape, Node) else term.shape.box
+
+
+@dataclass(frozen=True, eq=False)
+class Composite:
+    """Evaluates like a `CpuKernel`."""
+
+    kernel: Kernel
+    steps: tuple[tuple[Kernel | Samples, Does], ...]
+
+    @property
+    def dtype(self) -> np.dtype:
+        return self.kernel.dtype
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Compilable values at points, as `CpuKernel.points`."""
+        f = self.kernel.points(x, y, z)
+        for part, does in self.steps:
+            g = part.points(x, y, z).astype(f.dtype)
+            f = np.minimum(f, g) if does == "add" else np.maximum(f, -g if does == "cut" else g)
+        return f
+
+    def bricks(
+        self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
+    ) -> None:
+        """Compilable values on bricks, as `CpuKernel.bricks`."""
+        inner = np.indices((8, 8, 8)).reshape(3, 512)
+        at = [origin[k] + voxel * (corners[:, k, None] + inner[k]) for k in range(3)]
+        out[:] = self.points(*at)
+
+
+def altered(thing: Node | Compilable, does: Does, shape: Node | Samples) -> Node | Compilable:
+    """One more change. A formula is made part of a tree that has no sampled fields yet."""
+    if isinstance(thing, Node) and isinstance(shape, Node):
+        return _FOLDED[does](thing, shape)
+    if isinstance(thing, Altered):
+        return Altered(thing.root, (*thing.terms, Term(shape, does)))
+    return Altered(thing, (Term(shape, does),))

@@ -1,0 +1,222 @@
+"""From an object to one that prints: each change is measured on samples of what the ones before it left.
+
+Distances come from the samples by fast sweeping (Zhao 2004), so a millimetre is a millimetre for any formula.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from .._native import Grid
+from ..errors import VolumeError
+from ..formulas import Box, Node, box, cylinder, plane, transform
+from ..kernel import Compilable, compile_scene
+from ..scene import Print
+from ..volume import Bricks, Lattice, Plan, extent, sample
+from ..volume.grid import from_grid, to_grid
+from ..work import Work
+from .altered import altered
+from .bridges import struts
+from .parts import Parts, parts_of
+from .samples import Samples, positions, with_signs
+from .strokes import strokes
+from .walls import walls
+
+COARSE, FINE = 128, 640
+"""Samples along the longest side that distances are measured on, at least and at most."""
+
+SHARP = 6
+"""Samples across what is to be thickened, closed or left standing, if the finest grid has as many."""
+
+DUST = 1e-5
+"""The share of the whole below which a body is dust that no strut is built to."""
+
+
+def printable(planned: Plan, size: float, how: Print, work: Work | None = None) -> tuple[Plan, float]:
+    """A planned scene made printable, and its scale in mm per scene unit.
+
+    size: mm, the longest side of what stays. Raises `VolumeError` where nothing would be left or a length is
+    too small to be measured, `Cancelled`.
+    """
+    run = _Run(planned, size, how, work or Work())
+    for stage, change in run.changes():
+        run.work.check()
+        run.work.progress(stage, 0.0)
+        run.put(change())
+    return _standing(run.planned, how, run.scale), run.scale
+
+
+@dataclass
+class _Run:
+    """The object as it is so far."""
+
+    planned: Plan
+    size: float
+    how: Print
+    work: Work
+
+    @property
+    def thing(self) -> Node | Compilable:
+        return self.planned.root
+
+    @cached_property
+    def scale(self) -> float:
+        """mm per scene unit; asked for first when it is known which bodies stay."""
+        return self.size / max(self.planned.box.size)
+
+    def put(self, thing: Node | Compilable) -> None:
+        """The object is this now."""
+        self.planned = replace(self.planned, root=thing)
+
+    def measure(self) -> None:
+        """Finds how large the object is now."""
+        found = extent(compile_scene(self.thing), self.thing.facts, self.work)
+        self.planned = replace(self.planned, box=found.box, outer=found.outer)
+
+    def changes(self) -> Iterator[tuple[str, Callable[[], Node | Compilable]]]:
+        """What is asked for, in order."""
+        how = self.how
+        if how.cavities == "fill":
+            yield "filling cavities", self.filled
+        if how.keep == "largest":
+            yield "keeping the largest", self.largest
+            self.measure()
+        if how.bridge:
+            yield "bridging", self.bridged
+        if how.gap:
+            yield "closing gaps", self.closed
+        if how.thickness:
+            yield "thickening", self.thickened
+        if how.bridge or how.thickness:
+            self.measure()
+        if how.hollow:
+            yield "hollowing", self.hollowed
+
+    def distances(self, length: float = np.inf) -> Grid:
+        """Distances around the object as it is, fine enough for a length in mm."""
+        samples = min(max(COARSE, SHARP * self.size / length), FINE)
+        if length < 2 * self.size / samples:
+            least = 2 * self.size / samples
+            raise VolumeError(f"{length:g} mm in {self.size:g} mm: expected at least {least:.3g} mm, or 0")
+        lattice = Lattice.around(self.planned.outer, max(self.planned.box.size) / samples)
+        return to_grid(sample(compile_scene(self.thing), self.thing.facts, lattice, self.work)).redistance()
+
+    def filled(self) -> Node | Compilable:
+        """The space that nothing reaches becomes solid."""
+        solid = from_grid(self.distances())
+        parts = parts_of(solid)
+        if not len(parts.cavities):
+            return self.thing
+        return altered(self.thing, "add", _nearer(solid, parts, parts.cavities, np.array([0])))
+
+    def largest(self) -> Node | Compilable:
+        """Only the largest body stays."""
+        solid = from_grid(self.distances())
+        parts = parts_of(solid)
+        if len(parts.bodies) == 1:
+            return self.thing
+        return altered(self.thing, "keep", _nearer(solid, parts, parts.bodies[:1], parts.bodies[1:]))
+
+    def bridged(self) -> Node | Compilable:
+        """Struts between bodies, as few and as short as can be."""
+        solid = from_grid(self.distances())
+        parts = parts_of(solid)
+        bodies = parts.bodies[parts.count[parts.bodies] > DUST * parts.count[parts.inside].sum()]
+        return self.added(*struts(solid, parts, bodies), self.how.bridge / self.scale / 2, solid)
+
+    def closed(self) -> Node | Compilable:
+        """Gaps are filled from face to face."""
+        solid = Samples(from_grid(self.distances(self.how.gap)))
+        found = walls(solid, self.how.gap / self.scale, self.work, gaps=True)
+        one = _apart(found.middle, solid.bricks.voxel)
+        return self.added(found.start[one], found.end[one], solid.bricks.voxel, solid.bricks)
+
+    def thickened(self) -> Node | Compilable:
+        """Balls as wide as the least thickness along the middle of all walls that are thinner: what opening
+        with such a ball would take away (Serra 1982), along the part of the medial axis between opposite
+        faces.
+        """
+        solid, least = Samples(from_grid(self.distances(self.how.thickness))), self.how.thickness / self.scale
+        middle = walls(solid, least, self.work).middle
+        middle = middle[_apart(middle, solid.bricks.voxel)]
+        return self.added(middle, middle, least / 2, solid.bricks)
+
+    def added(self, start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Node | Compilable:
+        """With strokes, if there are any."""
+        self.planned = replace(self.planned, outer=self.planned.outer.grown(2 * radius))
+        return altered(self.thing, "add", strokes(start, end, radius, like)) if len(start) else self.thing
+
+    def hollowed(self) -> Node | Compilable:
+        """Everything farther inside than the walls are thick is taken away, and two holes made."""
+        hollow = from_grid(self.distances(self.how.hollow).offset(-self.how.hollow / self.scale))
+        rows, offsets = np.nonzero((hollow.values < 0) & (hollow.values > -hollow.voxel))
+        if not len(rows):
+            raise VolumeError(f"walls of {self.how.hollow:g} mm leave nothing to hollow out")
+        thing = altered(self.thing, "cut", Samples(hollow))
+        points = np.array(hollow.origin) + hollow.voxel * positions(hollow, rows, offsets)
+        depth = -hollow.values[rows, offsets]
+        for hole in self.drains(points, depth) if self.how.drain else ():
+            thing = altered(thing, "cut", hole)
+        return thing
+
+    def drains(self, hollow: np.ndarray, depth: np.ndarray) -> Iterator[Node]:
+        """From the hollow's lowest point to the nearer side along x: one downwards would be shut by the
+        plate. And from its highest point upwards, which hangs lowest on the printer. hollow: points in it,
+        next to its wall, [n, 3]; depth: how far they are from it.
+        """
+        radius, outer = self.how.drain / self.scale / 2, self.planned.outer
+        lowest, highest = (hollow[:, 2] - depth).argmin(), (hollow[:, 2] + depth).argmax()
+        x, y, z = hollow[lowest].tolist()
+        z -= float(depth[lowest])
+        to = outer.hi[0] + radius if x - outer.lo[0] > outer.hi[0] - x else outer.lo[0] - radius
+        side = cylinder(radius=radius, height=abs(to - x))
+        yield transform(side, rotate=(0, 1, 0, 90), translate=((x + to) / 2, y, z + radius))
+        x, y, z = hollow[highest].tolist()
+        low, high = z - radius, outer.hi[2] + radius
+        yield transform(cylinder(radius=radius, height=high - low), translate=(x, y, (low + high) / 2))
+
+
+def _apart(points: np.ndarray, voxel: float) -> np.ndarray:
+    """Numbers of points of which no two are in the same half voxel."""
+    _, first = np.unique(np.round(2 * points / voxel).astype(np.int64), axis=0, return_index=True)
+    return np.asarray(first)
+
+
+def _nearer(solid: Bricks, parts: Parts, these: np.ndarray, others: np.ndarray) -> Samples:
+    """Negative where it is nearer to these parts than to the others: half the difference of the distances. So
+    the border lies midway between them, and the surfaces of both stay as they are.
+    """
+    near, far = (
+        Samples(from_grid(to_grid(with_signs(solid, *parts.masks(p))).redistance())) for p in (these, others)
+    )
+    rows, offsets = np.divmod(np.arange(solid.values.size), 512)
+    at = (np.array(solid.origin) + solid.voxel * positions(solid, rows, offsets)).T
+    share = np.clip((near.points(*at) - far.points(*at)) / 2, -8 * solid.voxel, 8 * solid.voxel)
+    signed = with_signs(solid, *parts.masks(these))
+    return Samples(replace(signed, values=share.astype(np.float32).reshape(solid.values.shape)))
+
+
+def _standing(made: Plan, how: Print, scale: float) -> Plan:
+    """With its bottom cut off and a raft under it.
+
+    The raft reaches a tenth of the longest side beyond the object, and half its height into it.
+    """
+    thing, found, outer = made.root, made.box, made.outer
+    (x0, y0, z0), (x1, y1, z1) = found.lo, found.hi
+    base, raft = how.base / scale, how.raft / scale
+    if base:
+        z0 += base
+        if z0 >= z1:
+            raise VolumeError(f"a base of {base * scale:g} mm leaves nothing of the object")
+        thing = altered(thing, "keep", plane(normal=(0, 0, -1), offset=-z0))
+        found, outer = Box((x0, y0, z0), (x1, y1, z1)), Box((*outer.lo[:2], z0), outer.hi)
+    if raft:
+        rim = max(found.size) / 10
+        lying = Box((x0 - rim, y0 - rim, z0 - raft / 2), (x1 + rim, y1 + rim, z0 + raft / 2))
+        thing = altered(thing, "add", transform(box(size=lying.size), translate=lying.centre))
+        found, outer = found | lying, outer | lying
+    return replace(made, root=thing, box=found, outer=outer)

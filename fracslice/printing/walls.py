@@ -1,0 +1,133 @@
+"""How thick a sampled solid is, and how wide its gaps: straight through, from surface to surface.
+
+From each crossing of a grid edge a ray follows the normal until it comes out again, in steps of the distance
+to the surface (sphere tracing, Hart 1996); its length is the wall's thickness there if the two faces are
+turned away from each other. So the edge of a cube is no thin wall, as it would be to inscribed spheres
+(Hildebrand and Rüegsegger 1997), and a plate is as thick at its rim as in its middle. It is the shape
+diameter function (Shapira, Shamir and Cohen-Or 2008) with one ray.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..work import Work, chunks
+from .samples import Samples, interpolated, sample_at
+
+OPPOSITE = -0.5
+"""The cosine between the normals of two faces of a wall is at most this: wedges up to 60 degrees are walls.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """Walls or gaps that are thinner than a limit. start, end: float64 [n, 3], on the two faces; width:
+    float64 [n]; area: float64 [n], the part of the surface that each stands for. Scene units.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    width: np.ndarray
+    area: np.ndarray
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Halfway between the faces, float64 [n, 3]."""
+        return np.asarray((self.start + self.end) / 2)
+
+
+def walls(
+    solid: Samples,
+    limit: float,
+    work: Work,
+    *,
+    gaps: bool = False,
+    direction: tuple[float, float, float] | None = None,
+) -> Walls:
+    """Walls, or gaps, up to `limit` scene units thick, of a field of distances.
+
+    direction: measure along it instead of the normal, through faces that look along it or against it. Right
+    within a voxel; what is thinner than one shows only where a sample lies in it.
+    """
+    b, towards = solid.bricks, -1.0 if gaps else 1.0
+    lower, axis = _crossed(solid)
+    start, step = np.asarray(b.origin), b.voxel * np.eye(3)
+    points, ends, normals = (np.empty((len(lower), 3)) for _ in range(3))
+    width, facing = np.empty(len(lower)), np.empty(len(lower))
+
+    def task(part: slice) -> None:
+        here = start + b.voxel * lower[part]
+        beyond = here + step[axis[part]]
+        f, g = solid.points(*here.T), solid.points(*beyond.T)
+        points[part] = here + (f / np.where(f == g, 1, f - g))[:, None] * (beyond - here)
+        normals[part] = _normals(solid, points[part])
+        ways = -towards * normals[part]
+        if direction is not None:
+            ways = np.copysign(1, ways @ np.array(direction))[:, None] * np.array(direction)
+        frame = (*b.origin, b.voxel, b.index, solid.bounds, b.values)
+        _through(points[part], ways, limit, towards, *frame, width[part])
+        ends[part] = points[part] + width[part, None] * ways
+        facing[part] = (_normals(solid, ends[part]) * normals[part]).sum(1)
+        if direction is not None:
+            facing[part] = np.where(np.abs((normals[part] * ways).sum(1)) > -OPPOSITE, facing[part], 1)
+
+    work.map(task, chunks(len(lower), 1 << 13))
+    thin = (width < limit) & (facing < OPPOSITE)
+    area = b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
+    return Walls(points[thin], ends[thin], width[thin], area[thin])
+
+
+def _crossed(solid: Samples) -> tuple[np.ndarray, np.ndarray]:
+    """The lower grid points int64 [n, 3] and the axes int64 [n] of the edges that the surface crosses."""
+    b = solid.bricks
+    frame = (b.ijk, b.voxel, b.index, solid.bounds, b.values)
+    lower = np.empty((_edges(*frame, np.empty((0, 3), np.int64), np.empty(0, np.int64)), 3), np.int64)
+    axis = np.empty(len(lower), np.int64)
+    _edges(*frame, lower, axis)
+    return lower, axis
+
+
+@njit(cache=True, nogil=True)
+def _edges(ijk, voxel, index, bounds, values, lower, axis):  # type: ignore[no-untyped-def]
+    n = 0
+    for row in range(len(ijk)):
+        for s in range(512):
+            x, y, z = ijk[row, 0] + (s >> 6), ijk[row, 1] + ((s >> 3) & 7), ijk[row, 2] + (s & 7)
+            inside = values[row, s] < 0
+            for a in range(3):
+                u, v, w = x + (a == 0), y + (a == 1), z + (a == 2)
+                if (sample_at(index, bounds, values, voxel, u, v, w) < 0) != inside:
+                    if n < len(axis):
+                        lower[n, 0], lower[n, 1], lower[n, 2], axis[n] = x, y, z, a
+                    n += 1
+    return n
+
+
+def _normals(solid: Samples, points: np.ndarray) -> np.ndarray:
+    """Unit normals by central differences over a voxel, [n, 3]."""
+    half = solid.bricks.voxel / 2 * np.eye(3)
+    slope = np.stack([solid.points(*(points + s).T) - solid.points(*(points - s).T) for s in half], 1)
+    unit: np.ndarray = slope / np.maximum(np.linalg.norm(slope, axis=1), 1e-30)[:, None]
+    return unit
+
+
+@njit(cache=True, nogil=True)
+def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, bounds, values, width):  # type: ignore[no-untyped-def]
+    """How far it is to the other side; twice the limit where that is farther."""
+    for n in range(len(points)):
+        (x, y, z), (u, v, w) = points[n], ways[n]
+        s, f, before = 0.1 * voxel, 0.0, 0.0
+        width[n] = 2 * limit
+        while s < limit + voxel:
+            f = towards * interpolated(
+                x + s * u, y + s * v, z + s * w, x0, y0, z0, voxel, index, bounds, values
+            )
+            if f >= 0:
+                break
+            before, s = -f, s + max(-f, 0.1 * voxel)
+        if f >= 0 and s < limit + voxel:
+            step = max(before, 0.1 * voxel) if before > 0 else 0.0
+            width[n] = s - step * f / (f + before) if before + f > 0 else s
