@@ -22,8 +22,8 @@ def twist(child, x, y, z, rate, radius, margin, along_x, along_y):  # type: igno
     Primitives").
 
     At radius rho space is sheared by s = rate rho, which stretches by (s + sqrt(s^2 + 4)) / 2. With that at
-    5/4 of the element's own radius, L = the product of it and the element's. Beyond, the value is the distance
-    to the cylinder around it.
+    5/4 of the element's own radius, L = the product of it and the element's. Beyond, the value is the
+    distance to the cylinder around it.
     """
     if along_x:
         a, b, t = y, z, x
