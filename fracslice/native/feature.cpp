@@ -5,40 +5,51 @@
 namespace fracslice {
 namespace {
 
-using Matrix = std::array<Vec3, 3>;
+// A symmetric matrix: its diagonal, and the elements that are left where row and column k are struck out.
+struct Symmetric {
+    Vec3 diagonal{}, other{};
 
-// Eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations (1846).
-void eigen(Matrix a, Vec3& values, Matrix& vectors) {
-    vectors = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
-    bool turned = true;
-    for (int sweep = 0; sweep < 8 && turned; ++sweep) {
-        turned = false;
-        for (int p = 0; p < 2; ++p) {
-            for (int q = p + 1; q < 3; ++q) {
-                if (std::abs(a[p][q]) < 1e-15) continue;
-                turned = true;
-                double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-                double t = std::copysign(1.0, theta) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-                double c = 1 / std::sqrt(t * t + 1), s = t * c;
-                for (int k = 0; k < 3; ++k) {
-                    double x = a[k][p], y = a[k][q];
-                    a[k][p] = c * x - s * y;
-                    a[k][q] = s * x + c * y;
-                }
-                for (int k = 0; k < 3; ++k) {
-                    double x = a[p][k], y = a[q][k];
-                    a[p][k] = c * x - s * y;
-                    a[q][k] = s * x + c * y;
-                }
-                for (int k = 0; k < 3; ++k) {
-                    double x = vectors[k][p], y = vectors[k][q];
-                    vectors[k][p] = c * x - s * y;
-                    vectors[k][q] = s * x + c * y;
-                }
-            }
-        }
+    Vec3 row(int k) const {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        Vec3 found;
+        found[k] = diagonal[k], found[u] = other[v], found[v] = other[u];
+        return found;
     }
-    values = {a[0][0], a[1][1], a[2][2]};
+};
+
+// The eigenvalues, the largest first, from the cosines of a third of an angle (Smith 1961, "Eigenvalues of a symmetric 3 x 3
+// matrix"). One apart from the others is exact to rounding; two that are nearly equal, to its root.
+Vec3 eigenvalues(const Symmetric& a) {
+    double mean = (a.diagonal[0] + a.diagonal[1] + a.diagonal[2]) / 3;
+    Vec3 d = a.diagonal - Vec3{mean, mean, mean};
+    const Vec3& o = a.other;
+    double size = std::sqrt((dot(d, d) + 2 * dot(o, o)) / 6);
+    if (!(size > 1e-15 * mean)) return {mean, mean, mean};
+    double determinant = d[0] * d[1] * d[2] + 2 * o[0] * o[1] * o[2];
+    for (int k = 0; k < 3; ++k) determinant -= d[k] * o[k] * o[k];
+    double angle = std::acos(std::clamp(determinant / (2 * size * size * size), -1.0, 1.0)) / 3;
+    double largest = mean + 2 * size * std::cos(angle), least = mean - 2 * size * std::cos(angle - M_PI / 3);
+    return {largest, 3 * mean - largest - least, least};
+}
+
+// The unit vector that the matrix takes to `value` times itself, for an eigenvalue apart from the others: across the rows of
+// what is left when it is taken off.
+Vec3 eigenvector(Symmetric a, double value) {
+    a.diagonal = a.diagonal - Vec3{value, value, value};
+    Vec3 best{};
+    double longest = 0;
+    for (int k = 0; k < 3; ++k) {
+        Vec3 across = cross(a.row((k + 1) % 3), a.row((k + 2) % 3));
+        double length = dot(across, across);
+        if (length > longest) best = across, longest = length;
+    }
+    return longest > 0 ? (1 / std::sqrt(longest)) * best : Vec3{0, 0, 1};
+}
+
+// The solution of a x = b, by Cramer's rule: the inverse is as symmetric as the matrix.
+Vec3 solved(const Symmetric& a, const Vec3& b) {
+    Vec3 x = cross(a.row(1), a.row(2)), y = cross(a.row(2), a.row(0)), z = cross(a.row(0), a.row(1));
+    return (1 / dot(a.row(0), x)) * Vec3{dot(x, b), dot(y, b), dot(z, b)};
 }
 
 // Directions whose eigenvalue is a smaller share of the largest say nothing about where the planes meet.
@@ -93,31 +104,32 @@ bool clipped(const Vec3& start, const Vec3& direction, const Vec3& lower, double
 bool feature_point(const Crossing* crossings, int count, const Vec3& lower, double margin, Vec3& point) {
     Vec3 mean{};
     for (int i = 0; i < count; ++i) mean = mean + (1.0 / count) * crossings[i].point;
-    Matrix a{};
+    Symmetric a;
     Vec3 b{};
     for (int i = 0; i < count; ++i) {
         const Vec3& n = crossings[i].normal;
         double d = dot(n, crossings[i].point - mean);
-        for (int r = 0; r < 3; ++r) {
-            for (int c = 0; c < 3; ++c) a[r][c] += n[r] * n[c];
-            b[r] += d * n[r];
+        for (int k = 0; k < 3; ++k) {
+            a.diagonal[k] += n[k] * n[k];
+            a.other[k] += n[(k + 1) % 3] * n[(k + 2) % 3];
+            b[k] += d * n[k];
         }
     }
-    Vec3 values;
-    Matrix vectors;
-    eigen(a, values, vectors);
-    std::array<int, 3> order = {0, 1, 2};
-    std::sort(order.begin(), order.end(), [&](int i, int j) { return values[i] > values[j]; });
-    auto column = [&](int k) { return Vec3{vectors[0][order[k]], vectors[1][order[k]], vectors[2][order[k]]}; };
     // Where two planes meet is a line; a third direction, if the planes tell it, makes it a corner.
-    if (!(values[order[1]] > kRank * values[order[0]])) return false;
-    Vec3 line = mean;
-    for (int k = 0; k < 2; ++k) line = line + (dot(column(k), b) / values[order[k]]) * column(k);
-    if (values[order[2]] > kRank * values[order[0]]) {
-        point = line + (dot(column(2), b) / values[order[2]]) * column(2);
+    Vec3 values = eigenvalues(a);
+    if (!(values[1] > kRank * values[0])) return false;
+    if (values[2] > kRank * values[0]) {
+        point = mean + solved(a, b);
         if (fits(crossings, count, point) && moved_inside(point, lower, margin)) return true;
     }
-    return clipped(line, column(2), lower, margin, point) && fits(crossings, count, point);
+    Vec3 along = eigenvector(a, values[2]);
+    Symmetric across = a;
+    for (int k = 0; k < 3; ++k) {
+        across.diagonal[k] += values[0] * along[k] * along[k];
+        across.other[k] += values[0] * along[(k + 1) % 3] * along[(k + 2) % 3];
+    }
+    Vec3 line = mean + solved(across, b - dot(along, b) * along);
+    return clipped(line, along, lower, margin, point) && fits(crossings, count, point);
 }
 
 bool face_corner(const Crossing& a, const Crossing& b, int axis, const Vec3& lower, double margin, Vec3& corner) {
