@@ -85,15 +85,23 @@ class HostAccumulator:
 
     def mean(self) -> np.ndarray:
         """The picture so far: float32 [height, width, 3], linear light; black where there is no sample."""
-        counts = self.sums[:, 5:6]
-        colours = (self.sums[:, :3] / np.maximum(counts, 1)).reshape(self.height, self.width, 3)
-        if self.passes == 1:
-            y, x = np.mgrid[: self.height, : self.width] // self.coarse * self.coarse
-            colours = colours[y, x]
-        return np.asarray(colours, np.float32)
+        return self._spread(self._known())
 
     def shown(self, film: Film, mode: str) -> np.ndarray:
-        return levels(develop(self.mean(), film, mode))
+        return self._spread(levels(develop(self._known(), film, mode)))
+
+    def _known(self) -> np.ndarray:
+        """The mean of the pixels that have samples, float32; after the first pass those of its grid."""
+        step = self.coarse if self.passes == 1 else 1
+        sums = self.sums.reshape(self.height, self.width, CHANNELS)[::step, ::step]
+        return np.asarray(sums[..., :3] / np.maximum(sums[..., 5:], 1), np.float32)
+
+    def _spread(self, known: np.ndarray) -> np.ndarray:
+        """A picture of the whole film."""
+        if self.passes != 1:
+            return known
+        wide = known.repeat(self.coarse, 0).repeat(self.coarse, 1)
+        return np.ascontiguousarray(wide[: self.height, : self.width])
 
     def statistics(self) -> tuple[float, float]:
         squares = self.squares() if self.passes > 2 else np.array([np.inf])
@@ -123,12 +131,10 @@ class HostAccumulator:
         return pixels, len(pixels)
 
     def _pressing(self, most: int, tolerance: float) -> np.ndarray:
-        from scipy.ndimage import maximum_filter
-
         n = self.counts.astype(np.int32)
         squares = np.where(n < TRUSTED, np.inf, self.squares())
-        unfinished = (n < most) & (maximum_filter(squares, 3, mode="nearest") > tolerance * tolerance)
-        gain = maximum_filter(squares / n, 3, mode="nearest")
+        unfinished = (n < most) & (around(squares) > tolerance * tolerance)
+        gain = around(squares / n)
         begun = (n & (n - 1)) != 0
         known = gain[unfinished]
         return np.asarray(unfinished & (begun | (gain >= NEARLY * known.mean() if known.size else False)))
@@ -157,6 +163,13 @@ class HostAccumulator:
         if found != key or sums.shape != (width * height, CHANNELS):
             raise RenderError(f"{path}: is of another scene, view, size or version")
         return cls(width, height, sums, passes, coarse)
+
+
+def around(values: np.ndarray) -> np.ndarray:
+    """The largest of each pixel's value and its eight neighbours'."""
+    padded = np.pad(values, 1, mode="edge")
+    rows = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    return np.asarray(np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
 
 
 def levels(shown: np.ndarray) -> np.ndarray:

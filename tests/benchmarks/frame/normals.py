@@ -61,9 +61,7 @@ def main() -> None:
         ):
             cosine = (gradient(root, points, offsets, centre) * wanted).sum(1)
             angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-            print(
-                f"{name:12}{way:16} mean {angle.mean():7.3f}  worst 1 % {np.quantile(angle, 0.99):7.2f}"
-            )
+            print(f"{name:12}{way:16} mean {angle.mean():7.3f}  worst 1 % {np.quantile(angle, 0.99):7.2f}")
 
 
 if __name__ == "__main__":
