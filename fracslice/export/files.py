@@ -52,7 +52,7 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
             raise
         _settle(target.parent)
     except OSError as error:
-        raise ExportError(f"{path}: {_reason(error)}") from error
+        raise ExportError(f"{path}: {reason(error)}") from error
 
 
 def _mode(target: Path) -> int:
@@ -74,7 +74,8 @@ def _settle(folder: Path) -> None:
             os.close(handle)
 
 
-def _reason(error: OSError) -> str:
+def reason(error: OSError) -> str:
+    """Why the file system refuses, in words."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return "the disk is full; nothing was written"
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):

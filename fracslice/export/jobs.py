@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from fracslice.errors import ExportError
-from fracslice.export.files import _reason as reason
-from fracslice.export.files import check_target, replacing
+from fracslice.export.files import check_target, reason, replacing
 from fracslice.slicing import Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from fracslice.errors import ExportError
-from fracslice.export.files import _reason as reason
-from fracslice.export.files import check_target
+from fracslice.export.files import check_target, reason
 
 _HEAD = struct.Struct("<II")
 """Of a record: the length and the CRC-32 of what follows."""

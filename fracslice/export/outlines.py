@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from fracslice.errors import ExportError
-from fracslice.export.files import replacing
-from fracslice.export.jobs import JOB, SliceRun, reason, resumable_folder
+from fracslice.export.files import reason, replacing
+from fracslice.export.jobs import JOB, SliceRun, resumable_folder
 from fracslice.export.journal import journal
 from fracslice.slicing import Contours, Layer
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from fracslice.errors import ExportError
 from fracslice.export import png
-from fracslice.export.files import replacing
-from fracslice.export.jobs import JOB, SliceRun, add, reason, resumable_folder, resumable_zip
+from fracslice.export.files import reason, replacing
+from fracslice.export.jobs import JOB, SliceRun, add, resumable_folder, resumable_zip
 from fracslice.slicing import Layer
 
 MOST_MEMBERS = 65_535

@@ -21,6 +21,8 @@ constexpr uint64_t middles(int size) {
         for (int x = size / 2; x < kTile; x += size) word |= uint64_t(1) << (kTile * y + x);
     return word;
 }
+double length(double x, double y) { return std::sqrt(x * x + y * y); }
+
 uint16_t share_of(float share) { return uint16_t(share * kWhole + 0.5f); }
 
 constexpr uint64_t kMiddles[9] = {0, 0, middles(2), 0, middles(4), 0, 0, 0, middles(8)};
@@ -101,7 +103,7 @@ std::vector<Slab::Block> Slab::coarse(const Field& field, const Bounds& bounds) 
     std::vector<Block> blocks, cut;
     for (int y = 1; y < ty_ - 1; y += kCoarsest)
         for (int x = 1; x < tx_ - 1; x += kCoarsest) blocks.push_back({y, x, kCoarsest, 0, layers() - 1});
-    double width = std::hypot(frame_.dx, frame_.dy) * kTile / 2;
+    double width = length(frame_.dx, frame_.dy) * kTile / 2;
     while (!blocks.empty() && blocks[0].size > 0) {
         cut.clear();
         auto middle = [&](size_t i, double& column, double& row, double& height) {
@@ -111,7 +113,7 @@ std::vector<Slab::Block> Slab::coarse(const Field& field, const Bounds& bounds) 
         };
         evaluate(field, blocks.size(), middle, [&](size_t i, float f) {
             const Block& b = blocks[i];
-            if (std::fabs(f) > bounds.proven * std::hypot(width * b.size, (z_[b.last] - z_[b.first]) / 2)) {
+            if (std::fabs(f) > bounds.proven * length(width * b.size, (z_[b.last] - z_[b.first]) / 2)) {
                 if (f < 0) fill(b);
                 return;
             }
@@ -147,7 +149,7 @@ void Slab::tiles(const Field& field, const Bounds& bounds, const std::vector<Blo
     for (const Block& b : blocks)
         if (b.first <= layer && layer <= b.last) places.push_back({layer, b.y, b.x});
     constexpr int middle = kTile * kTile / 2 + kTile / 2;
-    double reach = std::hypot(frame_.dx, frame_.dy) * kTile / 2;
+    double reach = length(frame_.dx, frame_.dy) * kTile / 2;
     auto where = [&](size_t i, double& column, double& row, double& height) {
         const Place& p = places[i];
         column = (p.x - 0.5) * kTile, row = (p.y - 0.5) * kTile, height = z_[p.layer];
@@ -178,14 +180,14 @@ double Slab::likely(const Bounds& bounds, const float* middle) const {
             if (!std::isnan(other)) steep[axis] = std::max(steep[axis], std::fabs(*middle - other) / step[axis]);
         }
     if (steep[0] < 0 || steep[1] < 0) return bounds.proven;
-    return std::min(std::max(kSteep * std::hypot(steep[0], steep[1]), bounds.outside), bounds.proven);
+    return std::min(std::max(kSteep * length(steep[0], steep[1]), bounds.outside), bounds.proven);
 }
 
 // The middles of the quarters of each block of `size` whose own middle decides too little; their signs become the implied
 // ones of their quarters.
 void Slab::finer(const Field& field, const Bounds& bounds, int size) {
     int half = size / 2, quarter = size / 4;
-    double reach = std::hypot(frame_.dx, frame_.dy) * size / 2;
+    double reach = length(frame_.dx, frame_.dy) * size / 2;
     std::vector<int64_t> samples;
     for (size_t t = first_; t < count(); ++t) {
         for (uint64_t probes = known[t] & kMiddles[size]; probes; probes &= probes - 1) {
