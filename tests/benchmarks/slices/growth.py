@@ -1,8 +1,8 @@
 """How the cost of slicing grows: ``python -m tests.benchmarks.slices.growth [FINEST]``.
 
-Each scene at 256, 512, ... FINEST (1024) pixels and half as many layers, with pictures; prints the pixels that
-contours cut, evaluations and processor time, and how many times more each doubling takes. The surface grows four
-times, the volume eight times; a fractal's surface a little more than four.
+Each scene at 256, 512, ... FINEST (1024) pixels and half as many layers, with pictures; prints the pixels
+that contours cut, evaluations and processor time, and how many times more each doubling takes. The surface
+grows four times, the volume eight times; a fractal's surface a little more than four.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def main() -> None:
         last, pixels = None, 256
         while pixels <= finest:
             found = np.array(cost(root, pixels))
-            line = f"{name:10} {pixels:5} cut {found[0]:9.0f}  evaluations {found[1]:9.0f}  CPU {found[2]:6.2f} s"
+            line = f"{name:10} {pixels:5} cut {found[0]:8.0f}  evaluations {found[1]:9.0f}  {found[2]:6.2f} s"
             if last is not None:
                 line += "  times " + " ".join(f"{t:.2f}" for t in found / last)
             print(line)

@@ -1,0 +1,68 @@
+"""``fracslice slice`` as a person meets it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from fracslice_cli.main import run
+
+BALL = '<scene version="1"><solid size="20mm"><sphere/></solid></scene>'
+
+
+@pytest.fixture
+def ball(tmp_path: Path) -> Path:
+    path = tmp_path / "ball.xml"
+    path.write_text(BALL)
+    return path
+
+
+def sliced(*arguments: object) -> int:
+    return run(["slice", *map(str, arguments), "--pixel", "0.2mm"])
+
+
+def test_layers_of_a_range_of_heights(ball: Path, tmp_path: Path) -> None:
+    target = tmp_path / "ball.json"
+    assert sliced(ball, "-o", target, "--layer", "0.2mm..0.6mm") == 0
+    layers = json.loads(target.read_text())["layers"]
+    assert {round(layer["height"], 3) for layer in layers} == {0.2, 0.4, 0.6}
+    assert sum(layer["height"] for layer in layers) == pytest.approx(20)
+    assert layers[-1]["top"] == 20
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--layer", "0.4mm..0.2mm"], "expected a range from the lowest to the highest"),
+        (["--layer", "0.2mm..thick"], "'thick'"),
+        (["--layer", "..0.2mm"], "''"),
+        (["--layer", "30mm"], "as high as the object"),
+        (["--format", "gcode"], "known are"),
+    ],
+)
+def test_bad_input_is_one_line(
+    options: list[str], said: str, ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert sliced(ball, "-o", tmp_path / "out.cli", *options) == 2
+    error = capfd.readouterr().err
+    assert error.startswith("fracslice: ")
+    assert error.count("\n") == 1
+    assert said in error
+    assert [path.name for path in tmp_path.iterdir()] == ["ball.xml"]
+
+
+def test_an_archive_of_layers_of_one_height_refuses_a_range(
+    ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "out.sl1"
+    assert run(["slice", str(ball), "-o", str(target), "--layer", "0.2mm..0.6mm", "--printer", "sl1s"]) == 2
+    assert "has layers of one height" in capfd.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["ball.xml"]
+
+
+def test_a_folder_that_is_not_this_job(ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "layers").mkdir()
+    (tmp_path / "layers" / "job.json").write_text("{}")
+    assert sliced(ball, "-o", tmp_path / "layers", "--layer", "1mm") == 2
+    assert "is not this job interrupted" in capfd.readouterr().err
