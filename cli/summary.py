@@ -11,10 +11,14 @@ if TYPE_CHECKING:
 
 def summary(path: str, report: Report) -> str:
     """What was made, in a line or two."""
-    error = report.surface_error_mm
+    error, fewer = report.surface_error_mm, ""
+    if report.simplified is not None:
+        done = report.simplified
+        off = max(done.bound_mm, done.back_mm)
+        fewer = f"simplified from {done.from_triangles:,} triangles, at most {off:.3g} mm off\n"
     return (
         f"{path}: {found(report.mesh)}\n"
-        f"vertices {error.mean * 1000:.2g} um from the surface (99 %: {error.p99 * 1000:.2g} um), "
+        f"{fewer}vertices {error.mean * 1000:.2g} um from the surface (99 %: {error.p99 * 1000:.2g} um), "
         f"voxel {report.voxel_mm:.3g} mm, {report.seconds['total']:.1f} s, {report.peak_rss_mb:.0f} MB"
     )
 

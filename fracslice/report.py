@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .mesh.check import MeshReport
     from .mesh.components import Removed
+    from .mesh.simplify import Simplified
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Report:
     bricks: int
     seconds: dict[str, float]
     peak_rss_mb: float
+    simplified: Simplified | None = None
 
     @property
     def problems(self) -> tuple[str, ...]:
