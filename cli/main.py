@@ -12,8 +12,17 @@ from typing import NoReturn
 
 import click
 
-from fracslice.errors import ExportError, FracsliceError, RenderError, SceneError, SliceError, VolumeError
+from fracslice.errors import (
+    BenchError,
+    ExportError,
+    FracsliceError,
+    RenderError,
+    SceneError,
+    SliceError,
+    VolumeError,
+)
 
+from .bench import bench
 from .check import check
 from .formulas import formulas
 from .mesh import mesh
@@ -23,7 +32,7 @@ from .show import show
 from .slice import slice_
 from .working import StoppedError
 
-BAD_INPUT = (SceneError, RenderError, VolumeError, ExportError, SliceError)
+BAD_INPUT = (SceneError, RenderError, VolumeError, ExportError, SliceError, BenchError)
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 
 
@@ -43,7 +52,7 @@ def commands(context: click.Context) -> None:
         context.exit(USAGE)
 
 
-for command in (mesh, render, slice_, check, show, formulas, scenes):
+for command in (mesh, render, slice_, check, show, formulas, scenes, bench):
     commands.add_command(command)
 
 

@@ -37,5 +37,9 @@ class SliceError(FracsliceError):
     """Layers cannot be cut or written."""
 
 
+class BenchError(FracsliceError):
+    """A benchmark cannot be run as asked."""
+
+
 class Cancelled(FracsliceError):  # noqa: N818  it is no fault
     """The caller asked to stop."""

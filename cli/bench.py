@@ -1,0 +1,81 @@
+"""fracslice bench: run time against error, on this machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .options import quiet_option, threads_option
+from .working import working
+
+
+@click.command()
+@click.option("-o", "--output", default="bench", metavar="DIR", help="Where to; the folder bench by default.")
+@click.option("--workload", "workloads", multiple=True, metavar="NAME", help="Only this one; repeatable.")
+@click.option(
+    "--resolution", "resolutions", type=int, multiple=True, metavar="N", help="64, 128 and 256 by default."
+)
+@click.option(
+    "--peer",
+    "peers",
+    multiple=True,
+    metavar="NAME=COMMAND",
+    help="Another program; {workload}, {resolution} and {output} (a .ply file) are filled in.",
+)
+@click.option(
+    "--repeat", type=click.IntRange(1, 100), default=3, metavar="N", help="Medians of 3 by default."
+)
+@click.option(
+    "--limit",
+    type=click.FloatRange(0, min_open=True),
+    default=60.0,
+    metavar="SECONDS",
+    help="60 by default; what takes longer is not tried at finer resolutions.",
+)
+@threads_option
+@quiet_option
+def bench(
+    output: str,
+    workloads: tuple[str, ...],
+    resolutions: tuple[int, ...],
+    peers: tuple[str, ...],
+    repeat: int,
+    limit: float,
+    threads: int,
+    quiet: bool,
+) -> int:
+    """Measure run time against error of each way to a mesh, and write a report with plots.
+
+    Workloads: sphere, torus, menger3, menger4, mandelbulb, julia. A peer writes its mesh in scene units; its
+    time is that of the whole command, unless the last line it prints is a JSON object with "wall_s" and
+    "cpu_s". Needs matplotlib, and scikit-image for its column: pip install 'fracslice[bench]'.
+    """
+    from fracslice.bench.report import require_plots, write_report
+    from fracslice.bench.runs import Peer, Task, measure
+
+    require_plots()
+    chosen = {"workloads": workloads, "resolutions": resolutions}
+    given = {name: values for name, values in chosen.items() if values}
+    task = Task(**given, peers=tuple(Peer.read(text) for text in peers), repeats=repeat, limit_s=limit)  # type: ignore[arg-type]
+    folder = Path(output)
+    check_folder(folder)
+    with working(threads, quiet) as work:
+        found = measure(task, work)
+        folder.mkdir(exist_ok=True)
+        paths = write_report(found, folder)
+    if not quiet:
+        click.echo(f"{paths[0]}: {len(found)} measurements")
+        for one in found:
+            if one.failed:
+                click.echo(f"{one.workload} {one.resolution}, {one.method}: {one.failed}", err=True)
+    return 1 if any(one.failed for one in found) else 0
+
+
+def check_folder(folder: Path) -> None:
+    """Refuses a folder that could not be made or written to before any work is done."""
+    from fracslice.export import check_target
+
+    check_target(folder / "report.md" if folder.is_dir() else folder)
+    if folder.exists() and not folder.is_dir():
+        raise click.UsageError(f"{folder}: expected a folder")

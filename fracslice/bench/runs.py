@@ -1,0 +1,173 @@
+"""All measurements of a benchmark, one after the other, each in a child process."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from ..errors import BenchError, FracsliceError
+from ..work import Work
+from .methods import METHODS
+from .workloads import WORKLOADS
+
+PLACES = ("{workload}", "{resolution}", "{output}")
+
+
+@dataclass(frozen=True)
+class Peer:
+    """A program to run beside ours. command: words with {workload}, {resolution} and {output}, a mesh file in
+    scene units that it writes."""
+
+    name: str
+    command: tuple[str, ...]
+
+    @classmethod
+    def read(cls, text: str) -> Peer:
+        """From NAME=COMMAND. Raises `BenchError`."""
+        name, _, command = text.partition("=")
+        missing = [place for place in PLACES if place not in command]
+        if not name or missing:
+            raise BenchError(
+                f"peer {text!r}: expected NAME=COMMAND with {{workload}}, {{resolution}} and {{output}}"
+            )
+        return cls(name, tuple(shlex.split(command)))
+
+
+@dataclass(frozen=True)
+class Task:
+    """What to measure. repeats: the median of so many runs is told. limit_s: a method that took longer at a
+    resolution is not tried at finer ones."""
+
+    workloads: tuple[str, ...] = tuple(WORKLOADS)
+    resolutions: tuple[int, ...] = (64, 128, 256)
+    peers: tuple[Peer, ...] = ()
+    repeats: int = 3
+    limit_s: float = 60.0
+
+    def __post_init__(self) -> None:
+        for name in self.workloads:
+            if name not in WORKLOADS:
+                raise BenchError(f"workload {name!r}: expected one of {', '.join(WORKLOADS)}")
+        for n in self.resolutions:
+            if not 16 <= n <= 2048:
+                raise BenchError(f"resolution {n}: expected 16 to 2048")
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """numbers: wall_s, cpu_s and error_voxels, and what else the method tells; or failed: why there are
+    none."""
+
+    workload: str
+    resolution: int
+    method: str
+    numbers: dict[str, float]
+    failed: str = ""
+
+
+def measure(task: Task, work: Work) -> list[Measurement]:
+    """Runs everything. A method that fails is told of, and the rest goes on. Raises `Cancelled`."""
+    methods: list[str | Peer] = [name for name in METHODS if "scikit" not in name or find_spec("skimage")]
+    methods += task.peers
+    cases = [(w, n, m) for w in task.workloads for n in sorted(task.resolutions) for m in methods]
+    found: list[Measurement] = []
+    slow = set()
+    for i, (workload, resolution, method) in enumerate(cases):
+        work.progress("measuring", i / len(cases))
+        name = method.name if isinstance(method, Peer) else method
+        if (workload, name) in slow:
+            continue
+        started = time.perf_counter()
+        try:
+            runs = list(_runs(task.repeats, workload, resolution, method, work))
+            middle = {key: median(run[key] for run in runs) for key in runs[0]}
+            found.append(Measurement(workload, resolution, name, middle))
+        except _FailedError as error:
+            found.append(Measurement(workload, resolution, name, {}, str(error)))
+        if time.perf_counter() - started > task.limit_s * task.repeats:
+            slow.add((workload, name))
+    work.progress("measuring", 1.0)
+    return found
+
+
+class _FailedError(FracsliceError):
+    """A child process ended without a result."""
+
+
+def _runs(
+    repeats: int, workload: str, resolution: int, method: str | Peer, work: Work
+) -> Iterator[dict[str, float]]:
+    about = {"workload": workload, "resolution": resolution, "threads": work.threads}
+    for _ in range(repeats):
+        if isinstance(method, Peer):
+            yield _peer(method, about, work)
+        else:
+            yield _child(about | {"method": method}, work)
+
+
+def _child(asked: dict[str, Any], work: Work) -> dict[str, float]:
+    output, _ = _run([sys.executable, "-m", "fracslice.bench.measure"], json.dumps(asked), work)
+    told: dict[str, float] = json.loads(output)
+    return told
+
+
+def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
+    """Runs a peer: its time is that of the whole command, unless it tells its own."""
+    with tempfile.TemporaryDirectory(prefix="fracslice-") as folder:
+        path = Path(folder) / "mesh.ply"
+        places = {"workload": about["workload"], "resolution": about["resolution"], "output": path}
+        words = [word.format(**places) for word in peer.command]
+        output, used = _run(words, "", work)
+        with suppress(ValueError, IndexError):
+            told = json.loads(output.splitlines()[-1])
+            used |= {key: float(told[key]) for key in ("wall_s", "cpu_s", "evaluations") if key in told}
+        if not path.exists():
+            raise _FailedError(f"{words[0]} wrote no mesh")
+        return used | _child(about | {"mesh": str(path)}, work)
+
+
+def _run(words: list[str], text: str, work: Work) -> tuple[str, dict[str, float]]:
+    """A command's output, and the time and memory it took. Raises `_FailedError`, `Cancelled`."""
+    start = time.perf_counter()
+    with tempfile.TemporaryFile() as fed, tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        fed.write(text.encode())
+        fed.seek(0)
+        try:
+            child = subprocess.Popen(words, stdin=fed, stdout=out, stderr=err)
+        except OSError as error:
+            raise _FailedError(f"{words[0]}: {error.strerror}") from None
+        status, usage = _ended(child, work)
+        wall = time.perf_counter() - start
+        out.seek(0)
+        err.seek(0)
+        if status:
+            lines = err.read().decode(errors="replace").strip().splitlines()
+            raise _FailedError(lines[-1] if lines else f"{words[0]} ended with status {status}")
+        peak = usage.ru_maxrss / (1 << 20 if sys.platform == "darwin" else 1 << 10)
+        used = {"wall_s": wall, "cpu_s": usage.ru_utime + usage.ru_stime, "peak_mb": peak}
+        return out.read().decode(errors="replace"), used
+
+
+def _ended(child: subprocess.Popen[bytes], work: Work) -> tuple[int, Any]:
+    """Waits for a child, and stops it when the work is cancelled."""
+    while True:
+        pid, status, usage = os.wait4(child.pid, os.WNOHANG)
+        if pid:
+            child.returncode = os.waitstatus_to_exitcode(status)
+            return child.returncode, usage
+        if work.cancel.wait(0.02):
+            child.kill()
+            child.wait()
+            work.check()
