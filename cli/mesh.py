@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from fracslice.job import MeshJob, Result
     from fracslice.report import Report
     from fracslice.scene import Scene
+    from fracslice.store import Store
     from fracslice.work import Work
 
 GRID, STL = ".vdb", ".stl"
@@ -34,6 +35,11 @@ GRID, STL = ".vdb", ".stl"
 @set_option
 @click.option("--report", metavar="FILE.json", help="Write the numbers that prove what was made.")
 @click.option("--picture", metavar="FILE.png", help="Write a shaded picture of the mesh.")
+@click.option(
+    "--cache",
+    metavar="FOLDER",
+    help="Keep samples and surface there, and use those of the same scene and voxel, whatever else differs.",
+)
 @threads_option
 @quiet_option
 def mesh(
@@ -42,6 +48,7 @@ def mesh(
     settings: tuple[str, ...],
     report: str | None,
     picture: str | None,
+    cache: str | None,
     threads: int,
     quiet: bool,
     **options: Any,
@@ -56,7 +63,7 @@ def mesh(
     check_outputs(output, report, picture)
     scene = load_scene(source, settings)
     job = job_of(scene, **options)
-    with working(threads, quiet) as work:
+    with working(threads, quiet, store_in(cache)) as work:
         try:
             told = made(scene, job, output, picture, work)
         except TooLargeError:
@@ -68,6 +75,13 @@ def mesh(
     if not quiet:
         click.echo(summary(output, told))
     return 1 if told.problems else 0
+
+
+def store_in(folder: str | None) -> Store | None:
+    """Where finished work is kept, if it is."""
+    from fracslice.store import Store
+
+    return None if folder is None else Store(Path(folder))
 
 
 def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> Report:

@@ -8,9 +8,13 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from fracslice.errors import Cancelled, FracsliceError
 from fracslice.work import Work
+
+if TYPE_CHECKING:
+    from fracslice.store import Store
 
 Progress = Callable[[str, float], None]
 
@@ -24,10 +28,10 @@ class StoppedError(FracsliceError):
 
 
 @contextmanager
-def working(threads: int, quiet: bool) -> Iterator[Work]:
+def working(threads: int, quiet: bool, store: Store | None = None) -> Iterator[Work]:
     """Work that shows its progress if somebody may be looking, and is cancelled by SIGINT and SIGTERM."""
     with _bar(quiet) as progress, _cancelled_by_signals() as cancel:
-        yield Work(threads=threads, progress=progress, cancel=cancel)
+        yield Work(threads=threads, progress=progress, cancel=cancel, store=store)
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .errors import SceneError
 from .export.files import check_target, replacing
 from .export.stl import write_pieces
 from .job import Clock, MeshJob
@@ -53,6 +54,10 @@ def stream_mesh(
     how = what.how(scene)
     if not how.whole:
         raise how.fail("cannot change a mesh that does not fit in memory, other than by keep and cavities")
+    if what.simplify_mm is not None:
+        raise SceneError(
+            f"simplify {what.simplify_mm:g}mm: needs the whole mesh, which does not fit in memory"
+        )
     from .export import application
     from .mesh.extract import contour_pieces
     from .mesh.survey import Survey

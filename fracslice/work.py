@@ -7,9 +7,12 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from .errors import Cancelled
+
+if TYPE_CHECKING:
+    from .store import Store
 
 T = TypeVar("T")
 
@@ -22,11 +25,12 @@ def _silent(stage: str, done: float) -> None:
 class Work:
     """threads: how many to use (default: all cores). progress: called as ``progress(stage, fraction)`` from
     time to time. cancel: set it from anywhere and the work stops within a fraction of a second with
-    `Cancelled`."""
+    `Cancelled`. store: where samples and surfaces are kept and looked for, if anywhere."""
 
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
     progress: Callable[[str, float], None] = _silent
     cancel: threading.Event = field(default_factory=threading.Event)
+    store: Store | None = None
 
     def check(self) -> None:
         """Raises `Cancelled` once somebody asked to stop."""
@@ -68,5 +72,3 @@ class Work:
 def chunks(count: int, size: int) -> list[slice]:
     """The slices that cut `count` things into pieces of at most `size`."""
     return [slice(i, min(i + size, count)) for i in range(0, count, size)]
-
-

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import MeshError
 from ..formulas.registry import Node
 from ..kernel import Compilable
+from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
 from ..volume.crossings import Crossings, refine_crossings
 from ..volume.lattice import BRICK
@@ -48,8 +49,15 @@ def contour(root: Node | Compilable, bricks: Bricks | SignBricks, work: Work | N
     proof. After Ho, Wu, Chen, Chuang and Ouhyoung 2005, "Cubical Marching Squares". Raises `MeshError` as
     `extract`, and `Cancelled`.
     """
-    (piece,) = contour_pieces(root, bricks, work, len(bricks))
-    return piece.mesh
+    work = work or Work()
+
+    def made() -> Arrays:
+        (piece,) = contour_pieces(root, bricks, work, len(bricks))
+        return {"vertices": piece.mesh.vertices, "triangles": piece.mesh.triangles}
+
+    signs = bricks.signs if isinstance(bricks, Bricks) else bricks
+    parts = ("surface", bricks.origin, bricks.voxel, bricks.index.shape, bricks.ijk, signs.signs)
+    return Mesh(**stored(work.store, parts, root, made))
 
 
 @dataclass(frozen=True, eq=False)

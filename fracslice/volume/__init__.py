@@ -8,6 +8,7 @@ from ..formulas.box import Box
 from ..formulas.registry import Node
 from ..kernel import Compilable, compile_scene
 from ..kernel.depth import resolve_depths
+from ..store import Arrays, stored
 from ..work import Work
 from .bricks import Bricks, SignBricks
 from .extent import Extent, extent
@@ -53,9 +54,24 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
 
 
 def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
-    """Samples a planned scene around its surface. Raises `VolumeError`, `Cancelled`."""
+    """Samples a planned scene around its surface, or takes the samples that were kept of it.
+
+    Raises `VolumeError`, `Cancelled`.
+    """
+    work = work or Work()
     lattice = Lattice.around(planned.outer, planned.voxel)
-    return sample(compile_scene(planned.root), planned.root.facts, lattice, work)
+
+    fresh: list[Bricks] = []
+
+    def made() -> Arrays:
+        bricks = sample(compile_scene(planned.root), planned.root.facts, lattice, work)
+        fresh.append(bricks)
+        return {"ijk": bricks.ijk, "values": bricks.values, "index": bricks.index}
+
+    kept = stored(work.store, ("samples", lattice), planned.root, made)
+    if fresh:
+        return fresh[0]
+    return Bricks(lattice.origin, lattice.voxel, kept["ijk"], kept["values"], kept["index"])
 
 
 def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
