@@ -54,7 +54,8 @@ def dense(what: Workload, resolution: int, work: Work) -> Made:
         values[i] = kernel.points(np.full_like(y, axis[i]), y, z).reshape(values[i].shape)
 
     work.map(layer, range(len(axis)))
-    points, triangles, *_ = marching_cubes(values, 0.0, spacing=(what.voxel(resolution),) * 3)
+    spacing = (what.voxel(resolution),) * 3
+    points, triangles, *_ = marching_cubes(values, 0.0, spacing=spacing)  # type: ignore[no-untyped-call]
     mesh = Mesh(points.astype(np.float64) - what.half, triangles.astype(np.int32))
     return mesh, values.size, values.size
 

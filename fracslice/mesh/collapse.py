@@ -55,7 +55,8 @@ def collapsed(mesh: Mesh, tolerance: NDArray[np.float64]) -> Collapsed:
     """
     count = len(mesh.vertices)
     triangles, corner = mesh.triangles.copy(), np.full(count, -1, np.int64)
-    across = _across(triangles, *corners_by_vertex(triangles, count), corner)
+    start, around = corners_by_vertex(triangles, count)
+    across = _across(triangles, start, around, corner)
     edge = np.flatnonzero(np.arange(len(across)) < across)
     t, k = edge // 3, edge % 3
     middles = (mesh.vertices[triangles[t, (k + 1) % 3]] + mesh.vertices[triangles[t, (k + 2) % 3]]) / 2

@@ -100,6 +100,7 @@ def test_scenes(text, message, folder, capfd):
             "mesh ball.xml -o out/x.stl --voxel 1mm --resolution 64",
             "voxel and resolution: expected one of them",
         ),
+        ("mesh ball.xml -o out/x.stl --simplify 0", "length '0': expected a length above zero"),
         ("mesh ball.xml -o out/x.stl --resolution 0", "resolution 0: expected 8 to 16384"),
         ("mesh ball.xml -o out/x.stl --resolution many", "'many' is not a valid integer"),
         ("mesh ball.xml -o out/x.stl --threads 0", "0 is not in the range"),

@@ -71,6 +71,18 @@ def test_size_set_and_base_change_what_is_made(ball, tmp_path, capfd):
     assert high[2] == pytest.approx(27, abs=0.2)
 
 
+def test_simplify_writes_fewer_triangles_and_says_how_near(ball, tmp_path, capfd):
+    model, report = tmp_path / "b.stl", tmp_path / "b.json"
+    options = ("--resolution", 48, "--simplify", "0.1mm", "--report", report)
+    assert fracslice("mesh", ball, "-o", model, *options) == 0
+    told = json.loads(report.read_text())
+    assert told["triangles"] < told["simplified"]["from_triangles"] / 3
+    assert max(told["simplified"]["bound_mm"], told["simplified"]["back_mm"]) <= 0.1
+    assert told["printable"] and told["surface_error_mm"]["max"] < 1e-4
+    assert model.stat().st_size == 84 + 50 * told["triangles"]
+    assert "simplified from " in capfd.readouterr().out
+
+
 def test_a_shipped_scene_is_known_by_its_name(tmp_path, capfd):
     assert (
         fracslice(
