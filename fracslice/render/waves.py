@@ -48,6 +48,7 @@ def follow_STEP(W, I, n, m, limit, P):
                 while following < n and W[$start + following] >= W[$end + following]:
                     W[$status + following] = 2.0
                     W[$steps + following] = 0.0
+                    W[$t + following] = 0.0
                     following += 1
                 W[@before + lane] = 0.0
                 W[@stride + lane] = 0.0
@@ -187,7 +188,7 @@ ONWARD = """
             store(W, $dz + i, ez)
             store(W, $side + i, es)
             enter, leave = span_box(nx, ny, nz, ex, ey, ez, P)
-            store(W, $end + i, leave)
+            store(W, $end + i, where(more > 0.002, leave, 0.0))
             store(W, $start + i, enter)
         else:
             store(W, $tr + i, more)
@@ -195,6 +196,7 @@ ONWARD = """
             store(W, $tb + i, more)
         start = load(W, $start + i)
         store(W, $start + i, where(more > 0.002, start, 1e30))"""
+"""A ray that is over starts behind its end, so that it is not followed: its numbers may be no numbers."""
 
 GATHER = """
 def gather(W, I, A, n, m, width):

@@ -15,7 +15,7 @@ def compiled(linked: Linked, bits: int, loops: str, name: str, arguments: str, f
     """The PTX of one loop for compute capability 9.0, an H100 or H200.
 
     arguments: a letter each: "r" a real, "n" a whole number; "R", "I" arrays of reals and int32, "M", "N"
-    2-D ones.
+    2-D ones, "U" a 2-D one of uint8.
     """
     path = folder / "scene.py"
     path.write_text(cuda_source.module(linked, bits, loops))
@@ -30,6 +30,7 @@ def compiled(linked: Linked, bits: int, loops: str, name: str, arguments: str, f
     kinds = {"r": real, "n": types.int64}
     for letters, element in (("RM", real), ("IN", types.int32)):
         kinds |= {letter: types.Array(element, k, "C") for k, letter in enumerate(letters, 1)}
+    kinds["U"] = types.Array(types.uint8, 2, "C")
     signature = tuple(kinds[letter] for letter in arguments)
     with pytest.MonkeyPatch.context() as patch:
         # Numba asks the GPU for its capability even where it is told one.
