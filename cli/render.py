@@ -26,9 +26,9 @@ def pixels(_: click.Context, __: click.Parameter, value: str | None) -> tuple[in
     if value is None:
         return None
     match = re.fullmatch(r"\s*(\d{1,5})\s*x\s*(\d{1,5})\s*", value)
-    if not match or not all(1 <= int(n) <= 32767 for n in match.groups()):
+    if not match or not all(1 <= int(n) <= 32768 for n in match.groups()):
         raise click.BadParameter(
-            f"{value!r}: expected pixels across and down, such as 1280x720, from 1 to 32767"
+            f"{value!r}: expected pixels across and down, such as 1280x720, from 1 to 32768"
         )
     return int(match[1]), int(match[2])
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -158,8 +160,10 @@ class HostAccumulator:
             with np.load(path, allow_pickle=False) as stored:
                 width, height, passes, coarse = map(int, stored["shape"])
                 sums, found = np.ascontiguousarray(stored["sums"]), str(stored["key"])
-        except (OSError, ValueError, KeyError) as error:
-            raise RenderError(f"{path}: expected a picture in the making: {error}") from None
+        except OSError as error:
+            raise RenderError(f"{path}: {error.strerror or error}") from None
+        except (ValueError, KeyError, EOFError, BadZipFile, zlib.error):
+            raise RenderError(f"{path}: expected a picture in the making, whole, as it was saved") from None
         if found != key or sums.shape != (width * height, CHANNELS):
             raise RenderError(f"{path}: is of another scene, view, size or version")
         return cls(width, height, sums, passes, coarse)

@@ -77,9 +77,45 @@ def test_a_state_of_another_picture_is_refused(tmp_path: Path) -> None:
     other = Renderer(ROOT, VIEW, (34, 50), Work(threads=1), "cpu")
     with pytest.raises(RenderError, match="another scene"):
         other.resume(tmp_path / "state.npz")
-    (tmp_path / "state.npz").write_bytes(b"no")
-    with pytest.raises(RenderError, match="expected a picture in the making"):
-        other.resume(tmp_path / "state.npz")
+
+
+@pytest.mark.parametrize("left", [0, 2, 500, -30])
+def test_a_state_that_was_cut_off_is_refused(tmp_path: Path, left: int) -> None:
+    of, path = renderer(), tmp_path / "state.npz"
+    with open(path, "wb") as file:
+        of.save(file)
+    path.write_bytes(path.read_bytes()[:left])
+    with pytest.raises(RenderError, match=r"state.npz: expected a picture in the making"):
+        of.resume(path)
+
+
+def test_a_picture_that_was_not_looked_at_in_time_is_gone() -> None:
+    passes = renderer().passes()
+    first, second = next(passes), next(passes)
+    assert second.shown.dtype == np.uint8
+    with pytest.raises(RenderError, match="pass 1: its picture is gone"):
+        _ = first.image
+
+
+def test_most_samples_go_where_they_take_most_error_away() -> None:
+    of = renderer()
+    for done in of.passes(256, tolerance=0.0):
+        if done.samples > 24:
+            break
+    n = of.accumulator.host().counts
+    assert n.min() >= 8
+    assert n.max() >= 4 * n.min()
+    assert ((n[n > 8].astype(int) & (n[n > 8].astype(int) - 1)) == 0).any()
+
+
+@pytest.mark.parametrize(("within", "coarse"), [(1e-9, 8), (1e9, 2)])
+def test_the_first_pass_from_a_moved_camera_is_as_fine_as_there_is_time(within: float, coarse: int) -> None:
+    of = renderer()
+    finished(of)
+    of.look(VIEW.camera.moved(right=0.1), within)  # type: ignore[union-attr]
+    first = next(of.passes())
+    assert first.active == pytest.approx(1 / coarse**2, rel=0.3)
+    assert (first.image.sum(2) > 0).mean() > 0.9
 
 
 def test_cancelling_keeps_what_was_complete() -> None:
