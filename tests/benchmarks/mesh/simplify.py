@@ -18,7 +18,7 @@ from fracslice.mesh.extract import contour
 from fracslice.mesh.nearest import sampled_distances
 from fracslice.mesh.rounding import rounded
 from fracslice.mesh.simplify import simplify
-from fracslice.mesh.solid import from_manifold, to_manifold
+from fracslice.mesh.solid import to_manifold
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 
@@ -33,7 +33,8 @@ TOLERANCE = 0.05
 
 
 def by_manifold3d(mesh: Mesh, tolerance: float, count: int) -> Mesh:
-    return from_manifold(to_manifold(mesh).as_original().simplify(tolerance))
+    found = to_manifold(mesh).as_original().simplify(tolerance).to_mesh64()
+    return Mesh(np.ascontiguousarray(found.vert_properties[:, :3]), found.tri_verts.astype(np.int32))
 
 
 def by_pymeshlab(mesh: Mesh, tolerance: float, count: int) -> Mesh:
