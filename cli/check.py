@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from typing import Any
 
 import click
 
 from .inputs import is_model, load_model, load_scene
 from .options import job_of, job_options, length, print_options, quiet_option, set_option, threads_option
-from .slice import check_print, heights
+from .slice import check_print, heights, limits_of
 from .summary import found, summary
 from .working import working
 
@@ -21,6 +22,10 @@ from .working import working
 @click.option("--pixel", callback=length, metavar="LENGTH", help="With --layer; the printer's, or 0.05mm.")
 @click.option("--printer", "machine", metavar="NAME", help="With --layer: whose bed it has to fit.")
 @click.option("--picture", metavar="FILE.png", help="With --layer: draw the worst layers.")
+@click.option("--wall", callback=length, default="0.1mm", metavar="LENGTH", help="The thinnest wall; 0.1mm.")
+@click.option(
+    "--floor", callback=length, default="0.1mm", metavar="LENGTH", help="The thinnest floor; 0.1mm."
+)
 @print_options
 @job_options
 @set_option
@@ -39,10 +44,11 @@ def check(
 ) -> int:
     """Say whether a model file, or the mesh or the layers of a scene, would print as it is.
 
-    The options after --json are for scenes, as for "fracslice mesh". Exits with 1 if it would not print.
+    The options after --json are for scenes. Exits with 1 if it would not print.
     """
     from fracslice.job import make_mesh
     from fracslice.mesh.check import check as examined
+    from fracslice.printing.checks import check_solid
 
     if options["layer"] is not None and not is_model(source):
         return check_print(source, settings, as_json, threads, quiet, **options)
@@ -53,8 +59,11 @@ def check(
     else:
         scene = load_scene(source, settings)
         with working(threads, quiet) as work:
-            report = make_mesh(scene, job_of(scene, **options), work).report
-        numbers, line, problems = report.as_dict(), summary(source, report), report.problems
+            result = make_mesh(scene, job_of(scene, **options), work)
+            solid = check_solid(result.bricks, result.place.scale, limits_of(options), work)
+        numbers = result.report.as_dict() | {"solid": solid.as_dict()}
+        problems = [*result.report.problems, *solid.thin]
+        line = os.linesep.join([summary(source, result.report), *(f"  {p}" for p in solid.thin)])
     click.echo(json.dumps(numbers, indent=2) if as_json else line)
     return 1 if problems else 0
 

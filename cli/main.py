@@ -14,6 +14,7 @@ import click
 
 from fracslice.errors import (
     BenchError,
+    DeviceError,
     ExportError,
     FracsliceError,
     RenderError,
@@ -32,7 +33,7 @@ from .show import show
 from .slice import slice_
 from .working import StoppedError
 
-BAD_INPUT = (SceneError, RenderError, VolumeError, ExportError, SliceError, BenchError)
+BAD_INPUT = (DeviceError, SceneError, RenderError, VolumeError, ExportError, SliceError, BenchError)
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 
 

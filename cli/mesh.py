@@ -40,6 +40,12 @@ GRID, STL = ".vdb", ".stl"
     metavar="FOLDER",
     help="Keep samples and surface there, and use those of the same scene and voxel, whatever else differs.",
 )
+@click.option(
+    "--device",
+    type=click.Choice(["cpu", "cuda", "auto"]),
+    default="cpu",
+    help="What samples the field; auto: the GPU, if there is one.",
+)
 @threads_option
 @quiet_option
 def mesh(
@@ -49,6 +55,7 @@ def mesh(
     report: str | None,
     picture: str | None,
     cache: str | None,
+    device: str,
     threads: int,
     quiet: bool,
     **options: Any,
@@ -59,11 +66,14 @@ def mesh(
     that does not fit in memory is made piece after piece if it goes to an .stl file.
     """
     from fracslice.errors import TooLargeError
+    from fracslice.kernel.devices import chosen
+    from fracslice.work import Work
 
     check_outputs(output, report, picture)
     scene = load_scene(source, settings)
     job = job_of(scene, **options)
-    with working(threads, quiet, store_in(cache)) as work:
+    how = Work(threads, store=store_in(cache), device=chosen(device))
+    with working(how, quiet) as work:
         try:
             told = made(scene, job, output, picture, work)
         except TooLargeError:

@@ -15,6 +15,7 @@ from .working import working
 
 if TYPE_CHECKING:
     from fracslice.scene import Scene
+    from fracslice.printing.checks import Limits
     from fracslice.slicing import SliceJob, Stack
     from fracslice.slicing.checks import PrintReport
     from fracslice.slicing.printers import Printer
@@ -187,12 +188,19 @@ def check_print(
     machine = chosen_printer(options["machine"])
     with working(threads, quiet) as work:
         stack = stack_of(scene, machine, options, work)
-        report = check_layers(stack, printer=machine, work=work)
+        report = check_layers(stack, limits_of(options), machine, work)
         if options["picture"]:
             with replacing(options["picture"]) as file:
                 worst_layers(stack, report.worst, file, work)
     click.echo(json.dumps(report.as_dict(), indent=2) if as_json else told(source, report))
     return 1 if report.problems else 0
+
+
+def limits_of(options: dict[str, Any]) -> Limits:
+    """What counts as too thin."""
+    from fracslice.printing.checks import Limits
+
+    return Limits(wall=options["wall"], floor=options["floor"])
 
 
 def told(source: str, report: PrintReport) -> str:

@@ -7,14 +7,11 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from types import FrameType
-from typing import TYPE_CHECKING
 
 from fracslice.errors import Cancelled, FracsliceError
 from fracslice.work import Work
-
-if TYPE_CHECKING:
-    from fracslice.store import Store
 
 Progress = Callable[[str, float], None]
 
@@ -28,10 +25,14 @@ class StoppedError(FracsliceError):
 
 
 @contextmanager
-def working(threads: int, quiet: bool, store: Store | None = None) -> Iterator[Work]:
-    """Work that shows its progress if somebody may be looking, and is cancelled by SIGINT and SIGTERM."""
+def working(how: int | Work, quiet: bool) -> Iterator[Work]:
+    """Work that shows its progress if somebody may be looking, and is cancelled by SIGINT and SIGTERM.
+
+    how: the work that it is like, or the number of its threads.
+    """
+    like = Work(how) if isinstance(how, int) else how
     with _bar(quiet) as progress, _cancelled_by_signals() as cancel:
-        yield Work(threads=threads, progress=progress, cancel=cancel, store=store)
+        yield replace(like, progress=progress, cancel=cancel)
 
 
 @contextmanager

@@ -13,6 +13,10 @@ class KernelError(FracsliceError):
     """A distance kernel cannot be linked or compiled."""
 
 
+class DeviceError(KernelError):
+    """There is no such device to compute on."""
+
+
 class VolumeError(FracsliceError):
     """A volume cannot be sampled, read or written."""
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 from .errors import Cancelled
 
 if TYPE_CHECKING:
+    from .kernel.devices import Device
     from .store import Store
 
 T = TypeVar("T")
@@ -25,12 +26,14 @@ def _silent(stage: str, done: float) -> None:
 class Work:
     """threads: how many to use (default: all cores). progress: called as ``progress(stage, fraction)`` from
     time to time. cancel: set it from anywhere and the work stops within a fraction of a second with
-    `Cancelled`. store: where samples and surfaces are kept and looked for, if anywhere."""
+    `Cancelled`. store: where samples and surfaces are kept and looked for, if anywhere. device:
+    what samples bricks; a GPU's samples can differ from the CPU's in the last place."""
 
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
     progress: Callable[[str, float], None] = _silent
     cancel: threading.Event = field(default_factory=threading.Event)
     store: Store | None = None
+    device: Device = "cpu"
 
     def check(self) -> None:
         """Raises `Cancelled` once somebody asked to stop."""

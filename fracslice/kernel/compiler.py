@@ -19,6 +19,7 @@ from .loops import Loop
 
 SOURCE = "<linked scene>"
 
+
 @dataclass(frozen=True)
 class Target:
     """What code is made for: float width, lanes per vector, CPU name and features."""

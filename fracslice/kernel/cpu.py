@@ -31,6 +31,10 @@ class Kernel(Protocol):
     @property
     def dtype(self) -> np.dtype: ...
 
+    @property
+    def batch(self) -> int:
+        """How many samples are worth a call."""
+
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray, /) -> np.ndarray: ...
 
     def bricks(
@@ -49,6 +53,8 @@ class Compilable(Protocol):
 
 class CpuKernel:
     """The compiled field of one scene. Safe to call from many threads at once."""
+
+    batch = 1 << 17
 
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype: np.dtype = np.dtype(precision)

@@ -81,6 +81,8 @@ def require() -> Any:
 class CudaKernel:
     """The compiled field of one scene on the GPU, with the face of `CpuKernel`. Many threads may call it."""
 
+    batch = 1 << 22
+
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self._cuda = require()
         self.dtype = np.dtype(precision)

@@ -41,8 +41,7 @@ def _depth(node: Node, voxel: float) -> int:
 
 
 def _surface_points(node: Node) -> np.ndarray:
-    """Points [3, n] on the surface: bisection between random inside and outside points, always the same ones.
-    """
+    """Points [3, n] on the surface, always the same: bisected between random points inside and outside."""
     kernel, box = compile_scene(node, "float64"), node.facts.box
     rng = np.random.default_rng(0)
     points = rng.uniform(np.array(box.lo)[:, None], np.array(box.hi)[:, None], (3, PROBES))

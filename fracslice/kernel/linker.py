@@ -32,8 +32,7 @@ FIELD = "field"
 
 @dataclass(frozen=True)
 class Linked:
-    """A scene as source text, whose function ``field(x, y, z, P)`` is its signed field, and its parameters P.
-    """
+    """A scene as source text, with the signed field ``field(x, y, z, P)``, and its parameters P."""
 
     source: str
     parameters: np.ndarray = field(compare=False)

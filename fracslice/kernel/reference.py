@@ -1,5 +1,4 @@
-"""The reference back end: the linked scene on NumPy float64 arrays. Slow, and the oracle of every other one.
-"""
+"""The reference back end: the linked scene on NumPy float64 arrays. Slow, the oracle of every other one."""
 
 from __future__ import annotations
 

@@ -73,8 +73,12 @@ class Composite:
     def dtype(self) -> np.dtype:
         return self.kernel.dtype
 
+    @property
+    def batch(self) -> int:
+        return self.kernel.batch
+
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Compilable values at points, as `CpuKernel.points`."""
+        """Field values at points, as `CpuKernel.points`."""
         f = self.kernel.points(x, y, z)
         for part, does in self.steps:
             g = part.points(x, y, z).astype(f.dtype)
@@ -84,7 +88,7 @@ class Composite:
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """Compilable values on bricks, as `CpuKernel.bricks`."""
+        """Field values on bricks, as `CpuKernel.bricks`."""
         inner = np.indices((8, 8, 8)).reshape(3, 512)
         at = [origin[k] + voxel * (corners[:, k, None] + inner[k]) for k in range(3)]
         out[:] = self.points(*at)

@@ -8,6 +8,7 @@ from ..formulas.box import Box
 from ..formulas.registry import Node
 from ..kernel import Compilable, compile_scene
 from ..kernel.depth import resolve_depths
+from ..kernel.devices import compile_for
 from ..store import Arrays, stored
 from ..work import Work
 from .bricks import Bricks, SignBricks
@@ -64,11 +65,11 @@ def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
     fresh: list[Bricks] = []
 
     def made() -> Arrays:
-        bricks = sample(compile_scene(planned.root), planned.root.facts, lattice, work)
+        bricks = sample(compile_for(work.device, planned.root), planned.root.facts, lattice, work)
         fresh.append(bricks)
         return {"ijk": bricks.ijk, "values": bricks.values, "index": bricks.index}
 
-    kept = stored(work.store, ("samples", lattice), planned.root, made)
+    kept = stored(work.store, ("samples", work.device, lattice), planned.root, made)
     if fresh:
         return fresh[0]
     return Bricks(lattice.origin, lattice.voxel, kept["ijk"], kept["values"], kept["index"])
@@ -76,5 +77,6 @@ def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
 
 def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
     """As `sample_scene`, of each sample only its sign."""
+    work = work or Work()
     lattice = Lattice.around(planned.outer, planned.voxel)
-    return sample_signs(compile_scene(planned.root), planned.root.facts, lattice, work)
+    return sample_signs(compile_for(work.device, planned.root), planned.root.facts, lattice, work)

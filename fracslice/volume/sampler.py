@@ -31,7 +31,6 @@ COARSEST = 16
 """Bricks along a cell of the first level: 128 voxels, as in OpenVDB's tree."""
 
 EMPTY, CANDIDATE, FULL, QUEUED = 0, 1, 2, 3
-CHUNK = 256
 AUDITS = 8
 FAR_AUDITS = 1 << 15
 
@@ -180,7 +179,7 @@ class _Run:
                 np.nan_to_num(out, copy=False, nan=self.lattice.voxel)
             signs[part] = np.packbits(out < 0, axis=1, bitorder="little")
 
-        self.work.map(task, chunks(len(bricks), CHUNK))
+        self.work.map(task, chunks(len(bricks), self.kernel.batch // BRICK**3))
         self.evaluations += len(bricks) * BRICK**3
         self.corners.append(corners)
         if self.keep:

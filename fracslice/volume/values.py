@@ -7,8 +7,6 @@ import numpy as np
 from ..kernel import Kernel
 from ..work import Work, chunks
 
-CHUNK = 1 << 14
-
 
 def values_at(kernel: Kernel, points: np.ndarray, work: Work) -> np.ndarray:
     """Field values [n] in the kernel's dtype at points [3, n], scene units. Raises `Cancelled`."""
@@ -17,5 +15,5 @@ def values_at(kernel: Kernel, points: np.ndarray, work: Work) -> np.ndarray:
     def task(part: slice) -> None:
         f[part] = kernel.points(*points[:, part])
 
-    work.map(task, chunks(len(f), CHUNK))
+    work.map(task, chunks(len(f), kernel.batch // 8))
     return f

@@ -104,6 +104,7 @@ def test_scenes(text, message, folder, capfd):
         ("mesh ball.xml -o out/x.stl --resolution 0", "resolution 0: expected 8 to 16384"),
         ("mesh ball.xml -o out/x.stl --resolution many", "'many' is not a valid integer"),
         ("mesh ball.xml -o out/x.stl --threads 0", "0 is not in the range"),
+        ("mesh ball.xml -o out/x.stl --device gpu", "'gpu' is not one of 'cpu', 'cuda', 'auto'"),
         ("mesh ball.xml -o out/x.stl --dust nan", "nan: expected a finite number >= 0"),
         ("mesh ball.xml -o out/x.stl --keep some", "'some': expected all or largest"),
         (
