@@ -34,6 +34,11 @@ def drawn(root: Node, rng: np.random.Generator, spread: float = 1.0) -> Node:
     raise AssertionError(f"{root}: no other parameters are possible")
 
 
+def torn(root: Node) -> bool:
+    """Whether a power in it is not whole: it tears space, and no bound holds across the tear."""
+    return any(node.values.get("power", 0.0) % 1 for node in root.walk())
+
+
 def _known(node: Node) -> dict[str, int]:
     return {name: 1 for name, value in node.values.items() if isinstance(value, str) and value == AUTO}
 

@@ -8,8 +8,9 @@ import pytest
 
 from fracslice.formulas import intersection, sphere, transform
 from fracslice.scene import library
-from tests.benchmarks.stability.scenes import settings, torn
+from tests.benchmarks.stability.scenes import settings
 
+from .draws import torn
 from .solids import Outcome, outcome
 
 

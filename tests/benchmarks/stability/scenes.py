@@ -14,7 +14,7 @@ import numpy as np
 
 from fracslice.formulas import Node
 from fracslice.scene import library, read
-from tests.stability.draws import drawn
+from tests.stability.draws import drawn, torn
 from tests.stability.solids import Outcome, outcome
 
 SETTINGS, RESOLUTIONS = 20, (48.0, 80.0, 128.0)
@@ -26,11 +26,6 @@ def settings(name: str, count: int) -> list[Node]:
     root = read(library.path(name)).root
     rng = np.random.default_rng(crc32(name.encode()))
     return [root, *(drawn(root, rng, SPREAD) for _ in range(count))]
-
-
-def torn(root: Node) -> bool:
-    """Whether a power in it is not whole: there no bound holds, and the audit has to repair."""
-    return any(node.values.get("power", 0.0) % 1 for node in root.walk())
 
 
 def _kind(root: Node, found: Outcome) -> str:
