@@ -14,8 +14,8 @@ from .options import length, print_options, printing_of, quiet_option, set_optio
 from .working import working
 
 if TYPE_CHECKING:
-    from fracslice.scene import Scene
     from fracslice.printing.checks import Limits
+    from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Stack
     from fracslice.slicing.checks import PrintReport
     from fracslice.slicing.printers import Printer

@@ -66,10 +66,20 @@ def interpolated(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ig
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
     u, v, w = u - i, v - j, w - k
     total = 0.0
+    p, q, r = i & 7, j & 7, k & 7
+    nx, ny, nz = index.shape
+    known = 0 <= i < 8 * nx and 0 <= j < 8 * ny and 0 <= k < 8 * nz and max(p, q, r) < 7
+    row = index[i >> 3, j >> 3, k >> 3] if known else 0
+    if known and row < 0:
+        return float(bounds[i >> 3, j >> 3, k >> 3])
+    first = 64 * p + 8 * q + r
     for corner in range(8):
         a, b, c = corner >> 2, (corner >> 1) & 1, corner & 1
         share = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w)
-        total += share * sample_at(index, bounds, values, voxel, i + a, j + b, k + c)
+        if known:
+            total += share * values[row, first + 64 * a + 8 * b + c]
+        else:
+            total += share * sample_at(index, bounds, values, voxel, i + a, j + b, k + c)
     return total
 
 

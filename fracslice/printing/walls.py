@@ -56,7 +56,7 @@ def walls(
     lower, axis = _crossed(solid)
     start, step = np.asarray(b.origin), b.voxel * np.eye(3)
     points, ends, normals = (np.empty((len(lower), 3)) for _ in range(3))
-    width, facing = np.empty(len(lower)), np.empty(len(lower))
+    width, facing = np.empty(len(lower)), np.ones(len(lower))
 
     def task(part: slice) -> None:
         here = start + b.voxel * lower[part]
@@ -70,12 +70,13 @@ def walls(
         frame = (*b.origin, b.voxel, b.index, solid.bounds, b.values)
         _through(points[part], ways, limit, towards, *frame, width[part])
         ends[part] = points[part] + width[part, None] * ways
-        facing[part] = (_normals(solid, ends[part]) * normals[part]).sum(1)
+        hit = part.start + np.flatnonzero(width[part] < limit)
+        facing[hit] = (_normals(solid, ends[hit]) * normals[hit]).sum(1)
         if direction is not None:
             facing[part] = np.where(np.abs((normals[part] * ways).sum(1)) > -OPPOSITE, facing[part], 1)
 
     work.map(task, chunks(len(lower), 1 << 13))
-    thin = (width < limit) & (facing < OPPOSITE)
+    thin = facing < OPPOSITE
     area = b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
     return Walls(points[thin], ends[thin], width[thin], area[thin])
 

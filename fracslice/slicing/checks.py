@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import SliceError
+from ..printing.checks import Limits, SolidReport, check_object
+from ..printing.widths import Widths, widths_of
 from ..work import Work
 from .graph import Found, Graph, Nodes
 from .layers import Layer, Slicer
@@ -18,7 +20,7 @@ from .printers import Printer
 from .raster import check_fits
 from .runs import Parts, parts_of, unsupported
 from .stack import Stack
-from .thickness import BINS, histogram, widths
+from .thickness import widths
 
 THICKNESS_LAYERS = 24
 """Layers that walls and gaps are measured in, spread over the height."""
@@ -27,36 +29,11 @@ WORST = 6
 
 
 @dataclass(frozen=True)
-class Limits:
-    """What counts. speck: parts with less area (mm^2) in every layer are dust that is counted but no reason
-    to stop. cup: the least area of a suction cup, mm^2. wall: the thinnest wall, mm; it is judged by the
-    thinnest hundredth. density: of the resin, g/cm^3.
-    """
-
-    speck: float = 0.02
-    cup: float = 1.0
-    wall: float = 0.1
-    density: float = 1.1
-
-
-@dataclass(frozen=True)
-class Widths:
-    """Of walls or gaps in mm: the smallest, the thinnest hundredth, the median; and how many pixels of
-    middle lines are in each bin, whose edges `edges` are.
-    """
-
-    smallest: float
-    thinnest_hundredth: float
-    median: float
-    counts: tuple[int, ...]
-    edges: tuple[float, ...] = tuple(round(float(b), 3) for b in BINS)
-
-
-@dataclass(frozen=True)
 class PrintReport:
     """What the layers told. Lengths in mm, areas in mm^2, volumes in mm^3; lists have the largest first.
 
-    specks: islands and bodies below the limit. worst: layers with most overhang or the largest islands.
+    specks: islands and bodies below the limit. solid: what was measured in space, not in layers. worst:
+    layers with most overhang or the largest islands.
     """
 
     layers: int
@@ -76,6 +53,7 @@ class PrintReport:
     walls: Widths | None
     gaps: Widths | None
     worst: list[int]
+    solid: SolidReport
     problems: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
@@ -107,7 +85,9 @@ def check_layers(
         measured = widths(image, stack.pixel) if layer.index in chosen else (None, None)
         return _Told(*parts_of(image), layer.area, *measured)
 
-    return _Collector(stack, limits or Limits(), printer).report(Slicer(stack, work or Work()).map(make))
+    limits, work = limits or Limits(), work or Work()
+    solid = check_object(stack.root, stack.outer, stack.scale, limits, work)
+    return _Collector(stack, limits, printer, solid).report(Slicer(stack, work).map(make))
 
 
 @dataclass(eq=False)
@@ -115,6 +95,7 @@ class _Collector:
     stack: Stack
     limits: Limits
     printer: Printer | None
+    solid: SolidReport
 
     def report(self, told: Iterator[_Told]) -> PrintReport:
         stack, solid, empty = self.stack, Graph(), Graph()
@@ -154,9 +135,10 @@ class _Collector:
             cups=cups,
             traps=traps,
             cavities=[c for c in self.found(hollows, hollows.sealed()) if c.area >= self.limits.speck],
-            walls=_widths(np.concatenate(walls)),
-            gaps=_widths(np.concatenate(gaps)),
+            walls=widths_of(np.concatenate(walls)),
+            gaps=widths_of(np.concatenate(gaps)),
             worst=_worst(overhang, real),
+            solid=self.solid,
         )
         report.problems.extend(_problems(report, self.limits, self.printer))
         return report
@@ -175,13 +157,6 @@ class _Collector:
         except SliceError:
             return False
         return True
-
-
-def _widths(values: np.ndarray) -> Widths | None:
-    if not len(values):
-        return None
-    low, hundredth, middle = (float(v) for v in np.quantile(values, (0, 0.01, 0.5)))
-    return Widths(low, hundredth, middle, tuple(histogram(values).tolist()))
 
 
 def _worst(overhang: np.ndarray, islands: list[Found]) -> list[int]:
@@ -212,4 +187,4 @@ def _problems(r: PrintReport, limits: Limits, printer: Printer | None) -> list[s
         found.append(f"{len(r.traps)} resin traps hold {sum(t.volume for t in r.traps):.3g} mm3")
     if r.walls and r.walls.thinnest_hundredth < limits.wall:
         found.append(f"walls of {r.walls.thinnest_hundredth:.3g} mm: the limit is {limits.wall:g} mm")
-    return found
+    return found + r.solid.thin

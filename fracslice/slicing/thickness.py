@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-BINS = 0.05 * np.arange(41)
-"""Edges of the histogram's bins, mm; what is thicker is in the last one."""
-
 
 def widths(image: np.ndarray, pixel: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Widths of walls and of gaps along their middle lines, mm, float64 [n] and [m]; one for each pixel of
@@ -36,8 +33,3 @@ def _across(region: np.ndarray, pixel: tuple[float, float]) -> np.ndarray:
     middle = (slope < 0.6) & region[1:-1, 1:-1] & (distance[1:-1, 1:-1] > beside - 0.4 * unit)
     # Where two pixels are in the middle, the middle lies between them.
     return np.asarray(2 * distance[1:-1, 1:-1][middle] + unit * (slope[middle] > 0.25))
-
-
-def histogram(values: np.ndarray) -> np.ndarray:
-    """How many of the widths are in each bin, int64 [40]."""
-    return np.histogram(np.minimum(values, BINS[-1] - 1e-9), BINS)[0]

@@ -1,0 +1,127 @@
+"""Would it print? What the samples tell of the solid as a whole, in time linear in its surface."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..formulas import Box, Node
+from ..kernel import Compilable, compile_scene
+from ..volume import Bricks, Lattice, sample
+from ..volume.grid import from_grid, to_grid
+from ..work import Work
+from .parts import parts_of
+from .samples import Samples
+from .walls import Walls, walls
+from .widths import BINS, Widths, widths_of
+
+COARSE, FINE = 96, 160
+"""Samples along the longest side, at least and at most."""
+
+SPECK = 27
+"""Samples: less is not told from noise."""
+
+ACROSS = 4
+"""Samples across the thinnest wall that may be, if `FINE` allows."""
+
+UP = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What counts. speck: parts with less area (mm^2) in every layer, or less volume (mm^3), are dust that is
+    counted but no reason to stop. cup: the least area of a suction cup, mm^2. wall: the thinnest wall, mm; in
+    a layer it is judged by the thinnest hundredth. floor: the thinnest floor or roof, mm, measured upwards.
+    thin: walls and floors count from so much thin surface on, mm^2. density: of the resin, g/cm^3.
+    """
+
+    speck: float = 0.02
+    cup: float = 1.0
+    wall: float = 0.1
+    floor: float = 0.1
+    thin: float = 1.0
+    density: float = 1.1
+
+
+@dataclass(frozen=True)
+class SolidReport:
+    """What the samples told. voxel: mm between samples: lengths are right within one, and thinner walls may
+    not be seen. bodies, cavities: their volumes in mm^3, the largest first, without specks. walls, gaps,
+    floors: thicknesses up to 2 mm. thin_walls, thin_floors: how much surface is under the limits, mm^2.
+    """
+
+    voxel: float
+    bodies: list[float]
+    cavities: list[float]
+    walls: Widths | None
+    gaps: Widths | None
+    floors: Widths | None
+    thin_walls: float
+    thin_floors: float
+    problems: list[str]
+
+    @property
+    def thin(self) -> list[str]:
+        """The problems that neither a mesh nor layers tell of."""
+        return self.problems[int(len(self.bodies) > 1) + int(bool(self.cavities)) :]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON."""
+        return asdict(self)
+
+
+def check_object(
+    root: Node | Compilable, outer: Box, scale: float, limits: Limits | None = None, work: Work | None = None
+) -> SolidReport:
+    """Checks an object, all depths of its tree known, within the box `outer`. scale: mm per scene unit.
+    Raises as `check_solid`.
+    """
+    limits, work = limits or Limits(), work or Work()
+    longest = max(outer.size)
+    wanted = ACROSS * longest * scale / max(min(limits.wall, limits.floor), 1e-6)
+    lattice = Lattice.around(outer, longest / min(max(wanted, COARSE), FINE))
+    bricks = sample(compile_scene(root), root.facts, lattice, work)
+    return check_solid(bricks, scale, limits, work)
+
+
+def check_solid(
+    bricks: Bricks, scale: float, limits: Limits | None = None, work: Work | None = None
+) -> SolidReport:
+    """Checks a sampled solid: loose bodies, sealed cavities, thin walls and floors. scale: mm per scene unit.
+
+    Raises `VolumeError`, `Cancelled`.
+    """
+    limits, work = limits or Limits(), work or Work()
+    work.progress("checking the solid", 0.0)
+    solid = Samples(from_grid(to_grid(bricks).redistance()))
+    work.check()
+    parts, cube = parts_of(solid.bricks), (bricks.voxel * scale) ** 3
+    most = float(BINS[-1]) / scale
+    thick, between = walls(solid, most, work), walls(solid, most, work, gaps=True)
+    floors = walls(solid, most, work, direction=UP)
+    thin, bare = _under(thick, limits.wall, scale), _under(floors, limits.floor, scale)
+    speck = max(limits.speck, SPECK * cube)
+    bodies, cavities = (
+        [v for v in (cube * parts.count[numbers]).tolist() if v >= speck]
+        for numbers in (parts.bodies, parts.cavities)
+    )
+    problems = []
+    if len(bodies) > 1:
+        problems.append(f"{len(bodies)} loose bodies")
+    if cavities:
+        problems.append(f"{len(cavities)} sealed cavities of {sum(cavities):.3g} mm3")
+    if thin >= limits.thin:
+        problems.append(f"{thin:.3g} mm2 of walls are thinner than {limits.wall:g} mm")
+    if bare >= limits.thin:
+        problems.append(f"{bare:.3g} mm2 of floors are thinner than {limits.floor:g} mm")
+    told = [widths_of(w.width * scale, w.area * scale**2) for w in (thick, between, floors)]
+    return SolidReport(
+        bricks.voxel * scale, bodies, cavities, told[0], told[1], told[2], thin, bare, problems
+    )
+
+
+def _under(found: Walls, limit: float, scale: float) -> float:
+    """How much surface is thinner than a limit, mm^2, by more than a hundredth of it."""
+    return float(np.sum(found.area[found.width * scale < 0.99 * limit]) * scale**2)

@@ -1,0 +1,185 @@
+"""Measured in space: thickness, gaps, bodies and cavities of shapes that are known, and what `<print>` makes
+of them; meshes and slices of the same scene agree.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from fracslice import MeshJob, make_mesh
+from fracslice.errors import VolumeError
+from fracslice.formulas import (
+    Node,
+    bounds,
+    box,
+    cylinder,
+    difference,
+    repeat,
+    shell,
+    sphere,
+    torus,
+    transform,
+    union,
+)
+from fracslice.printing import printable
+from fracslice.printing.checks import Limits, SolidReport, check_object
+from fracslice.printing.parts import parts_of
+from fracslice.printing.samples import Samples
+from fracslice.printing.walls import walls
+from fracslice.scene import Print, scene
+from fracslice.slicing import SliceJob, plan_stack
+from fracslice.slicing.layers import Slicer
+from fracslice.volume import Plan, plan, sample_scene
+from fracslice.volume.grid import from_grid, to_grid
+from fracslice.work import Work
+
+SIZE = 20.0
+
+
+def at(node: Node, x: float, y: float, z: float) -> Node:
+    return transform(node, translate=(x, y, z))
+
+
+def distances(planned: Plan) -> Samples:
+    return Samples(from_grid(to_grid(sample_scene(planned)).redistance()))
+
+
+def made(root: Node, **printing: float | str) -> tuple[Samples, float]:
+    """The distances of a printable object of 20 mm on 0.2 mm samples, and its scale."""
+    thing, scale = printable(plan(root, 100), SIZE, Print(**printing))  # type: ignore[arg-type]
+    return distances(thing), scale
+
+
+def measured(root: Node, gaps: bool = False, **printing: float | str) -> np.ndarray:
+    """Thicknesses up to 3 mm, in mm."""
+    solid, scale = made(root, **printing)
+    return walls(solid, 3 / scale, Work(), gaps=gaps).width * scale
+
+
+PLATE = union(box(size=(2, 2, 1)), at(box(size=(0.06, 2, 1)), 0, 0, 0.9))
+TWO = union(at(box(size=(0.45, 1, 1)), -0.275, 0, 0), at(box(size=(0.45, 1, 1)), 0.275, 0, 0))
+
+
+@pytest.mark.parametrize(
+    ("root", "thick", "longest"),
+    [
+        (box(size=(2, 2, 0.1)), 0.1, 2),
+        (transform(box(size=(2, 2, 0.1)), rotate=(1, 2, 3, 37)), 0.1, None),
+        (shell(sphere(), thickness=0.1), 0.1, 2.1),
+        (torus(radius=1, tube=0.08), 0.16, 2.16),
+        (transform(box(size=(2, 2, 0.3)), scale=(1, 1, 1 / 3)), 0.1, 2),
+    ],
+    ids=["plate", "tilted", "shell", "torus", "no distance"],
+)
+def test_walls_of_known_thickness(root: Node, thick: float, longest: float | None) -> None:
+    planned = plan(root, 100)
+    solid = distances(planned)
+    found = walls(solid, 0.3, Work())
+    assert np.quantile(found.width, (0.05, 0.5)) == pytest.approx([thick] * 2, abs=planned.voxel)
+
+
+def test_a_cube_has_no_thin_walls_at_its_edges() -> None:
+    assert len(measured(box())) == 0
+    assert len(measured(box(), gaps=True)) == 0
+
+
+def test_thin_walls_become_as_thick_as_asked() -> None:
+    assert np.median(measured(PLATE)) == pytest.approx(0.6, abs=0.2)
+    after = measured(PLATE, thickness=1.5)
+    assert np.quantile(after, (0.01, 0.5)) == pytest.approx([1.5, 1.5], abs=0.2)
+    assert len(measured(box(), thickness=2)) == 0
+
+
+def test_what_is_thick_enough_stays_as_it_is() -> None:
+    planned = plan(box(), 100)
+    thing, scale = printable(planned, SIZE, Print(thickness=2))
+    assert (thing.root, scale) == (planned.root, pytest.approx(20))
+
+
+@pytest.mark.parametrize(("gap", "bodies"), [(1.7, 2), (2.3, 1)])
+def test_gaps_up_to_the_limit_are_closed(gap: float, bodies: int) -> None:
+    """They are 2 mm wide."""
+    solid, scale = made(TWO, gap=gap)
+    parts = parts_of(solid.bricks)
+    assert len(parts.bodies) == bodies
+    volume = parts.count[parts.inside].sum() * (solid.bricks.voxel * scale) ** 3
+    assert volume == pytest.approx(8000 if bodies == 1 else 7200, rel=0.03)
+
+
+def test_loose_bodies_are_joined_by_struts_across_the_middle() -> None:
+    after = measured(TWO, bridge=1.5)
+    assert np.median(after) == pytest.approx(1.5, abs=0.2)
+    solid, _ = made(union(TWO, at(sphere(radius=0.1), 0, 0, 0.8)), bridge=1.5)
+    assert len(parts_of(solid.bricks).bodies) == 1
+
+
+def test_cavities_are_filled_and_bodies_dropped() -> None:
+    holed = union(
+        difference(box(), at(sphere(radius=0.2), 0.1, 0, 0)), at(box(size=(0.2, 0.2, 0.2)), 0.8, 0, 0)
+    )
+    before = parts_of(made(holed)[0].bricks)
+    assert (len(before.bodies), len(before.cavities)) == (2, 1)
+    solid, scale = made(holed, cavities="fill", keep="largest")
+    after = parts_of(solid.bricks)
+    assert (len(after.bodies), len(after.cavities)) == (1, 0)
+    assert scale == pytest.approx(20, rel=0.01)
+    assert after.count[after.bodies[0]] * (solid.bricks.voxel * scale) ** 3 == pytest.approx(8000, rel=0.03)
+
+
+def test_lengths_that_cannot_be_measured() -> None:
+    with pytest.raises(VolumeError, match=r"0.01 mm in 20 mm: expected at least 0.0625 mm"):
+        printable(plan(box(), 100), SIZE, Print(thickness=0.01))
+
+
+def test_mesh_and_slices_agree() -> None:
+    how = Print(bridge=2, thickness=1.2, hollow=1.5, drain=2, base=0.5, raft=1)
+    thing = scene(union(PLATE, at(sphere(radius=0.2), 1.5, 0, 0)), size="20mm", printing=how)
+    mesh = make_mesh(thing, MeshJob(resolution=128))
+    assert mesh.report.problems == ()
+    stack = plan_stack(thing.root, SliceJob(size=20, layer=0.1, pixel=(0.1, 0.1), printing=how))
+    volume = sum(Slicer(stack).map(lambda layer: layer.area * layer.height))
+    assert volume == pytest.approx(mesh.report.mesh.volume_mm3, rel=0.01)
+    assert mesh.mesh.size == pytest.approx(stack.size, abs=0.3)
+
+
+def checked(root: Node, size: float = SIZE) -> SolidReport:
+    planned = plan(root, 100)
+    limits = Limits(wall=0.5, floor=0.5)
+    return check_object(planned.root, planned.outer, size / max(planned.box.size), limits)
+
+
+@pytest.mark.parametrize(
+    ("root", "problem"),
+    [
+        (box(), None),
+        (transform(box(), rotate=(1, 2, 3, 37)), None),
+        (sphere(), None),
+        (union(box(size=(2, 2, 0.5)), at(box(size=(2, 0.03, 1)), 0, 0, 0.6)), "walls are thinner"),
+        (union(box(size=(1, 1, 2)), at(box(size=(2, 1, 0.03)), 0, 0, 0.5)), "floors are thinner"),
+        (difference(box(), sphere(radius=0.2)), "1 sealed cavities of 268 mm3"),
+        (union(box(), at(sphere(radius=0.1), 0.8, 0, 0)), "2 loose bodies"),
+    ],
+)
+def test_seeded_defects_are_found_and_clean_solids_not_blamed(root: Node, problem: str | None) -> None:
+    found = checked(root).problems
+    assert found == [] if problem is None else any(problem in p for p in found)
+
+
+def test_time_is_linear_in_the_holes() -> None:
+    """10^4 holes take at most a few times what 100 do, on as many samples."""
+
+    def seconds(side: int) -> float:
+        pitch = 2 / side
+        rods = repeat(cylinder(radius=0.3 * pitch, height=1), period=(pitch, pitch, 4), count=(side, side, 1))
+        plate = difference(box(size=(2, 2, 0.1)), bounds(rods, min=(-1, -1, -1), max=(1, 1, 1)))
+        solid = distances(plan(plate, 300))
+        begin = time.process_time()
+        assert len(parts_of(solid.bricks).bodies) == 1
+        assert len(walls(solid, 0.02, Work(), gaps=True).width) > 0 or side < 100
+        return time.process_time() - begin
+
+    seconds(2)
+    assert seconds(100) < 10 * seconds(10)
