@@ -129,7 +129,7 @@ def _plot(found: list[Measurement], path: Path, x: str, y: str, point: Point) ->
     from matplotlib.figure import Figure
 
     workloads, methods = _unique(one.workload for one in found), _unique(one.method for one in found)
-    columns = min(3, max(1, len(workloads)))
+    columns = 2 if len(workloads) == 4 else min(3, max(1, len(workloads)))
     rows = max(1, -(-len(workloads) // columns))
     figure = Figure(figsize=(4 * columns, 3.1 * rows + 0.7), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
