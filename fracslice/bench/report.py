@@ -139,9 +139,7 @@ def _plot(found: list[Measurement], path: Path, x: str, y: str, point: Point) ->
     for panel in axes[len(workloads) :]:
         panel.remove()
     lines = [_line(method, methods) for method in methods]
-    figure.legend(
-        handles=lines, loc="outside lower center", ncols=min(4, max(1, len(methods))), frameon=False
-    )
+    figure.legend(handles=lines, loc="outside lower center", ncols=columns + 1, frameon=False)
     with replacing(path) as file:
         figure.savefig(file, format="png", dpi=110, metadata={"Software": None})
 
