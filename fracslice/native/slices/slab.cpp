@@ -11,7 +11,7 @@ namespace fracslice {
 namespace {
 
 constexpr int kCoarsest = 8;  // tiles along a block of the first level
-constexpr size_t kBatch = 2048;
+constexpr size_t kBatch = 1024;
 constexpr double kSteep = 0.7;
 
 // The middles of the blocks of 8, 4 and 2 samples of a tile.
@@ -55,15 +55,15 @@ void Slab::sample(const Field& field, const Bounds& bounds) {
 template <class Where, class Take>
 void Slab::evaluate(const Field& field, size_t n, const Where& where, const Take& take) {
     evaluations += int64_t(n);
+    double columns[kBatch], rows[kBatch], heights[kBatch];
     alignas(64) float x[kBatch], y[kBatch], z[kBatch], f[kBatch];
     for (size_t begin = 0; begin < n; begin += kBatch) {
         size_t m = std::min(kBatch, n - begin), padded = (m + 63) / 64 * 64;
+        for (size_t i = 0; i < m; ++i) where(begin + i, columns[i], rows[i], heights[i]);
         for (size_t i = 0; i < m; ++i) {
-            double column, row, height;
-            where(begin + i, column, row, height);
-            x[i] = float(frame_.x0 + frame_.dx * column);
-            y[i] = float(frame_.y0 + frame_.dy * row);
-            z[i] = float(height);
+            x[i] = float(frame_.x0 + frame_.dx * columns[i]);
+            y[i] = float(frame_.y0 + frame_.dy * rows[i]);
+            z[i] = float(heights[i]);
         }
         for (size_t i = m; i < padded; ++i) x[i] = x[0], y[i] = y[0], z[i] = z[0];
         field.values(x, y, z, f, padded);
