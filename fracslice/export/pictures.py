@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import threading
 from pathlib import Path
-
-import numpy as np
 
 from fracslice.errors import ExportError
 from fracslice.export import png
@@ -42,16 +39,8 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
     return folder
 
 
-_kept = threading.local()
-"""A canvas for each thread: laying the pages of a new one takes as long as the deflate."""
-
-
 def _encoded(run: SliceRun, layer: Layer) -> bytes:
-    image: np.ndarray | None = getattr(_kept, "canvas", None)
-    if image is None or image.shape != run.screen.shape:
-        image = _kept.canvas = png.canvas(*run.screen.shape)
-    image[:] = 0
-    return png.encode(run.screen.picture(layer, image))
+    return png.encode(run.screen.picture(layer, png.canvas(*run.screen.shape)))
 
 
 def write_sl1(run: SliceRun, path: str | Path) -> Path:
