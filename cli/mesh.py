@@ -77,7 +77,7 @@ def mesh(
         try:
             told = made(scene, job, output, picture, work)
         except TooLargeError:
-            if Path(output).suffix.lower() != STL or picture is not None or job.simplify_mm is not None:
+            if Path(output).suffix.lower() != STL or picture or job.chord_mm or job.simplify_mm:
                 raise
             told = streamed(scene, job, output, work)
         if report is not None:

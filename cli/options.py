@@ -60,6 +60,12 @@ _JOB = [
         help="Drop bodies with less; 1e-5 of the whole by default.",
     ),
     click.option(
+        "--chord",
+        callback=length,
+        metavar="LENGTH",
+        help="More triangles where the surface bends farther than this from them, such as 0.001mm.",
+    ),
+    click.option(
         "--simplify",
         callback=length,
         metavar="LENGTH",
@@ -134,5 +140,6 @@ def job_of(
         resolution=resolution,
         dust_mm3=others["dust"],
         printing=printing_of(scene, others),
+        chord_mm=others["chord"],
         simplify_mm=others["simplify"],
     )

@@ -41,8 +41,9 @@ class MeshJob:
     size_mm: the longest side, if not what the scene says. voxel_mm or resolution (voxels along the longest
     side): how fine; 256 along the longest side if neither is given. dust_mm3: bodies with less material are
     dropped; if not given, those under 1e-5 of the whole. printing: what makes it printable, if not what the
-    scene says. simplify_mm: fewer triangles, nowhere farther than this from all of them. Raises `SceneError`
-    for values that cannot be.
+    scene says. chord_mm: more triangles where a smooth surface is farther than this from them. simplify_mm:
+    fewer triangles, nowhere farther than this from all of them. Raises `SceneError` for values that cannot
+    be.
     """
 
     size_mm: float | None = None
@@ -50,6 +51,7 @@ class MeshJob:
     resolution: float | None = None
     dust_mm3: float | None = None
     printing: Print | None = None
+    chord_mm: float | None = None
     simplify_mm: float | None = None
 
     def __post_init__(self) -> None:
@@ -58,6 +60,7 @@ class MeshJob:
         for name, length in (
             ("size", self.size_mm),
             ("voxel", self.voxel_mm),
+            ("chord", self.chord_mm),
             ("simplify", self.simplify_mm),
         ):
             if length is not None:
@@ -136,6 +139,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     voxels, clock = what.voxels(scene), Clock(work)
     from .mesh.check import check
     from .mesh.extract import contour
+    from .mesh.refine import refine
     from .mesh.simplify import simplify
     from .printing import printable
     from .volume import plan, sample_scene
@@ -151,6 +155,10 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         bricks = sample_scene(planned, work)
     with clock("meshing"):
         raw = contour(planned.root, bricks, work)
+    if what.chord_mm is not None:
+        with clock("refining"):
+            unit = float(raw.size.max()) / what.size(scene)
+            raw = refine(planned.root, raw, what.chord_mm * unit, planned.voxel, work)
     with clock("finishing"):
         mesh, removed, place = _finished(raw, what, how, what.size(scene), scale)
     simplified = None

@@ -54,10 +54,9 @@ def stream_mesh(
     how = what.how(scene)
     if not how.whole:
         raise how.fail("cannot change a mesh that does not fit in memory, other than by keep and cavities")
-    if what.simplify_mm is not None:
-        raise SceneError(
-            f"simplify {what.simplify_mm:g}mm: needs the whole mesh, which does not fit in memory"
-        )
+    for name, length in (("chord", what.chord_mm), ("simplify", what.simplify_mm)):
+        if length is not None:
+            raise SceneError(f"{name} {length:g}mm: needs the whole mesh, which does not fit in memory")
     from .export import application
     from .mesh.extract import contour_pieces
     from .mesh.survey import Survey
