@@ -17,7 +17,7 @@ from .samples import Samples
 from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
 
-COARSE, FINE = 96, 160
+COARSE, FINE = 96, 192
 """Samples along the longest side, at least and at most."""
 
 SPECK = 27

@@ -12,7 +12,7 @@ from lxml import etree
 
 from fracslice.errors import SceneError
 from fracslice.formulas import box, mandelbulb, menger, plane, repeat, sphere, torus, transform, twist, union
-from fracslice.scene import Scene, reads, scene, to_xml
+from fracslice.scene import Print, Scene, reads, scene, to_xml
 from fracslice.scene.schema import PATH
 
 from .trees import trees
@@ -112,3 +112,17 @@ def test_a_tree_too_deep_is_refused():
         node = transform(node)
     with pytest.raises(SceneError, match="nested too deeply"):
         scene(node, size=1)
+
+
+def test_what_makes_it_printable_is_content() -> None:
+    text = (
+        '<scene version="1"><solid size="8cm"><sphere/></solid><print drain="0" thickness="0.8mm"/></scene>'
+    )
+    read = reads(text)
+    assert read.printing == Print(drain=0.0, thickness=0.8)
+    assert reads(to_xml(read)) == read
+    assert read.hash != reads(text.replace("0.8", "0.9")).hash
+    assert read.with_values(["print.raft=2mm"]).printing.raft == 2
+    for wrong in ('thickness="-1mm"', 'keep="some"', 'keep="largest" bridge="1mm"'):
+        with pytest.raises(SceneError, match="<print>"):
+            reads(text.replace('drain="0" thickness="0.8mm"', wrong))
