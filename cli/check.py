@@ -62,7 +62,7 @@ def check(
             result = make_mesh(scene, job_of(scene, **options), work)
             solid = check_solid(result.bricks, result.place.scale, limits_of(options), work)
         numbers = result.report.as_dict() | {"solid": solid.as_dict()}
-        problems = [*result.report.problems, *solid.thin]
+        problems = (*result.report.problems, *solid.thin)
         line = os.linesep.join([summary(source, result.report), *(f"  {p}" for p in solid.thin)])
     click.echo(json.dumps(numbers, indent=2) if as_json else line)
     return 1 if problems else 0

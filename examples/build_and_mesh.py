@@ -31,6 +31,7 @@ def show(stage: str, done: float) -> None:
 if __name__ == "__main__":
     target = sys.argv[1] if len(sys.argv) > 1 else "bauble.3mf"
     resolution = float(sys.argv[2]) if len(sys.argv) > 2 else 256
-    result = make_mesh(bauble, MeshJob(resolution=resolution, printing=Print(keep="largest")), Work(progress=show))
+    job = MeshJob(resolution=resolution, printing=Print(keep="largest"))
+    result = make_mesh(bauble, job, Work(progress=show))
     write(result.mesh, target, {"Title": bauble.name})
     print(json.dumps(result.report.as_dict(), indent=2))
