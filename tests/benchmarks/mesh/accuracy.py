@@ -13,7 +13,12 @@ from fracslice.formulas import Node, box, julia, menger, sphere, torus, transfor
 from fracslice.kernel import reference
 from fracslice.mesh import Mesh
 from fracslice.mesh.extract import contour, extract
+from fracslice.mesh.refine import refine
 from fracslice.volume import plan, sample_scene
+
+
+CHORD = 1e-3
+"""Voxels."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,9 @@ def main() -> None:
     for truth in TRUTHS:
         planned = plan(truth.root, truth.resolution)
         bricks = sample_scene(planned)
-        for how, mesh in (("samples alone", extract(bricks)), ("exact", contour(planned.root, bricks))):
+        exact = contour(planned.root, bricks)
+        bent = refine(planned.root, exact, CHORD * planned.voxel, planned.voxel)
+        for how, mesh in (("samples alone", extract(bricks)), ("exact", exact), ("exact, chord", bent)):
             print(f"{truth.name:24}{how:16}{errors(mesh, truth, planned.voxel)}")
 
 
