@@ -1,11 +1,11 @@
-"""C++ parts of fracslice: marching cubes on bricks, and OpenVDB. Callers use `fracslice.mesh.extract` and
-`fracslice.volume.grid`.
+"""C++ parts of fracslice: marching cubes on bricks, questions about triangle meshes, and OpenVDB. Callers use
+`fracslice.mesh` and `fracslice.volume.grid`.
 
 Arrays are C-contiguous and as `fracslice.volume.bricks.Bricks` describes them. Long calls let other threads
 run.
 """
 
-from numpy import float32, float64, int32, uint8, uint32
+from numpy import bool_, float32, float64, int32, int64, uint8, uint32
 from numpy.typing import NDArray
 
 Point = tuple[float, float, float]
@@ -97,12 +97,10 @@ class Grid:
         """origin, voxel, ijk, values, index. Raises ValueError unless voxels are axis-aligned cubes."""
 
     def mesh(self, adaptivity: float = 0.0) -> tuple[NDArray[float32], NDArray[uint32], NDArray[uint32]]:
-        """OpenVDB's own surface (dual contouring): points [n, 3], triangles [m, 3], quads [k, 4], outwards.
-        """
+        """OpenVDB's own surface (dual contouring): points [n, 3], triangles [m, 3], quads [k, 4]."""
 
     def redistance(self) -> Grid:
-        """The same surface in a field of distances, found by fast sweeping (Zhao, 2004). Raises ValueError.
-        """
+        """The same surface in a field of distances, by fast sweeping (Zhao, 2004). Raises ValueError."""
 
     def offset(self, distance: float) -> Grid:
         """The surface of a field of distances moved outwards, in scene units. Raises ValueError."""
@@ -122,3 +120,43 @@ class Grid:
     @property
     def memory(self) -> int:
         """Bytes."""
+
+# On triangle meshes: vertices [n, 3], triangles [m, 3]. All raise ValueError for an index out of range and
+# for arrays that contradict each other; results are the same for any number of threads.
+
+def links(triangles: NDArray[int32], counted: NDArray[bool_]) -> tuple[int, int, int, int, int]:
+    """`fracslice.mesh.links.edge_ends`."""
+
+def corners_by_vertex(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int64], NDArray[int64]]: ...
+def parts(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int32], int]: ...
+def shell_volumes(
+    vertices: NDArray[float64], triangles: NDArray[int32], labels: NDArray[int32], count: int
+) -> NDArray[float64]: ...
+def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]: ...
+def tree(
+    vertices: NDArray[float64], triangles: NDArray[int32]
+) -> tuple[NDArray[int64], NDArray[float64], NDArray[float64]]:
+    """`fracslice.mesh.tree.Tree`."""
+
+def crossing_triangles(
+    vertices: NDArray[float64],
+    triangles: NDArray[int32],
+    order: NDArray[int64],
+    low: NDArray[float64],
+    high: NDArray[float64],
+    threads: int = 0,
+) -> NDArray[bool_]: ...
+def nesting(
+    vertices: NDArray[float64],
+    triangles: NDArray[int32],
+    labels: NDArray[int32],
+    sizes: NDArray[float64],
+    first: NDArray[int64],
+    order: NDArray[int64],
+    low: NDArray[float64],
+    high: NDArray[float64],
+) -> tuple[NDArray[int64], NDArray[int64]]:
+    """winding, parent."""
+
+def side_of_line(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int: ...
+def side_of_plane(a: Point, b: Point, c: Point, d: Point) -> int: ...

@@ -141,7 +141,6 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     from .mesh.extract import contour
     from .mesh.refine import refine
     from .mesh.simplify import simplify
-    from .printing import printable
     from .volume import plan, sample_scene
 
     how = what.how(scene)
@@ -149,6 +148,8 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         refuse_what_does_not_fit(scene, voxels, what.size(scene), work)
         planned, scale = plan(scene.root, voxels, work), None
     if not how.whole:
+        from .printing import printable  # it needs Numba, whose import takes as long as a small mesh
+
         with clock("changing"):
             planned, scale = printable(planned, what.size(scene), how, work)
     with clock("sampling"):

@@ -1,20 +1,11 @@
 // The extension module fracslice._native. Its Python face and its documentation are in ../_native.pyi.
-#include <tbb/task_arena.h>
-
 #include "contour.h"
 #include "numpy.h"
 #include "signs.h"
+#include "unlocked.h"
 
 namespace fracslice {
 namespace {
-
-// Runs without the interpreter's lock, on so many threads (0: all cores).
-template <class Do>
-auto unlocked(int threads, const Do& act) {
-    nb::gil_scoped_release released;
-    tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-    return arena.execute(act);
-}
 
 nb::tuple bind_marching_cubes(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index,
                               const std::array<double, 3>& origin, double voxel, double clamp, int threads) {
@@ -97,4 +88,5 @@ NB_MODULE(_native, module) {
         .def("contour", &Cells::contour, "first"_a, "last"_a, "t"_a, "normals"_a, "origin"_a, "voxel"_a, "clamp"_a)
         .def("crossings_before", &Cells::crossings_before, "layer"_a);
     fracslice::bind_grid(module);
+    fracslice::bind_mesh(module);
 }

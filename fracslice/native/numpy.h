@@ -5,6 +5,7 @@
 #include <nanobind/stl/array.h>
 
 #include <cstring>
+#include <vector>
 
 #include "marching_cubes.h"
 
@@ -45,5 +46,6 @@ nb::object to_numpy(const std::vector<Row>& rows) {
 }
 
 void bind_grid(nb::module_& module);
+void bind_mesh(nb::module_& module);
 
 }  // namespace fracslice

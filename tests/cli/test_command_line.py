@@ -171,6 +171,17 @@ def test_heavy_packages_are_not_loaded_for_help():
     assert loaded & set(heavy.split()) == set()
 
 
+def test_a_second_mesh_does_without_numba(ball, tmp_path, monkeypatch):
+    """Loading it would cost more than all else that a small mesh needs."""
+    monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
+    arguments = ["mesh", str(ball), "-o", str(tmp_path / "b.stl"), "--resolution", "24", "--quiet"]
+    code = f"import sys; from fracslice_cli.main import run; run({arguments}); print('numba' in sys.modules)"
+    command = [sys.executable, "-c", code]
+    runs = [subprocess.run(command, check=True, capture_output=True, text=True).stdout for _ in range(2)]
+    assert runs == ["True\n", "False\n"]
+    assert (tmp_path / "b.stl").exists()
+
+
 def test_progress_is_shown_on_a_terminal_only(ball, tmp_path):
     reader, writer = os.openpty()
     arguments = ["mesh", str(ball), "-o", str(tmp_path / "b.stl"), "--resolution", "24"]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from fractions import Fraction
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -14,8 +16,12 @@ from hypothesis import strategies as st
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check
+from fracslice.mesh.crossings import crossing_triangles
+from fracslice.mesh.links import links, parts, shell_volumes
+from fracslice.mesh.nesting import nesting
 from fracslice.mesh.predicates import side_of_line, side_of_plane
 from fracslice.mesh.reading import joined
+from fracslice.mesh.tree import build
 
 from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved
 
@@ -91,6 +97,59 @@ def test_empty_and_nonsense_meshes() -> None:
         check(Mesh(cube().vertices, np.array([[0, 1, 8]], np.int32)))
     with pytest.raises(MeshError, match="without area"):
         check(Mesh(cube().vertices, np.array([[0, 1, 1]], np.int32)))
+
+
+def test_arrays_that_contradict_each_other_are_refused() -> None:
+    """Nothing reads beyond an array, whoever calls."""
+    mesh, beyond = cube(), np.array([[0, 1, 8]], np.int32)
+    tree, labels = build(mesh), np.zeros(12, np.int32)
+    calls: list[Callable[[], object]] = [
+        lambda: links(beyond, 8),
+        lambda: parts(-beyond, 9),
+        lambda: shell_volumes(mesh.vertices, mesh.triangles, labels + 1, 1),
+        lambda: build(Mesh(mesh.vertices, beyond)),
+        lambda: crossing_triangles(mesh, tree._replace(order=tree.order + 1)),
+        lambda: crossing_triangles(sphere(), tree),
+        lambda: nesting(mesh, labels[1:], np.ones(2), tree, np.array([-1, 0])),
+        lambda: nesting(mesh, labels, np.ones(2), tree, np.array([-2, 0])),
+    ]
+    for call in calls:
+        with pytest.raises(ValueError, match=r"does not exist|differ in length|not of this mesh"):
+            call()
+
+
+def apart(p: np.ndarray, q: np.ndarray) -> bool:
+    """Whether two segments or triangles of integer points miss each other: some axis separates them."""
+    edges = np.array([a - b for points in (p, q) for a, b in combinations(points, 2)])
+    normals = np.cross(edges[:, None], edges).reshape(-1, 3)
+    axes = np.concatenate([edges, normals, np.cross(normals[:, None], edges).reshape(-1, 3)]).T
+    p, q = p @ axes, q @ axes
+    return bool(((p.max(axis=0) < q.min(axis=0)) | (q.max(axis=0) < p.min(axis=0))).any())
+
+
+def meet(points: np.ndarray, shared: int) -> bool:
+    """Whether the triangles of the first three and the last three points meet beyond what they share."""
+    s, t = points[:3], points[3 - shared :]
+    if shared == 0:
+        return not apart(s, t)
+    if shared == 1:  # what they share beyond the corner ends on a side opposite to it
+        return not (apart(s[:2], t) and apart(s, t[1:]))
+    m, n = np.cross(s[2] - s[1], s[0] - s[1]), np.cross(s[2] - s[1], t[2] - s[1])
+    return not np.cross(m, n).any() and m @ n > 0
+
+
+@pytest.mark.parametrize("shared", [0, 1, 2])
+def test_pairs_of_triangles_meet_as_integers_say(shared: int) -> None:
+    """On a small grid, where most pairs touch, lie in one plane or miss each other narrowly."""
+    random, found = np.random.default_rng(shared), []
+    for _ in range(1000):
+        points = random.integers(-2, 3, (6 - shared, 3))
+        triangles = np.array([[0, 1, 2], random.permutation(np.arange(3 - shared, 6 - shared))], np.int32)
+        mesh = Mesh(points * 0.5, triangles)
+        if len(np.unique(points, axis=0)) == len(points) and np.linalg.norm(mesh.normals, axis=1).all():
+            found.append(meet(points, shared))
+            assert crossing_triangles(mesh).tolist() == [found[-1]] * 2, points.tolist()
+    assert 10 < sum(found) < len(found) - 10
 
 
 def test_self_intersections_agree_with_meshlab() -> None:

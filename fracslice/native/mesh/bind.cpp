@@ -1,0 +1,140 @@
+// Functions of fracslice._native on triangle meshes: what comes in is looked through once, for no index may leave its array.
+#include <stdexcept>
+
+#include "../numpy.h"
+#include "../unlocked.h"
+#include "crossings.h"
+#include "links.h"
+#include "nesting.h"
+#include "predicates.h"
+#include "tree.h"
+#include "weld.h"
+
+namespace fracslice {
+namespace {
+
+template <class T>
+using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+template <class T>
+using Rows = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+template <class T>
+void require_below(const T* values, size_t count, size_t end, const char* what, T least = 0) {
+    for (size_t i = 0; i < count; ++i) {
+        if (values[i] < least || (values[i] >= 0 && size_t(values[i]) >= end)) throw std::invalid_argument(what);
+    }
+}
+
+Triangles triangles_of(const Rows<int32_t>& triangles, size_t vertices) {
+    require_below(triangles.data(), triangles.size(), vertices, "a triangle names a vertex that does not exist");
+    return {triangles.data(), triangles.shape(0), vertices};
+}
+
+MeshView mesh_of(const Rows<double>& vertices, const Rows<int32_t>& triangles) {
+    return {triangles_of(triangles, vertices.shape(0)), vertices.data()};
+}
+
+TreeView tree_of(const MeshView& mesh, const Vector<int64_t>& order, const Rows<double>& low, const Rows<double>& high) {
+    TreeView tree{order.data(), low.data(), high.data(), order.size(), low.shape(0) / 2};
+    size_t leaves = 1;
+    while (leaves * kLeaf < mesh.count) leaves *= 2;
+    if (order.size() != mesh.count || low.shape(0) != 2 * leaves || high.shape(0) != 2 * leaves) {
+        throw std::invalid_argument("the tree is not of this mesh");
+    }
+    require_below(tree.order, tree.count, mesh.count, "the tree names a triangle that does not exist");
+    return tree;
+}
+
+void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t parts) {
+    if (labels.size() != mesh.count) throw std::invalid_argument("triangles and labels differ in length");
+    require_below(labels.data(), labels.size(), parts, "a label names a part that does not exist");
+}
+
+nb::tuple bind_links(const Rows<int32_t>& triangles, const Vector<bool>& counted) {
+    Links found = unlocked(0, [&] { return links(triangles_of(triangles, counted.size()), counted.data()); });
+    return nb::make_tuple(found.edges, found.open, found.crowded, found.misoriented, found.extra_fans);
+}
+
+nb::tuple bind_corners(const Rows<int32_t>& triangles, size_t vertices) {
+    CornersByVertex found = unlocked(0, [&] { return corners_by_vertex(triangles_of(triangles, vertices)); });
+    return nb::make_tuple(to_numpy(std::move(found.start), {vertices + 1}),
+                          to_numpy(std::move(found.corner), {triangles.size()}));
+}
+
+nb::tuple bind_parts(const Rows<int32_t>& triangles, size_t vertices) {
+    Parts found = unlocked(0, [&] { return parts(triangles_of(triangles, vertices)); });
+    return nb::make_tuple(to_numpy(std::move(found.labels), {triangles.shape(0)}), found.count);
+}
+
+nb::object bind_volumes(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int32_t>& labels,
+                        size_t count) {
+    Array<double> volumes = unlocked(0, [&] {
+        MeshView mesh = mesh_of(vertices, triangles);
+        require_labels(mesh, labels, count);
+        return shell_volumes(mesh, labels.data(), count);
+    });
+    return to_numpy(std::move(volumes), {count});
+}
+
+nb::tuple bind_weld(const Rows<float>& points) {
+    size_t count = points.shape(0);
+    Welded found = unlocked(0, [&] { return weld(reinterpret_cast<const uint32_t*>(points.data()), count); });
+    size_t sets = found.first.rows;
+    return nb::make_tuple(to_numpy(std::move(found.first), {sets}), to_numpy(std::move(found.labels), {count}));
+}
+
+nb::tuple bind_tree(const Rows<double>& vertices, const Rows<int32_t>& triangles) {
+    Tree tree = unlocked(0, [&] { return build_tree(mesh_of(vertices, triangles)); });
+    size_t nodes = tree.low.rows;
+    return nb::make_tuple(to_numpy(std::move(tree.order), {triangles.shape(0)}), to_numpy(std::move(tree.low), {nodes, 3}),
+                          to_numpy(std::move(tree.high), {nodes, 3}));
+}
+
+nb::object bind_crossings(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order,
+                          const Rows<double>& low, const Rows<double>& high, int threads) {
+    Array<bool> marks = unlocked(threads, [&] {
+        MeshView mesh = mesh_of(vertices, triangles);
+        return crossing_triangles(mesh, tree_of(mesh, order, low, high));
+    });
+    return to_numpy(std::move(marks), {triangles.shape(0)});
+}
+
+nb::tuple bind_nesting(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int32_t>& labels,
+                       const Vector<double>& sizes, const Vector<int64_t>& first, const Vector<int64_t>& order,
+                       const Rows<double>& low, const Rows<double>& high) {
+    size_t shells = sizes.size();
+    Nesting found = unlocked(0, [&] {
+        MeshView mesh = mesh_of(vertices, triangles);
+        require_labels(mesh, labels, shells);
+        if (first.size() != shells) throw std::invalid_argument("sizes and first differ in length");
+        require_below(first.data(), shells, mesh.vertices, "first names a vertex that does not exist", int64_t(-1));
+        return nesting(mesh, tree_of(mesh, order, low, high), labels.data(), sizes.data(), first.data(), shells);
+    });
+    return nb::make_tuple(to_numpy(std::move(found.winding), {shells}), to_numpy(std::move(found.parent), {shells}));
+}
+
+using Point = std::array<double, 3>;
+
+int bind_side_of_plane(const Point& a, const Point& b, const Point& c, const Point& d) {
+    return side_of_plane(a.data(), b.data(), c.data(), d.data());
+}
+
+}  // namespace
+
+void bind_mesh(nb::module_& module) {
+    using namespace nanobind::literals;
+    module.def("links", &bind_links, "triangles"_a, "counted"_a);
+    module.def("corners_by_vertex", &bind_corners, "triangles"_a, "vertices"_a);
+    module.def("parts", &bind_parts, "triangles"_a, "vertices"_a);
+    module.def("shell_volumes", &bind_volumes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a);
+    module.def("weld", &bind_weld, "points"_a);
+    module.def("tree", &bind_tree, "vertices"_a, "triangles"_a);
+    module.def("crossing_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,
+               "threads"_a = 0);
+    module.def("nesting", &bind_nesting, "vertices"_a, "triangles"_a, "labels"_a, "sizes"_a, "first"_a, "order"_a,
+               "low"_a, "high"_a);
+    module.def("side_of_line", &side_of_line, "ax"_a, "ay"_a, "bx"_a, "by"_a, "cx"_a, "cy"_a);
+    module.def("side_of_plane", &bind_side_of_plane, "a"_a, "b"_a, "c"_a, "d"_a);
+}
+
+}  // namespace fracslice

@@ -1,0 +1,151 @@
+// From the root down each node hands its children those nodes of the same level that their boxes meet. Pairs are looked at
+// once: at the node of the lower number.
+#include "crossings.h"
+
+#include <tbb/parallel_for.h>
+
+#include <atomic>
+#include <vector>
+
+#include "boxes.h"
+#include "overlap.h"
+
+namespace fracslice {
+namespace {
+
+// Leaves of a task.
+constexpr size_t kTask = 256;
+
+class Pairs {
+  public:
+    Pairs(const MeshView& mesh, const TreeView& tree) : mesh_(mesh), tree_(tree), aspects_(mesh.count), marks_(mesh.count) {
+        tbb::parallel_for(size_t(0), mesh.count, [&](size_t t) { aspects_[t] = aspect_of(mesh, t); });
+    }
+
+    Array<bool> run();
+
+  private:
+    // What one thread needs.
+    class Search;
+
+    bool meet(size_t a, size_t b) const {
+        const double *low = tree_.low, *high = tree_.high;
+        bool apart = false;
+        for (int k = 0; k < 3; ++k) apart |= low[3 * a + k] > high[3 * b + k] || high[3 * a + k] < low[3 * b + k];
+        return !apart;
+    }
+
+    bool marked(size_t t) const { return marks_[t].load(std::memory_order_relaxed); }
+    void mark(size_t t) { marks_[t].store(true, std::memory_order_relaxed); }
+
+    const MeshView& mesh_;
+    const TreeView& tree_;
+    std::vector<Aspect> aspects_;
+    std::vector<std::atomic<bool>> marks_;
+};
+
+class Pairs::Search {
+  public:
+    explicit Search(Pairs& pairs) : pairs_(pairs), mesh_(pairs.mesh_), tree_(pairs.tree_), cache_(kCached) {}
+
+    // All pairs of a leaf below a node.
+    void below(size_t node) {
+        others_.assign(1, 1);
+        size_t first = 0;
+        int depth = 0;
+        while (node >> depth > 1) ++depth;
+        while (depth-- > 0) {
+            size_t last = others_.size();
+            hand_down(node >> depth, first, last);
+            first = last;
+        }
+        visit(node, first);
+    }
+
+  private:
+    struct Leaf {
+        size_t number = size_t(-1);
+        LeafBoxes boxes;
+    };
+    static constexpr size_t kCached = 64;
+
+    void visit(size_t node, size_t first) {
+        size_t last = others_.size();
+        if (node >= tree_.leaves) {
+            for (size_t i = first; i < last; ++i) mark_leaves(node - tree_.leaves, others_[i] - tree_.leaves);
+            return;
+        }
+        for (size_t child : {2 * node, 2 * node + 1}) {
+            hand_down(child, first, last);
+            if (others_.size() > last) visit(child, last);
+            others_.resize(last);
+        }
+    }
+
+    // Adds to the end of the list the children of the nodes in [first, last) that meet the child.
+    void hand_down(size_t child, size_t first, size_t last) {
+        for (size_t i = first; i < last; ++i) {
+            for (size_t other : {2 * others_[i], 2 * others_[i] + 1}) {
+                if (other >= child && pairs_.meet(child, other)) others_.push_back(other);
+            }
+        }
+    }
+
+    // Neighbours in space follow each other: their boxes are kept a while.
+    const LeafBoxes& boxes(size_t number) {
+        Leaf& leaf = cache_[number % kCached];
+        if (leaf.number == number) return leaf.boxes;
+        leaf.number = number;
+        for (size_t lane = 0; lane < kLeaf; ++lane) {
+            size_t i = tree_.first(number) + lane;
+            if (i < tree_.count && pairs_.aspects_[tree_.order[i]].turn != 0) {
+                size_t t = size_t(tree_.order[i]);
+                leaf.boxes.set(lane, mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
+            } else {
+                leaf.boxes.clear(lane);
+            }
+        }
+        return leaf.boxes;
+    }
+
+    void mark_leaves(size_t one, size_t other) {
+        LeafBoxes mine = boxes(one);  // the cache may lose it to the other
+        const LeafBoxes& theirs = boxes(other);
+        size_t node = tree_.leaves + one;
+        for (unsigned near = theirs.meeting(box_of(tree_.low + 3 * node, tree_.high + 3 * node)); near; near &= near - 1) {
+            unsigned j = unsigned(__builtin_ctz(near)), met = mine.meeting(theirs[j]);
+            if (one == other) met &= (1u << j) - 1;
+            for (; met; met &= met - 1) {
+                mark_pair(tree_.order[tree_.first(one) + __builtin_ctz(met)], tree_.order[tree_.first(other) + j]);
+            }
+        }
+    }
+
+    void mark_pair(size_t s, size_t t) {
+        if (pairs_.marked(s) && pairs_.marked(t)) return;
+        if (!overlap(mesh_, s, t, pairs_.aspects_[s], pairs_.aspects_[t])) return;
+        pairs_.mark(s);
+        pairs_.mark(t);
+    }
+
+    Pairs& pairs_;
+    const MeshView& mesh_;
+    const TreeView& tree_;
+    std::vector<Leaf> cache_;
+    std::vector<size_t> others_;
+};
+
+Array<bool> Pairs::run() {
+    size_t first = 1;
+    for (size_t below = tree_.leaves; below > kTask; below /= 2) first *= 2;
+    tbb::parallel_for(first, 2 * first, [&](size_t node) { Search(*this).below(node); });
+    Array<bool> marks(mesh_.count, 1);
+    std::copy(marks_.begin(), marks_.end(), marks.data.get());
+    return marks;
+}
+
+}  // namespace
+
+Array<bool> crossing_triangles(const MeshView& mesh, const TreeView& tree) { return Pairs(mesh, tree).run(); }
+
+}  // namespace fracslice

@@ -1,0 +1,12 @@
+// Which triangles of a mesh cut, touch or cover others.
+#pragma once
+#include "../array.h"
+#include "triangles.h"
+
+namespace fracslice {
+
+// For each triangle whether it meets another one in more than what the vertices both have by index span. Triangles without
+// area are passed over.
+Array<bool> crossing_triangles(const MeshView& mesh, const TreeView& tree);
+
+}  // namespace fracslice

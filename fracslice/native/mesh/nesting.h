@@ -1,0 +1,19 @@
+// Which shell of a mesh lies inside which.
+#pragma once
+#include "../array.h"
+#include "triangles.h"
+
+namespace fracslice {
+
+struct Nesting {
+    Array<int64_t> winding;  // how often others surround each shell
+    Array<int64_t> parent;   // the smallest of these, or -1
+};
+
+// A ray from one vertex of each shell, first[shell], goes up and adds the winding of every triangle it passes; edges and
+// vertices on the ray count once (half-open edges). Shells with -1 for a vertex are not looked at. labels: the shell of each
+// triangle; sizes: the volume of each shell.
+Nesting nesting(const MeshView& mesh, const TreeView& tree, const int32_t* labels, const double* sizes,
+                const int64_t* first, size_t shells);
+
+}  // namespace fracslice

@@ -1,0 +1,20 @@
+// Whether two triangles of a mesh meet in more than what their shared vertices span, decided by signs of exact predicates
+// alone (the idea of Guigue and Devillers, "Fast and Robust Triangle-Triangle Overlap Test Using Orientation Predicates",
+// 2003).
+#pragma once
+#include "triangles.h"
+
+namespace fracslice {
+
+// How a triangle is seen along the axis along which it is broadest: its corners turn that way, 1 or -1. 0 for a triangle
+// without area.
+struct Aspect {
+    int8_t axis, turn;
+};
+
+Aspect aspect_of(const MeshView& mesh, size_t t);
+
+// s and t: different triangles with area, of these aspects.
+bool overlap(const MeshView& mesh, size_t s, size_t t, Aspect of_s, Aspect of_t);
+
+}  // namespace fracslice

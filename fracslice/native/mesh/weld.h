@@ -1,0 +1,17 @@
+// Equal corners made one vertex, bit by bit.
+#pragma once
+#include "../array.h"
+
+#include <cstdint>
+
+namespace fracslice {
+
+struct Welded {
+    Array<int64_t> first;   // of each set of equal points
+    Array<int32_t> labels;  // the set of each point
+};
+
+// bits: [count, 3], of float32 coordinates without negative zeros. Throws std::invalid_argument for more than 2^31 points.
+Welded weld(const uint32_t* bits, size_t count);
+
+}  // namespace fracslice
