@@ -57,7 +57,7 @@ def newton(
 ) -> np.ndarray:
     """Points [3, n] with values f [n] moved towards the zero set by Newton's steps along the gradient.
 
-    box: low and high corners, [3, n], that they stay in. Steps that do not bring a point nearer are not taken.
+    box: low and high corners, [3, n], that they stay in. A step that brings a point no nearer is not taken.
     """
     low, high = box or (np.full(p.shape, -np.inf), np.full(p.shape, np.inf))
     free = np.where(low < high, 1.0, 0.0)
