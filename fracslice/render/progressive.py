@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import RenderError
 from ..formulas.registry import Node
+from ..kernel.devices import chosen
 from ..scene.view import Camera, Film, View
 from ..work import Work
 from .accumulator import COARSE, Accumulator, HostAccumulator
@@ -65,19 +66,6 @@ class Pass:
                 f"pass {self.number}: its picture is gone, pass {self.source.passes} is over it"
             )
         return self.source
-
-
-def chosen(device: str) -> str:
-    """The device to use, "cpu" or "cuda"; "auto" takes the GPU if there is one. Raises `RenderError` if
-    there is none."""
-    if device == "cpu":
-        return device
-    from ..kernel.cuda import missing
-
-    reason = missing()
-    if reason and device == "cuda":
-        raise RenderError(f"device cuda: {reason}")
-    return "cpu" if reason else "cuda"
 
 
 def _machinery(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator], Accumulator]]:

@@ -36,10 +36,10 @@ A scene file is XML. It says what the object is, in units of its own, and how la
 </scene>
 ```
 
-Numbers are separated by spaces; kernels compute in float32, so none is beyond 1e9, and no radius or size below
-1e-15. Lengths in scene units have no unit; `size` takes `mm` (the default), `cm`, `m`, `in` or `um`. Comments
-may stand anywhere. Document types, entities and includes are not allowed. An editor completes and checks with
-the RELAX NG schema `fracslice/scene/scene.rng`, which ships with the package;
+Numbers are separated by spaces; kernels compute in float32, so none is beyond 1e9, and no radius or size
+below 1e-15. Lengths in scene units have no unit; `size` takes `mm` (the default), `cm`, `m`, `in` or `um`.
+Comments may stand anywhere. Document types, entities and includes are not allowed. An editor completes and
+checks with the RELAX NG schema `fracslice/scene/scene.rng`, which ships with the package;
 `python -c "from fracslice.scene import schema; print(schema.PATH)"` says where it is.
 
 In Python every element is a function of the same name in `fracslice.formulas`, and

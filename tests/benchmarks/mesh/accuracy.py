@@ -16,7 +16,6 @@ from fracslice.mesh.extract import contour, extract
 from fracslice.mesh.refine import refine
 from fracslice.volume import plan, sample_scene
 
-
 CHORD = 1e-3
 """Voxels."""
 
