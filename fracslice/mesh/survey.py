@@ -36,10 +36,9 @@ class Survey:
         labels = local.astype(np.int64) + self.count
         of_vertex = np.empty(len(mesh.vertices), np.int64)
         of_vertex[mesh.triangles] = labels[:, None]
-        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-        np.minimum.at(low, of_vertex - self.count, mesh.vertices)
-        np.maximum.at(high, of_vertex - self.count, mesh.vertices)
-        cones, areas = _cones(mesh, local, low)
+        low, high = _boxes(mesh.vertices, mesh.vertices, of_vertex - self.count, count)
+        near = Mesh(mesh.vertices - low[of_vertex - self.count], mesh.triangles)
+        cones, areas = _cones(near, local, count)
         self.cones.append(cones)
         self.areas.append(areas)
         self.low.append(low)
@@ -61,9 +60,7 @@ class Survey:
         """What all pieces together are made of."""
         of_label, count = self._united()
         lows, areas = np.concatenate(self.low), np.concatenate(self.areas)
-        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-        np.minimum.at(low, of_label, lows)
-        np.maximum.at(high, of_label, np.concatenate(self.high))
+        low, high = _boxes(lows, np.concatenate(self.high), of_label, count)
         # Cones over the corner of a part, moved to the corner of its shell.
         cones = np.concatenate(self.cones) + np.einsum("ij,ij->i", lows - low[of_label], areas) / 3
         volumes = np.bincount(of_label, cones, minlength=count).astype(np.float64)
@@ -116,14 +113,25 @@ class WholeShells:
         return Shells(np.empty(0, np.int32), self.volumes, parent), misplaced
 
 
-def _cones(
-    mesh: Mesh, labels: NDArray[np.int32], tips: NDArray[np.float64]
+def _boxes(
+    lows: NDArray[np.float64], highs: NDArray[np.float64], group: NDArray[np.integer], count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Of each part, float64 [s]: the signed volume between its triangles and a tip near by, [s, 3], so that
-    dust keeps its digits; and the sum of its normals, each as long as its triangle's area, [s, 3].
+    """The low and high corners of groups of boxes, float64 [count, 3] each."""
+    low, high = np.full((3, count), np.inf), np.full((3, count), -np.inf)
+    for k in range(3):  # one axis after the other: NumPy is quick at one dimension only
+        np.minimum.at(low[k], group, lows[:, k])
+        np.maximum.at(high[k], group, highs[:, k])
+    return low.T.copy(), high.T.copy()
+
+
+def _cones(
+    mesh: Mesh, labels: NDArray[np.int32], count: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of each part, float64 [s]: the signed volume between its triangles and the origin, which is near by, so
+    that dust keeps its digits; and the sum of its normals, each as long as its triangle's area, [s, 3].
     """
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]] - tips[labels] for k in range(3))
-    count, normals = len(tips), np.cross(b - a, c - a) / 2
-    cones = np.bincount(labels, np.einsum("ij,ij->i", a, normals), minlength=count) / 3
+    normals = mesh.normals / 2
+    tips = mesh.vertices[mesh.triangles[:, 0]]
+    cones = np.bincount(labels, np.einsum("ij,ij->i", tips, normals), minlength=count) / 3
     areas = [np.bincount(labels, normals[:, k], minlength=count) for k in range(3)]
     return cones, np.stack(areas, axis=1)
