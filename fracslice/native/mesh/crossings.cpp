@@ -2,6 +2,7 @@
 // once: at the node of the lower number.
 #include "crossings.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <atomic>
@@ -31,7 +32,7 @@ class Pairs {
     bool meet(size_t a, size_t b) const {
         const double *low = tree_.low, *high = tree_.high;
         bool apart = false;
-        for (int k = 0; k < 3; ++k) apart |= low[3 * a + k] > high[3 * b + k] || high[3 * a + k] < low[3 * b + k];
+        for (int k = 0; k < 3; ++k) apart |= (low[3 * a + k] > high[3 * b + k]) | (high[3 * a + k] < low[3 * b + k]);
         return !apart;
     }
 
@@ -66,13 +67,15 @@ class Pairs::Search {
     struct Leaf {
         size_t number = size_t(-1);
         LeafBoxes boxes;
+        Facet facets[kLeaf];
     };
-    static constexpr size_t kCached = 64;
+    static constexpr size_t kCached = 256;
 
     void visit(size_t node, size_t first) {
         size_t last = others_.size();
         if (node >= tree_.leaves) {
-            for (size_t i = first; i < last; ++i) mark_leaves(node - tree_.leaves, others_[i] - tree_.leaves);
+            Leaf mine = leaf(node - tree_.leaves);  // the cache may lose it to another
+            for (size_t i = first; i < last; ++i) mark_leaves(node, mine, others_[i]);
             return;
         }
         for (size_t child : {2 * node, 2 * node + 1}) {
@@ -91,39 +94,36 @@ class Pairs::Search {
         }
     }
 
-    // Neighbours in space follow each other: their boxes are kept a while.
-    const LeafBoxes& boxes(size_t number) {
+    // Neighbours in space follow each other: they are kept a while.
+    const Leaf& leaf(size_t number) {
         Leaf& leaf = cache_[number % kCached];
-        if (leaf.number == number) return leaf.boxes;
+        if (leaf.number == number) return leaf;
         leaf.number = number;
-        for (size_t lane = 0; lane < kLeaf; ++lane) {
-            size_t i = tree_.first(number) + lane;
-            if (i < tree_.count && pairs_.aspects_[tree_.order[i]].turn != 0) {
-                size_t t = size_t(tree_.order[i]);
-                leaf.boxes.set(lane, mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
-            } else {
-                leaf.boxes.clear(lane);
-            }
+        for (size_t lane = 0; lane < kLeaf; ++lane) leaf.boxes.clear(lane);
+        for (size_t i = tree_.first(number); i < tree_.last(number); ++i) {
+            size_t t = size_t(tree_.order[i]), lane = i % kLeaf;
+            if (pairs_.aspects_[t].turn == 0) continue;
+            leaf.boxes.set(lane, mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
+            leaf.facets[lane] = {{mesh_[t][0], mesh_[t][1], mesh_[t][2]}, pairs_.aspects_[t]};
         }
-        return leaf.boxes;
+        return leaf;
     }
 
-    void mark_leaves(size_t one, size_t other) {
-        LeafBoxes mine = boxes(one);  // the cache may lose it to the other
-        const LeafBoxes& theirs = boxes(other);
-        size_t node = tree_.leaves + one;
-        for (unsigned near = theirs.meeting(box_of(tree_.low + 3 * node, tree_.high + 3 * node)); near; near &= near - 1) {
-            unsigned j = unsigned(__builtin_ctz(near)), met = mine.meeting(theirs[j]);
-            if (one == other) met &= (1u << j) - 1;
-            for (; met; met &= met - 1) {
-                mark_pair(tree_.order[tree_.first(one) + __builtin_ctz(met)], tree_.order[tree_.first(other) + j]);
-            }
+    void mark_leaves(size_t node, const Leaf& mine, size_t other) {
+        const Leaf& theirs = leaf(other - tree_.leaves);
+        unsigned near = theirs.boxes.meeting(box_of(tree_.low + 3 * node, tree_.high + 3 * node));
+        for (; near; near &= near - 1) {
+            size_t j = size_t(__builtin_ctz(near));
+            unsigned met = mine.boxes.meeting(theirs.boxes[j]);
+            if (node == other) met &= (1u << j) - 1;
+            for (; met; met &= met - 1) mark_pair(mine, size_t(__builtin_ctz(met)), theirs, j);
         }
     }
 
-    void mark_pair(size_t s, size_t t) {
-        if (pairs_.marked(s) && pairs_.marked(t)) return;
-        if (!overlap(mesh_, s, t, pairs_.aspects_[s], pairs_.aspects_[t])) return;
+    void mark_pair(const Leaf& one, size_t i, const Leaf& other, size_t j) {
+        size_t s = size_t(tree_.order[tree_.first(one.number) + i]);
+        size_t t = size_t(tree_.order[tree_.first(other.number) + j]);
+        if ((pairs_.marked(s) && pairs_.marked(t)) || !overlap(mesh_, one.facets[i], other.facets[j])) return;
         pairs_.mark(s);
         pairs_.mark(t);
     }
@@ -138,7 +138,8 @@ class Pairs::Search {
 Array<bool> Pairs::run() {
     size_t first = 1;
     for (size_t below = tree_.leaves; below > kTask; below /= 2) first *= 2;
-    tbb::parallel_for(first, 2 * first, [&](size_t node) { Search(*this).below(node); });
+    tbb::enumerable_thread_specific<Search> searches([&] { return Search(*this); });
+    tbb::parallel_for(first, 2 * first, [&](size_t node) { searches.local().below(node); });
     Array<bool> marks(mesh_.count, 1);
     std::copy(marks_.begin(), marks_.end(), marks.data.get());
     return marks;

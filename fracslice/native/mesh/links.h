@@ -30,8 +30,8 @@ struct Parts {
 // Triangles with a common vertex are of one part.
 Parts parts(const Triangles& triangles);
 
-// Six times the signed volume of each part is summed from a vertex of its own: dust keeps its digits. labels: [count], each
-// below parts.
+// The signed volume of each part, measured from a vertex of its own: dust keeps its digits. labels: of the triangles, each below
+// parts.
 Array<double> shell_volumes(const MeshView& mesh, const int32_t* labels, size_t parts);
 
 }  // namespace fracslice

@@ -12,7 +12,7 @@ namespace {
 int winding_of(const MeshView& mesh, size_t t, const double* p) {
     int turn = 0;
     for (int k = 0; k < 3; ++k) {
-        const double *a = mesh.corner(t, k), *b = mesh.corner(t, k + 1);
+        const double *a = mesh.corner(t, k), *b = mesh.corner(t, (k + 1) % 3);
         bool up = a[1] <= p[1] && p[1] < b[1], down = b[1] <= p[1] && p[1] < a[1];
         if (!up && !down) continue;
         int side = side_of_line(a[0], a[1], b[0], b[1], p[0], p[1]);

@@ -17,30 +17,56 @@ struct Triangle {
     Aspect aspect;
 };
 
+constexpr int kNext[] = {1, 2, 0, 1};
+
 // side_of_line, seen along an axis.
 int turn(Point a, Point b, Point c, int axis) {
-    constexpr int next[] = {1, 2, 0, 1};
-    int i = next[axis], j = next[axis + 1];
+    int i = kNext[axis], j = kNext[axis + 1];
     return side_of_line(a[i], a[j], b[i], b[j], c[i], c[j]);
 }
 
-// Whether three points lie strictly on one side of the plane of a triangle, or all in it, or otherwise.
+// Whether points lie strictly on one side of a plane, or all in it, or otherwise.
 enum class Lie { kAside, kFlat, kAstride };
 
+// On which sides of the plane of a triangle the corners of another lie.
 struct Sides {
     int d, e, f;
 
     Lie lie() const { return d != e || d != f ? Lie::kAstride : d == 0 ? Lie::kFlat : Lie::kAside; }
 };
 
-Sides sides(const Triangle& s, Point d, Point e, Point f) {
-    return {side_of_plane(s.a, s.b, s.c, d), side_of_plane(s.a, s.b, s.c, e), side_of_plane(s.a, s.b, s.c, f)};
-}
+// The plane of a triangle: side_of_plane for many points, its minors taken once. The bound is the same.
+class Plane {
+  public:
+    explicit Plane(const Triangle& t) : a_(t.a), b_(t.b), c_(t.c) {
+        double b[3], c[3];
+        for (int k = 0; k < 3; ++k) b[k] = b_[k] - a_[k], c[k] = c_[k] - a_[k];
+        for (int k = 0; k < 3; ++k) {
+            double left = b[kNext[k]] * c[kNext[k + 1]], right = b[kNext[k + 1]] * c[kNext[k]];
+            normal_[k] = left - right;
+            bound_[k] = exact::kBound3 * (std::abs(left) + std::abs(right));
+        }
+    }
 
-Sides sides(const Triangle& s, Point e, Point f) {
-    int side = side_of_plane(s.a, s.b, s.c, e);
-    return {side, side, side_of_plane(s.a, s.b, s.c, f)};
-}
+    int side(Point p) const {
+        double x = p[0] - a_[0], y = p[1] - a_[1], z = p[2] - a_[2];
+        double above = normal_[0] * x + normal_[1] * y + normal_[2] * z;
+        double bound = bound_[0] * std::abs(x) + bound_[1] * std::abs(y) + bound_[2] * std::abs(z);
+        if (std::abs(above) > bound) return above > 0 ? -1 : 1;
+        return bound == 0 ? 0 : exact::side_of_plane(a_, b_, c_, p);
+    }
+
+    Sides sides(Point d, Point e, Point f) const { return {side(d), side(e), side(f)}; }
+    // The same without the corner that both triangles have.
+    Sides sides(Point e, Point f) const {
+        int first = side(e);
+        return {first, first, side(f)};
+    }
+
+  private:
+    Point a_, b_, c_;
+    double normal_[3], bound_[3];
+};
 
 // Whether the triangle s is seen to have the points d, e and f strictly beyond one of its edges.
 bool beyond_edge(const Triangle& s, Point d, Point e, Point f) {
@@ -51,24 +77,48 @@ bool beyond_edge(const Triangle& s, Point d, Point e, Point f) {
     return separates(s.a, s.b) || separates(s.b, s.c) || separates(s.c, s.a);
 }
 
-// Whether p is seen on the side `beyond` of the line from a to b, or on it, but with a strictly between p and b.
-bool beyond_line(Point a, Point b, Point p, int axis, int beyond) {
-    int side = turn(a, b, p, axis);
-    if (side != 0) return side == beyond;
-    int k = (axis + 1) % 3;
-    if (a[k] == b[k]) k = (axis + 2) % 3;
-    return b[k] > a[k] ? p[k] < a[k] : p[k] > a[k];
-}
+// Triangles at a common corner, seen along an axis.
+class Corner {
+  public:
+    // A point as seen from the corner.
+    struct Seen {
+        Point point;
+        double x, y;
+    };
+    enum Side : unsigned { kNone = 0, kLeft = 1, kRight = 2, kBoth = 3 };
+
+    Corner(Point at, int axis) : at_(at), axis_(axis), i_(kNext[axis]), j_(kNext[axis + 1]) {}
+
+    Seen see(Point p) const { return {p, p[i_] - at_[i_], p[j_] - at_[j_]}; }
+
+    // On which side of the line from the corner to p the point q lies: on the line, none, but behind the corner, both.
+    unsigned side(const Seen& p, const Seen& q) const {
+        double left = p.x * q.y, right = p.y * q.x, det = left - right;
+        if (std::abs(det) > exact::kBound2 * (std::abs(left) + std::abs(right))) return det > 0 ? kLeft : kRight;
+        return side_exactly(p, q);
+    }
+
+  private:
+    [[gnu::noinline]] unsigned side_exactly(const Seen& p, const Seen& q) const {
+        int side = turn(at_, p.point, q.point, axis_);
+        if (side != 0) return side > 0 ? kLeft : kRight;
+        return p.x * q.x < 0 || p.y * q.y < 0 ? kBoth : kNone;
+    }
+
+    Point at_;
+    int axis_, i_, j_;
+};
 
 // Whether a line along an edge at a is seen to separate s and t, but for their shared corner a; sure if true.
 bool apart_at_corner(const Triangle& s, const Triangle& t) {
-    int axis = s.aspect.axis, left = s.aspect.turn;
-    auto separates = [&](Point to, Point p, Point q, int beyond) {
-        return beyond_line(s.a, to, p, axis, beyond) && beyond_line(s.a, to, q, axis, beyond);
-    };
-    if (separates(s.b, t.b, t.c, -left) || separates(s.c, t.b, t.c, left)) return true;
-    left = turn(s.a, t.b, t.c, axis);
-    return left != 0 && (separates(t.b, s.b, s.c, -left) || separates(t.c, s.b, s.c, left));
+    Corner at(s.a, s.aspect.axis);
+    Corner::Seen b = at.see(s.b), c = at.see(s.c), e = at.see(t.b), f = at.see(t.c);
+    unsigned be = at.side(b, e), bf = at.side(b, f), ce = at.side(c, e), cf = at.side(c, f);
+    unsigned left = s.aspect.turn > 0 ? Corner::kLeft : Corner::kRight, right = Corner::kBoth - left;
+    if ((be & bf & right) || (ce & cf & left)) return true;
+    left = at.side(e, f);
+    right = Corner::kBoth - left;
+    return (left == Corner::kLeft || left == Corner::kRight) && ((be & ce & left) || (bf & cf & right));
 }
 
 bool within(Point p, const Triangle& t) {
@@ -111,9 +161,9 @@ bool any_edge_meets(const Triangle& s, const Sides& of, const Triangle& t) {
 }
 
 bool strangers_overlap(const Triangle& s, const Triangle& t) {
-    Sides of_t = sides(s, t.a, t.b, t.c);
+    Sides of_t = Plane(s).sides(t.a, t.b, t.c);
     if (of_t.lie() == Lie::kAside) return false;
-    Sides of_s = sides(t, s.a, s.b, s.c);
+    Sides of_s = Plane(t).sides(s.a, s.b, s.c);
     if (of_s.lie() == Lie::kAside) return false;
     if (beyond_edge(s, t.a, t.b, t.c) || beyond_edge(t, s.a, s.b, s.c)) return false;
     return of_t.lie() == Lie::kFlat || any_edge_meets(s, of_s, t) || any_edge_meets(t, of_t, s);
@@ -122,10 +172,10 @@ bool strangers_overlap(const Triangle& s, const Triangle& t) {
 // s and t share the corner a.
 bool overlap_at_corner(const Triangle& s, const Triangle& t) {
     if (apart_at_corner(s, t)) return false;
-    Sides of_t = sides(s, t.b, t.c);
+    Sides of_t = Plane(s).sides(t.b, t.c);
     if (of_t.lie() == Lie::kAside) return false;
-    Sides of_s = sides(t, s.b, s.c);
-    if (of_s.lie() == Lie::kAside) return false;
+    Sides of_s = Plane(t).sides(s.b, s.c);
+    if (of_s.lie() == Lie::kAside || apart_at_corner(t, s)) return false;
     // What they share beyond the corner ends on one of the edges opposite to it.
     return edge_meets(s.b, s.c, of_s.e, of_s.f, t) || edge_meets(t.b, t.c, of_t.e, of_t.f, s);
 }
@@ -151,20 +201,20 @@ Aspect aspect_of(const MeshView& mesh, size_t t) {
     return best;
 }
 
-bool overlap(const MeshView& mesh, size_t s, size_t t, Aspect of_s, Aspect of_t) {
-    int shared = 0, i = 0, j = 0, sum_i = 0, sum_j = 0;
+bool overlap(const MeshView& mesh, const Facet& s, const Facet& t) {
+    int shared = 0, i = 0, j = 0;
     for (int p = 0; p < 3; ++p) {
-        for (int q = 0; q < 3; ++q) {
-            if (mesh[s][p] != mesh[t][q]) continue;
-            ++shared, i = p, j = q;
-            sum_i += p, sum_j += q;
+        for (int q = 0; q < 3; ++q) {  // without branches, which would be guessed wrong
+            int same = s.corners[p] == t.corners[q];
+            shared += same, i += same * p, j += same * q;
         }
     }
     if (shared == 3) return true;
-    if (shared == 2) i = 3 - sum_i, j = 3 - sum_j;  // the corner that is not shared
-    Triangle one{mesh.corner(s, i), mesh.corner(s, i + 1), mesh.corner(s, i + 2), of_s};
-    if (shared == 2) return folded(one, mesh.corner(t, j));
-    Triangle other{mesh.corner(t, j), mesh.corner(t, j + 1), mesh.corner(t, j + 2), of_t};
+    if (shared == 2) i = 3 - i, j = 3 - j;  // the corner that is not shared, else the one that is
+    auto corner = [&](const Facet& of, int k) { return mesh.point(of.corners[k]); };
+    Triangle one{corner(s, i), corner(s, kNext[i]), corner(s, kNext[i + 1]), s.aspect};
+    if (shared == 2) return folded(one, corner(t, j));
+    Triangle other{corner(t, j), corner(t, kNext[j]), corner(t, kNext[j + 1]), t.aspect};
     return shared == 1 ? overlap_at_corner(one, other) : strangers_overlap(one, other);
 }
 

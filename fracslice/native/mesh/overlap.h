@@ -14,7 +14,12 @@ struct Aspect {
 
 Aspect aspect_of(const MeshView& mesh, size_t t);
 
-// s and t: different triangles with area, of these aspects.
-bool overlap(const MeshView& mesh, size_t s, size_t t, Aspect of_s, Aspect of_t);
+struct Facet {
+    int32_t corners[3];
+    Aspect aspect;
+};
+
+// Different triangles with area.
+bool overlap(const MeshView& mesh, const Facet& s, const Facet& t);
 
 }  // namespace fracslice

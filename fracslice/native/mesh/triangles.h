@@ -18,7 +18,7 @@ struct MeshView : Triangles {
     const double* positions;  // [vertices, 3]
 
     const double* point(int32_t v) const { return positions + 3 * size_t(v); }
-    const double* corner(size_t t, int k) const { return point(corners[3 * t + k % 3]); }
+    const double* corner(size_t t, int k) const { return point(corners[3 * t + size_t(k)]); }
 };
 
 // Triangles in a leaf of a tree.
