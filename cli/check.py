@@ -48,7 +48,6 @@ def check(
     """
     from fracslice.job import make_mesh
     from fracslice.mesh.check import check as examined
-    from fracslice.printing.checks import check_solid
 
     if options["layer"] is not None and not is_model(source):
         return check_print(source, settings, as_json, threads, quiet, **options)
@@ -57,6 +56,8 @@ def check(
         checked = examined(load_model(source), threads=threads)
         numbers, line, problems = checked.as_dict(), f"{source}: {found(checked)}", checked.problems
     else:
+        from fracslice.printing.checks import check_solid  # it needs Numba, and a model does not
+
         scene = load_scene(source, settings)
         with working(threads, quiet) as work:
             result = make_mesh(scene, job_of(scene, **options), work)

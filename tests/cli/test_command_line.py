@@ -171,15 +171,21 @@ def test_heavy_packages_are_not_loaded_for_help():
     assert loaded & set(heavy.split()) == set()
 
 
-def test_a_second_mesh_does_without_numba(ball, tmp_path, monkeypatch):
+def loads_numba(*arguments: object) -> bool:
+    code = "import sys; from fracslice_cli.main import run; print(run(sys.argv[1:]), 'numba' in sys.modules)"
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert done.split()[-2] == "0"
+    return done.split()[-1] == "True"
+
+
+def test_a_second_mesh_and_its_check_do_without_numba(ball, tmp_path, monkeypatch):
     """Loading it would cost more than all else that a small mesh needs."""
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
-    arguments = ["mesh", str(ball), "-o", str(tmp_path / "b.stl"), "--resolution", "24", "--quiet"]
-    code = f"import sys; from fracslice_cli.main import run; run({arguments}); print('numba' in sys.modules)"
-    command = [sys.executable, "-c", code]
-    runs = [subprocess.run(command, check=True, capture_output=True, text=True).stdout for _ in range(2)]
-    assert runs == ["True\n", "False\n"]
-    assert (tmp_path / "b.stl").exists()
+    model = tmp_path / "b.stl"
+    runs = [loads_numba("mesh", ball, "-o", model, "--resolution", 24, "--quiet") for _ in range(2)]
+    assert runs == [True, False]
+    assert not loads_numba("check", model)
 
 
 def test_progress_is_shown_on_a_terminal_only(ball, tmp_path):
