@@ -87,14 +87,16 @@ def render(
 
     check_image(output)
     check_target(output)
-    scene = load_scene(source, settings)
+    scene, start = load_scene(source, settings), time.monotonic()
     with working(threads, quiet) as work:
         renderer = Renderer(scene.root, scene.view, size, work, device)
         if state and Path(state).exists():
             renderer.resume(state)
         last = None
         for last in timed(renderer, samples, limit):
-            work.progress(shown(last), fraction(last, renderer, samples))
+            work.progress(
+                f"{reached(last)}, {last.rate / 1e6:.2f} M samples/s", fraction(last, renderer, samples)
+            )
             if pass_images:
                 Path(pass_images).mkdir(parents=True, exist_ok=True)
                 save(Path(pass_images) / f"pass{last.number:04}.png", last, scene, "8")
@@ -105,8 +107,8 @@ def render(
     save(output, last, scene, bits)
     if not quiet:
         click.echo(
-            f"{output}: {renderer.width} x {renderer.height} pixels, {shown(last)}, "
-            f"{renderer.setting.precision}, {renderer.device}"
+            f"{output}: {renderer.width} x {renderer.height} pixels, {reached(last)}, "
+            f"{renderer.setting.precision}, {renderer.device}, {time.monotonic() - start:.1f} s"
         )
 
 
@@ -119,10 +121,9 @@ def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Itera
             return
 
 
-def shown(done: Pass) -> str:
+def reached(done: Pass) -> str:
     """How far the picture is, in words."""
-    rate = f", {done.rate / 1e6:.2f} M samples/s" if done.rate else ""
-    return f"{done.samples:.1f} samples a pixel, error {done.error:.2g}{rate}"
+    return f"{done.samples:.1f} samples a pixel, error {done.error:.2g}"
 
 
 def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
