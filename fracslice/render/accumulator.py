@@ -24,6 +24,11 @@ COARSE = 4
 NEARLY = 0.999
 """The largest of some numbers is not below so much of their mean, however that is rounded."""
 
+FEW = 1 / 256
+"""When no more than this share of the pixels is unfinished, there is no choosing among them: a pass costs its
+time for a single pixel too.
+"""
+
 
 class Accumulator(Protocol):
     """A picture in the making, wherever its sums are.
@@ -139,7 +144,8 @@ class HostAccumulator:
         gain = around(squares / n)
         begun = (n & (n - 1)) != 0
         known = gain[unfinished]
-        return np.asarray(unfinished & (begun | (gain >= NEARLY * known.mean() if known.size else False)))
+        least = NEARLY * known.mean() if known.size > FEW * gain.size else 0.0
+        return np.asarray(unfinished & (begun | (gain >= least)))
 
     def receive(self, add: Callable[[Any], None]) -> None:
         sums = self.sums.copy()

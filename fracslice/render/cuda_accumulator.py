@@ -13,7 +13,7 @@ from ..kernel.cpu import Precision
 from ..kernel.cuda import launched, load_loops, require
 from ..kernel.linker import Linked
 from ..scene.view import Film
-from .accumulator import NEARLY, TRUSTED, HostAccumulator
+from .accumulator import FEW, NEARLY, TRUSTED, HostAccumulator
 from .cpu import ordered
 
 PARTS = 8192
@@ -178,7 +178,7 @@ class CudaAccumulator:
         judged = (self.sums, self._squares, self._gains, self._parts, self.width)
         limits = (real(TRUSTED), real(most), real(tolerance * tolerance))
         total, unfinished, _ = self._summed(self._loops.judge, *judged, *limits)
-        least = real(NEARLY * total / unfinished if unfinished else 0.0)
+        least = real(NEARLY * total / unfinished if unfinished > FEW * self.width * self.height else 0.0)
         chosen = (self._gains, self._order, self._pixels, self._parts, self.width, least)
         return self._pixels, int(self._summed(self._loops.choose, *chosen)[0])
 
