@@ -18,7 +18,7 @@ def marching_cubes(
     voxel: float,
     clamp: float,
     threads: int = 0,
-) -> tuple[NDArray[float64], NDArray[int32], NDArray[int32], NDArray[uint8]]:
+) -> tuple[NDArray[float64], NDArray[int32]]:
     """The surface between the samples < 0 and the others: closed, an oriented 2-manifold, free of
     self-crossings.
 
@@ -26,8 +26,7 @@ def marching_cubes(
     result is the same for any number.
 
     Returns vertices float64 [n, 3] at origin + voxel * (grid position); triangles int32 [m, 3],
-    counter-clockwise seen from outside; and the grid edge that each vertex lies on, by its lower grid point
-    int32 [n, 3] and its axis uint8 [n]. Marching cubes after Lorensen and Cline (1987), with a table that
+    counter-clockwise seen from outside. Marching cubes after Lorensen and Cline (1987), with a table that
     `make_cases.py` derives.
 
     Raises ValueError if a sign change leaves the samples or the arrays contradict each other, and for a

@@ -34,7 +34,7 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
     from .._native import marching_cubes
 
     placement = tuple(float(v) for v in bricks.origin), float(bricks.voxel), clamp(bricks)
-    vertices, triangles, *_ = _called(
+    vertices, triangles = _called(
         marching_cubes, bricks.ijk, bricks.values, bricks.index, *placement, threads
     )
     return Mesh(vertices, triangles)

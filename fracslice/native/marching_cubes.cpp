@@ -42,8 +42,6 @@ class Extraction {
         });
         surface_.triangles = {running_sum(counts, &Count::triangles, "triangles"), 3};
         surface_.vertices = {cells_.vertices(), 3};
-        surface_.lower = {cells_.vertices(), 3};
-        surface_.axis = {cells_.vertices(), 1};
         tbb::parallel_for(size_t(0), cells_.size(), [&](size_t i) {
             Octant near = cells_.octant(i);
             if (i < cells_.sampled()) write_vertices(i, near);
@@ -79,9 +77,7 @@ class Extraction {
         place[edge.axis] += t;
         for (size_t k = 0; k < 3; ++k) {
             surface_.vertices.data[first + k] = placement_.origin[k] + placement_.voxel * place[k];
-            surface_.lower.data[first + k] = edge.lower[k];
         }
-        surface_.axis.data[edge.vertex] = edge.axis;
     }
 
     void write_triangles(const Octant& near, int32_t* out) const {

@@ -7,8 +7,6 @@ namespace fracslice {
 struct Surface {
     Array<double> vertices;    // [n, 3], origin + voxel * (grid position)
     Array<int32_t> triangles;  // [m, 3], counter-clockwise seen from outside
-    Array<int32_t> lower;      // [n, 3], the grid edge that a vertex lies on: its lower grid point ...
-    Array<uint8_t> axis;       // [n], ... and its direction
 };
 
 struct Placement {

@@ -12,8 +12,7 @@ nb::tuple bind_marching_cubes(const IjkArray& ijk, const ValuesArray& values, co
     Bricks bricks = view(ijk, values, index);
     Surface surface = unlocked(threads, [&] { return marching_cubes(bricks, {origin, voxel, clamp}); });
     size_t n = surface.vertices.rows, m = surface.triangles.rows;
-    return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
-                          to_numpy(std::move(surface.lower), {n, 3}), to_numpy(std::move(surface.axis), {n}));
+    return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}));
 }
 
 // The cells of a surface, kept from one piece of it to the next together with the arrays they look into.

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fracslice._native import marching_cubes, open_edges
+from fracslice._native import Cells, marching_cubes, open_edges
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.crossings import crossing_triangles
@@ -120,9 +120,11 @@ def test_volumes_of_known_solids(side: int) -> None:
         assert len(mesh.vertices) - len(mesh.triangles) // 2 == euler, name
 
 
-def test_vertices_lie_on_the_edges_they_name() -> None:
+def test_vertices_lie_on_the_crossed_edges_in_their_order() -> None:
     bricks = bricks_of(noise(5, 16, spread=4))
-    vertices, _, lower, axis = marching_cubes(bricks.ijk, bricks.values, bricks.index, (0, 0, 0), 1.0, 1e-4)
+    vertices, _ = marching_cubes(bricks.ijk, bricks.values, bricks.index, (0, 0, 0), 1.0, 1e-4)
+    cells = Cells(bricks.ijk, bricks.signs.signs, bricks.index)
+    lower, axis = cells.crossed_edges(0, len(bricks.index))
     along = vertices - lower
     rows = np.arange(len(axis))
     t = along[rows, axis].copy()
