@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..formulas.registry import Node
-from ..kernel import Compilable, compile_scene
-from ..volume.settling import newton
-from ..volume.values import values_at
-from ..work import Work, chunks
+from ..kernel import Compilable
+from ..volume.settling import anywhere, settle
+from ..work import Work
 from .model import Mesh
 
 PASSES = 6
@@ -33,7 +32,7 @@ def refine(root: Node | Compilable, mesh: Mesh, chord: float, voxel: float, work
         edges, sides = _edges(mesh.triangles)
         ends = mesh.vertices[edges]
         middles = ends.mean(axis=1)
-        there = _projected(root, middles, voxel, work)
+        there = settle(root, middles, anywhere, voxel, work)
         off = np.linalg.norm(there - middles, axis=1)
         split = (off > chord) & (off < SMOOTH * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
         split &= ~np.isin(_keys(edges), kept)
@@ -73,18 +72,6 @@ def _edges(triangles: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.
     count = int(triangles.max()) + 1
     keys, sides = np.unique(ends[..., 0] * count + ends[..., 1], return_inverse=True)
     return np.stack([keys // count, keys % count], axis=1), sides.reshape(-1, 3)
-
-
-def _projected(root: Node | Compilable, points: np.ndarray, voxel: float, work: Work) -> np.ndarray:
-    """Points moved to the zero set along its gradient, float64 [n, 3]."""
-    kernel, moved = compile_scene(root, "float64"), points.copy()
-    f = values_at(kernel, np.ascontiguousarray(points.T), work)
-
-    def task(part: slice) -> None:
-        moved[part] = newton(kernel, points[part].T, f[part], voxel).T
-
-    work.map(task, chunks(len(points), 1 << 13))
-    return moved
 
 
 def _split(

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
+from ..disjoint import find, roots, unite
 from ..volume import Bricks
 from ..volume.bricks import INSIDE
 
@@ -64,37 +65,12 @@ def parts_of(bricks: Bricks) -> Parts:
     inside[labels.ravel()] = bricks.values.ravel() < 0
     inside[tiles[empty]] = bricks.index[empty] == INSIDE
     _unite_faces(bricks.index, labels, tiles, inside, parent)
-    root = _roots(parent)
+    root = roots(parent)
     names, number = np.unique(root, return_inverse=True)
     count = np.bincount(number[labels.ravel()], minlength=len(names))
     count += 512 * np.bincount(number[tiles[empty]], minlength=len(names))
     found = np.where(empty, number[tiles], -1).astype(np.int32)
     return Parts(number.astype(np.int32)[labels], found, inside[names], count)
-
-
-@njit(cache=True, nogil=True)
-def _find(parent, i):  # type: ignore[no-untyped-def]
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
-
-
-@njit(cache=True, nogil=True)
-def _unite(parent, a, b):  # type: ignore[no-untyped-def]
-    a, b = _find(parent, a), _find(parent, b)
-    if a < b:
-        parent[b] = a
-    else:
-        parent[a] = b
-
-
-@njit(cache=True, nogil=True)
-def _roots(parent):  # type: ignore[no-untyped-def]
-    root = np.empty_like(parent)
-    for i in range(len(parent)):
-        root[i] = _find(parent, i)
-    return root
 
 
 @njit(cache=True, nogil=True)
@@ -107,14 +83,14 @@ def _label(values, labels, first):  # type: ignore[no-untyped-def]
             parent[s] = s
             for step, at in ((64, s >> 6), (8, (s >> 3) & 7), (1, s & 7)):
                 if at and (f[s] < 0) == (f[s - step] < 0):
-                    _unite(parent, s, s - step)
+                    unite(parent, s, s - step)
         count = 0
         for s in range(512):
             if parent[s] == s:
                 labels[row, s] = count
                 count += 1
             else:
-                labels[row, s] = labels[row, _find(parent, s)]
+                labels[row, s] = labels[row, find(parent, s)]
         first[row + 1] = first[row] + count
 
 
@@ -127,13 +103,13 @@ def _unite_faces(index, labels, tiles, inside, parent):  # type: ignore[no-untyp
                 here = index[x, y, z]
                 rim = min(x, y, z) == 0 or x == nx - 1 or y == ny - 1 or z == nz - 1
                 if here < 0 and rim and not inside[tiles[x, y, z]]:
-                    _unite(parent, 0, tiles[x, y, z])
+                    unite(parent, 0, tiles[x, y, z])
                 for axis in range(3):
                     u, v, w = x + (axis == 0), y + (axis == 1), z + (axis == 2)
                     there = index[u, v, w] if u < nx and v < ny and w < nz else -1
                     if here < 0 and there < 0:
                         if u < nx and v < ny and w < nz and inside[tiles[x, y, z]] == inside[tiles[u, v, w]]:
-                            _unite(parent, tiles[x, y, z], tiles[u, v, w])
+                            unite(parent, tiles[x, y, z], tiles[u, v, w])
                         continue
                     other = tiles[u, v, w] if u < nx and v < ny and w < nz else 0
                     _unite_face(axis, here, there, tiles[x, y, z], other, labels, inside, parent)
@@ -151,4 +127,4 @@ def _unite_face(axis, here, there, own, other, labels, inside, parent):  # type:
             a = labels[here, s + 7 * step] if here >= 0 else own
             b = labels[there, s] if there >= 0 else other
             if inside[a] == inside[b]:
-                _unite(parent, a, b)
+                unite(parent, a, b)

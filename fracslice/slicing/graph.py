@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numba import njit
 
-from .runs import Parts, find, overlaps, unite
+from ..disjoint import find, unite
+from .runs import Parts, overlaps
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from ..disjoint import find, unite
+
 THRESHOLD = 128
 """The coverage from which a pixel is solid."""
 
@@ -97,25 +99,6 @@ def _gaps(rows, begin, end, nx, gaps, gap_begin, gap_end):  # type: ignore[no-un
             n += 1
         gaps[y + 1] = n
     return n
-
-
-@njit(cache=True, nogil=True)
-def find(parent, i):  # type: ignore[no-untyped-def]
-    """The root of i, paths halved on the way (Tarjan and van Leeuwen 1984)."""
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
-
-
-@njit(cache=True, nogil=True)
-def unite(parent, a, b):  # type: ignore[no-untyped-def]
-    """One set from two; the smaller root stays."""
-    a, b = find(parent, a), find(parent, b)
-    if a < b:
-        parent[b] = a
-    else:
-        parent[a] = b
 
 
 @njit(cache=True, nogil=True)

@@ -6,16 +6,22 @@ pierce a mesh whose triangles stay in their cells.
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..formulas import vocabulary
 from ..formulas.registry import Node
-from ..kernel import Compilable, Kernel, compile_scene
+from ..kernel import Compilable, compile_scene
 from ..kernel.cpu import lane_count, load_functions
 from ..kernel.linker import link
 from ..kernel.loops import Loop
 from ..work import Work, chunks
+
+Run = Callable[[np.ndarray, np.ndarray], None]
+"""Fills rows 6 to 9 from rows 0 to 5, float64 [10, n]."""
 
 CROSSINGS = Loop(
     "crossings",
@@ -114,15 +120,10 @@ def refine_crossings(
     ijk: int32 [n, 3], the lower grid point of each edge; axis: uint8 [n]. Where the float64 field does not
     change its sign (it is smaller than float32 can tell at one end) t is that end.
     """
-    if not isinstance(root, Node):
-        return _by_points(root, np.asarray(origin) + voxel * ijk, axis, voxel, work or Work())
-    linked = link(root)
-    width = lane_count(64)
-    run = load_functions(linked, 64, width, (CROSSINGS,))["crossings"]
+    run, width = _compiled(root) if isinstance(root, Node) else _on_arrays(root)
     n = len(ijk)
     t, normals = np.empty(n), np.empty((n, 3))
     frame = np.array([PRECISION * voxel, REACH * voxel, BRACKET])
-    parameters = np.ascontiguousarray(linked.parameters)
     start = np.asarray(origin)[:, None]
 
     def task(part: slice) -> None:
@@ -130,49 +131,40 @@ def refine_crossings(
         rows = np.zeros((10, -(-count // width) * width))
         rows[:3, :count] = start + voxel * ijk[part].T
         rows[3 + axis[part], np.arange(count)] = voxel
-        run(parameters.ctypes.data, frame.ctypes.data, *(row.ctypes.data for row in rows), rows.shape[1])
+        run(frame, rows)
         t[part], normals[part] = rows[6, :count], rows[7:, :count].T
 
     (work or Work()).map(task, chunks(n, 1 << 13))
     return Crossings(t, normals)
 
 
-def _by_points(root: Compilable, lower: np.ndarray, axis: np.ndarray, voxel: float, work: Work) -> Crossings:
-    """The same for a field without a loop of its own. lower: float64 [n, 3], the edges' lower ends."""
+def _compiled(root: Node) -> tuple[Run, int]:
+    """The loop over a scene's field, and how many lanes it takes at once."""
+    linked, width = link(root), lane_count(64)
+    run = load_functions(linked, 64, width, (CROSSINGS,))["crossings"]
+    parameters = np.ascontiguousarray(linked.parameters)
+
+    def call(frame: np.ndarray, rows: np.ndarray) -> None:
+        places = (row.ctypes.data for row in rows)
+        run(parameters.ctypes.data, frame.ctypes.data, *places, rows.shape[1])
+
+    return call, width
+
+
+def _on_arrays(root: Compilable) -> tuple[Run, int]:
+    """The same text run by NumPy, for a field that is not linked: all edges are one vector."""
     kernel = compile_scene(root, "float64")
-    t, normals = np.empty(len(lower)), np.empty((len(lower), 3))
+    words = {
+        **vars(vocabulary),
+        "WIDTH": sys.maxsize,
+        "load": lambda row, _: row,
+        "store": lambda row, _, values: np.copyto(row, values),
+        "field": lambda x, y, z, _: kernel.points(x, y, z),
+    }
+    exec(CROSSINGS.source, words)
 
-    def task(part: slice) -> None:
-        start, along = lower[part].T, voxel * np.eye(3)[:, axis[part]]
-        t[part] = _roots(kernel, start, along, PRECISION * voxel)
-        at, e = start + t[part] * along, REACH * voxel
-        corners = [kernel.points(*(at + e * np.array(way)[:, None])) for way in _TETRAHEDRON]
-        slope = sum(np.multiply.outer(way, f) for way, f in zip(_TETRAHEDRON, corners, strict=True))
-        normals[part] = (slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-100)).T
+    def call(frame: np.ndarray, rows: np.ndarray) -> None:
+        with np.errstate(all="ignore"):
+            words["crossings"](None, frame, *rows, rows.shape[1])
 
-    work.map(task, chunks(len(lower), 1 << 13))
-    return Crossings(t, normals)
-
-
-_TETRAHEDRON = ((1, -1, -1), (-1, -1, 1), (-1, 1, -1), (1, 1, 1))
-
-
-def _roots(kernel: Kernel, start: np.ndarray, along: np.ndarray, small: float) -> np.ndarray:
-    """Where the field changes its sign between start and start + along, [3, n], as a share."""
-    a, b = np.zeros(start.shape[1]), np.ones(start.shape[1])
-    fa, fb = kernel.points(*start), kernel.points(*(start + along))
-    t = np.where((fa < 0) == (fa < fb), b, a)
-    rows = np.flatnonzero((fa < 0) != (fb < 0))
-    a, b, fa, fb = a[rows], b[rows], fa[rows], fb[rows]
-    for step in range(40):
-        if not len(rows):
-            break
-        u = (a + b) / 2 if step % 3 == 2 else np.clip((a * fb - b * fa) / (fb - fa), a, b)
-        f = kernel.points(*(start[:, rows] + u * along[:, rows]))
-        t[rows] = u
-        left = (f < 0) == (fa < 0)
-        a, b = np.where(left, u, a), np.where(left, b, u)
-        fa, fb = np.where(left, f, fa / 2), np.where(left, fb / 2, f)
-        open_ = (np.abs(f) > small) & (b - a > 1e-13)
-        rows, a, b, fa, fb = rows[open_], a[open_], b[open_], fa[open_], fb[open_]
-    return t
+    return call, 1

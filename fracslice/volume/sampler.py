@@ -133,9 +133,9 @@ class _Run:
         """
         candidate = state == CANDIDATE
         if self.facts.weak:
-            candidate &= _beside(state == EMPTY, True) | outside
+            candidate &= _touching(state == EMPTY, True) | outside
         # Said to be full next to what is said to be empty: the bound is wrong there.
-        wrong = (state == FULL) & _beside(state == EMPTY, True)
+        wrong = (state == FULL) & _touching(state == EMPTY, True)
         self.repaired += int(wrong.sum())
         return np.argwhere(candidate | wrong).astype(np.int32)
 
@@ -211,7 +211,7 @@ class _Run:
         """Bricks without samples, with a sample of the other sign than assumed; always the same points."""
         rng = np.random.default_rng(turn)
         bare = state != QUEUED
-        near = np.argwhere(bare & _beside(~bare, False))
+        near = np.argwhere(bare & _touching(~bare, False))
         far = np.flatnonzero(bare)
         chosen = np.unravel_index(rng.choice(far, min(FAR_AUDITS, len(far)), replace=False), state.shape)
         bricks = np.concatenate([near, np.stack(chosen, 1)]).astype(np.int32)
@@ -295,7 +295,7 @@ def _around(state: np.ndarray, bricks: np.ndarray) -> np.ndarray:
     return found
 
 
-def _beside(cells: np.ndarray, beyond: bool) -> np.ndarray:
+def _touching(cells: np.ndarray, beyond: bool) -> np.ndarray:
     """Which cells of a boolean grid have a true neighbour on a face; `beyond` stands for what is outside the
     grid.
     """

@@ -41,34 +41,24 @@ def settle(
     low, high = room(points[away])
 
     def task(part: slice) -> None:
-        rows = away[part]
-        settled[rows] = newton(kernel, points[rows].T, values[rows], voxel, (low[part].T, high[part].T)).T
+        p, f = points[away[part]].T, values[away[part]]
+        free = np.where(low[part] < high[part], 1.0, 0.0).T
+        for _ in range(STEPS):
+            slope = free * _gradient(kernel, p, REACH * voxel)
+            step = f * slope / np.maximum((slope * slope).sum(0), FLAT**2)
+            moved = np.clip(p - step, low[part].T, high[part].T)
+            there = kernel.points(*moved)
+            nearer = (np.abs(there) < np.abs(f)) & (np.abs(f) > NEAR * voxel)
+            p, f = np.where(nearer, moved, p), np.where(nearer, there, f)
+        settled[away[part]] = p.T
 
     work.map(task, chunks(len(away), 1 << 13))
     return settled
 
 
-def newton(
-    kernel: Kernel,
-    p: np.ndarray,
-    f: np.ndarray,
-    voxel: float,
-    box: tuple[np.ndarray, np.ndarray] | None = None,
-) -> np.ndarray:
-    """Points [3, n] with values f [n] moved towards the zero set by Newton's steps along the gradient.
-
-    box: low and high corners, [3, n], that they stay in. A step that brings a point no nearer is not taken.
-    """
-    low, high = box or (np.full(p.shape, -np.inf), np.full(p.shape, np.inf))
-    free = np.where(low < high, 1.0, 0.0)
-    for _ in range(STEPS):
-        slope = free * _gradient(kernel, p, REACH * voxel)
-        step = f * slope / np.maximum((slope * slope).sum(0), FLAT**2)
-        moved = np.clip(p - step, low, high)
-        there = kernel.points(*moved)
-        nearer = (np.abs(there) < np.abs(f)) & (np.abs(f) > NEAR * voxel)
-        p, f = np.where(nearer, moved, p), np.where(nearer, there, f)
-    return p
+def anywhere(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes without borders."""
+    return np.full(points.shape, -np.inf), np.full(points.shape, np.inf)
 
 
 def _gradient(kernel: Kernel, p: np.ndarray, h: float) -> np.ndarray:
