@@ -35,10 +35,10 @@ class Bounds:
     to its farthest sample.
 
     proven: for blocks over several layers. outside, inside: within a layer, by the sign of the middle.
-    stop_outside, stop_inside: blocks of so many pixels are not cut any more. fractal: inside values are of
-    another scale than outside ones, so crossings are measured; even: of one scale everywhere, so that a part
-    of the crossings tells for all, and the bound outside follows the steepness of the field, from `outside`
-    up to `proven`.
+    stop_outside, stop_inside: blocks of so many pixels are not cut any more. even: inside values are of
+    another scale than outside ones, but of one everywhere, so that a part of the crossings tells for all, and
+    the bound outside follows the steepness of the field, from `outside` up to `proven`. In a field that is not
+    even every crossing is settled on the field, and so are corners within pixels.
     """
 
     def __init__(
@@ -48,7 +48,6 @@ class Bounds:
         inside: float,
         stop_outside: int,
         stop_inside: int,
-        fractal: bool,
         even: bool,
     ) -> None: ...
 

@@ -51,7 +51,8 @@ class Layer:
         """Writes how much of each pixel is inside to an image of zeros, uint8 [ny, nx] of any strides, 255
         for wholly; row 0 is the front (lowest y).
 
-        The area that the polygon through the crossings of the pixel's sides cuts from it.
+        The area that the outline cuts from it: straight between where it crosses the pixel's sides, with a
+        corner where it turns.
         """
         self._painted = self.slab.paint(self.place, image)
 

@@ -72,9 +72,9 @@ class Sampler:
         bound, weak = self.facts.lipschitz, self.facts.weak
         even = weak and is_fractal(self.root)
         if even:
-            return Bounds(bound, bound * LIKELY[0], bound * LIKELY[1], 1, 1, True, True)
+            return Bounds(bound, bound * LIKELY[0], bound * LIKELY[1], 1, 1, True)
         stop = STOP if weak else (1, 1)
-        return Bounds(bound, bound, bound, *stop, weak, False)
+        return Bounds(bound, bound, bound, *stop, False)
 
 
 def is_fractal(root: Node | Compilable) -> bool:

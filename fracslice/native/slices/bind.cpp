@@ -101,8 +101,8 @@ NB_MODULE(_slices, module) {
     nb::class_<Compiled, Field>(module, "Compiled").def(nb::init<uintptr_t, uintptr_t>(), "code"_a, "parameters"_a);
     nb::class_<Called, Field>(module, "Called").def(nb::init<nb::callable>(), "function"_a);
     nb::class_<Bounds>(module, "Bounds")
-        .def(nb::init<double, double, double, int, int, bool, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
-             "stop_inside"_a, "fractal"_a, "even"_a);
+        .def(nb::init<double, double, double, int, int, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
+             "stop_inside"_a, "even"_a);
     nb::class_<Slab>(module, "Slab")
         .def("__init__",
              [](Slab* self, std::array<double, 4> f, std::vector<double> z, std::vector<int> layers, int ny, int nx) {

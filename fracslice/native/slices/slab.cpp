@@ -23,8 +23,6 @@ constexpr uint64_t middles(int size) {
 }
 double length(double x, double y) { return std::sqrt(x * x + y * y); }
 
-uint16_t share_of(float share) { return uint16_t(share * kWhole + 0.5f); }
-
 constexpr uint64_t kMiddles[9] = {0, 0, middles(2), 0, middles(4), 0, 0, 0, middles(8)};
 
 }  // namespace
@@ -38,6 +36,7 @@ Slab::Slab(const Frame& frame, std::vector<double> z, std::vector<int> wanted, i
       where_(z_.size() * ty_ * tx_, kEmpty) {}
 
 void Slab::sample(const Field& field, const Bounds& bounds) {
+    span.resize(z_.size());
     std::vector<Block> blocks = coarse(field, bounds);
     // Layer by layer, so that what is worked on stays near.
     for (int k : wanted_) {
@@ -47,7 +46,10 @@ void Slab::sample(const Field& field, const Bounds& bounds) {
         mend(k);
         close(field);
         corners();
-        measure(field, bounds);
+        measure(field, bounds, k);
+        span[k] = {int32_t(first_), int32_t(count())};
+        if (!bounds.even) sharpen(field, k);
+        span[k][1] = int32_t(count());
     }
 }
 
@@ -88,10 +90,20 @@ void Slab::evaluate(const Field& field, const std::vector<int64_t>& samples, con
     });
 }
 
+std::vector<float> Slab::values_at(const Field& field, int layer, const std::vector<Spot>& spots) {
+    std::vector<float> found(spots.size());
+    auto where = [&](size_t i, double& column, double& row, double& height) {
+        column = spots[i].column, row = spots[i].row, height = z_[layer];
+    };
+    evaluate(field, spots.size(), where, [&](size_t i, float f) { found[i] = f; });
+    return found;
+}
+
 int32_t Slab::add(int layer, int y, int x) {
     int32_t& here = where_[(size_t(layer) * ty_ + y) * tx_ + x];
     inside.push_back(here == kFull ? kAll : 0);
     known.push_back(0);
+    sharp.push_back(0);
     values.emplace_back();
     outside_.push_back(0);
     place.push_back({layer, y, x});
@@ -282,9 +294,7 @@ void Slab::corners() {
 }
 
 // --- where edges are crossed -----------------------------------------------------------------------------------------------
-// By linear interpolation; where inside values are of another scale than outside ones, after the field's value at the middle
-// of edges, see `halve`.
-void Slab::measure(const Field& field, const Bounds& bounds) {
+void Slab::measure(const Field& field, const Bounds& bounds, int layer) {
     cross.resize(count());
     std::vector<Edge> edges;
     for (size_t t = first_; t < count(); ++t) {
@@ -295,28 +305,25 @@ void Slab::measure(const Field& field, const Bounds& bounds) {
             for (uint64_t w = words[up]; w; w &= w - 1) {
                 int bit = lowest(w);
                 float a = values[t][bit], b = value(p, int32_t(t), (bit >> 3) + up, (bit & 7) + 1 - up);
-                if (bounds.fractal)
-                    edges.push_back({int32_t(t), 64 * up + bit, a, b});
-                else
-                    cross[t][64 * up + bit] = share_of(a / (a - b));
+                edges.push_back({int32_t(t), 64 * up + bit, a, b});
             }
     }
-    if (bounds.fractal) halve(field, bounds.even, edges);
+    if (bounds.even)
+        halve(field, edges);
+    else
+        settle(field, layer, edges);
 }
 
-// Crossings after the values at the middles of edges.
-//
-// In an even field inside values are multiplied by the one factor with which as many crossings lie before the middle as do
-// in truth; then an eighth of the edges is enough to know it. In any other, the line goes through the middle and the end on
-// its own side, which is right for true distances.
-void Slab::halve(const Field& field, bool even, const std::vector<Edge>& edges) {
+// Crossings of an even field, by interpolation. Inside values are multiplied by the one factor with which as many crossings
+// lie before the middle of their edge as do in truth; an eighth of the edges is enough to know it.
+void Slab::halve(const Field& field, const std::vector<Edge>& edges) {
     constexpr size_t few = 1024;
     auto column = [&](const Edge& e) { return kTile * (place[e.tile].x - 1) + (e.number & 7); };
     auto row = [&](const Edge& e) { return kTile * (place[e.tile].y - 1) + (e.number >> 3 & 7); };
     std::vector<Edge> halved;
     for (const Edge& e : edges) {
         uint32_t at = uint32_t(column(e)) * 0x9E3779B1u + uint32_t(row(e)) * 0x85EBCA6Bu;
-        if (!even || edges.size() < few || at >> 29 == 0) halved.push_back(e);
+        if (edges.size() < few || at >> 29 == 0) halved.push_back(e);
     }
     std::vector<float> middle(halved.size());
     auto where = [&](size_t i, double& x, double& y, double& z) {
@@ -327,23 +334,12 @@ void Slab::halve(const Field& field, bool even, const std::vector<Edge>& edges) 
     evaluate(field, halved.size(), where, [&](size_t i, float f) { middle[i] = f; });
     // The share of the edge from its outer end.
     auto put = [&](const Edge& e, float share) { cross[e.tile][e.number] = share_of(e.first > e.second ? share : 1 - share); };
-    if (even) {
-        float scale = inside_scale(halved, middle);
-        for (const Edge& e : edges) put(e, e.out() / (e.out() - scale * e.in()));
-        for (size_t i = 0; i < halved.size(); ++i) {
-            const Edge& e = halved[i];
-            float m = middle[i], in = scale * e.in();
-            put(e, m < 0 ? 0.5f * e.out() / (e.out() - scale * m) : 0.5f + 0.5f * m / (m - in));
-        }
-    } else {
-        for (size_t i = 0; i < halved.size(); ++i) {
-            const Edge& e = halved[i];
-            float m = middle[i], in = e.in(), out = e.out();
-            if (m < 0)
-                put(e, m > in ? std::max(0.5f + 0.5f * m / (m - in), 0.f) : 0.25f);
-            else
-                put(e, out > m ? std::min(0.5f * out / (out - m), 1.f) : 0.75f);
-        }
+    float scale = inside_scale(halved, middle);
+    for (const Edge& e : edges) put(e, e.out() / (e.out() - scale * e.in()));
+    for (size_t i = 0; i < halved.size(); ++i) {
+        const Edge& e = halved[i];
+        float m = middle[i], in = scale * e.in();
+        put(e, m < 0 ? 0.5f * e.out() / (e.out() - scale * m) : 0.5f + 0.5f * m / (m - in));
     }
 }
 

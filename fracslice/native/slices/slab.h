@@ -14,6 +14,8 @@ constexpr int32_t kEmpty = -1, kFull = -2;
 constexpr float kWhole = 32768;
 constexpr uint64_t kAll = ~uint64_t(0);
 
+inline uint16_t share_of(float share) { return uint16_t(share * kWhole + 0.5f); }
+
 // What is sampled; may be called from many threads.
 class Field {
  public:
@@ -32,8 +34,7 @@ struct Bounds {
     double proven;           // for blocks of 16 pixels and more, and whole tiles if nothing better is known
     double outside, inside;  // for tiles and what is in them, by the value's sign
     int stop_outside, stop_inside;  // blocks of so many samples are not cut any more
-    bool fractal;            // values inside are of another scale than outside: crossings are measured, see `cross`
-    bool even;               // ... of one scale in the whole slab, so that a part of the crossings tells for all
+    bool even;  // a fractal: values inside are of another scale than outside, one in the whole slab; see `halve`
 };
 
 // A vector whose new elements are left uninitialised.
@@ -55,6 +56,11 @@ using Rows = std::vector<T, Uninitialised<T>>;
 
 struct Place {
     int32_t layer, y, x;
+};
+
+// A place on the lattice.
+struct Spot {
+    double column, row;
 };
 
 // Tiles of 8 x 8 samples: two words of 64 bits, *inside* and *known*, and 64 values; bit 8 * row + column belongs to the
@@ -94,11 +100,16 @@ class Slab {
     }
 
     std::vector<Place> place;
+    // The tiles of each layer, from the first of a pair to before the second.
+    std::vector<std::array<int32_t, 2>> span;
     std::vector<uint64_t> inside, known;
     Rows<std::array<float, 64>> values;
     // The share of the edge before its crossing, of `kWhole`: of the edge from each sample to its right, then of the one
     // upwards.
     Rows<std::array<uint16_t, 128>> cross;
+    // The cells of each tile that a corner changes, and by how much of their area.
+    std::vector<uint64_t> sharp;
+    float tip(int32_t tile, int bit) const;
     int64_t evaluations = 0;
 
  private:
@@ -113,11 +124,17 @@ class Slab {
         float out() const { return first > second ? first : second; }
         float in() const { return first > second ? second : first; }
     };
+    // What a corner adds to the inside of a cell, in pixels; `cell` is 64 * tile + bit.
+    struct Tip {
+        int64_t cell;
+        float area;
+    };
 
     template <class Where, class Take>
     void evaluate(const Field& field, size_t n, const Where& where, const Take& take);
     template <class Take>
     void evaluate(const Field& field, const std::vector<int64_t>& samples, const Take& take);
+    std::vector<float> values_at(const Field& field, int layer, const std::vector<Spot>& spots);
 
     int32_t add(int layer, int y, int x);
     std::vector<Block> coarse(const Field& field, const Bounds& bounds);
@@ -129,14 +146,18 @@ class Slab {
     void close(const Field& field);
     void ask(std::vector<int32_t>& active, std::vector<uint8_t>& marked, std::vector<int64_t>& samples);
     void corners();
-    void measure(const Field& field, const Bounds& bounds);
-    void halve(const Field& field, bool even, const std::vector<Edge>& edges);
+    void measure(const Field& field, const Bounds& bounds, int layer);
+    void halve(const Field& field, const std::vector<Edge>& edges);
     static float inside_scale(const std::vector<Edge>& edges, const std::vector<float>& middle);
+    void settle(const Field& field, int layer, const std::vector<Edge>& edges);
+    void sharpen(const Field& field, int layer);
+    void put_tip(int layer, int row, int column, float area);
 
     Frame frame_;
     std::vector<double> z_;
     std::vector<int> wanted_;  // ascending
     std::vector<float> outside_;  // of each tile, the bound for outside values in it
+    std::vector<Tip> tips_;       // ascending
     size_t first_ = 0;         // tile of the layer that is sampled
     int ty_, tx_;
     std::vector<int32_t> where_;

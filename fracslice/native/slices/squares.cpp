@@ -40,6 +40,7 @@ class Cell {
     // The inside part of the cell's area.
     float area(int signs) const {
         switch (signs) {
+            case 0: return 0;
             case 1: return lower() * left() / 2;
             case 2: return (1 - lower()) * right() / 2;
             case 4: return (1 - upper()) * (1 - right()) / 2;
@@ -106,7 +107,8 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
             bool empty = t == kEmpty || x0 >= canvas.columns;
             Corners corners(slab, k, y, empty ? 0 : x);
             uint64_t whole = empty ? 0 : corners.whole();
-            if (whole == kAll) {
+            uint64_t sharp = t >= 0 ? slab.sharp[t] : 0;
+            if (whole == kAll && !sharp) {
                 ++full;
                 continue;
             }
@@ -117,12 +119,13 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
                 full = 0;
             }
             if (empty) continue;
-            painted.area += __builtin_popcountll(whole);
-            fill(canvas, y0, x0, whole);
-            for (uint64_t mixed = t >= 0 ? corners.mixed() : 0; mixed; mixed &= mixed - 1) {
+            painted.area += __builtin_popcountll(whole & ~sharp);
+            fill(canvas, y0, x0, whole & ~sharp);
+            for (uint64_t mixed = t >= 0 ? corners.mixed() | sharp : 0; mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed), r = y0 + (bit >> 3), c = x0 + (bit & 7);
                 if (r >= canvas.rows || c >= canvas.columns) continue;
                 float area = Cell(slab, {k, y, x}, t, bit).area(corners.signs(bit));
+                if (sharp >> bit & 1) area = std::clamp(area + slab.tip(t, bit), 0.f, 1.f);
                 canvas.data[r * canvas.down + c * canvas.across] = uint8_t(255 * area + 0.5f);
                 painted.area += area;
                 ++painted.partly;
@@ -134,7 +137,9 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
 
 Crossings crossings(const Slab& slab, int k) {
     Crossings found;
-    std::unique_ptr<int32_t[]> ids(new int32_t[slab.count() * 128]);
+    auto [first, end] = slab.span[k];
+    std::unique_ptr<int32_t[]> ids(new int32_t[size_t(end - first) * 128]);
+    auto id = [&, first = first](int32_t t, int number) -> int32_t& { return ids[128 * size_t(t - first) + number]; };
     for (int y = 1; y < slab.rows() - 1; ++y)
         for (int x = 1; x < slab.columns() - 1; ++x) {
             int32_t t = slab.at(k, y, x);
@@ -145,7 +150,7 @@ Crossings crossings(const Slab& slab, int k) {
                 int bit = lowest(w), r = bit >> 3, c = bit & 7;
                 for (int up = 0; up < 2; ++up) {
                     if (!(words[up] >> bit & 1)) continue;
-                    ids[128 * size_t(t) + 64 * up + bit] = int32_t(found.edges.size());
+                    id(t, 64 * up + bit) = int32_t(found.edges.size());
                     found.edges.push_back({kTile * (x - 1) + c, kTile * (y - 1) + r, up, -1});
                     found.ends.push_back(slab.values[t][bit]);
                     found.ends.push_back(slab.value({k, y, x}, t, r + up, c + 1 - up));
@@ -159,10 +164,10 @@ Crossings crossings(const Slab& slab, int k) {
             Corners corners(slab, k, y, x);
             for (uint64_t mixed = corners.mixed(); mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed);
-                int32_t right = (bit & 7) == 7 ? std::max(slab.at(k, y, x + 1), 0) : t;
-                int32_t upper = bit >> 3 == 7 ? std::max(slab.at(k, y + 1, x), 0) : t;
-                const int32_t e[4] = {ids[128 * size_t(t) + bit], ids[128 * size_t(right) + 64 + (bit & 56) + ((bit + 1) & 7)],
-                                      ids[128 * size_t(upper) + ((bit + 8) & 63)], ids[128 * size_t(t) + 64 + bit]};
+                int32_t right = (bit & 7) == 7 ? std::max(slab.at(k, y, x + 1), first) : t;
+                int32_t upper = bit >> 3 == 7 ? std::max(slab.at(k, y + 1, x), first) : t;
+                const int32_t e[4] = {id(t, bit), id(right, 64 + (bit & 56) + ((bit + 1) & 7)), id(upper, (bit + 8) & 63),
+                                      id(t, 64 + bit)};
                 link(Cell(slab, {k, y, x}, t, bit), corners.signs(bit), e, found.edges);
             }
         }
