@@ -7,11 +7,13 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .errors import SceneError, TooLargeError
+from .formulas import Box
 from .memory import available_bytes, peak_rss_mb
 from .report import Report, SurfaceError, version
 from .scene import Print, Scene, parse_length
@@ -151,7 +153,8 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         from .printing import printable  # it needs Numba, whose import takes as long as a small mesh
 
         with clock("changing"):
-            planned, scale = printable(planned, what.size(scene), how, work)
+            size_of = partial(_mesh_box, what=what, how=how, size=what.size(scene), work=work)
+            planned, scale = printable(planned, what.size(scene), how, work, size_of)
     with clock("sampling"):
         bricks = sample_scene(planned, work)
     with clock("meshing"):
@@ -218,18 +221,34 @@ def _finished(
     one, what stays is made to be of that size.
     """
     from .mesh.clean import clean
-    from .mesh.components import select
     from .mesh.solid import place_on_bed
 
     rough = scale or size / float(raw.size.max())
-    dust = what.dust(raw.volume * rough**3)
-    cavities = how.cavities if how.whole else "keep"  # a hollow is one, too
-    kept, removed = select(raw.scaled(rough), keep=how.keep, dust_mm3=dust, cavities=cavities)
+    kept, removed = _kept(raw.scaled(rough), what, how)
     exact = 1.0 if scale else size / float(kept.size.max())
     mesh = kept.scaled(exact)
     placed = place_on_bed(mesh)
     x, y, z = (placed.bounds[0] - mesh.bounds[0]).tolist()
     return clean(placed), removed, Placement(rough * exact, (x, y, z))
+
+
+def _kept(mesh: Mesh, what: MeshJob, how: Print) -> tuple[Mesh, Removed]:
+    """The bodies of a mesh in mm that are wanted."""
+    from .mesh.components import select
+
+    cavities = how.cavities if how.whole else "keep"  # a hollow is one, too
+    return select(mesh, keep=how.keep, dust_mm3=what.dust(mesh.volume), cavities=cavities)
+
+
+def _mesh_box(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> Box:
+    """The box of the mesh that would be made of a planned scene, scene units."""
+    from .mesh.extract import contour
+    from .volume import sample_scene
+
+    raw = contour(planned.root, sample_scene(planned, work), work)
+    rough = size / float(raw.size.max())
+    lo, hi = (_kept(raw.scaled(rough), what, how)[0].bounds / rough).tolist()
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
 
 
 def _surface_error(planned: Plan, mesh: Mesh, place: Placement, work: Work) -> SurfaceError:

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from .._native import Grid
 from ..errors import VolumeError
 from ..formulas import Box, Node, box, cylinder, plane, transform
+from ..formulas.box import Triple
 from ..kernel import Compilable, compile_scene
 from ..scene import Print
 from ..volume import Bricks, Lattice, Plan, extent, sample
@@ -36,17 +36,26 @@ DUST = 1e-5
 """The share of the whole below which a body is dust that no strut is built to."""
 
 
-def printable(planned: Plan, size: float, how: Print, work: Work | None = None) -> tuple[Plan, float]:
+Measure = Callable[[Plan], Box]
+
+
+def printable(
+    planned: Plan, size: float, how: Print, work: Work | None = None, measure: Measure | None = None
+) -> tuple[Plan, float]:
     """A planned scene made printable, and its scale in mm per scene unit.
 
-    size: mm, the longest side of what stays. Raises `VolumeError` where nothing would be left or a length is
-    too small to be measured, `Cancelled`.
+    size: mm, the longest side of what stays. measure: of an object, what box will be called its size, if not
+    that of its field: a mesh has not all tips of a fractal. Samples with the voxel of `planned` are at the
+    same points before and after. Raises `VolumeError` where nothing would be left or a length is too small to
+    be measured, `Cancelled`.
     """
-    run = _Run(planned, size, how, work or Work())
+    run = _Run(planned, size, how, work or Work(), measure)
     for stage, change in run.changes():
         run.work.check()
         run.work.progress(stage, 0.0)
         run.put(change())
+    if (how.base or how.raft) and run.grown:
+        run.weigh()
     return _standing(run.planned, how, run.scale), run.scale
 
 
@@ -58,24 +67,32 @@ class _Run:
     size: float
     how: Print
     work: Work
+    measure: Measure | None
+    scale: float = 1.0
+    """mm per scene unit, known when it is known which bodies stay."""
 
     @property
     def thing(self) -> Node | Compilable:
         return self.planned.root
 
-    @cached_property
-    def scale(self) -> float:
-        """mm per scene unit; asked for first when it is known which bodies stay."""
-        return self.size / max(self.planned.box.size)
-
     def put(self, thing: Node | Compilable) -> None:
         """The object is this now."""
         self.planned = replace(self.planned, root=thing)
 
-    def measure(self) -> None:
+    def bound(self) -> None:
         """Finds how large the object is now."""
         found = extent(compile_scene(self.thing), self.thing.facts, self.work)
         self.planned = replace(self.planned, box=found.box, outer=found.outer)
+
+    def weigh(self) -> None:
+        """Its box is what is called its size."""
+        if self.measure:
+            self.planned = replace(self.planned, box=self.measure(self.planned))
+
+    @property
+    def grown(self) -> bool:
+        """Whether something is added to its outside."""
+        return bool(self.how.bridge or self.how.thickness)
 
     def changes(self) -> Iterator[tuple[str, Callable[[], Node | Compilable]]]:
         """What is asked for, in order."""
@@ -84,15 +101,19 @@ class _Run:
             yield "filling cavities", self.filled
         if how.keep == "largest":
             yield "keeping the largest", self.largest
-            self.measure()
+            self.bound()
+        self.weigh()
+        self.scale = self.size / max(self.planned.box.size)
         if how.bridge:
             yield "bridging", self.bridged
         if how.gap:
             yield "closing gaps", self.closed
         if how.thickness:
             yield "thickening", self.thickened
-        if how.bridge or how.thickness:
-            self.measure()
+        if self.grown:
+            middle = self.planned.outer.centre
+            self.bound()
+            self.planned = replace(self.planned, outer=_around(middle, self.planned.outer))
         if how.hollow:
             yield "hollowing", self.hollowed
 
@@ -200,6 +221,13 @@ def _nearer(solid: Bricks, parts: Parts, these: np.ndarray, others: np.ndarray) 
     return Samples(replace(signed, values=share.astype(np.float32).reshape(solid.values.shape)))
 
 
+def _around(middle: Triple, box: Box) -> Box:
+    """A box that encloses another, with a middle that is given: samples stay where they were."""
+    half = np.maximum(np.subtract(middle, box.lo), np.subtract(box.hi, middle))
+    lo, hi = np.subtract(middle, half).tolist(), np.add(middle, half).tolist()
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
+
+
 def _standing(made: Plan, how: Print, scale: float) -> Plan:
     """With its bottom cut off and a raft under it.
 
@@ -208,15 +236,19 @@ def _standing(made: Plan, how: Print, scale: float) -> Plan:
     thing, found, outer = made.root, made.box, made.outer
     (x0, y0, z0), (x1, y1, z1) = found.lo, found.hi
     base, raft = how.base / scale, how.raft / scale
+    if 0 < raft < made.voxel:
+        raise VolumeError(
+            f"a raft of {how.raft:g} mm: expected at least a voxel, {made.voxel * scale:.4g} mm"
+        )
     if base:
         z0 += base
         if z0 >= z1:
             raise VolumeError(f"a base of {base * scale:g} mm leaves nothing of the object")
         thing = altered(thing, "keep", plane(normal=(0, 0, -1), offset=-z0))
-        found, outer = Box((x0, y0, z0), (x1, y1, z1)), Box((*outer.lo[:2], z0), outer.hi)
+        found = Box((x0, y0, z0), (x1, y1, z1))
     if raft:
         rim = max(found.size) / 10
         lying = Box((x0 - rim, y0 - rim, z0 - raft / 2), (x1 + rim, y1 + rim, z0 + raft / 2))
         thing = altered(thing, "add", transform(box(size=lying.size), translate=lying.centre))
-        found, outer = found | lying, outer | lying
+        found, outer = found | lying, _around(outer.centre, outer | lying)
     return replace(made, root=thing, box=found, outer=outer)

@@ -19,8 +19,12 @@ FIRST = 16
 LEVELS = 9
 GROWTHS = 6
 MOST = 1_000_000
-"""Cells of the last level. A flat face has ever more of them; then its place is known a little less exactly.
-"""
+"""Cells of the last level; a flat face has ever more of them."""
+
+STARTS = 16
+STEPS = 256
+EXACT = 1e-6
+"""Of the longest side: the last step that the outermost points known take outwards."""
 
 
 @dataclass(frozen=True)
@@ -32,12 +36,13 @@ class Extent:
 
 
 def extent(kernel: Kernel, facts: Facts, work: Work | None = None) -> Extent:
-    """The box of the points where the field is negative, its faces to about 1/4000 of the longest side; 1/500
-    if flat.
+    """The box of the points where the field is negative: smooth faces and edges to 1e-6 of the longest side,
+    the tips of a fractal to 1/4000 or better.
 
     Cells that cannot be inside (``f > L * half diagonal``), or that do not reach beyond an inside point known
-    already, are dropped; the rest are cut in eight. The box that the formulas promise is doubled as long as
-    the object reaches its border (an offset or smooth union of a field that underestimates distances can).
+    already, are dropped; the rest are cut in eight. Then the surface is climbed from the outermost inside
+    points. The box that the formulas promise is doubled as long as the object reaches its border (an offset
+    or smooth union of a field that underestimates distances can).
     Raises `VolumeError` if nothing is inside, or the object has no end.
     """
     box = facts.box
@@ -62,7 +67,7 @@ def _search(kernel: Kernel, facts: Facts, box: Box, work: Work) -> Extent | None
     cells = np.indices((FIRST,) * 3).reshape(3, -1)
     centres = np.array(box.centre)[:, None] - half[:, None] + step[:, None] * (cells + 0.5)
     rim = ((cells == 0) | (cells == FIRST - 1)).any(0)
-    lo, hi = np.full(3, np.inf), np.full(3, -np.inf)
+    lo, hi, starts = np.full(3, np.inf), np.full(3, -np.inf), np.empty((4, 0))
     offsets = np.array(np.meshgrid(*[(-0.25, 0.25)] * 3)).reshape(3, 1, 8)
     for level in range(LEVELS):
         f = values_at(kernel, centres, work)
@@ -71,6 +76,7 @@ def _search(kernel: Kernel, facts: Facts, box: Box, work: Work) -> Extent | None
             return None
         if inside.any():
             lo, hi = np.minimum(lo, centres[:, inside].min(1)), np.maximum(hi, centres[:, inside].max(1))
+            starts = _outermost(np.column_stack([starts, [*centres[:, inside], f[inside]]]))
         possible = ~(f > facts.lipschitz * np.linalg.norm(step) / 2)
         reach = step[:, None] / 2
         beyond = ((centres + reach > hi[:, None]) | (centres - reach < lo[:, None])).any(0)
@@ -83,8 +89,44 @@ def _search(kernel: Kernel, facts: Facts, box: Box, work: Work) -> Extent | None
         raise VolumeError("there is no surface: nothing in the scene is inside")
     outer_lo = np.minimum(lo, centres.min(1, initial=np.inf)) - step / 2
     outer_hi = np.maximum(hi, centres.max(1, initial=-np.inf)) + step / 2
-    # A face lies between the outermost inside centre and the next one, half a cell on average.
-    return Extent(_box(lo - step / 2, hi + step / 2), _box(outer_lo, outer_hi))
+    for axis in range(3):
+        lo[axis] = min(lo[axis], -_climbed(kernel, starts, axis, -1, float(step.max()), work))
+        hi[axis] = max(hi[axis], _climbed(kernel, starts, axis, 1, float(step.max()), work))
+    return Extent(_box(lo, hi), _box(np.minimum(outer_lo, lo), np.maximum(outer_hi, hi)))
+
+
+def _outermost(found: np.ndarray) -> np.ndarray:
+    """Of points and their values [4, n] those from which the surface is farthest out along an axis, if values
+    are distances; `STARTS` for each side of each axis.
+    """
+    reach = np.concatenate([found[:3] + found[3], -found[:3] + found[3]])
+    order = np.argsort(reach, axis=1, kind="stable")[:, :STARTS]
+    chosen: np.ndarray = found[:, np.unique(order)]
+    return chosen
+
+
+def _climbed(kernel: Kernel, starts: np.ndarray, axis: int, side: int, step: float, work: Work) -> float:
+    """How far the object reaches along an axis, to one side.
+
+    starts: inside points and their values [4, n]. From there steps outwards, straight or aslant, are taken as
+    long as they end inside, then shorter ones (pattern search: Hooke and Jeeves 1961).
+    """
+    exact = EXACT * float(np.ptp(starts[:3], axis=1).max())
+    here = starts[:3, np.argsort(starts[3] - side * starts[axis], kind="stable")[:STARTS]]
+    slants = 0.1 ** np.arange(0, 3.5, 0.5)
+    ways = side * np.roll(np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), slants)).reshape(3, -1), axis - 2, 0)
+    for _ in range(STEPS):
+        tried = here[:, :, None] + step * ways[:, None, :]
+        inside = values_at(kernel, tried.reshape(3, -1), work).reshape(tried.shape[1:]) < 0
+        gain = np.where(inside, ways[axis] * side, 0.0)
+        best = gain.argmax(1)
+        here = np.where(gain.max(1) > 0, np.take_along_axis(tried, best[None, :, None], 2)[..., 0], here)
+        if not gain.any():
+            if step < exact:
+                break
+            step /= 2
+    # The face lies between that point and the next one, half a step on average.
+    return float((side * here[axis]).max()) + step / 2
 
 
 def _box(lo: np.ndarray, hi: np.ndarray) -> Box:

@@ -17,6 +17,7 @@ from fracslice.formulas import (
     box,
     cylinder,
     difference,
+    julia,
     repeat,
     shell,
     sphere,
@@ -183,3 +184,34 @@ def test_time_is_linear_in_the_holes() -> None:
 
     seconds(2)
     assert seconds(100) < 10 * seconds(10)
+
+
+@pytest.mark.parametrize("root", [sphere(), julia(iterations=7)], ids=["sphere", "julia"])
+def test_a_millimetre_is_a_millimetre(root: Node) -> None:
+    """What is cut off or stands below is exact, and the size before that, of a mesh that lacks tips."""
+
+    def size(**printing: float) -> np.ndarray:
+        how = Print(**printing)  # type: ignore[arg-type]
+        return make_mesh(scene(root, size="80mm", printing=how), MeshJob(resolution=64)).mesh.size
+
+    plain = size()
+    assert plain.max() == pytest.approx(80, abs=1e-4)
+    np.testing.assert_allclose(size(base=1), plain - np.array([0, 0, 1]), atol=1e-3)
+    np.testing.assert_allclose(size(base=1, raft=1.5), plain + np.array([16, 16, -0.25]), atol=1e-3)
+    np.testing.assert_allclose(size(hollow=3, drain=0), plain, atol=1e-3)
+
+
+def test_layers_are_as_large_as_asked() -> None:
+    """Of a solid whose box no formula tells: its contours, across and along, with a base cut off."""
+    root = transform(
+        difference(box(size=(2, 1, 1)), at(box(size=(4, 4, 4)), 2.7137, 0, 0)), rotate=(0, 0, 1, 9)
+    )
+    stack = plan_stack(root, SliceJob(size=40, layer=0.5, pixel=(0.1, 0.1), printing=Print(base=1)))
+    points = next(Slicer(stack).map(lambda layer: layer.contours.points, [len(stack.z) // 2]))
+    np.testing.assert_allclose(np.ptp(points, axis=0), stack.size[:2], atol=2e-3)
+    assert max(stack.size) == pytest.approx(40, abs=1e-3)
+
+
+def test_a_raft_that_no_voxel_holds_is_refused() -> None:
+    with pytest.raises(VolumeError, match=r"a raft of 0.2 mm: expected at least a voxel, 0.3125 mm"):
+        printable(plan(box(), 64), SIZE, Print(raft=0.2))

@@ -97,7 +97,7 @@ def test_what_fractals_cost_and_what_is_lost(root: Node) -> None:
 @pytest.mark.parametrize("root", [julia(iterations=10), mandelbulb(iterations=3), mandelbulb(power=2)])
 def test_coverage_of_fractals_has_no_bias(root: Node) -> None:
     """The area of all pixels against counting 8 x 8 signs in each: within 0.2 %."""
-    stack = stack_of(root, 192, 2.4)
+    stack = stack_of(root, 256, 3.2)
     x0, y0, dx, dy = stack.frame
     y, x = ((np.arange(8 * n) + 0.5) / 8 for n in stack.shape)
     kernel = compile_scene(stack.root)
