@@ -9,7 +9,10 @@ from .box import Box
 from .escape import CORE, levels, potential_distance
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
-from .vocabulary import any_of, maximum, minimum, orbit, rsqrt, where
+from .vocabulary import any_of, maximum, orbit, where
+
+ESCAPED = 256.0
+"""How large |w| is one step past the escape circle."""
 
 
 @shape(
@@ -27,13 +30,14 @@ from .vocabulary import any_of, maximum, minimum, orbit, rsqrt, where
     ),
     bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
 )
-def julia(x, y, z, c, iterations, first_level, last_level, escape2, flat, loose):  # type: ignore[no-untyped-def]
+def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat, loose):  # type: ignore[no-untyped-def]
     """The solid filled Julia set of q^2 + c in the quaternions, cut at k = 0.
 
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
     1989, "Ray Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is
     Koebe's bound for connected complex Julia sets; one that falls apart has its derivative taken at a larger
-    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/accuracy.md`.
+    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/accuracy.md`. The real part of q^2
+    is 2 x^2 - |q|^2.
     """
     cr, ci, cj, ck = c
     r2 = x * x + y * y + z * z
@@ -45,32 +49,26 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, flat, loose)
     for _ in range(iterations):
         if not any_of(alive):
             break
-        if loose:
-            r2 = maximum(r2, CORE)
-        d2 = 4.0 * r2 * d2
+        d2 = 2.0 * (maximum(r2, CORE) if loose else r2) * (2.0 * d2)
         twice = x + x
-        square = x * x - (y * y + z * z) + cr
+        x = twice * x + (cr - r2)
         y = twice * y + ci
         z = twice * z + cj
-        if flat:
-            x = square
-            r2 = x * x + y * y + z * z
-        else:
-            x = square - k * k
+        r2 = y * y + z * z + x * x
+        if not flat:
             k = twice * k + ck
-            r2 = x * x + y * y + z * z + k * k
+            r2 = r2 + k * k
         orbit(r2, alive)
         end_r2 = where(alive, r2, end_r2)
         slope2 = where(alive, maximum(d2, slope2), slope2)
         level = where(alive, level + level, level)
         alive = alive & (r2 < escape2)
-    slope2 = minimum(slope2, 1e30)
-    return potential_distance(end_r2, slope2 * rsqrt(slope2), level, first_level, last_level)
+    return potential_distance(end_r2, slope2, level, first_level, last_level, least)
 
 
 @julia.arguments
 def _(node: Node) -> dict[str, object]:
-    first, last, escape2 = levels(2, node["iterations"], node["bailout"])
+    first, last, escape2, least = levels(2, node["iterations"], node["bailout"], ESCAPED)
     flat = Fixed(node["c"][3] == 0)
     return {
         "c": node["c"],
@@ -78,6 +76,7 @@ def _(node: Node) -> dict[str, object]:
         "first_level": first,
         "last_level": last,
         "escape2": escape2,
+        "least": least,
         "flat": flat,
         "loose": Fixed(_falls_apart(node["c"], node["iterations"], node["bailout"], escape2)),
     }

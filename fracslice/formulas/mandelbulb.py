@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 
 from .box import Box, Triple
-from .escape import CORE, JUMP, levels, potential_distance
+from .escape import CORE, levels, potential_distance
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
-from .vocabulary import absolute, any_of, atan2, cos, exp, log, maximum, orbit, rsqrt, sin, where
+from .vocabulary import absolute, any_of, atan2, cos, exp, log, maximum, orbit, rsqrt, sin, sqrt, where
+
+ESCAPED = 1e4
+"""How large |w| is one step past the escape circle; the map of a neighbourhood counts as radial there."""
 
 
 @shape(
@@ -37,6 +40,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     first_level,
     last_level,
     escape2,
+    least_r2,
     over_escape2,
     c,
     digits,
@@ -52,7 +56,8 @@ def mandelbulb(  # type: ignore[no-untyped-def]
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
     w = (rho (u, v), z), (u, v) a unit vector, w^n = (Im (z + i rho)^n (u + iv)^n, Re (z + i rho)^n): both
-    powers are products, and Im (z + i rho)^n is carried divided by rho, so the poles are no special case.
+    powers are products, and Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The
+    real part of a square is 2 re^2 minus the squared norm, which is known.
 
     The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
     latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
@@ -66,7 +71,8 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     if fixed_c:
         cx, cy, cz = c
         grow = 0.0
-    r2 = x * x + y * y + z * z
+    rho2 = x * x + y * y
+    r2 = rho2 + z * z
     dr = 0.0 * x + 1.0
     level = 0.0 * x + first_level
     end_r2, slope = r2, dr
@@ -74,19 +80,23 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     for _ in range(iterations):
         if not any_of(alive):
             break
-        safe = maximum(r2, 1e-30)
-        over_r = rsqrt(safe)
-        rho2 = maximum(x * x + y * y, 1e-30)
+        rho2 = maximum(rho2, 1e-30)
         over_rho = rsqrt(rho2)
+        rho = rho2 * over_rho
         if whole:
             u = x * over_rho
             v = y * over_rho
             re, im, cu, cv = z, 0.0 * x + 1.0, u, v
+            norm2 = r2
             for odd in digits:
-                re, im = re * re - im * im * rho2, (re + re) * im
-                cu, cv = cu * cu - cv * cv, (cu + cu) * cv
+                twice = re + re
+                re, im = twice * re - norm2, twice * im
+                norm2 = norm2 * norm2
+                twice = cv + cv
+                cu, cv = 1.0 - twice * cv, twice * cu
                 if odd:
                     re, im = re * z - im * rho2, re + im * z
+                    norm2 = norm2 * r2
                     cu, cv = cu * u - cv * v, cu * v + cv * u
             meridian = r2
             for odd in half_digits:
@@ -94,31 +104,33 @@ def mandelbulb(  # type: ignore[no-untyped-def]
                 if odd:
                     meridian = meridian * r2
             if even:
-                meridian = meridian * (r2 * over_r)
+                meridian = meridian * sqrt(r2)
             if linear:
-                meridian = r2 * over_r
+                meridian = sqrt(r2)
         else:
+            safe = maximum(r2, 1e-30)
             rn = exp(0.5 * power * log(safe))
-            theta = power * atan2(rho2 * over_rho, z)
+            theta = power * atan2(rho, z)
             phi = power * atan2(y, x)
             re, im = rn * cos(theta), rn * sin(theta) * over_rho
             cu, cv = cos(phi), sin(phi)
-            meridian = rn * over_r
+            meridian = rn * rsqrt(safe)
         if loose:
             meridian = maximum(meridian, least)
         latitude = absolute(im) * (1.0 - r2 * over_escape2)
         dr = power * maximum(meridian, latitude) * dr + grow
-        s = im * rho2 * over_rho
+        s = im * rho
         x = s * cu + cx
         y = s * cv + cy
         z = re + cz
-        r2 = x * x + y * y + z * z
+        rho2 = x * x + y * y
+        r2 = rho2 + z * z
         orbit(r2, alive)
         end_r2 = where(alive, r2, end_r2)
         slope = where(alive, maximum(dr, slope), slope)
         level = where(alive, level * power, level)
         alive = alive & (r2 < escape2)
-    return potential_distance(end_r2, slope, level, first_level, last_level)
+    return potential_distance(end_r2, slope * slope, level, first_level, last_level, least_r2)
 
 
 def _digits(n: int) -> tuple[int, ...]:
@@ -129,13 +141,14 @@ def _digits(n: int) -> tuple[int, ...]:
 @mandelbulb.arguments
 def _(node: Node) -> dict[str, object]:
     power = node["power"]
-    first, last, escape2 = levels(power, node["iterations"], node["bailout"])
+    first, last, escape2, least_r2 = levels(power, node["iterations"], node["bailout"], ESCAPED)
     return {
         "power": power,
         "iterations": node["iterations"],
         "first_level": first,
         "last_level": last,
         "escape2": escape2,
+        "least_r2": least_r2,
         "over_escape2": 1 / escape2,
         "c": node["julia"] or (0.0, 0.0, 0.0),
         "fixed_c": Fixed(node["julia"] is not None),
@@ -192,7 +205,7 @@ def _(node: Node) -> Box:
     # |w_n+1| >= |w_n|^power - |c|, c the start point or the constant: backwards from |w_N| <= R, from above.
     power, steps = node["power"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
     constant = math.hypot(*node["julia"]) if node["julia"] else None
-    radius = node["bailout"] + JUMP
+    radius = node["bailout"] + ESCAPED
     for _ in range(100):
         start, radius = radius, node["bailout"]
         for _ in range(steps):

@@ -15,6 +15,8 @@ def menger(x, y, z, level):  # type: ignore[no-untyped-def]
     Menger 1926; distance: Quilez 2011, "Menger fractal": a box minus, per level, an infinite lattice of
     crosses. Every term is the distance to its own solid or less, so their maximum has L = 1. Volume 8
     (20/27)^n, area 4 (2 (20/9)^n + 4 (8/9)^n).
+
+    q is how far a point is from the middle of its cell, in cells; the next level's is |3 q - nearest whole|.
     """
     ax = absolute(x) - 1.0
     ay = absolute(y) - 1.0
@@ -23,19 +25,27 @@ def menger(x, y, z, level):  # type: ignore[no-untyped-def]
     oy = maximum(ay, 0.0)
     oz = maximum(az, 0.0)
     d = sqrt(ox * ox + oy * oy + oz * oz) + minimum(maximum(ax, maximum(ay, az)), 0.0)
-    scale = 1.0
     cell = 1.0 / 3.0
+    qx = absolute(0.5 * x - floor(0.5 * x) - 0.5)
+    qy = absolute(0.5 * y - floor(0.5 * y) - 0.5)
+    qz = absolute(0.5 * z - floor(0.5 * z) - 0.5)
     for _ in range(level):
-        qx = absolute(0.5 * scale * x - floor(0.5 * scale * x) - 0.5)
-        qy = absolute(0.5 * scale * y - floor(0.5 * scale * y) - 0.5)
-        qz = absolute(0.5 * scale * z - floor(0.5 * scale * z) - 0.5)
-        rx = absolute(1.0 - 6.0 * qx)
-        ry = absolute(1.0 - 6.0 * qy)
-        rz = absolute(1.0 - 6.0 * qz)
-        cross = minimum(maximum(rx, ry), minimum(maximum(ry, rz), maximum(rz, rx)))
+        ux = 3.0 * qx
+        uy = 3.0 * qy
+        uz = 3.0 * qz
+        vx = ux - 1.0
+        vy = uy - 1.0
+        vz = uz - 1.0
+        rx = absolute(ux + vx)
+        ry = absolute(uy + vy)
+        rz = absolute(uz + vz)
+        low, high = minimum(rx, ry), maximum(rx, ry)
+        cross = maximum(low, minimum(high, rz))
         orbit(4.0 * (qx * qx + qy * qy + qz * qz), (cross - 1.0) * cell > d)
-        d = maximum(d, (cross - 1.0) * cell)
-        scale = scale * 3.0
+        d = maximum(d, cross * cell - cell)
+        qx = minimum(ux, absolute(vx))
+        qy = minimum(uy, absolute(vy))
+        qz = minimum(uz, absolute(vz))
         cell = cell * (1.0 / 3.0)
     return d
 

@@ -22,10 +22,11 @@ SOURCE = "<linked scene>"
 
 @dataclass(frozen=True)
 class Target:
-    """What code is made for: float width, lanes per vector, CPU name and features."""
+    """What code is made for: float width, lanes and the registers they fill, CPU name and features."""
 
     bits: int
     width: int
+    registers: int
     cpu: str
     features: str
 
@@ -33,7 +34,7 @@ class Target:
 def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> bytes:
     """An object file with one C function per loop over the scene's field. Raises `KernelError`."""
     lanes_math.HOST_FEATURES = frozenset(f[1:] for f in target.features.split(",") if f.startswith("+"))
-    kind = lanes.Lanes(target.bits, target.width)
+    kind = lanes.Lanes(target.bits, target.width, target.registers)
     scope: dict[str, Any] = {name: getattr(lanes, name) for name in NAMES}
     scope |= {"load": lanes.loader(kind), "store": lanes.store, "WIDTH": target.width}
     exec(compile(linked.source, SOURCE, "exec"), scope)

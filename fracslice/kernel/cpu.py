@@ -22,6 +22,9 @@ from ..formulas.registry import Facts, Node
 from .linker import Linked, link
 from .loops import BRICKS, POINTS, Loop
 
+REGISTERS = 2
+"""How many are in flight at once, which hides the latency of the arithmetic."""
+
 Precision = Literal["float32", "float64"]
 
 
@@ -143,9 +146,9 @@ def cache_folder() -> Path:
 
 
 def lane_count(bits: int) -> int:
-    """Lanes of a vector of this float width. Two registers in flight hide the latency of the arithmetic."""
+    """How many points of this float width are evaluated at once."""
     register = 512 if "+avx512f" in host()[1].split(",") else 256
-    return 2 * register // bits
+    return REGISTERS * register // bits
 
 
 @lru_cache(maxsize=1)
@@ -183,7 +186,7 @@ def load_functions(
     except OSError:
         from .compiler import Target, compile_object
 
-        code = compile_object(linked, Target(bits, width, *host()), loops)
+        code = compile_object(linked, Target(bits, width, REGISTERS, *host()), loops)
         _keep(path, code)
     return _functions(code, loops)
 

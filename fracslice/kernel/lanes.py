@@ -1,8 +1,9 @@
 """SIMD lanes for Numba: the vocabulary of the formulas on vectors of 8 to 64 floats.
 
-A `Lanes` value is one LLVM vector, a `Mask` a vector of booleans. Numba types and links the formulas;
-everything here is emitted as LLVM IR and becomes one or two instructions per register. The only fast-math
-flag is `contract` (fused multiply-add): results do not depend on what surrounds an operation, and NaN and
+A `Lanes` value is a few registers of floats, a `Mask` of booleans. Numba types and links the formulas;
+everything here is emitted as LLVM IR and becomes one or two instructions per register. A product to which
+something is added in the same expression is fused with it here, not by LLVM, which may choose another one
+of two products in another place: results do not depend on what surrounds an operation, and NaN and
 infinity behave.
 
 Only compiling needs this module (and Numba); a kernel from the cache does not import it.
@@ -12,7 +13,9 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
+from functools import reduce
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from llvmlite import ir
 from numba.core import types
@@ -24,39 +27,64 @@ from .lanes_math import Vec
 
 
 class Lanes(types.Type):
-    def __init__(self, bits: int, width: int) -> None:
-        self.bits, self.width = bits, width
+    """So many floats of 32 or 64 bits, in so many registers."""
+
+    def __init__(self, bits: int, width: int, registers: int) -> None:
+        self.bits, self.width, self.registers = bits, width, registers
         super().__init__(f"lanes_f{bits}x{width}")
 
     @property
-    def llvm(self) -> ir.VectorType:
-        return ir.VectorType(ir.FloatType() if self.bits == 32 else ir.DoubleType(), self.width)
+    def register(self) -> ir.VectorType:
+        element = ir.FloatType() if self.bits == 32 else ir.DoubleType()
+        return ir.VectorType(element, self.width // self.registers)
+
+    @property
+    def mask(self) -> Mask:
+        return Mask(self.width, self.registers)
 
 
 class Mask(types.Type):
-    def __init__(self, width: int) -> None:
-        self.width = width
+    def __init__(self, width: int, registers: int) -> None:
+        self.width, self.registers = width, registers
         super().__init__(f"mask_x{width}")
+
+    @property
+    def register(self) -> ir.VectorType:
+        return ir.VectorType(ir.IntType(1), self.width // self.registers)
 
 
 @register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Lanes) -> None:
-        super().__init__(manager, kind, kind.llvm)
-
-
 @register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Mask) -> None:
-        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.width))
+class _Model(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, ir.ArrayType(kind.register, kind.registers))
+
+
+def _unpacked(builder: Any, kind: Lanes | Mask, value: Any) -> Vec:
+    parts = tuple(builder.extract_value(value, k) for k in range(kind.registers))
+    return Vec(builder, parts, _FACTORS.get(value))
+
+
+_FACTORS: WeakKeyDictionary[Any, tuple[Vec, Vec]] = WeakKeyDictionary()
+"""Of each product of lanes that LLVM may see added to something."""
+
+
+def _packed(vec: Vec) -> Any:
+    value = ir.Constant(ir.ArrayType(vec.register, len(vec.parts)), ir.Undefined)
+    for k, part in enumerate(vec.parts):
+        value = vec.builder.insert_value(value, part, k)
+    if vec.factors:
+        _FACTORS[value] = vec.factors
+    return value
 
 
 def _vec(context: Any, builder: Any, kind: Any, value: Any, lanes: Lanes) -> Vec:
-    """A value as a vector: lanes as they are, a number in all of them."""
-    if not isinstance(kind, Lanes):
-        scalar = types.float32 if lanes.bits == 32 else types.float64
-        value = lanes_math.splat(builder, context.cast(builder, value, kind, scalar), lanes.llvm)
-    return Vec(builder, value)
+    """A value as registers: lanes as they are, a number in all of them."""
+    if isinstance(kind, Lanes):
+        return _unpacked(builder, kind, value)
+    scalar = types.float32 if lanes.bits == 32 else types.float64
+    register = lanes_math.splat(builder, context.cast(builder, value, kind, scalar), lanes.register)
+    return Vec(builder, (register,) * lanes.registers)
 
 
 def _lanes_of(args: tuple[Any, ...]) -> Lanes | None:
@@ -71,13 +99,13 @@ def _operator(op: Callable[..., Any], emit: Callable[..., Any], to_mask: bool = 
         def generic(self, args: tuple[Any, ...], _: Any) -> Any:
             lanes = _lanes_of(args)
             if lanes:
-                return signature(Mask(lanes.width) if to_mask else lanes, *args)
+                return signature(lanes.mask if to_mask else lanes, *args)
             return None
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         lanes = _lanes_of(sig.args)
         vectors = [_vec(context, builder, k, v, lanes) for k, v in zip(sig.args, args, strict=True)]  # type: ignore[arg-type]
-        return emit(*vectors).value
+        return _packed(emit(*vectors))
 
     for kinds in ((Lanes, Lanes), (Lanes, types.Number), (types.Number, Lanes)):
         lower_builtin(op, *kinds)(lower)
@@ -97,7 +125,7 @@ class _Negate(AbstractTemplate):
 
 @lower_builtin(operator.neg, Lanes)
 def _negate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return (-Vec(builder, args[0])).value
+    return _packed(-_unpacked(builder, sig.args[0], args[0]))
 
 
 def _mask_operator(op: Callable[..., Any], method: str) -> None:
@@ -108,7 +136,8 @@ def _mask_operator(op: Callable[..., Any], method: str) -> None:
 
     @lower_builtin(op, Mask, Mask)
     def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return getattr(builder, method)(*args)
+        pairs = zip(*(_unpacked(builder, sig.args[0], a).parts for a in args), strict=True)
+        return _packed(Vec(builder, tuple(getattr(builder, method)(*pair) for pair in pairs)))
 
 
 _mask_operator(operator.and_, "and_")
@@ -121,7 +150,7 @@ def _function(emit: Callable[..., Vec]) -> Any:
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         lanes = _lanes_of(sig.args)
         vectors = [_vec(context, builder, k, v, lanes) for k, v in zip(sig.args, args, strict=True)]  # type: ignore[arg-type]
-        return emit(*vectors).value
+        return _packed(emit(*vectors))
 
     def unary(typing: Any, a: Any) -> Any:
         lanes = _lanes_of((a,))
@@ -156,7 +185,7 @@ def where(typing: Any, mask: Any, a: Any, b: Any) -> Any:
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         x, y = (_vec(context, builder, k, v, lanes) for k, v in zip(sig.args[1:], args[1:], strict=True))
-        return builder.select(args[0], x.value, y.value)
+        return _packed(_unpacked(builder, mask, args[0]).choose(x, y))
 
     return lanes(mask, a, b), generate
 
@@ -167,8 +196,9 @@ def any_of(typing: Any, mask: Any) -> Any:
         return None
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        bits = builder.bitcast(args[0], ir.IntType(mask.width))
-        return builder.icmp_unsigned("!=", bits, bits.type(0))
+        word = ir.IntType(mask.width // mask.registers)
+        bits = [builder.bitcast(part, word) for part in _unpacked(builder, mask, args[0]).parts]
+        return builder.icmp_unsigned("!=", reduce(builder.or_, bits), word(0))
 
     return types.boolean(mask), generate
 
@@ -180,9 +210,10 @@ def loader(lanes: Lanes) -> Any:
     @intrinsic
     def load(typing: Any, pointer: Any, index: Any) -> Any:
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            value = builder.load(_address(builder, args, lanes))
-            value.align = lanes.bits // 8
-            return value
+            values = [
+                builder.load(place, align=lanes.bits // 8) for place in _addresses(builder, args, lanes)
+            ]
+            return _packed(Vec(builder, tuple(values)))
 
         return lanes(pointer, types.intp), generate
 
@@ -192,13 +223,16 @@ def loader(lanes: Lanes) -> Any:
 @intrinsic
 def store(typing: Any, pointer: Any, index: Any, value: Any) -> Any:
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        stored = builder.store(args[2], _address(builder, args, value))
-        stored.align = value.bits // 8
+        registers = _unpacked(builder, value, args[2]).parts
+        for place, register in zip(_addresses(builder, args, value), registers, strict=True):
+            builder.store(register, place, align=value.bits // 8)
         return context.get_dummy_value()
 
     return types.void(pointer, types.intp, value), generate
 
 
-def _address(builder: Any, args: Any, lanes: Lanes) -> Any:
-    element = builder.gep(args[0], [args[1]])
-    return builder.bitcast(element, lanes.llvm.as_pointer())
+def _addresses(builder: Any, args: Any, lanes: Lanes) -> list[Any]:
+    """Where each register lies, from element args[1] of args[0] on."""
+    first = builder.gep(args[0], [args[1]])
+    steps = (ir.Constant(ir.IntType(64), k * lanes.register.count) for k in range(lanes.registers))
+    return [builder.bitcast(builder.gep(first, [step]), lanes.register.as_pointer()) for step in steps]

@@ -8,17 +8,16 @@ over the range that formulas use; tests hold them to it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from llvmlite import ir
 
-FLAGS = ("contract",)
-
 
 def splat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
-    """A scalar in every lane."""
+    """A scalar in every element of a register."""
     undefined = ir.Constant(vector, ir.Undefined)
     first = builder.insert_element(undefined, scalar, ir.Constant(ir.IntType(32), 0))
     return builder.shuffle_vector(
@@ -28,14 +27,23 @@ def splat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Vec:
-    """An LLVM vector of floats (or the integers of the same width) with Python's operators."""
+    """LLVM vectors of floats (or integers of the same width, or booleans), each one register, with Python's
+    operators: done on one register after the other, so that several are in flight.
+
+    factors: of which it is the product. Adding to it or subtracting is one instruction and one rounding.
+    """
 
     builder: Any
-    value: Any
+    parts: tuple[Any, ...]
+    factors: tuple[Vec, Vec] | None = None
+
+    @property
+    def register(self) -> ir.VectorType:
+        return self.parts[0].type
 
     @property
     def bits(self) -> int:
-        element = self.value.type.element
+        element = self.register.element
         return (
             element.width
             if isinstance(element, ir.IntType)
@@ -46,38 +54,56 @@ class Vec:
 
     @property
     def whole(self) -> ir.VectorType:
-        return ir.VectorType(ir.IntType(self.bits), self.value.type.count)
+        return ir.VectorType(ir.IntType(self.bits), self.register.count)
 
     @property
     def real(self) -> ir.VectorType:
-        return ir.VectorType(ir.FloatType() if self.bits == 32 else ir.DoubleType(), self.value.type.count)
+        return ir.VectorType(ir.FloatType() if self.bits == 32 else ir.DoubleType(), self.register.count)
 
     def const(self, number: float) -> Vec:
-        return Vec(self.builder, ir.Constant(self.value.type, [number] * self.value.type.count))
+        constant = ir.Constant(self.register, [number] * self.register.count)
+        return Vec(self.builder, (constant,) * len(self.parts))
 
-    def _with(self, value: Any) -> Vec:
-        return Vec(self.builder, value)
-
-    def _other(self, other: Vec | float) -> Any:
-        return other.value if isinstance(other, Vec) else self.const(other).value
+    def _each(self, emit: Callable[..., Any], *others: Vec | float) -> Vec:
+        """An instruction on each register of self and the others."""
+        rows = [o.parts if isinstance(o, Vec) else self.const(o).parts for o in others]
+        return Vec(self.builder, tuple(emit(*p) for p in zip(self.parts, *rows, strict=True)))
 
     def __add__(self, other: Vec | float) -> Vec:
-        return self._with(self.builder.fadd(self.value, self._other(other), flags=FLAGS))
+        if self.factors:
+            return self._fused(1, other)
+        if isinstance(other, Vec) and other.factors:
+            return other._fused(1, self)
+        return self._each(self.builder.fadd, other)
 
     def __sub__(self, other: Vec | float) -> Vec:
-        return self._with(self.builder.fsub(self.value, self._other(other), flags=FLAGS))
+        if self.factors:
+            return self._fused(1, -other)
+        if isinstance(other, Vec) and other.factors:
+            return other._fused(-1, self)
+        return self._each(self.builder.fsub, other)
+
+    def __rsub__(self, other: float) -> Vec:
+        return self.const(other) - self
 
     def __mul__(self, other: Vec | float) -> Vec:
-        return self._with(self.builder.fmul(self.value, self._other(other), flags=FLAGS))
+        product = self._each(self.builder.fmul, other)
+        return replace(product, factors=(self, other if isinstance(other, Vec) else self.const(other)))
+
+    def _fused(self, sign: int, other: Vec | float) -> Vec:
+        """sign * self + other, where self is a product."""
+        assert self.factors
+        a, b = self.factors
+        return (a if sign > 0 else -a).call("fmuladd", b, other)
 
     def __truediv__(self, other: Vec | float) -> Vec:
-        return self._with(self.builder.fdiv(self.value, self._other(other), flags=FLAGS))
+        return self._each(self.builder.fdiv, other)
 
     def __neg__(self) -> Vec:
-        return self._with(self.builder.fneg(self.value))
+        return self._each(self.builder.fneg)
 
     def _compare(self, how: str, other: Vec | float) -> Vec:
-        return self._with(self.builder.fcmp_ordered(how, self.value, self._other(other)))
+        return self._each(partial(self.builder.fcmp_ordered, how), other)
 
     def __lt__(self, other: Vec | float) -> Vec:
         return self._compare("<", other)
@@ -98,46 +124,49 @@ class Vec:
         """With self a mask: yes where it holds, else no; at least one of them a vector."""
         like = yes if isinstance(yes, Vec) else no
         assert isinstance(like, Vec)
-        return self._with(self.builder.select(self.value, like._other(yes), like._other(no)))
+        yes, no = (v if isinstance(v, Vec) else like.const(v) for v in (yes, no))
+        return self._each(self.builder.select, yes, no)
 
-    def call(self, name: str, *others: Vec) -> Vec:
+    def call(self, name: str, *others: Vec | float) -> Vec:
         """An LLVM intrinsic on vectors of this type."""
-        kind = self.value.type
-        full = f"llvm.{name}.v{kind.count}f{self.bits}"
+        kind = self.register
         function = ir.FunctionType(kind, [kind] * (1 + len(others)))
-        declared = _declare(self.builder.module, function, full)
-        return self._with(self.builder.call(declared, [self.value, *(o.value for o in others)]))
+        declared = _declare(self.builder.module, function, f"llvm.{name}.v{kind.count}f{self.bits}")
+        return self._each(lambda *registers: self.builder.call(declared, registers), *others)
 
     def as_whole(self) -> Vec:
         """The same bits as integers."""
-        return self._with(self.builder.bitcast(self.value, self.whole))
+        return self._to(self.builder.bitcast, self.whole)
 
     def as_real(self) -> Vec:
         """The same bits as floats."""
-        return self._with(self.builder.bitcast(self.value, self.real))
+        return self._to(self.builder.bitcast, self.real)
 
     def to_real(self) -> Vec:
         """Integers as floats."""
-        return self._with(self.builder.sitofp(self.value, self.real))
+        return self._to(self.builder.sitofp, self.real)
 
     def to_whole(self) -> Vec:
         """Floats, already whole, as integers."""
-        return self._with(self.builder.fptosi(self.value, self.whole))
+        return self._to(self.builder.fptosi, self.whole)
+
+    def _to(self, conversion: Callable[[Any, ir.VectorType], Any], kind: ir.VectorType) -> Vec:
+        return self._each(lambda register: conversion(register, kind))
 
     def plus(self, n: int | Vec) -> Vec:
-        return self._with(self.builder.add(self.value, self._other(n)))
+        return self._each(self.builder.add, n)
 
     def masked(self, n: int) -> Vec:
-        return self._with(self.builder.and_(self.value, self.const(n).value))
+        return self._each(self.builder.and_, n)
 
     def left(self, n: int) -> Vec:
-        return self._with(self.builder.shl(self.value, self.const(n).value))
+        return self._each(self.builder.shl, n)
 
     def right(self, n: int) -> Vec:
-        return self._with(self.builder.ashr(self.value, self.const(n).value))
+        return self._each(self.builder.ashr, n)
 
     def is_set(self) -> Vec:
-        return self._with(self.builder.icmp_signed("!=", self.value, self.const(0).value))
+        return self._each(partial(self.builder.icmp_signed, "!="), 0)
 
 
 def _declare(module: Any, function: ir.FunctionType, name: str) -> Any:
@@ -166,31 +195,40 @@ def absolute(a: Vec) -> Vec:
 
 
 def minimum(a: Vec, b: Vec) -> Vec:
-    return (a < b).choose(a, b)
+    """a where a < b, else b."""
+    return _extreme(a, b, "min") if _is_avx512(a) else (a < b).choose(a, b)
 
 
 def maximum(a: Vec, b: Vec) -> Vec:
-    return (a > b).choose(a, b)
+    """a where a > b, else b."""
+    return _extreme(a, b, "max") if _is_avx512(a) else (a > b).choose(a, b)
+
+
+def _extreme(a: Vec, b: Vec, which: str) -> Vec:
+    """As one instruction, that LLVM can merge with the mask of a `where` around it."""
+    kind, current = a.register, ir.Constant(ir.IntType(32), 4)
+    function = _avx512(a, which, [kind, kind, current.type])
+    return a._each(lambda x, y: a.builder.call(function, [x, y, current]), b)
 
 
 def rsqrt(a: Vec) -> Vec:
     """1/sqrt(a): the hardware's 14-bit estimate and Newton steps where there is one, else a division."""
-    if not _has_estimate(a):
+    if not _is_avx512(a):
         return a.const(1.0) / sqrt(a)
     y = _estimate(a, "rsqrt14")
     half = a * 0.5
     for _ in range(1 if a.bits == 32 else 2):
-        y = y * (a.const(1.5) - half * y * y)
+        y = y * (1.5 - half * y * y)
     return y
 
 
 def inverse(a: Vec) -> Vec:
     """1/a: as `rsqrt`."""
-    if not _has_estimate(a):
+    if not _is_avx512(a):
         return a.const(1.0) / a
     y = _estimate(a, "rcp14")
     for _ in range(1 if a.bits == 32 else 2):
-        y = y + y * (a.const(1.0) - a * y)
+        y = y + y * (1.0 - a * y)
     return y
 
 
@@ -198,38 +236,21 @@ HOST_FEATURES: frozenset[str] = frozenset()
 """CPU features that code may use; set by the back end before it compiles."""
 
 
-def _has_estimate(a: Vec) -> bool:
-    return "avx512f" in HOST_FEATURES and a.value.type.count * a.bits % 512 == 0
+def _is_avx512(a: Vec) -> bool:
+    return "avx512f" in HOST_FEATURES and a.register.count * a.bits == 512
+
+
+def _avx512(a: Vec, instruction: str, arguments: list[ir.Type]) -> Any:
+    name = f"llvm.x86.avx512.{instruction}.p{'s' if a.bits == 32 else 'd'}.512"
+    return _declare(a.builder.module, ir.FunctionType(a.register, arguments), name)
 
 
 def _estimate(a: Vec, instruction: str) -> Vec:
-    """AVX-512's rsqrt14 or rcp14 on each 512-bit part."""
-    count = 512 // a.bits
-    part = ir.VectorType(a.value.type.element, count)
-    mask = ir.IntType(count)
-    name = f"llvm.x86.avx512.{instruction}.p{'s' if a.bits == 32 else 'd'}.512"
-    function = _declare(a.builder.module, ir.FunctionType(part, [part, part, mask]), name)
-    zero = ir.Constant(part, None)
-    parts = []
-    for start in range(0, a.value.type.count, count):
-        piece = _slice(a.builder, a.value, start, count)
-        parts.append(a.builder.call(function, [piece, zero, ir.Constant(mask, (1 << count) - 1)]))
-    return Vec(a.builder, _joined(a.builder, parts))
-
-
-def _slice(builder: Any, value: Any, start: int, count: int) -> Any:
-    if value.type.count == count:
-        return value
-    index = ir.Constant(ir.VectorType(ir.IntType(32), count), list(range(start, start + count)))
-    return builder.shuffle_vector(value, ir.Constant(value.type, ir.Undefined), index)
-
-
-def _joined(builder: Any, parts: list[Any]) -> Any:
-    while len(parts) > 1:
-        count = 2 * parts[0].type.count
-        index = ir.Constant(ir.VectorType(ir.IntType(32), count), list(range(count)))
-        parts = [builder.shuffle_vector(a, b, index) for a, b in zip(parts[::2], parts[1::2], strict=True)]
-    return parts[0]
+    """rsqrt14 or rcp14."""
+    kind, mask = a.register, ir.IntType(a.register.count)
+    function = _avx512(a, instruction, [kind, kind, mask])
+    rest = ir.Constant(kind, None), ir.Constant(mask, (1 << kind.count) - 1)
+    return a._each(lambda register: a.builder.call(function, [register, *rest]))
 
 
 _LN2_HI, _LN2_LO = (
@@ -251,7 +272,7 @@ _LOG = {
 
 
 def log(x: Vec) -> Vec:
-    """Natural logarithm of a positive, normal number; infinity and NaN pass through."""
+    """Natural logarithm of a positive, normal number; anything for another."""
     mantissa, one, root_half = (
         (23, 0x3F800000, 0x3F3504F3) if x.bits == 32 else (52, 0x3FF << 52, 0x3FE6A09E << 32)
     )
@@ -260,11 +281,7 @@ def log(x: Vec) -> Vec:
     f = shifted.masked((1 << mantissa) - 1).plus(root_half).as_real() - 1.0
     s = f * inverse(f + 2.0)
     z = s * s
-    half_square = f * f * 0.5
-    r = z * _polynomial(z, _LOG[x.bits])
-    small = s * (half_square + r) + exponent * _LN2_LO[x.bits]
-    result = exponent * _LN2_HI[x.bits] - ((half_square - small) - f)
-    return (x < math.inf).choose(result, x)
+    return exponent * math.log(2) + s * (z * _polynomial(z, _LOG[x.bits]) + 2.0)
 
 
 def exp(x: Vec) -> Vec:
@@ -347,6 +364,6 @@ def atan2(y: Vec, x: Vec) -> Vec:
     z = u * u
     angle = u - u * z * _polynomial(z, _ATAN)
     angle = far.choose(angle + math.pi / 4, angle)
-    angle = steep.choose(angle.const(math.pi / 2) - angle, angle)
-    angle = (x < 0.0).choose(angle.const(math.pi) - angle, angle)
+    angle = steep.choose(math.pi / 2 - angle, angle)
+    angle = (x < 0.0).choose(math.pi - angle, angle)
     return (y < 0.0).choose(-angle, angle)

