@@ -1,5 +1,5 @@
-"""C++ parts of fracslice: the samples around the contours of a few neighbouring layers, and marching squares
-on them. Callers use `fracslice.slicing`.
+"""C++ parts of fracslice: the samples around the contours of a few neighbouring layers, marching squares on
+them, and pictures. Callers use `fracslice.slicing`.
 
 Long calls let other threads run.
 """
@@ -34,11 +34,11 @@ class Bounds:
     """How far values reach: a block is decided where |f| exceeds a bound times the distance from its middle
     to its farthest sample.
 
-    proven: for blocks over several layers. outside, inside: within a layer, by the sign of the middle.
+    proven: for blocks over all layers. outside, inside: for finer ones, by the sign of the middle.
     stop_outside, stop_inside: blocks of so many pixels are not cut any more. even: inside values are of
     another scale than outside ones, but of one everywhere, so that a part of the crossings tells for all, and
-    the bound outside follows the steepness of the field, from `outside` up to `proven`. In a field that is not
-    even every crossing is settled on the field, and so are corners within pixels.
+    the bound outside follows the steepness of the field, from `outside` up to `proven`. In a field that is
+    not even every crossing is settled on the field, and so are corners within pixels.
     """
 
     def __init__(
@@ -51,19 +51,29 @@ class Bounds:
         even: bool,
     ) -> None: ...
 
+class Memory:
+    """Of slabs that are gone, for those to come."""
+
 class Slab:
     """The samples of layers on a lattice of ny x nx points at (x0 + dx i, y0 + dy j).
 
-    frame: (x0, y0, dx, dy). z: heights of neighbouring layers. All in scene units. layers: numbers of those
-    that are sampled, ascending; their samples do not depend on which others are.
+    memory: shared by slabs of one job. frame: (x0, y0, dx, dy). z: heights of neighbouring layers. All in
+    scene units.
     """
 
     def __init__(
-        self, frame: tuple[float, float, float, float], z: list[float], layers: list[int], ny: int, nx: int
+        self,
+        memory: Memory,
+        field: Field,
+        bounds: Bounds,
+        frame: tuple[float, float, float, float],
+        z: list[float],
+        ny: int,
+        nx: int,
     ) -> None: ...
-    def sample(self, field: Field, bounds: Bounds) -> None:
-        """Finds the samples around all contours, closed: every edge that a contour crosses has two evaluated
-        ends. Once. Raises BorderError.
+    def sample(self, layer: int) -> None:
+        """Finds the samples around the contours of a layer, closed: every edge that a contour crosses has two
+        evaluated ends. Once; they do not depend on which layers were sampled before. Raises BorderError.
         """
 
     @property
@@ -78,6 +88,22 @@ class Slab:
         cuts.
         """
 
+    def picture(
+        self,
+        layer: int,
+        pixels: tuple[int, int],
+        transposed: bool,
+        backwards: bool,
+        at: tuple[int, int],
+        shape: tuple[int, int],
+        levels: bytes,
+    ) -> tuple[bytes, float, int]:
+        """A layer's coverage as a screen shows it, see `fracslice.slicing.layers.View`: the rows of pixels,
+        each after a byte 0, as a zlib stream; and what `paint` returns.
+
+        pixels: rows and columns of the screen. shape: of the layer.
+        """
+
     def crossings(self, layer: int) -> tuple[NDArray[int32], NDArray[float64]]:
         """The crossed edges of a layer, row by row of tiles: int32 [n, 4], column, row and direction (0
         right, 1 up) of each and the number of the one that follows on its contour, the inside to the left;
@@ -88,3 +114,6 @@ class Slab:
         """Which samples are inside, and which were evaluated: 0 or 1, uint8 [layers, rows, columns], rows and
         columns rounded up to whole tiles of 8.
         """
+
+def deflated(image: NDArray[uint8]) -> bytes:
+    """The rows of an image of any strides, each after a byte 0, as a zlib stream."""

@@ -27,7 +27,7 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
     def write(layer: Layer) -> None:
         # Not renamed into place, nor forced to the disk one by one: a remainder is read before it is used.
         try:
-            (folder / f"{layer.index:05d}.png").write_bytes(_encoded(run, layer))
+            (folder / f"{layer.index:05d}.png").write_bytes(png.encode_layer(run.screen, layer))
         except OSError as error:
             raise ExportError(f"{folder}: {reason(error)}") from error
 
@@ -37,10 +37,6 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
         file.write(said)
     (folder / JOB).unlink()
     return folder
-
-
-def _encoded(run: SliceRun, layer: Layer) -> bytes:
-    return png.encode(run.screen.picture(layer, png.canvas(*run.screen.shape)))
 
 
 def write_sl1(run: SliceRun, path: str | Path) -> Path:
@@ -64,7 +60,7 @@ def write_sl1(run: SliceRun, path: str | Path) -> Path:
             add(archive, "fracslice.json", run.describe())
             add(archive, "prusaslicer.ini", _ini(_settings(run)))
         start = sum(1 for n in done if n.endswith(".png"))
-        pictures = run.slicer.map(lambda layer: _encoded(run, layer), range(start, run.layers))
+        pictures = run.slicer.map(lambda layer: png.encode_layer(run.screen, layer), range(start, run.layers))
         for index, data in enumerate(pictures, start):
             add(archive, f"{name}{index:05d}.png", data)
     return target

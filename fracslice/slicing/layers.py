@@ -26,6 +26,22 @@ SLAB = 8
 T = TypeVar("T")
 
 
+@dataclass(frozen=True)
+class View:
+    """How a screen shows a layer, its back up.
+
+    shape: rows and columns of the picture. transposed: its rows run along the layer's y; backwards: its
+    columns from right to left. at: row and column of the layer's first pixel on the screen as seen from
+    above, the first row in front. levels: of the screen by coverage, 256 bytes, the first 0, the last 255.
+    """
+
+    shape: tuple[int, int]
+    transposed: bool
+    backwards: bool
+    at: tuple[int, int]
+    levels: bytes
+
+
 @dataclass(eq=False)
 class Layer:
     """One layer of a stack, before it is given a form. evaluations: of the field for this layer, about."""
@@ -47,25 +63,30 @@ class Layer:
         """mm."""
         return float(self.stack.heights[self.index])
 
-    def paint(self, image: np.ndarray) -> None:
-        """Writes how much of each pixel is inside to an image of zeros, uint8 [ny, nx] of any strides, 255
-        for wholly; row 0 is the front (lowest y).
+    def deflated(self, view: View) -> bytes:
+        """What a PNG file holds of the layer as a screen shows it: rows, each after a byte 0, as a zlib
+        stream.
+        """
+        data, area, cut = self.slab.picture(
+            self.place, view.shape, view.transposed, view.backwards, view.at, self.stack.shape, view.levels
+        )
+        self._painted = area, cut
+        return data
+
+    @cached_property
+    def coverage(self) -> np.ndarray:
+        """How much of each pixel is inside, uint8 [ny, nx], 255 for wholly; row 0 is the front (lowest y).
 
         The area that the outline cuts from it: straight between where it crosses the pixel's sides, with a
         corner where it turns.
         """
+        image = np.zeros(self.stack.shape, np.uint8)
         self._painted = self.slab.paint(self.place, image)
+        return image
 
     @cached_property
     def _painted(self) -> tuple[float, int]:
         return self.slab.paint(self.place, np.zeros(self.stack.shape, np.uint8))
-
-    @cached_property
-    def coverage(self) -> np.ndarray:
-        """The painted image, uint8 [ny, nx]."""
-        image = np.zeros(self.stack.shape, np.uint8)
-        self.paint(image)
-        return image
 
     @property
     def area(self) -> float:
@@ -105,11 +126,12 @@ class Slicer:
         def slab(group: list[int]) -> list[T]:
             self.work.check()
             first = group[0] // SLAB * SLAB
-            found = sampler.sample(self.stack.z[first : first + SLAB], [index - first for index in group])
-            spent = found.evaluations / len(group)
-            made = []
+            found, made = sampler.slab(self.stack.z[first : first + SLAB]), []
             for index in group:
                 self.work.check()
+                before = found.evaluations
+                sampler.sample(found, index - first)
+                spent = found.evaluations - before
                 made.append(make(Layer(self.stack, index, spent, found, index - first, exact)))
             return made
 

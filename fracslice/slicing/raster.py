@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
+from .._slices import deflated
 from ..errors import SliceError
-from .layers import Layer
+from .layers import Layer, View
 from .printers import Printer
 from .stack import Stack
 
@@ -46,21 +47,30 @@ class Screen:
         across, along = self.printer.pixels
         return (across, along) if self.printer.portrait else (along, across)
 
-    def picture(self, layer: Layer, image: np.ndarray | None = None) -> np.ndarray:
-        """uint8 [rows, columns], as the file wants it: the first row at the top. Painted on `image` if there
-        is one, zeros of that shape and any strides.
-        """
-        image = np.zeros(self.shape, np.uint8) if image is None else image
+    def picture(self, layer: Layer) -> np.ndarray:
+        """uint8 [rows, columns], as the file wants it: the first row at the top."""
+        image = np.zeros(self.shape, np.uint8)
         bed, mine = self._bed(image), self._place
         if self.compensation:
             bed[mine.on_bed] = compensated(layer.coverage, self.compensation, self.stack.pixel)[mine.of_layer]
-        elif mine.cropped:
-            bed[mine.on_bed] = layer.coverage[mine.of_layer]
         else:
-            layer.paint(bed[mine.on_bed])
-        if self.gamma != 1:
-            bed[mine.on_bed] = self._levels[bed[mine.on_bed]]
+            bed[mine.on_bed] = layer.coverage[mine.of_layer]
+        bed[mine.on_bed] = self._levels[bed[mine.on_bed]]
         return image
+
+    def deflated(self, layer: Layer) -> bytes:
+        """The picture as a PNG file holds it: each row after a byte 0 for no filter, as a zlib stream.
+
+        Written from the layer's tiles as runs of equal pixels, without laying out the picture, unless there
+        is compensation.
+        """
+        if self.compensation:
+            return deflated(self.picture(layer))
+        mine = self._place
+        at = [on.start - of.start for on, of in zip(mine.on_bed, mine.of_layer, strict=True)]
+        levels = self._levels.tobytes()
+        backwards = self._mirrored != self._portrait
+        return layer.deflated(View(self.shape, self._portrait, backwards, (at[0], at[1]), levels))
 
     @cached_property
     def _levels(self) -> np.ndarray:
@@ -75,15 +85,21 @@ class Screen:
             first, count = (room - mine) // 2, min(mine, room)
             on_bed.append(slice(max(first, 0), max(first, 0) + count))
             of_layer.append(slice(max(-first, 0), max(-first, 0) + count))
-        return _Window((on_bed[0], on_bed[1]), (of_layer[0], of_layer[1]), any(s.start for s in of_layer))
+        return _Window((on_bed[0], on_bed[1]), (of_layer[0], of_layer[1]))
+
+    @property
+    def _portrait(self) -> bool:
+        return bool(self.printer and self.printer.portrait)
+
+    @property
+    def _mirrored(self) -> bool:
+        return self.mirror if self.mirror is not None else bool(self.printer and self.printer.mirror)
 
     def _bed(self, image: np.ndarray) -> np.ndarray:
         """A picture as seen from above, row 0 at the front: a view."""
-        portrait = bool(self.printer and self.printer.portrait)
-        mirror = self.mirror if self.mirror is not None else bool(self.printer and self.printer.mirror)
-        if portrait:
-            return image[::-1].T if mirror else image[::-1, ::-1].T
-        return image[::-1, ::-1] if mirror else image[::-1]
+        if self._portrait:
+            return image[::-1].T if self._mirrored else image[::-1, ::-1].T
+        return image[::-1, ::-1] if self._mirrored else image[::-1]
 
 
 @dataclass(frozen=True)
@@ -92,7 +108,6 @@ class _Window:
 
     on_bed: tuple[slice, slice]
     of_layer: tuple[slice, slice]
-    cropped: bool
 
 
 def check_fits(stack: Stack, printer: Printer) -> None:

@@ -22,7 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .._slices import BorderError, Bounds, Called, Compiled, Field, Slab
+from .._slices import BorderError, Bounds, Called, Compiled, Field, Memory, Slab
 from ..errors import SliceError
 from ..formulas.registry import Facts, Node
 from ..kernel import Compilable, CpuKernel, Kernel
@@ -48,18 +48,21 @@ class Sampler:
     frame: np.ndarray
     shape: tuple[int, int]
 
-    def sample(self, z: np.ndarray, layers: list[int] | None = None) -> Slab:
-        """The samples of layers at heights `z` (scene units), all or those of the numbers `layers`.
-
-        Raises `SliceError` where the solid reaches the rim of the lattice.
-        """
+    def slab(self, z: np.ndarray) -> Slab:
+        """Neighbouring layers at heights `z` (scene units), none of them sampled."""
         x0, y0, dx, dy = self.frame.tolist()
-        slab = Slab((x0, y0, dx, dy), z.tolist(), layers or list(range(len(z))), *self.shape)
+        return Slab(self._memory, self._field, self._bounds, (x0, y0, dx, dy), z.tolist(), *self.shape)
+
+    def sample(self, slab: Slab, layer: int) -> None:
+        """Samples a layer of a slab. Raises `SliceError` where the solid reaches the rim of the lattice."""
         try:
-            slab.sample(self._field, self._bounds)
+            slab.sample(layer)
         except BorderError as error:
             raise SliceError(f"{error}; give it finite <bounds>") from None
-        return slab
+
+    @cached_property
+    def _memory(self) -> Memory:
+        return Memory()
 
     @cached_property
     def _field(self) -> Field:

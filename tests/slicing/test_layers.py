@@ -51,7 +51,10 @@ def sampler_of(stack: Stack, facts: Facts | None = None) -> Sampler:
 
 def signs(sampler: Sampler, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Inside and known, bool [layers, y, x], of all samples."""
-    inside, known = sampler.sample(z).signs()
+    slab = sampler.slab(z)
+    for layer in range(len(z)):
+        sampler.sample(slab, layer)
+    inside, known = slab.signs()
     return inside > 0, known > 0
 
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import zlib
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from fracslice._slices import deflated
 from fracslice.errors import SliceError
-from fracslice.formulas import box, sphere, transform, union
+from fracslice.formulas import Node, box, mandelbulb, menger, sphere, transform, union
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.printers import PRINTERS, Printer, printer
 from fracslice.slicing.raster import Screen, compensated
@@ -80,6 +84,53 @@ def test_an_object_as_large_as_the_bed_fits() -> None:
 def test_too_large_for_the_printer() -> None:
     with pytest.raises(SliceError, match="13 mm along x, the Small has 12 mm"):
         Screen(stack_of(box(size=(13, 1, 1)), 13.0), SMALL)
+
+
+@pytest.mark.parametrize("machine", [None, SMALL, replace(SMALL, portrait=True)])
+@pytest.mark.parametrize(
+    "options", [{}, {"mirror": True}, {"mirror": False}, {"gamma": 2.2}, {"compensation": 0.1}]
+)
+@pytest.mark.parametrize("root", [ELL, mandelbulb(), menger(level=2)])
+def test_deflated_pictures_are_the_pictures(
+    root: Node, options: dict[str, Any], machine: Printer | None
+) -> None:
+    """As the library zlib reads them, whatever way they are turned; at 9.9 mm the layers are cropped."""
+    for size in (6.1, 9.9):
+        screen = Screen(stack_of(root, size), machine, **options)
+        rows, columns = screen.shape
+        layers = list(Slicer(screen.stack).map(lambda layer: layer))[::5]
+        for layer in layers:
+            rows_read = np.frombuffer(zlib.decompress(screen.deflated(layer)), np.uint8).reshape(
+                rows, columns + 1
+            )
+            assert not rows_read[:, 0].any()
+            assert (rows_read[:, 1:] == screen.picture(layer)).all()
+
+
+def test_deflated_pictures_are_small() -> None:
+    """An empty screen takes two bits for each 258 pixels, as little as deflate can say."""
+    empty = np.zeros((2400, 3840), np.uint8)
+    assert len(deflated(empty)) < empty.size / 1032 + 250
+    noise = np.random.default_rng(0).integers(0, 256, (300, 400), np.uint8)
+    assert len(deflated(noise)) < 1.01 * noise.size + 250
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_runs_are_deflated(seed: int) -> None:
+    """Runs of all lengths around those that deflate codes apart, in an image of any strides; codes that would
+    be longer than 15 bits.
+    """
+    rng = np.random.default_rng(seed)
+    lengths = rng.choice([1, 2, 3, 4, 257, 258, 259, 260, 261, 516, 519, 70_000], 4000)
+    values = np.minimum(rng.geometric(0.5, 4000) - 1, 255) * 7 % 256
+    size = lengths.sum() // 1000 * 1000
+    image = np.repeat(values.astype(np.uint8), lengths)[:size].reshape(1000, -1)
+    for turned in (image, image[::-1], image[:, ::-1].T):
+        rows = np.frombuffer(zlib.decompress(deflated(turned)), np.uint8).reshape(len(turned), -1)
+        assert (rows[:, 1:] == turned).all()
+    rare = np.repeat(np.arange(25, dtype=np.uint8), [1, 1, *np.cumsum(2 ** np.arange(18)), 1, 1, 1, 1, 1])
+    rare = rng.permutation(rare)[None]
+    assert zlib.decompress(deflated(rare)) == b"\0" + rare.tobytes()
 
 
 @pytest.mark.parametrize("by", [0.05, 0.13, 0.3, -0.08, -0.21])

@@ -2,11 +2,13 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <memory>
 
-#include "squares.h"
+#include "picture.h"
 
 namespace nb = nanobind;
 
@@ -65,6 +67,30 @@ nb::tuple bind_paint(const Slab& slab, int layer, const Bytes& image) {
     return nb::make_tuple(painted.area, painted.partly);
 }
 
+nb::bytes bytes(const std::vector<uint8_t>& data) { return nb::bytes(data.data(), data.size()); }
+
+nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_columns, bool transposed, bool backwards,
+                       std::array<int, 2> at, std::array<int, 2> shape, const nb::bytes& levels) {
+    View view{rows_columns[0], rows_columns[1], transposed, backwards, at, shape, {}};
+    if (levels.size() != view.levels.size()) throw nb::value_error("256 levels were expected");
+    std::copy_n(reinterpret_cast<const uint8_t*>(levels.c_str()), view.levels.size(), view.levels.begin());
+    Picture shown;
+    {
+        nb::gil_scoped_release released;
+        shown = picture(slab, layer, view);
+    }
+    return nb::make_tuple(bytes(shown.data), shown.painted.area, shown.painted.partly);
+}
+
+nb::bytes bind_deflated(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device::cpu>& image) {
+    std::vector<uint8_t> data;
+    {
+        nb::gil_scoped_release released;
+        data = deflated({const_cast<uint8_t*>(image.data()), int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)});
+    }
+    return bytes(data);
+}
+
 nb::tuple bind_crossings(const Slab& slab, int layer) {
     Crossings found;
     {
@@ -84,7 +110,7 @@ nb::tuple bind_signs(const Slab& slab) {
                 int y = int(r / kTile) + 1, x = int(c / kTile) + 1, bit = int(kTile * (r % kTile) + c % kTile);
                 int32_t t = slab.at(int(k), y, x);
                 inside[(k * shape[1] + r) * shape[2] + c] = slab.word(int(k), y, x) >> bit & 1;
-                known[(k * shape[1] + r) * shape[2] + c] = t >= 0 ? slab.known[t] >> bit & 1 : 0;
+                known[(k * shape[1] + r) * shape[2] + c] = slab.known[t] >> bit & 1;
             }
     auto wide = {shape[0], shape[1], shape[2]};
     return nb::make_tuple(owned<uint8_t>(std::move(inside), wide), owned<uint8_t>(std::move(known), wide));
@@ -103,15 +129,19 @@ NB_MODULE(_slices, module) {
     nb::class_<Bounds>(module, "Bounds")
         .def(nb::init<double, double, double, int, int, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
              "stop_inside"_a, "even"_a);
+    module.def("deflated", &bind_deflated, "image"_a);
+    nb::class_<Memory>(module, "Memory").def(nb::init<>());
     nb::class_<Slab>(module, "Slab")
         .def("__init__",
-             [](Slab* self, std::array<double, 4> f, std::vector<double> z, std::vector<int> layers, int ny, int nx) {
-                 new (self) Slab({f[0], f[1], f[2], f[3]}, std::move(z), std::move(layers), ny, nx);
+             [](Slab* self, std::shared_ptr<Memory> memory, std::shared_ptr<Field> field, const Bounds& bounds,
+                std::array<double, 4> f, std::vector<double> z, int ny, int nx) {
+                 new (self) Slab(std::move(memory), std::move(field), bounds, {f[0], f[1], f[2], f[3]}, std::move(z), ny, nx);
              },
-             "frame"_a, "z"_a, "layers"_a, "ny"_a, "nx"_a)
-        .def("sample", &Slab::sample, "field"_a, "bounds"_a, nb::call_guard<nb::gil_scoped_release>())
+             "memory"_a, "field"_a, "bounds"_a, "frame"_a, "z"_a, "ny"_a, "nx"_a)
+        .def("sample", &Slab::sample, "layer"_a, nb::call_guard<nb::gil_scoped_release>())
         .def_ro("evaluations", &Slab::evaluations)
         .def("paint", &bind_paint, "layer"_a, "image"_a)
+        .def("picture", &bind_picture, "layer"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a)
         .def("crossings", &bind_crossings, "layer"_a)
         .def("signs", &bind_signs);
 }

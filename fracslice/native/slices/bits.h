@@ -15,11 +15,34 @@ inline uint64_t lefts(uint64_t word, uint64_t beside) { return (word << 1 & ~kFi
 inline uint64_t uppers(uint64_t word, uint64_t beside) { return word >> 8 | beside << 56; }
 inline uint64_t lowers(uint64_t word, uint64_t beside) { return word << 8 | beside >> 56; }
 
-// The samples of a block of size x size.
-inline uint64_t block_mask(int size, int y, int x) {
-    uint64_t line = (uint64_t(0xFF) >> (8 - size)) << x, mask = 0;
-    for (int r = y; r < y + size; ++r) mask |= line << 8 * r;
-    return mask;
+// visit(bit) for each bit of a word, ascending.
+template <class Visit>
+inline void each(uint64_t word, const Visit& visit) {
+    for (; word; word &= word - 1) visit(lowest(word));
+}
+
+// The word with each row's columns from right to left, and with rows as columns (Warren 2012, "Hacker's Delight", 7-3).
+inline uint64_t mirrored(uint64_t w) {
+    w = (w >> 1 & 0x5555555555555555) | (w & 0x5555555555555555) << 1;
+    w = (w >> 2 & 0x3333333333333333) | (w & 0x3333333333333333) << 2;
+    return (w >> 4 & 0x0F0F0F0F0F0F0F0F) | (w & 0x0F0F0F0F0F0F0F0F) << 4;
+}
+inline uint64_t transposed(uint64_t w) {
+    auto swap = [&](uint64_t mask, int by) {
+        uint64_t t = (w ^ w >> by) & mask;
+        w ^= t ^ t << by;
+    };
+    swap(0x00AA00AA00AA00AA, 7);
+    swap(0x0000CCCC0000CCCC, 14);
+    swap(0x00000000F0F0F0F0, 28);
+    return w;
+}
+
+// The samples of a block of size x size, the first of a tile.
+constexpr uint64_t block(int size) {
+    uint64_t line = (uint64_t(1) << size) - 1, word = 0;
+    for (int row = 0; row < size; ++row) word |= line << 8 * row;
+    return word;
 }
 
 }  // namespace fracslice

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "evaluate.h"
 #include "squares.h"
 
 namespace fracslice {
@@ -76,7 +77,8 @@ double share_beyond(Vector a, Vector b, Vector tip, const Place& own, const Plac
 // Crossings on the zero set: false position with the Illinois rule (Dowell and Jarratt 1971), all edges at once. Straight
 // lines between the values at both ends would miss it by up to half a pixel where other faces are nearer, as just below a
 // horizontal one.
-void Slab::settle(const Field& field, int layer, const std::vector<Edge>& edges) {
+void Slab::settle(int layer, const std::vector<Edge>& edges) {
+    cross.resize(count());
     struct Root {
         float low, high, below, above, share;
         int moved;
@@ -102,7 +104,7 @@ void Slab::settle(const Field& field, int layer, const std::vector<Edge>& edges)
             spots.push_back({kTile * (place[e.tile].x - 1) + (e.number & 7) + (up ? 0 : share),
                              kTile * (place[e.tile].y - 1) + (e.number >> 3 & 7) + (up ? share : 0)});
         }
-        std::vector<float> f = values_at(field, layer, spots);
+        std::vector<float> f = values_at(layer, spots);
         size_t left = 0;
         for (size_t n = 0; n < todo.size(); ++n) {
             Root& root = roots[todo[n]];
@@ -118,7 +120,7 @@ void Slab::settle(const Field& field, int layer, const std::vector<Edge>& edges)
 
 // Corners within pixels: where the sides before and after meet, if the field changes its sign there. In the pixel that both
 // crossings belong to, or in one beside it.
-void Slab::sharpen(const Field& field, int layer) {
+void Slab::sharpen(int layer) {
     const Outline outline(*this, layer);
     std::vector<Corner> corners;
     std::vector<Spot> spots;
@@ -138,7 +140,7 @@ void Slab::sharpen(const Field& field, int layer) {
             spots.push_back({spot.x, spot.y});
         }
     }
-    std::vector<float> f = values_at(field, layer, spots);
+    std::vector<float> f = values_at(layer, spots);
     size_t first = tips_.size();
     for (size_t n = 0; n < corners.size(); ++n) {
         if ((f[2 * n] < 0) == (f[2 * n + 1] < 0)) continue;
@@ -156,7 +158,7 @@ void Slab::put_tip(int layer, int row, int column, float area) {
     if (row < 0 || column < 0 || row >= kTile * (ty_ - 2) || column >= kTile * (tx_ - 2)) return;
     int y = row / kTile + 1, x = column / kTile + 1, bit = kTile * (row % kTile) + column % kTile;
     int32_t t = at(layer, y, x);
-    if (t < 0) t = add(layer, y, x), cross.resize(count());
+    if (t < kTiles) t = add(layer, y, x), cross.resize(count());
     sharp[t] |= uint64_t(1) << bit;
     tips_.push_back({64 * int64_t(t) + bit, area});
 }

@@ -4,66 +4,10 @@
 #include <cstring>
 #include <memory>
 
-#include "bits.h"
+#include "pixels.h"
 
 namespace fracslice {
 namespace {
-
-// The signs of the corners 0 to 3 of each cell of a tile; a cell has the bit of its corner 0.
-struct Corners {
-    uint64_t word[4];
-
-    Corners(const Slab& slab, int k, int y, int x) {
-        uint64_t s = slab.word(k, y, x), up = slab.word(k, y + 1, x), right = slab.word(k, y, x + 1), diagonal = slab.word(k, y + 1, x + 1);
-        uint64_t r = rights(s, right);
-        word[0] = s, word[1] = r, word[2] = uppers(r, rights(up, diagonal)), word[3] = uppers(s, up);
-    }
-    uint64_t whole() const { return word[0] & word[1] & word[2] & word[3]; }
-    uint64_t mixed() const { return (word[0] | word[1] | word[2] | word[3]) & ~whole(); }
-    int signs(int bit) const {
-        return int(word[0] >> bit & 1) | int(word[1] >> bit & 1) << 1 | int(word[2] >> bit & 1) << 2 | int(word[3] >> bit & 1) << 3;
-    }
-};
-
-// Where the edges of a mixed cell are crossed; those that are not crossed have no meaning.
-class Cell {
- public:
-    Cell(const Slab& slab, const Place& p, int32_t t, int bit) : cross_(slab.cross.data()), t_(t), bit_(bit) {
-        right_ = (bit & 7) == 7 ? std::max(slab.at(p.layer, p.y, p.x + 1), 0) : t;
-        upper_ = bit >> 3 == 7 ? std::max(slab.at(p.layer, p.y + 1, p.x), 0) : t;
-    }
-    // Whether the inside corners q and q + 2 of an alternating cell are connected: if more of its border is inside.
-    bool joined(int q) const {
-        float more = lower() + left() - upper() - right();
-        return q == 0 ? more > 0 : more < 0;
-    }
-    // The inside part of the cell's area.
-    float area(int signs) const {
-        switch (signs) {
-            case 0: return 0;
-            case 1: return lower() * left() / 2;
-            case 2: return (1 - lower()) * right() / 2;
-            case 4: return (1 - upper()) * (1 - right()) / 2;
-            case 8: return upper() * (1 - left()) / 2;
-            case 3: return (left() + right()) / 2;
-            case 9: return (lower() + upper()) / 2;
-            case 5: return joined(0) ? 1 - area(2) - area(8) : area(1) + area(4);
-            case 10: return joined(1) ? 1 - area(1) - area(4) : area(2) + area(8);
-            default: return 1 - area(15 - signs);
-        }
-    }
-
- private:
-    // The share of an edge before its crossing, from the left or from below.
-    float lower() const { return cross_[t_][bit_] / kWhole; }
-    float left() const { return cross_[t_][64 + bit_] / kWhole; }
-    float right() const { return cross_[right_][64 + (bit_ & 56) + ((bit_ + 1) & 7)] / kWhole; }
-    float upper() const { return cross_[upper_][(bit_ + 8) & 63] / kWhole; }
-
-    const std::array<uint16_t, 128>* cross_;
-    int32_t t_, right_, upper_;
-    int bit_;
-};
 
 // Sets a span of pixels of one row.
 void fill(const Canvas& canvas, int y, int x, int n) {
@@ -83,8 +27,8 @@ void fill(const Canvas& canvas, int y0, int x0, uint64_t whole) {
 }
 
 // The outline of a cell's inside, counter-clockwise, leaves along one edge and comes back along another.
-void link(const Cell& cell, int signs, const int32_t* e, std::vector<Crossing>& edges) {
-    bool alone = (signs == 5 && !cell.joined(0)) || (signs == 10 && !cell.joined(1));
+void link(const std::array<float, 4>& sides, int signs, const int32_t* e, std::vector<Crossing>& edges) {
+    bool alone = (signs == 5 && !Cells::joined(sides, 0)) || (signs == 10 && !Cells::joined(sides, 1));
     for (int q = 0; q < 4; ++q) {
         int g = (q + 1) & 3;
         if (!(signs >> q & 1) || signs >> g & 1) continue;
@@ -107,7 +51,7 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
             bool empty = t == kEmpty || x0 >= canvas.columns;
             Corners corners(slab, k, y, empty ? 0 : x);
             uint64_t whole = empty ? 0 : corners.whole();
-            uint64_t sharp = t >= 0 ? slab.sharp[t] : 0;
+            uint64_t sharp = slab.sharp[t];
             if (whole == kAll && !sharp) {
                 ++full;
                 continue;
@@ -121,11 +65,11 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
             if (empty) continue;
             painted.area += __builtin_popcountll(whole & ~sharp);
             fill(canvas, y0, x0, whole & ~sharp);
-            for (uint64_t mixed = t >= 0 ? corners.mixed() | sharp : 0; mixed; mixed &= mixed - 1) {
+            const Cells cells(slab, {k, y, x});
+            for (uint64_t mixed = t >= kTiles ? corners.mixed() | sharp : 0; mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed), r = y0 + (bit >> 3), c = x0 + (bit & 7);
                 if (r >= canvas.rows || c >= canvas.columns) continue;
-                float area = Cell(slab, {k, y, x}, t, bit).area(corners.signs(bit));
-                if (sharp >> bit & 1) area = std::clamp(area + slab.tip(t, bit), 0.f, 1.f);
+                float area = coverage(slab, cells, t, bit, corners.signs(bit));
                 canvas.data[r * canvas.down + c * canvas.across] = uint8_t(255 * area + 0.5f);
                 painted.area += area;
                 ++painted.partly;
@@ -143,32 +87,30 @@ Crossings crossings(const Slab& slab, int k) {
     for (int y = 1; y < slab.rows() - 1; ++y)
         for (int x = 1; x < slab.columns() - 1; ++x) {
             int32_t t = slab.at(k, y, x);
-            if (t < 0) continue;
-            uint64_t s = slab.inside[t];
-            uint64_t words[2] = {s ^ rights(s, slab.word(k, y, x + 1)), s ^ uppers(s, slab.word(k, y + 1, x))};
-            for (uint64_t w = words[0] | words[1]; w; w &= w - 1) {
-                int bit = lowest(w), r = bit >> 3, c = bit & 7;
-                for (int up = 0; up < 2; ++up) {
-                    if (!(words[up] >> bit & 1)) continue;
-                    id(t, 64 * up + bit) = int32_t(found.edges.size());
-                    found.edges.push_back({kTile * (x - 1) + c, kTile * (y - 1) + r, up, -1});
-                    found.ends.push_back(slab.values[t][bit]);
-                    found.ends.push_back(slab.value({k, y, x}, t, r + up, c + 1 - up));
-                }
-            }
+            if (t < kTiles) continue;
+            uint64_t of = slab.inside[t];
+            uint64_t words[2] = {of ^ rights(of, slab.word(k, y, x + 1)), of ^ uppers(of, slab.word(k, y + 1, x))};
+            for (uint64_t w = words[0] | words[1]; w; w &= w - 1)
+                slab.crossed(t, w & -w, [&, t = t](int number, float a, float b) {
+                    id(t, number) = int32_t(found.edges.size());
+                    found.edges.push_back({kTile * (x - 1) + (number & 7), kTile * (y - 1) + (number >> 3 & 7), number >> 6, -1});
+                    found.ends.push_back(a);
+                    found.ends.push_back(b);
+                });
         }
     for (int y = 1; y < slab.rows() - 1; ++y)
         for (int x = 1; x < slab.columns() - 1; ++x) {
             int32_t t = slab.at(k, y, x);
-            if (t < 0) continue;
-            Corners corners(slab, k, y, x);
+            if (t < kTiles) continue;
+            const Corners corners(slab, k, y, x);
+            const Cells cells(slab, {k, y, x});
             for (uint64_t mixed = corners.mixed(); mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed);
                 int32_t right = (bit & 7) == 7 ? std::max(slab.at(k, y, x + 1), first) : t;
                 int32_t upper = bit >> 3 == 7 ? std::max(slab.at(k, y + 1, x), first) : t;
                 const int32_t e[4] = {id(t, bit), id(right, 64 + (bit & 56) + ((bit + 1) & 7)), id(upper, (bit + 8) & 63),
                                       id(t, 64 + bit)};
-                link(Cell(slab, {k, y, x}, t, bit), corners.signs(bit), e, found.edges);
+                link(cells.sides(bit), corners.signs(bit), e, found.edges);
             }
         }
     return found;

@@ -31,7 +31,7 @@ def cost(root: Node, pixels: int) -> tuple[float, float, float]:
     screen = Screen(stack)
 
     def make(layer: Layer) -> tuple[float, float]:
-        png.encode(screen.picture(layer, png.canvas(*screen.shape)))
+        png.encode_layer(screen, layer)
         return layer.boundary, layer.evaluations
 
     list(Slicer(stack).map(make, range(8)))  # compiles

@@ -63,7 +63,7 @@ def main() -> None:
     stack = part(whole, range((len(whole.z) - count) // 2, (len(whole.z) + count) // 2))
     run = SliceRun(stack, Screen(stack, machine))
     rows, columns = run.screen.shape
-    list(Slicer(stack).map(run.screen.picture, [count // 2]))
+    list(Slicer(stack).map(run.screen.deflated, [count // 2]))
     with tempfile.TemporaryDirectory() as folder:
         wall, cpu = seconds(lambda: write_slices(run, Path(folder) / "layers", "png"))
         size = sum(f.stat().st_size for f in Path(folder).rglob("*.png"))

@@ -40,7 +40,7 @@ def ours(job: Stack, folder: Path) -> dict[str, float]:
     screen = Screen(job)
 
     def make(layer: Layer) -> tuple[float, int, int]:
-        data = png.encode(screen.picture(layer, png.canvas(*screen.shape)))
+        data = png.encode_layer(screen, layer)
         (folder / f"{layer.index:04d}.png").write_bytes(data)
         return layer.evaluations, layer.boundary, len(data)
 

@@ -1,0 +1,29 @@
+// Layers and images as what a PNG file holds of them: rows, each after the byte 0 for no filter, deflated.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "squares.h"
+
+namespace fracslice {
+
+// How a screen shows a layer, its back up.
+struct View {
+    int rows, columns;       // of the picture
+    bool transposed;         // rows run along the layer's y
+    bool backwards;          // columns run from right to left
+    std::array<int, 2> at;   // row and column of the layer's first pixel as seen from above, the first row in front
+    std::array<int, 2> shape;  // of the layer
+    std::array<uint8_t, 256> levels;  // of the screen, by the coverage; 0 of 0, 255 of 255
+};
+
+struct Picture {
+    std::vector<uint8_t> data;
+    Painted painted;
+};
+
+Picture picture(const Slab& slab, int layer, const View& view);
+std::vector<uint8_t> deflated(const Canvas& image);
+
+}  // namespace fracslice

@@ -1,0 +1,60 @@
+#include "tiles.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fracslice {
+
+void Tiles::push(const Place& at, uint64_t signs) {
+    place.push_back(at);
+    inside.push_back(signs);
+    known.push_back(0);
+    decided.push_back(0);
+    sharp.push_back(0);
+    reach.push_back(0);
+    values.emplace_back();
+}
+
+void Tiles::clear(size_t places) {
+    where.assign(places, kEmpty);
+    place.clear(), inside.clear(), known.clear(), decided.clear(), sharp.clear(), reach.clear(), values.clear(), cross.clear();
+    push({0, 0, 0}, kAll);
+    push({0, 0, 0}, 0);
+    values[kFull].fill(0), values[kEmpty].fill(0);
+}
+
+Tiles Memory::take(size_t places) {
+    Tiles tiles;
+    {
+        std::lock_guard<std::mutex> lock(mutex_);
+        if (!free_.empty()) {
+            tiles = std::move(free_.back());
+            free_.pop_back();
+        }
+    }
+    tiles.clear(places);
+    return tiles;
+}
+
+void Memory::give(Tiles&& tiles) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    free_.push_back(std::move(tiles));
+}
+
+Discs::Discs(double dx, double dy) {
+    double unit = std::min(dx, dy);
+    for (int d2 = 0; d2 <= kMost; ++d2)
+        for (int bit = 0; bit < 64; ++bit) {
+            uint64_t word = 0;
+            for (int row = 0; row < kTile; ++row) {
+                double down = (row - (bit >> 3)) * dy / unit, left = d2 - down * down;
+                if (left < 0) continue;
+                int column = bit & 7, wide = int(std::sqrt(left) * unit / dx);
+                int from = std::max(column - wide, 0), to = std::min(column + wide, kTile - 1);
+                word |= ((uint64_t(2) << to) - (uint64_t(1) << from)) << kTile * row;
+            }
+            discs_[d2][bit] = word;
+        }
+}
+
+}  // namespace fracslice
