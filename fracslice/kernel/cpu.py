@@ -165,7 +165,9 @@ def host() -> tuple[str, str]:
 def _toolchain() -> str:
     """Everything beside the scene that the machine code depends on."""
     here = Path(__file__).parent
-    texts = [(here / name).read_text() for name in ("lanes.py", "lanes_math.py", "compiler.py")]
+    texts = [
+        (here / name).read_text() for name in ("registers.py", "lanes.py", "lanes_math.py", "compiler.py")
+    ]
     versions = [version(p) for p in ("numba", "llvmlite")]
     return "\n".join([*host(), *versions, *texts])
 

@@ -1,9 +1,8 @@
 """SIMD lanes for Numba: the vocabulary of the formulas on vectors of 8 to 64 floats.
 
 A `Lanes` value is a few registers of floats, a `Mask` of booleans. Numba types and links the formulas;
-everything here is emitted as LLVM IR and becomes one or two instructions per register. A product to which
-something is added in the same expression is fused with it here, not by LLVM, which may choose another one
-of two products in another place: results do not depend on what surrounds an operation, and NaN and
+everything here is emitted as LLVM IR and becomes one or two instructions per register. There is no fast-math:
+results do not depend on what surrounds an operation (`registers` says how products are fused), and NaN and
 infinity behave.
 
 Only compiling needs this module (and Numba); a kernel from the cache does not import it.
@@ -23,7 +22,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
 from . import lanes_math
-from .lanes_math import Vec
+from .registers import Vec, splat
 
 
 class Lanes(types.Type):
@@ -83,7 +82,7 @@ def _vec(context: Any, builder: Any, kind: Any, value: Any, lanes: Lanes) -> Vec
     if isinstance(kind, Lanes):
         return _unpacked(builder, kind, value)
     scalar = types.float32 if lanes.bits == 32 else types.float64
-    register = lanes_math.splat(builder, context.cast(builder, value, kind, scalar), lanes.register)
+    register = splat(builder, context.cast(builder, value, kind, scalar), lanes.register)
     return Vec(builder, (register,) * lanes.registers)
 
 

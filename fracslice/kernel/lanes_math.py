@@ -8,170 +8,12 @@ over the range that formulas use; tests hold them to it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 from llvmlite import ir
 
-
-def splat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
-    """A scalar in every element of a register."""
-    undefined = ir.Constant(vector, ir.Undefined)
-    first = builder.insert_element(undefined, scalar, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(
-        first, undefined, ir.Constant(ir.VectorType(ir.IntType(32), vector.count), None)
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Vec:
-    """LLVM vectors of floats (or integers of the same width, or booleans), each one register, with Python's
-    operators: done on one register after the other, so that several are in flight.
-
-    factors: of which it is the product. Adding to it or subtracting is one instruction and one rounding.
-    """
-
-    builder: Any
-    parts: tuple[Any, ...]
-    factors: tuple[Vec, Vec] | None = None
-
-    @property
-    def register(self) -> ir.VectorType:
-        return self.parts[0].type
-
-    @property
-    def bits(self) -> int:
-        element = self.register.element
-        return (
-            element.width
-            if isinstance(element, ir.IntType)
-            else 32
-            if isinstance(element, ir.FloatType)
-            else 64
-        )
-
-    @property
-    def whole(self) -> ir.VectorType:
-        return ir.VectorType(ir.IntType(self.bits), self.register.count)
-
-    @property
-    def real(self) -> ir.VectorType:
-        return ir.VectorType(ir.FloatType() if self.bits == 32 else ir.DoubleType(), self.register.count)
-
-    def const(self, number: float) -> Vec:
-        constant = ir.Constant(self.register, [number] * self.register.count)
-        return Vec(self.builder, (constant,) * len(self.parts))
-
-    def _each(self, emit: Callable[..., Any], *others: Vec | float) -> Vec:
-        """An instruction on each register of self and the others."""
-        rows = [o.parts if isinstance(o, Vec) else self.const(o).parts for o in others]
-        return Vec(self.builder, tuple(emit(*p) for p in zip(self.parts, *rows, strict=True)))
-
-    def __add__(self, other: Vec | float) -> Vec:
-        if self.factors:
-            return self._fused(1, other)
-        if isinstance(other, Vec) and other.factors:
-            return other._fused(1, self)
-        return self._each(self.builder.fadd, other)
-
-    def __sub__(self, other: Vec | float) -> Vec:
-        if self.factors:
-            return self._fused(1, -other)
-        if isinstance(other, Vec) and other.factors:
-            return other._fused(-1, self)
-        return self._each(self.builder.fsub, other)
-
-    def __rsub__(self, other: float) -> Vec:
-        return self.const(other) - self
-
-    def __mul__(self, other: Vec | float) -> Vec:
-        product = self._each(self.builder.fmul, other)
-        return replace(product, factors=(self, other if isinstance(other, Vec) else self.const(other)))
-
-    def _fused(self, sign: int, other: Vec | float) -> Vec:
-        """sign * self + other, where self is a product."""
-        assert self.factors
-        a, b = self.factors
-        return (a if sign > 0 else -a).call("fmuladd", b, other)
-
-    def __truediv__(self, other: Vec | float) -> Vec:
-        return self._each(self.builder.fdiv, other)
-
-    def __neg__(self) -> Vec:
-        return self._each(self.builder.fneg)
-
-    def _compare(self, how: str, other: Vec | float) -> Vec:
-        return self._each(partial(self.builder.fcmp_ordered, how), other)
-
-    def __lt__(self, other: Vec | float) -> Vec:
-        return self._compare("<", other)
-
-    def __le__(self, other: Vec | float) -> Vec:
-        return self._compare("<=", other)
-
-    def __gt__(self, other: Vec | float) -> Vec:
-        return self._compare(">", other)
-
-    def __ge__(self, other: Vec | float) -> Vec:
-        return self._compare(">=", other)
-
-    def __eq__(self, other: object) -> Vec:  # type: ignore[override]
-        return self._compare("==", other)  # type: ignore[arg-type]
-
-    def choose(self, yes: Vec | float, no: Vec | float) -> Vec:
-        """With self a mask: yes where it holds, else no; at least one of them a vector."""
-        like = yes if isinstance(yes, Vec) else no
-        assert isinstance(like, Vec)
-        yes, no = (v if isinstance(v, Vec) else like.const(v) for v in (yes, no))
-        return self._each(self.builder.select, yes, no)
-
-    def call(self, name: str, *others: Vec | float) -> Vec:
-        """An LLVM intrinsic on vectors of this type."""
-        kind = self.register
-        function = ir.FunctionType(kind, [kind] * (1 + len(others)))
-        declared = _declare(self.builder.module, function, f"llvm.{name}.v{kind.count}f{self.bits}")
-        return self._each(lambda *registers: self.builder.call(declared, registers), *others)
-
-    def as_whole(self) -> Vec:
-        """The same bits as integers."""
-        return self._to(self.builder.bitcast, self.whole)
-
-    def as_real(self) -> Vec:
-        """The same bits as floats."""
-        return self._to(self.builder.bitcast, self.real)
-
-    def to_real(self) -> Vec:
-        """Integers as floats."""
-        return self._to(self.builder.sitofp, self.real)
-
-    def to_whole(self) -> Vec:
-        """Floats, already whole, as integers."""
-        return self._to(self.builder.fptosi, self.whole)
-
-    def _to(self, conversion: Callable[[Any, ir.VectorType], Any], kind: ir.VectorType) -> Vec:
-        return self._each(lambda register: conversion(register, kind))
-
-    def plus(self, n: int | Vec) -> Vec:
-        return self._each(self.builder.add, n)
-
-    def masked(self, n: int) -> Vec:
-        return self._each(self.builder.and_, n)
-
-    def left(self, n: int) -> Vec:
-        return self._each(self.builder.shl, n)
-
-    def right(self, n: int) -> Vec:
-        return self._each(self.builder.ashr, n)
-
-    def is_set(self) -> Vec:
-        return self._each(partial(self.builder.icmp_signed, "!="), 0)
-
-
-def _declare(module: Any, function: ir.FunctionType, name: str) -> Any:
-    known = module.globals.get(name)
-    return known if known is not None else ir.Function(module, function, name)
+from .registers import Vec, declare
 
 
 def _polynomial(x: Vec, coefficients: Sequence[float]) -> Vec:
@@ -208,7 +50,7 @@ def _extreme(a: Vec, b: Vec, which: str) -> Vec:
     """As one instruction, that LLVM can merge with the mask of a `where` around it."""
     kind, current = a.register, ir.Constant(ir.IntType(32), 4)
     function = _avx512(a, which, [kind, kind, current.type])
-    return a._each(lambda x, y: a.builder.call(function, [x, y, current]), b)
+    return a.each(lambda x, y: a.builder.call(function, [x, y, current]), b)
 
 
 def rsqrt(a: Vec) -> Vec:
@@ -242,7 +84,7 @@ def _is_avx512(a: Vec) -> bool:
 
 def _avx512(a: Vec, instruction: str, arguments: list[ir.Type]) -> Any:
     name = f"llvm.x86.avx512.{instruction}.p{'s' if a.bits == 32 else 'd'}.512"
-    return _declare(a.builder.module, ir.FunctionType(a.register, arguments), name)
+    return declare(a.builder.module, ir.FunctionType(a.register, arguments), name)
 
 
 def _estimate(a: Vec, instruction: str) -> Vec:
@@ -250,7 +92,7 @@ def _estimate(a: Vec, instruction: str) -> Vec:
     kind, mask = a.register, ir.IntType(a.register.count)
     function = _avx512(a, instruction, [kind, kind, mask])
     rest = ir.Constant(kind, None), ir.Constant(mask, (1 << kind.count) - 1)
-    return a._each(lambda register: a.builder.call(function, [register, *rest]))
+    return a.each(lambda register: a.builder.call(function, [register, *rest]))
 
 
 _LN2_HI, _LN2_LO = (
