@@ -52,7 +52,7 @@ class Cells:
 
     def crossed_edges(self, first: int, last: int) -> tuple[NDArray[int32], NDArray[uint8]]:
         """The grid edges that the surface crosses, in the order of the vertices of `marching_cubes`, of some
-        layers: lower grid points int32 [n, 3] and axes uint8 [n]."""
+        layers: lower grid points int32 [3, n] and axes uint8 [n]."""
 
     def contour(
         self,
@@ -63,14 +63,15 @@ class Cells:
         origin: Point,
         voxel: float,
         clamp: float,
-    ) -> tuple[NDArray[float64], NDArray[int32], int, int]:
+    ) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8]]:
         """The surface of `marching_cubes` in some layers through exact crossings, its edges and corners kept.
 
         t: where on each edge of ``crossed_edges(first - 1, last + 2)`` the surface crosses it, [n]; normals:
-        unit, outward, [n, 3]. Returns vertices and triangles as `marching_cubes`, how many vertices are
-        crossings (the first: those of the layers `first` to `last`) and how many corners in cell faces (the
-        next; the rest are tips within cells). Raises ValueError for other than n crossings, and for more than
-        2^31 vertices or triangles.
+        unit, outward, [3, n]. Returns vertices and triangles as `marching_cubes`, how many vertices are
+        crossings (the first: those of the layers `first` to `last`), and for each of the others, in faces and
+        cells, grid points of its face or cell near it, dx + 2 dy + 4 dz: an inside one, and 8 times an
+        outside one, uint8. Raises ValueError for other than n crossings, and for more than 2^31 vertices or
+        triangles.
         """
 
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:

@@ -16,7 +16,7 @@ from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
 from ..volume.crossings import Crossings, refine_crossings
 from ..volume.lattice import BRICK
-from ..volume.settling import settle
+from ..volume.settling import Rooms, settle
 from ..work import Work
 from .model import Mesh
 
@@ -84,32 +84,30 @@ def contour_pieces(
     signs = bricks.signs if isinstance(bricks, Bricks) else bricks
     cells = _called(Cells, signs.ijk, signs.signs, signs.index, work.threads)
     placement = tuple(float(v) for v in signs.origin), float(signs.voxel), clamp(signs)
-    known, start = Crossings(np.empty(0), np.empty((0, 3))), 0
+    known, start = Crossings(np.empty(0), np.empty((3, 0))), 0
     for first, last in _layers(signs, most):
         begin, done = cells.crossings_before(first - 1), start + len(known.t)
         lower, axis = cells.crossed_edges(first - 1, last + 2)
         fresh = refine_crossings(
-            root, signs.origin, signs.voxel, lower[done - begin :], axis[done - begin :], work
+            root, signs.origin, signs.voxel, lower[:, done - begin :], axis[done - begin :], work
         )
-        known = Crossings(
-            np.concatenate([known.t[begin - start :], fresh.t]),
-            np.concatenate([known.normals[begin - start :], fresh.normals]),
-        )
+        known = known.after(begin - start).joined(fresh)
         start = begin
-        vertices, triangles, count, _ = _called(
+        vertices, triangles, count, ends = _called(
             cells.contour, first, last, known.t, known.normals, *placement
         )
-        room = partial(_room, bricks=signs)
-        vertices[count:] = settle(root, vertices[count:], room, signs.voxel, work)
+        features = vertices[count:]
+        rooms = partial(_rooms, features, ends, signs)
+        moved, places = settle(root, features, rooms, signs.voxel, work)
+        features[moved] = places
         numbers = np.full(len(vertices), -1, np.int64)
         numbers[:count] = cells.crossings_before(first) + np.arange(count)
-        used = np.zeros(len(vertices), bool)
-        used[triangles] = True
-        whole = Mesh(vertices, triangles)
-        end = signs.origin[0] + signs.voxel * BRICK * last
-        yield Piece(
-            whole if used.all() else whole.selected(np.ones(len(triangles), bool)), end, numbers[used]
-        )
+        mesh = Mesh(vertices, triangles)
+        if last < len(signs.index):  # The next piece has what this one numbers and does not use.
+            used = np.zeros(len(vertices), bool)
+            used[triangles] = True
+            mesh, numbers = mesh.selected(np.ones(len(triangles), bool)), numbers[used]
+        yield Piece(mesh, signs.origin[0] + signs.voxel * BRICK * last, numbers)
 
 
 def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
@@ -126,14 +124,24 @@ def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
     return list(zip(cuts, [*cuts[1:], len(counts)], strict=True))
 
 
-def _room(points: np.ndarray, bricks: SignBricks) -> tuple[np.ndarray, np.ndarray]:
-    """How far a vertex within a cell, or within a cell's face, may move: strictly inside it."""
-    origin, voxel, margin = np.asarray(bricks.origin), bricks.voxel, clamp(bricks)
-    grid = (points - origin) / voxel
-    flat = np.abs(grid - np.round(grid)) < margin / 2
-    low = np.where(flat, points, origin + voxel * (np.floor(grid) + margin))
-    high = np.where(flat, points, origin + voxel * (np.floor(grid) + 1 - margin))
-    return low, high
+def _rooms(
+    features: np.ndarray, ends: np.ndarray, bricks: SignBricks, which: np.ndarray, inside: np.ndarray
+) -> Rooms:
+    """How far vertices within cells, or within cells' faces, may move: strictly inside these; or towards the
+    corner of theirs with the other sign.
+    """
+    corners = np.where(inside, ends[which] >> 3, ends[which])
+    origin, voxel, margin = np.array(bricks.origin)[:, None], bricks.voxel, clamp(bricks)
+    there = np.ascontiguousarray(features[which].T)
+    grid = (there - origin) / voxel
+    whole = np.round(grid)
+    flat = np.abs(grid - whole) < margin / 2
+    cell = np.where(flat, whole, np.floor(grid))
+    return Rooms(
+        np.where(flat, there, origin + voxel * (cell + margin)),
+        np.where(flat, there, origin + voxel * (cell + (1 - margin))),
+        origin + voxel * (cell + (corners >> np.arange(3)[:, None] & 1)),
+    )
 
 
 def clamp(bricks: Bricks | SignBricks) -> float:

@@ -32,7 +32,9 @@ def refine(root: Node | Compilable, mesh: Mesh, chord: float, voxel: float, work
         edges, sides = _edges(mesh.triangles)
         ends = mesh.vertices[edges]
         middles = ends.mean(axis=1)
-        there = settle(root, middles, anywhere, voxel, work)
+        there = middles.copy()
+        moved, places = settle(root, middles, anywhere, voxel, work)
+        there[moved] = places
         off = np.linalg.norm(there - middles, axis=1)
         split = (off > chord) & (off < SMOOTH * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
         split &= ~np.isin(_keys(edges), kept)

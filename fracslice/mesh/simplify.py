@@ -41,8 +41,9 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
     mesh: a closed, oriented 2-manifold without crossings. The result is one too, of the same topology; its
     vertices are some of the original's, so that they stay on the surface and on sharp edges. What is done is
     checked: a bound on the distance of every original triangle, the distance back at samples half an edge
-    apart, and crossings. Where that fails less is allowed, at last nothing, and all is done again. Raises
-    `MeshError` for a mesh that is not a closed manifold, or if that comes to no end, and `Cancelled`.
+    apart, crossings, and that no shell is inside out. Where that fails less is allowed, at last nothing, and
+    all is done again. Raises `MeshError` for a mesh that is not a closed manifold, or if that comes to no
+    end, and `Cancelled`.
     """
     from fracslice.mesh.collapse import collapsed
     from fracslice.mesh.links import links
@@ -83,11 +84,25 @@ def _examined(
     bounds = distance_bounds(gone, coarse, tolerance, work, tree)
     fresh = Mesh(mesh.vertices, found.triangles[found.fresh])
     back = sampled_distances(fresh, mesh, _edge(mesh) / 2, work)
-    faulty = crossing_triangles(coarse, tree, work.threads)
+    faulty = crossing_triangles(coarse, tree, work.threads) | _turned(mesh, coarse)
     faulty[found.fresh] |= back > tolerance
     faulty[found.owner[gone.triangles[np.isinf(bounds)]]] = True
     work.check()
     return faulty, float(bounds.max(initial=0.0)), float(back.max(initial=0.0))
+
+
+def _turned(mesh: Mesh, coarse: Mesh) -> NDArray[np.bool_]:
+    """The triangles of shells that are inside out: a crumb that fewer triangles cannot hold open."""
+    from fracslice.mesh.links import parts, shell_volumes
+
+    labels, count = parts(mesh.triangles, len(mesh.vertices))
+    shell = np.zeros(len(mesh.vertices), labels.dtype)
+    shell[mesh.triangles] = labels[:, None]
+    left = shell[coarse.triangles[:, 0]]
+    before = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
+    after = shell_volumes(mesh.vertices, coarse.triangles, left, count)
+    turned: NDArray[np.bool_] = ((before < 0) != (after < 0))[left]
+    return turned
 
 
 def _edge(mesh: Mesh) -> float:

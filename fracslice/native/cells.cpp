@@ -25,17 +25,6 @@ size_t find_crossings(const std::array<Corners, kSide + 1>& corners, Crossings& 
     return total;
 }
 
-// Numbers the crossings of one slab of a brick, as far as they are seen.
-void number(const Crossings& owner, int axis, int x, Slab seen, uint32_t* numbers) {
-    Slab all = owner.bits[axis][x];
-    uint32_t first = uint32_t(owner.base) + owner.rank[axis][x];
-    for (Slab bits = all & seen; bits; bits &= bits - 1) {
-        int bit = __builtin_ctzll(bits);
-        Slab before = (Slab(1) << bit) - 1;
-        numbers[bit / 8 * kReach + bit % 8] = first + uint32_t(__builtin_popcountll(all & before));
-    }
-}
-
 // The ghosts' places, in order.
 std::vector<Place> ghosts(const Layout& layout, const std::vector<Signs>& signs) {
     std::vector<Place> found;
@@ -79,16 +68,7 @@ CellGrid::CellGrid(const Layout& layout, std::vector<Signs> signs)
 }
 
 void CellGrid::collect(const Octant& near, Numbers& numbers) const {
-    for (int k = 0; k < 8; ++k) {
-        if (near.rows[k] < 0) continue;
-        const Crossings& owner = crossings_[size_t(near.rows[k])];
-        Slab seen = (k & 2 ? kFirstY : ~Slab(0)) & (k & 4 ? kFirstZ : ~Slab(0));
-        for (int axis = 0; axis < 3; ++axis) {
-            for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) {
-                number(owner, axis, x, seen, &numbers[number_at(axis, x + (k & 1) * 8, (k & 2) * 4, (k & 4) * 2)]);
-            }
-        }
-    }
+    for_each_near(near, [&](size_t place, uint32_t vertex) { numbers[place] = vertex; });
 }
 
 // The first brick of a sorted range whose layer is not before this one.

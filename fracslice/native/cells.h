@@ -136,7 +136,30 @@ class CellGrid {
     // Number of the brick with the cell at x, y, z relative to a place, -1 if the surface passes no cell of it.
     int64_t find(const Place& place, int x, int y, int z) const;
 
-    // The numbers of a brick's own crossings and of those on its neighbours' near sides; the rest is not written.
+    // Calls visit(place in Numbers, vertex) for a brick's own crossings, in order, then for those on its neighbours' near
+    // sides.
+    template <class Visit>
+    void for_each_near(const Octant& near, const Visit& visit) const {
+        for (int k = 0; k < 8; ++k) {
+            if (near.rows[k] < 0) continue;
+            const Crossings& owner = crossings_[size_t(near.rows[k])];
+            Slab seen = (k & 2 ? kFirstY : ~Slab(0)) & (k & 4 ? kFirstZ : ~Slab(0));
+            for (int axis = 0; axis < 3; ++axis) {
+                for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) {
+                    size_t place = number_at(axis, x + (k & 1) * 8, (k & 2) * 4, (k & 4) * 2);
+                    uint32_t first = uint32_t(owner.base) + owner.rank[axis][x];
+                    Slab all = owner.bits[axis][x];
+                    for (Slab bits = all & seen; bits; bits &= bits - 1) {
+                        int bit = __builtin_ctzll(bits);
+                        Slab before = (Slab(1) << bit) - 1;
+                        visit(place + size_t(bit / 8 * kReach + bit % 8), first + uint32_t(__builtin_popcountll(all & before)));
+                    }
+                }
+            }
+        }
+    }
+
+    // The numbers of these crossings; the rest is not written.
     void collect(const Octant& near, Numbers& numbers) const;
 
     // The crossing on edge e of the cell x, y, z of the brick at `place`.

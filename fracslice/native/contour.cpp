@@ -1,5 +1,6 @@
-// Passes over the bricks, each brick by itself: which cells and faces have features; how many, and how many triangles; then
-// vertices and triangles at the places that the sums of the counts give.
+// Passes over the bricks, each brick by itself: which cells have tips, and where their faces may have corners; which of these
+// are corners, for both cells must have tips; how many triangles that makes; then vertices and triangles at the places that
+// the sums of the counts give.
 #include "contour.h"
 
 #include <tbb/parallel_for.h>
@@ -11,13 +12,19 @@
 namespace fracslice {
 namespace {
 
+// A vertex that is no crossing, and corners of its cell near it: one inside, and 8 times one outside.
+struct Feature {
+    Vec3 point;
+    uint8_t ends;
+};
+
 // The features of a brick's cells: bit y*8 + z of slab x for each cell with a tip, and for its lower face along each axis.
 struct Features {
     Signs tips{};
     std::array<Signs, 3> corners{};
     std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that slab
-    std::vector<Vec3> points;                           // the tips, in the order of their cells
-    std::array<std::vector<Vec3>, 3> corner_points;     // the corners by axis, in the order of their cells
+    std::vector<Feature> points;                        // the corners by axis, then the tips, in the order of their cells
+    uint32_t loops = 0;                                 // triangles that these cells would have without corners
     size_t tip_base = 0, corner_base = 0, triangles = 0;
 };
 
@@ -31,36 +38,88 @@ constexpr int8_t common_face(int e, int f) {
     return -1;
 }
 
-// The faces that a case's loop passes, one after each crossing, and which of them it passes more than once.
+// The faces that a case's loop passes, one after each crossing; and after which crossing it passes the lower face along each
+// axis, -1 where it does not, or twice.
 struct Faces {
     std::array<int8_t, sizeof(Case::loop)> after{};
-    uint8_t twice = 0;
+    std::array<int8_t, 3> lower{-1, -1, -1};
 };
 
 constexpr std::array<Faces, 256> make_faces() {
     std::array<Faces, 256> faces{};
     for (int c = 0; c < 256; ++c) {
-        int count = kCases[c].loop_length, seen = 0;
+        int count = kCases[c].loop_length, times[3] = {0, 0, 0};
         for (int k = 0; k < count; ++k) {
             int face = common_face(kCases[c].loop[k], kCases[c].loop[(k + 1) % count]);
             faces[c].after[k] = int8_t(face);
-            faces[c].twice |= uint8_t(seen & 1 << face);
-            seen |= 1 << face;
+            if (face % 2 == 0) faces[c].lower[face / 2] = int8_t(times[face / 2]++ ? -1 : k);
         }
     }
     return faces;
 }
 constexpr std::array<Faces, 256> kFaces = make_faces();
 
-// A brick with what the cells in it look at.
+// The ends of a feature in a cell's lower face along axis 0, 1 or 2, or in the cell (3), by case and the octant it is in: the
+// corner with fewest steps to that octant's, of either sign.
+using Ends = std::array<std::array<std::array<uint8_t, 8>, 256>, 4>;
+
+constexpr Ends make_ends() {
+    Ends ends{};
+    for (int axis = 0; axis < 4; ++axis) {
+        for (int number = 0; number < 256; ++number) {
+            for (int octant = 0; octant < 8; ++octant) {
+                int least[2] = {4, 4}, nearest[2] = {0, 0};
+                for (int k = 0; k < 8; ++k) {
+                    int outside = !(number >> k & 1), d = k ^ octant, steps = (d & 1) + (d >> 1 & 1) + (d >> 2);
+                    if (k >> axis & 1 || steps >= least[outside]) continue;
+                    least[outside] = steps, nearest[outside] = k;
+                }
+                ends[axis][number][octant] = uint8_t(nearest[0] | nearest[1] << 3);
+            }
+        }
+    }
+    return ends;
+}
+constexpr Ends kEnds = make_ends();
+
+// Where Numbers holds the crossing on each edge of the cell at 0, 0, 0.
+constexpr std::array<uint16_t, 12> make_places() {
+    std::array<uint16_t, 12> places{};
+    for (int e = 0; e < 12; ++e) places[e] = uint16_t(number_at(kEdges[e].axis, kEdges[e].dx, kEdges[e].dy, kEdges[e].dz));
+    return places;
+}
+constexpr std::array<uint16_t, 12> kPlaces = make_places();
+
+// The slab read one step against y or z; `before` is the slab of the neighbour on that side.
+Slab from_y(Slab slab, Slab before) { return slab << 8 | before >> 56; }
+Slab from_z(Slab slab, Slab before) { return (slab << 1 & ~kFirstZ) | (before >> 7 & kFirstZ); }
+
+int popcount(Slab bits) { return __builtin_popcountll(bits); }
+
+// A brick with what the cells in it look at; its crossings are still to be numbered.
 struct Near {
     Octant octant;
     std::array<Corners, kSide + 1> corners;
     Numbers numbers;
 
-    Near(const CellGrid& cells, size_t i) : octant(cells.octant(i)), corners(corners_of(octant, cells.signs())) {
-        cells.collect(octant, numbers);
-    }
+    Near(const CellGrid& cells, size_t i) : octant(cells.octant(i)), corners(corners_of(octant, cells.signs())) {}
+};
+
+// What is known of a crossing; a brick's are laid side by side, for its cells look at each up to four times.
+struct Datum {
+    double t;
+    Vec3 normal;
+};
+
+// A cell: its lower corner relative to its brick, and in grid units; its case; where Numbers holds its crossings.
+struct Cell {
+    int x, y, z;
+    Vec3 lower;
+    uint8_t number;
+    const uint32_t* numbers;
+
+    uint32_t at(int e) const { return numbers[kPlaces[e]]; }
+    Slab bit() const { return Slab(1) << (y * 8 + z); }
 };
 
 class Contouring {
@@ -78,8 +137,8 @@ class Contouring {
 
     Contour run() {
         Span own = cells_.span(layers_), numbered = cells_.span({layers_.first, layers_.last + 1});
-        each(near_, [&](size_t i) { find_tips(i); });
-        each(numbered, [&](size_t i) { find_corners(i); });
+        each(near_, [&](size_t i) { find(i); });
+        each(numbered, [&](size_t i) { choose(i); });
         each(own, [&](size_t i) { count(i); });
         result_.crossings = cells_.crossings_before(layers_.last + 1) - first_vertex_;
         result_.corners = running_sum(features_, &Features::corner_base, "vertices");
@@ -88,145 +147,158 @@ class Contouring {
         size_t total = result_.crossings + result_.corners + result_.tips;
         if (total > kMostElements) throw std::length_error("the surface has more than 2^31 vertices");
         result_.vertices = {total, 3};
+        result_.ends = {result_.corners + result_.tips, 1};
         each(numbered, [&](size_t i) { write_vertices(i); });
         each(own, [&](size_t i) { write_triangles(i); });
         return std::move(result_);
     }
 
   private:
+    using Loop = std::array<Crossing, sizeof(Case::loop)>;
+    using Data = std::array<Datum, std::tuple_size<Numbers>::value>;
+
     template <class Do>
     static void each(const Span& span, const Do& act) {
         tbb::parallel_for(size_t(0), span.size(), [&](size_t k) { act(span.brick(k)); });
     }
 
-    Features& features(size_t i) { return features_[near_.place_of(i)]; }
-    const Features& features(size_t i) const { return features_[near_.place_of(i)]; }
-    size_t vertex(const CellEdge& edge) const { return edge.vertex - first_vertex_; }
-
-    Crossing crossing(const CellEdge& edge) const {
-        Crossing c{{double(edge.lower[0]), double(edge.lower[1]), double(edge.lower[2])}, {}};
-        size_t datum = edge.vertex - first_datum_;
-        c.point[edge.axis] += clamped(data_.t[datum]);
-        for (int k = 0; k < 3; ++k) c.normal[k] = data_.normals[3 * datum + k];
-        return c;
-    }
-
-    double clamped(double t) const { return t > margin_ ? (t < 1 - margin_ ? t : 1 - margin_) : margin_; }
-
-    Crossing crossing(const Near& near, const Place& place, int x, int y, int z, int e) const {
-        return crossing(CellGrid::edge(near.numbers, place, x, y, z, e));
-    }
-
-    void find_tips(size_t i) {
-        const Near near(cells_, i);
-        const Place& place = cells_.place(i);
+    template <class Visit>
+    void for_each(const Near& near, size_t i, const Visit& visit) const {
+        const Place& p = cells_.place(i);
         for_each_cell(near.corners, [&](int x, int y, int z, uint8_t number) {
-            const Case& cell = kCases[number];
-            std::array<Crossing, sizeof(Case::loop)> loop;
-            bool bent = false;
-            for (int a = 0; a < cell.loop_length; ++a) {
-                loop[a] = crossing(near, place, x, y, z, cell.loop[a]);
-                for (int b = 0; b < a; ++b) bent |= sharp(loop[a], loop[b]);
-            }
-            Vec3 tip;
-            if (!bent || !feature_point(loop.data(), cell.loop_length, lower_corner(place, x, y, z), margin_, tip)) return;
-            features(i).tips[x] |= Slab(1) << (y * 8 + z);
-            features(i).points.push_back(tip);
+            Vec3 lower = {double(p[0] * kSide + x), double(p[1] * kSide + y), double(p[2] * kSide + z)};
+            visit(Cell{x, y, z, lower, number, &near.numbers[number_at(0, x, y, z)]});
         });
     }
 
-    // Whether the cell at these coordinates, relative to brick i, has a tip; it may lie in a neighbour.
-    bool has_tip(size_t i, int x, int y, int z) const {
-        int64_t at = x >= 0 && y >= 0 && z >= 0 ? int64_t(i) : cells_.find(cells_.place(i), x, y, z);
-        return at >= 0 && features(size_t(at)).tips[x & 7] >> ((y & 7) * 8 + (z & 7)) & 1;
+    Features& features(size_t i) { return features_[near_.place_of(i)]; }
+    const Features& features(size_t i) const { return features_[near_.place_of(i)]; }
+
+    // The features of the brick one step from brick i along an axis; null if the surface passes no cell of it.
+    const Features* beside(size_t i, int axis, int step) const {
+        Place to = cells_.place(i);
+        to[axis] += step;
+        int64_t at = cells_.find(to, 0, 0, 0);
+        return at >= 0 ? &features(size_t(at)) : nullptr;
     }
 
-    struct Corner {
-        const Features* owner = nullptr;  // of the brick that numbers it; null if there is none
-        int axis = 0, x = 0, bit = 0;
-    };
-
-    // The corner in a face (axis*2 + upper) of the cell x, y, z of a brick.
-    Corner corner(size_t i, int x, int y, int z, int face) const {
-        int axis = face / 2, up = face % 2;
-        x += axis == 0 ? up : 0, y += axis == 1 ? up : 0, z += axis == 2 ? up : 0;
-        int64_t at = x < kSide && y < kSide && z < kSide ? int64_t(i) : cells_.find(cells_.place(i), x, y, z);
-        if (at < 0) return {};
-        const Features& owner = features(size_t(at));
-        int bit = (y & 7) * 8 + (z & 7);
-        if (!(owner.corners[axis][x & 7] >> bit & 1)) return {};
-        return {&owner, axis, x & 7, bit};
+    double root(size_t vertex) const {
+        double t = data_.t[vertex - first_datum_];
+        return t > margin_ ? (t < 1 - margin_ ? t : 1 - margin_) : margin_;
     }
 
-    size_t vertex(const Corner& c) const {
-        Slab before = c.owner->corners[c.axis][c.x] & ((Slab(1) << c.bit) - 1);
-        return result_.crossings + c.owner->corner_base + c.owner->rank[c.axis][c.x] + size_t(__builtin_popcountll(before));
+    Datum datum(size_t vertex) const {
+        const double* n = data_.normals + (vertex - first_datum_);
+        return {root(vertex), {n[0], n[data_.count], n[2 * data_.count]}};
     }
 
-    template <class Visit>
-    void for_each_tip(const Near& near, size_t i, const Visit& visit) const {
-        const Signs& tips = features(i).tips;
-        for (int x = 0; x < kSide; ++x) {
-            for (Slab bits = tips[x]; bits; bits &= bits - 1) {
-                int y = __builtin_ctzll(bits) / 8, z = __builtin_ctzll(bits) % 8;
-                visit(x, y, z, uint8_t(cases_of_row(near.corners[x], near.corners[x + 1], y) >> 8 * z));
-            }
+    // Fills in the normals of a cell's loop of crossings; returns whether two of them make a feature.
+    static bool bent(const Cell& cell, const Data& data, Loop& loop) {
+        const Case& type = kCases[cell.number];
+        bool found = false;
+        for (int a = 0; a < type.loop_length; ++a) {
+            loop[a].normal = data[cell.at(type.loop[a])].normal;
+            for (int b = 0; b < a; ++b) found |= sharp(loop[a], loop[b]);
         }
+        return found;
+    }
+
+    static void place(const Cell& cell, const Data& data, Loop& loop) {
+        const Case& type = kCases[cell.number];
+        for (int a = 0; a < type.loop_length; ++a) {
+            const Edge& edge = kEdges[type.loop[a]];
+            loop[a].point = cell.lower + Vec3{double(edge.dx), double(edge.dy), double(edge.dz)};
+            loop[a].point[edge.axis] += data[cell.at(type.loop[a])].t;
+        }
+    }
+
+    void find(size_t i) {
+        Near near(cells_, i);
+        Data data;
+        uint32_t seen = 0;
+        cells_.for_each_near(near.octant, [&](size_t at, uint32_t vertex) {
+            near.numbers[at] = seen;
+            data[seen++] = datum(vertex);
+        });
+        Features& own = features(i);
+        std::vector<Feature> tips;
+        std::array<std::vector<Feature>, 3> corners;
+        for_each(near, i, [&](const Cell& cell) {
+            const Case& type = kCases[cell.number];
+            Loop loop;
+            Vec3 point;
+            if (bent(cell, data, loop) && (place(cell, data, loop), feature_point(loop.data(), type.loop_length, cell.lower, margin_, point))) {
+                own.tips[cell.x] |= cell.bit();
+                own.loops += type.loop_length;
+                tips.push_back({point, ends(cell, point, 3)});
+                for (int axis = 0; axis < 3; ++axis) {
+                    if (!corner_in(cell, loop, axis, point)) continue;
+                    own.corners[axis][cell.x] |= cell.bit();
+                    corners[axis].push_back({point, ends(cell, point, axis)});
+                }
+                return;
+            }
+            own.loops += type.triangles;
+        });
+        own.points.reserve(corners[0].size() + corners[1].size() + corners[2].size() + tips.size());
+        for (const auto& some : corners) own.points.insert(own.points.end(), some.begin(), some.end());
+        own.points.insert(own.points.end(), tips.begin(), tips.end());
     }
 
     // The corner of the trace in a cell's lower face along `axis`, if there is one. A face that the loop passes twice has
     // none: two could cross.
-    bool corner_in(const Near& near, const Place& place, int x, int y, int z, uint8_t number, int axis, Vec3& corner) const {
-        const Case& cell = kCases[number];
-        const Faces& faces = kFaces[number];
-        if (faces.twice >> 2 * axis & 1) return false;
-        for (int k = 0; k < cell.loop_length; ++k) {
-            if (faces.after[k] != 2 * axis) continue;
-            Crossing a = crossing(near, place, x, y, z, cell.loop[k]);
-            Crossing b = crossing(near, place, x, y, z, cell.loop[(k + 1) % cell.loop_length]);
-            return sharp(a, b) && face_corner(a, b, axis, lower_corner(place, x, y, z), margin_, corner);
-        }
-        return false;
+    bool corner_in(const Cell& cell, const Loop& loop, int axis, Vec3& corner) const {
+        int k = kFaces[cell.number].lower[axis];
+        if (k < 0) return false;
+        const Crossing &a = loop[k], &b = loop[k + 1 < kCases[cell.number].loop_length ? k + 1 : 0];
+        return sharp(a, b) && face_corner(a, b, axis, cell.lower, margin_, corner);
     }
 
-    static Vec3 lower_corner(const Place& place, int x, int y, int z) {
-        return {double(place[0] * kSide + x), double(place[1] * kSide + y), double(place[2] * kSide + z)};
+    static uint8_t ends(const Cell& cell, const Vec3& point, int axis) {
+        int octant = 0;
+        for (int k = 0; k < 3; ++k) octant |= int(point[k] - cell.lower[k] > 0.5) << k;
+        return kEnds[axis][cell.number][octant];
     }
 
-    void find_corners(size_t i) {
-        const Near near(cells_, i);
-        for_each_tip(near, i, [&](int x, int y, int z, uint8_t number) {
-            for (int axis = 0; axis < 3; ++axis) {
-                Vec3 corner;
-                if (!has_tip(i, x - (axis == 0), y - (axis == 1), z - (axis == 2))) continue;
-                if (!corner_in(near, cells_.place(i), x, y, z, number, axis, corner)) continue;
-                features(i).corners[axis][x] |= Slab(1) << (y * 8 + z);
-                features(i).corner_points[axis].push_back(corner);
-            }
-        });
-        number_corners(features(i));
-    }
-
-    static void number_corners(Features& own) {
+    // Keeps the corners between two cells with tips, and numbers them.
+    void choose(size_t i) {
+        Features& own = features(i);
+        if (own.points.empty()) return;
+        auto from = own.points.begin(), to = from;
         for (int axis = 0; axis < 3; ++axis) {
+            const Features* below = beside(i, axis, -1);
+            Signs none{}, before = below ? below->tips : none;
             for (int x = 0; x < kSide; ++x) {
+                Slab tips = own.tips[x], other = axis == 0   ? (x ? own.tips[x - 1] : before[kSide - 1])
+                                                 : axis == 1 ? from_y(tips, before[x])
+                                                             : from_z(tips, before[x]);
+                for (Slab bits = own.corners[axis][x]; bits; bits &= bits - 1, ++from) {
+                    if (bits & -bits & other) *to++ = *from;
+                }
+                own.corners[axis][x] &= other;
                 own.rank[axis][x] = uint16_t(own.corner_base);
-                own.corner_base += size_t(__builtin_popcountll(own.corners[axis][x]));
+                own.corner_base += size_t(popcount(own.corners[axis][x]));
             }
         }
+        own.points.erase(to, from);
     }
 
+    // A corner makes one more triangle in both of its cells.
     void count(size_t i) {
         Features& own = features(i);
-        own.tip_base = own.points.size();
-        for_each_cell(corners_of(cells_.octant(i), cells_.signs()), [&](int x, int y, int z, uint8_t number) {
-            if (!(own.tips[x] >> (y * 8 + z) & 1)) {
-                own.triangles += kCases[number].triangles;
-                return;
+        own.triangles = own.loops + own.corner_base;
+        own.tip_base = own.points.size() - own.corner_base;
+        if (own.points.empty()) return;
+        for (int axis = 0; axis < 3; ++axis) {
+            const Features* above = beside(i, axis, 1);
+            Signs none{}, after = above ? above->corners[axis] : none;
+            for (int x = 0; x < kSide; ++x) {
+                Slab corners = own.corners[axis][x], upper = axis == 0   ? (x + 1 < kSide ? own.corners[0][x + 1] : after[0])
+                                                     : axis == 1 ? shift_y(corners, after[x])
+                                                                 : shift_z(corners, after[x]);
+                own.triangles += size_t(popcount(upper & own.tips[x]));
             }
-            own.triangles += kCases[number].loop_length;
-            for (int face = 0; face < 6; ++face) own.triangles += corner(i, x, y, z, face).owner != nullptr;
-        });
+        }
     }
 
     void put(size_t vertex, const Vec3& p) {
@@ -235,50 +307,71 @@ class Contouring {
         }
     }
 
+    void put(size_t vertex, const Feature& feature) {
+        put(vertex, feature.point);
+        result_.ends.data[vertex - result_.crossings] = feature.ends;
+    }
+
     void write_vertices(size_t i) {
+        cells_.for_each_own_edge(i, [&](const CellEdge& edge) {
+            Vec3 point = {double(edge.lower[0]), double(edge.lower[1]), double(edge.lower[2])};
+            point[edge.axis] += root(edge.vertex);
+            put(edge.vertex - first_vertex_, point);
+        });
         const Features& own = features(i);
-        cells_.for_each_own_edge(i, [&](const CellEdge& edge) { put(vertex(edge), crossing(edge).point); });
-        size_t at = result_.crossings + own.corner_base;
-        for (const auto& points : own.corner_points) {
-            for (const Vec3& point : points) put(at++, point);
-        }
+        size_t corners = corners_of_brick(own), at = result_.crossings + own.corner_base;
+        for (size_t k = 0; k < corners; ++k) put(at++, own.points[k]);
+    }
+
+    static size_t corners_of_brick(const Features& own) {
+        return size_t(own.rank[2][kSide - 1] + popcount(own.corners[2][kSide - 1]));
     }
 
     void write_triangles(size_t i) {
         const Features& own = features(i);
         int32_t* out = result_.triangles.data.get() + 3 * own.triangles;
-        const Near near(cells_, i);
+        Near near(cells_, i);
+        cells_.collect(near.octant, near.numbers);
         size_t tip = result_.crossings + result_.corners + own.tip_base;
-        for (size_t k = 0; k < own.points.size(); ++k) put(tip + k, own.points[k]);
-        for_each_cell(near.corners, [&](int x, int y, int z, uint8_t number) {
-            auto at = [&](int e) {
-                const Edge& edge = kEdges[e];
-                return near.numbers[number_at(edge.axis, x + edge.dx, y + edge.dy, z + edge.dz)] - first_vertex_;
-            };
-            if (own.tips[x] >> (y * 8 + z) & 1) {
-                out = write_fan(i, x, y, z, number, at, tip++, out);
+        for (size_t k = corners_of_brick(own), at = tip; k < own.points.size(); ++k) put(at++, own.points[k]);
+        std::array<const Features*, 3> above{};
+        if (!own.points.empty()) above = {beside(i, 0, 1), beside(i, 1, 1), beside(i, 2, 1)};
+        for_each(near, i, [&](const Cell& cell) {
+            if (own.tips[cell.x] & cell.bit()) {
+                out = write_fan(own, above, cell, tip++, out);
                 return;
             }
-            const Case& cell = kCases[number];
-            for (int k = 0; k < 3 * cell.triangles; ++k) *out++ = int32_t(at(cell.corners[k]));
+            const Case& type = kCases[cell.number];
+            for (int k = 0; k < 3 * type.triangles; ++k) *out++ = int32_t(cell.at(type.corners[k]) - first_vertex_);
         });
     }
 
-    template <class VertexAt>
-    int32_t* write_fan(size_t i, int x, int y, int z, uint8_t number, const VertexAt& at, size_t tip, int32_t* out) const {
+    // The number of the corner in a face (axis*2 + upper) of a cell; -1 if there is none.
+    int64_t corner(const Features& own, const std::array<const Features*, 3>& above, const Cell& cell, int face) const {
+        int axis = face / 2, at[3] = {cell.x, cell.y, cell.z};
+        const Features* owner = &own;
+        if (face % 2 && ++at[axis] == kSide) at[axis] = 0, owner = above[axis];
+        if (!owner) return -1;
+        Slab corners = owner->corners[axis][at[0]], bit = Slab(1) << (at[1] * 8 + at[2]);
+        if (!(corners & bit)) return -1;
+        return int64_t(result_.crossings + owner->corner_base + owner->rank[axis][at[0]]) + popcount(corners & (bit - 1));
+    }
+
+    int32_t* write_fan(const Features& own, const std::array<const Features*, 3>& above, const Cell& cell, size_t tip,
+                       int32_t* out) const {
         auto triangle = [&](size_t a, size_t b) {
             *out++ = int32_t(a), *out++ = int32_t(b), *out++ = int32_t(tip);
         };
-        const Case& cell = kCases[number];
-        for (int k = 0; k < cell.loop_length; ++k) {
-            size_t a = at(cell.loop[k]), b = at(cell.loop[(k + 1) % cell.loop_length]);
-            Corner between = corner(i, x, y, z, kFaces[number].after[k]);
-            if (!between.owner) {
+        const Case& type = kCases[cell.number];
+        for (int k = 0; k < type.loop_length; ++k) {
+            size_t a = cell.at(type.loop[k]) - first_vertex_;
+            size_t b = cell.at(type.loop[k + 1 < type.loop_length ? k + 1 : 0]) - first_vertex_;
+            int64_t between = corner(own, above, cell, kFaces[cell.number].after[k]);
+            if (between < 0) {
                 triangle(a, b);
                 continue;
             }
-            size_t c = vertex(between);
-            triangle(a, c), triangle(c, b);
+            triangle(a, size_t(between)), triangle(size_t(between), b);
         }
         return out;
     }
@@ -303,7 +396,7 @@ CrossedEdges crossed_edges(const CellGrid& cells, Layers layers) {
     tbb::parallel_for(span.row, span.row + span.rows, [&](size_t i) {
         cells.for_each_own_edge(i, [&](const CellEdge& edge) {
             size_t at = edge.vertex - first;
-            std::copy(edge.lower.begin(), edge.lower.end(), &found.lower.data[3 * at]);
+            for (size_t k = 0; k < 3; ++k) found.lower.data[k * count + at] = edge.lower[k];
             found.axis.data[at] = edge.axis;
         });
     });

@@ -7,7 +7,7 @@ namespace fracslice {
 
 // Grid edges that the surface crosses, in the order of marching_cubes' vertices.
 struct CrossedEdges {
-    Array<int32_t> lower;  // [n, 3], their lower grid points ...
+    Array<int32_t> lower;  // [3, n], their lower grid points ...
     Array<uint8_t> axis;   // [n], ... and directions
 };
 
@@ -15,7 +15,7 @@ struct CrossedEdges {
 CrossedEdges crossed_edges(const CellGrid& cells, Layers layers);
 
 // Where on its grid edge each of some crossings, in the order of crossed_edges, exactly lies, and the surface's unit normal
-// there.
+// there, [3, count].
 struct Hermite {
     const double* t;
     const double* normals;
@@ -25,6 +25,9 @@ struct Hermite {
 struct Contour {
     Array<double> vertices;    // [crossings + corners + tips, 3], origin + voxel * (grid position)
     Array<int32_t> triangles;  // [m, 3], counter-clockwise seen from outside
+    // [corners + tips]: corners of the cell of each, or of its face, near it: one inside, and 8 times one outside; corner
+    // dx + 2 dy + 4 dz.
+    Array<uint8_t> ends;
     size_t crossings, corners, tips;
 };
 

@@ -17,43 +17,43 @@ struct Symmetric {
     }
 };
 
-// The eigenvalues, the largest first, from the cosines of a third of an angle (Smith 1961, "Eigenvalues of a symmetric 3 x 3
-// matrix"). One apart from the others is exact to rounding; two that are nearly equal, to its root.
-Vec3 eigenvalues(const Symmetric& a) {
-    double mean = (a.diagonal[0] + a.diagonal[1] + a.diagonal[2]) / 3;
-    Vec3 d = a.diagonal - Vec3{mean, mean, mean};
-    const Vec3& o = a.other;
-    double size = std::sqrt((dot(d, d) + 2 * dot(o, o)) / 6);
-    if (!(size > 1e-15 * mean)) return {mean, mean, mean};
-    double determinant = d[0] * d[1] * d[2] + 2 * o[0] * o[1] * o[2];
-    for (int k = 0; k < 3; ++k) determinant -= d[k] * o[k] * o[k];
-    double angle = std::acos(std::clamp(determinant / (2 * size * size * size), -1.0, 1.0)) / 3;
-    double largest = mean + 2 * size * std::cos(angle), least = mean - 2 * size * std::cos(angle - M_PI / 3);
-    return {largest, 3 * mean - largest - least, least};
+// The rows of the adjugate; as symmetric as the matrix. Their products with the matrix' rows are its determinant.
+std::array<Vec3, 3> adjugate(const Symmetric& a) {
+    Vec3 x = a.row(0), y = a.row(1), z = a.row(2);
+    return {cross(y, z), cross(z, x), cross(x, y)};
 }
 
-// The unit vector that the matrix takes to `value` times itself, for an eigenvalue apart from the others: across the rows of
-// what is left when it is taken off.
-Vec3 eigenvector(Symmetric a, double value) {
-    a.diagonal = a.diagonal - Vec3{value, value, value};
-    Vec3 best{};
-    double longest = 0;
-    for (int k = 0; k < 3; ++k) {
-        Vec3 across = cross(a.row((k + 1) % 3), a.row((k + 2) % 3));
-        double length = dot(across, across);
-        if (length > longest) best = across, longest = length;
+// The least eigenvalue: Newton's method on the characteristic polynomial, which comes to it from below.
+double least_eigenvalue(double trace, double minors, double determinant) {
+    double value = determinant / minors;
+    for (int step = 0; step < 20 && value > 0; ++step) {
+        double p = ((trace - value) * value - minors) * value + determinant;
+        double further = p / (minors - (2 * trace - 3 * value) * value);
+        if (!(further > 0)) break;
+        value += further;
+        if (further < 1e-6 * trace) break;
     }
-    return longest > 0 ? (1 / std::sqrt(longest)) * best : Vec3{0, 0, 1};
+    return value;
 }
 
-// The solution of a x = b, by Cramer's rule: the inverse is as symmetric as the matrix.
-Vec3 solved(const Symmetric& a, const Vec3& b) {
-    Vec3 x = cross(a.row(1), a.row(2)), y = cross(a.row(2), a.row(0)), z = cross(a.row(0), a.row(1));
-    return (1 / dot(a.row(0), x)) * Vec3{dot(x, b), dot(y, b), dot(z, b)};
+Vec3 product(const std::array<Vec3, 3>& rows, const Vec3& b) { return {dot(rows[0], b), dot(rows[1], b), dot(rows[2], b)}; }
+
+// The unit vector that the matrix takes to `value` times itself, for an eigenvalue apart from the others: the adjugate of what
+// is left when it is taken off is that vector times itself.
+Vec3 eigenvector(const Symmetric& a, std::array<Vec3, 3> adjugate, double trace, double value) {
+    int longest = 0;
+    for (int k = 0; k < 3; ++k) {
+        adjugate[k] = adjugate[k] + value * a.row(k);
+        adjugate[k][k] += value * (value - trace);
+        if (adjugate[k][k] > adjugate[longest][longest]) longest = k;
+    }
+    const Vec3& v = adjugate[longest];
+    double square = dot(v, v);
+    return square > 0 ? (1 / std::sqrt(square)) * v : Vec3{0, 0, 1};
 }
 
-// Directions whose eigenvalue is a smaller share of the largest say nothing about where the planes meet.
-constexpr double kRank = 0.02;
+// Directions whose eigenvalue is a smaller share of the trace say nothing about where the planes meet.
+constexpr double kRank = 0.01;
 
 // How far outside its cell a feature may lie to be moved to the cell's border instead of being given up.
 constexpr double kNear = 0.4;
@@ -90,7 +90,7 @@ bool clipped(const Vec3& start, const Vec3& direction, const Vec3& lower, double
             if (low > kNear || high < -kNear) return false;
             continue;
         }
-        double p = low / direction[k], q = high / direction[k];
+        double over = 1 / direction[k], p = low * over, q = high * over;
         first = std::max(first, std::min(p, q));
         last = std::min(last, std::max(p, q));
     }
@@ -115,28 +115,28 @@ bool feature_point(const Crossing* crossings, int count, const Vec3& lower, doub
             b[k] += d * n[k];
         }
     }
-    // Where two planes meet is a line; a third direction, if the planes tell it, makes it a corner.
-    Vec3 values = eigenvalues(a);
-    if (!(values[1] > kRank * values[0])) return false;
-    if (values[2] > kRank * values[0]) {
-        point = mean + solved(a, b);
+    // Where two planes meet is a line; a third direction, if the planes tell it, makes it a corner. The trace is `count`; the
+    // determinant over the sum of the minors is the least eigenvalue, or a little less.
+    auto inverse = adjugate(a);
+    double determinant = dot(a.row(0), inverse[0]), minors = inverse[0][0] + inverse[1][1] + inverse[2][2];
+    if (!(minors > 2 * kRank * count * count)) return false;
+    if (determinant > kRank * minors * count) {
+        point = mean + (1 / determinant) * product(inverse, b);
         if (fits(crossings, count, point) && moved_inside(point, lower, margin)) return true;
     }
-    Vec3 along = eigenvector(a, values[2]);
-    Symmetric across = a;
-    for (int k = 0; k < 3; ++k) {
-        across.diagonal[k] += values[0] * along[k] * along[k];
-        across.other[k] += values[0] * along[(k + 1) % 3] * along[(k + 2) % 3];
-    }
-    Vec3 line = mean + solved(across, b - dot(along, b) * along);
+    double least = least_eigenvalue(count, minors, determinant), others = count - least;
+    Vec3 along = eigenvector(a, inverse, count, least);
+    // Across that direction the matrix solves its characteristic polynomial, which is so its inverse (Cayley and Hamilton).
+    Vec3 across = b - dot(along, b) * along;
+    Vec3 line = mean + (1 / (minors - least * others)) * (others * across - product({a.row(0), a.row(1), a.row(2)}, across));
     return clipped(line, along, lower, margin, point) && fits(crossings, count, point);
 }
 
 bool face_corner(const Crossing& a, const Crossing& b, int axis, const Vec3& lower, double margin, Vec3& corner) {
     int u = (axis + 1) % 3, v = (axis + 2) % 3;
     double au = a.normal[u], av = a.normal[v], bu = b.normal[u], bv = b.normal[v];
-    double det = au * bv - av * bu, size = std::hypot(au, av) * std::hypot(bu, bv);
-    if (!(std::abs(det) > 0.3 * size) || size < 0.05) return false;
+    double det = au * bv - av * bu, square = (au * au + av * av) * (bu * bu + bv * bv);
+    if (!(det * det > 0.09 * square) || square < 0.0025) return false;
     double ca = au * a.point[u] + av * a.point[v], cb = bu * b.point[u] + bv * b.point[v];
     corner = a.point;
     corner[u] = (ca * bv - cb * av) / det;

@@ -25,18 +25,19 @@ class Cells {
     nb::tuple crossed_edges(int first, int last) const {
         CrossedEdges found = unlocked(threads_, [&] { return fracslice::crossed_edges(grid_, {first, last}); });
         size_t n = found.axis.rows;
-        return nb::make_tuple(to_numpy(std::move(found.lower), {n, 3}), to_numpy(std::move(found.axis), {n}));
+        return nb::make_tuple(to_numpy(std::move(found.lower), {3, n}), to_numpy(std::move(found.axis), {n}));
     }
 
     nb::tuple contour(int first, int last, const RootsArray& t, const NormalsArray& normals,
                       const std::array<double, 3>& origin, double voxel, double clamp) const {
-        if (t.shape(0) != normals.shape(0)) throw nb::value_error("t and normals differ in length");
+        if (t.shape(0) != normals.shape(1)) throw nb::value_error("t and normals differ in length");
         Hermite data{t.data(), normals.data(), t.shape(0)};
         Contour surface = unlocked(
             threads_, [&] { return fracslice::contour(grid_, {first, last}, data, {origin, voxel, clamp}); });
         size_t n = surface.vertices.rows, m = surface.triangles.rows;
+        size_t k = surface.ends.rows;
         return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
-                              surface.crossings, surface.corners);
+                              surface.crossings, to_numpy(std::move(surface.ends), {k}));
     }
 
     size_t crossings_before(int layer) const { return grid_.crossings_before(layer); }

@@ -125,6 +125,7 @@ def test_vertices_lie_on_the_crossed_edges_in_their_order() -> None:
     vertices, _ = marching_cubes(bricks.ijk, bricks.values, bricks.index, (0, 0, 0), 1.0, 1e-4)
     cells = Cells(bricks.ijk, bricks.signs.signs, bricks.index)
     lower, axis = cells.crossed_edges(0, len(bricks.index))
+    lower = lower.T
     along = vertices - lower
     rows = np.arange(len(axis))
     t = along[rows, axis].copy()

@@ -72,7 +72,7 @@ def test_a_rough_fractal_stays_a_solid_without_crossings():
     assert len(few.triangles) < 0.8 * len(bulb.triangles)
     before, after = check(bulb), check(few)
     assert (after.problems, after.genus, after.components) == ((), before.genus, before.components)
-    assert distance_bounds(bulb, few, 0.1, Work()).max() == pytest.approx(done.bound_mm)
+    assert distance_bounds(bulb, few, 0.1, Work()).max() == pytest.approx(done.bound_mm, rel=1e-3)
     assert sampled_distances(few, bulb, 0.05, Work()).max() < 0.15, "the other way: near it, not promised"
 
 

@@ -4,9 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracslice.formulas import box, sphere
+from fracslice.formulas import Node, box, mandelbulb, sphere
+from fracslice.kernel import compile_scene
 from fracslice.volume.accuracy import surface_error
-from fracslice.volume.settling import settle
+from fracslice.volume.settling import Rooms, settle
+
+
+def settled(
+    root: Node, points: np.ndarray, low: np.ndarray, high: np.ndarray, *ends: np.ndarray
+) -> np.ndarray:
+    """ends: for each point one inside and one outside."""
+
+    def rooms(which: np.ndarray, inside: np.ndarray) -> Rooms:
+        other = np.where(inside, ends[1][which].T, ends[0][which].T) if ends else None
+        return Rooms(low[which].T, high[which].T, other)
+
+    moved = points.copy()
+    which, there = settle(root, points, rooms, 0.1)
+    moved[which] = there
+    return moved
 
 
 def test_points_reach_the_surface_and_stay_in_their_boxes() -> None:
@@ -14,9 +30,9 @@ def test_points_reach_the_surface_and_stay_in_their_boxes() -> None:
     points = rng.normal(size=(500, 3))
     points *= 1.02 / np.linalg.norm(points, axis=1, keepdims=True)
     low, high = points - 0.05, points + 0.05
-    settled = settle(sphere(), points, lambda _: (low, high), 0.1)
-    assert np.abs(np.linalg.norm(settled, axis=1) - 1).max() < 1e-9
-    assert (settled >= low).all() and (settled <= high).all()
+    there = settled(sphere(), points, low, high)
+    assert np.abs(np.linalg.norm(there, axis=1) - 1).max() < 1e-9
+    assert (there >= low).all() and (there <= high).all()
 
 
 def test_a_flat_box_holds_its_coordinate_and_a_narrow_one_its_point() -> None:
@@ -24,14 +40,28 @@ def test_a_flat_box_holds_its_coordinate_and_a_narrow_one_its_point() -> None:
     room = np.array([0, 0.3, 0.3])
     low, high = points - room, points + room
     high[1] = points[1] + np.array([0.01, 0, 0])
-    settled = settle(sphere(), points, lambda _: (low, high), 0.1)
-    assert settled[0, 0] == 0.9 and abs(np.linalg.norm(settled[0]) - 1) < 1e-6
-    assert np.allclose(settled[1], [0.91, 0, 0])
+    there = settled(sphere(), points, low, high)
+    assert there[0, 0] == 0.9 and abs(np.linalg.norm(there[0]) - 1) < 1e-6
+    assert np.allclose(there[1], [0.91, 0, 0], atol=1e-5)
+
+
+def test_where_no_gradient_leads_a_point_is_drawn_to_the_other_sign() -> None:
+    """Next to a Mandelbulb, in boxes of a tenth with an end of either sign: whatever is between."""
+    root, rng = mandelbulb(iterations=8), np.random.default_rng(0)
+    kernel = compile_scene(root, "float64")
+    ends = rng.uniform(-1, 1, (2, 40000, 3))
+    ends[1] = ends[0] + rng.uniform(-0.1, 0.1, (40000, 3))
+    signs = kernel.points(*np.moveaxis(ends, 2, 0)) < 0
+    inside, outside = ends[0, signs[0] & ~signs[1]], ends[1, signs[0] & ~signs[1]]
+    low, high = np.minimum(inside, outside), np.maximum(inside, outside)
+    there = settled(root, rng.uniform(low, high), low, high, inside, outside)
+    assert len(there) > 500 and (there >= low).all() and (there <= high).all()
+    assert np.abs(kernel.points(*there.T)).max() < 1e-6
 
 
 def test_what_lies_on_the_surface_stays() -> None:
     corner = np.array([[0.5, 0.5, 0.5]])
-    assert (settle(box(), corner, lambda p: (p - 0.1, p + 0.1), 0.1) == corner).all()
+    assert (settled(box(), corner, corner - 0.1, corner + 0.1) == corner).all()
 
 
 def test_surface_error_is_a_distance_also_at_an_edge() -> None:
