@@ -50,6 +50,7 @@ EXAMPLES: dict[str, Node] = {
     "mandelbulb 2": mandelbulb(iterations=7, power=2),
     "mandelbulb 5": mandelbulb(iterations=5, power=5),
     "mandelbulb 7.5": mandelbulb(iterations=4, power=7.5),
+    "mandelbulb in pieces": mandelbulb(iterations=3, power=6, julia=(0.9, -0.6, 0.5)),
     "mandelbulb julia": mandelbulb(iterations=6, julia=(0.3, 0.4, -0.5)),
     "union": union(sphere(radius=0.7), BAR, torus(radius=0.9, tube=0.1)),
     "smooth union": union(sphere(radius=0.7), BAR, smooth=0.2),

@@ -22,10 +22,23 @@ def union(a, b, smooth):  # type: ignore[no-untyped-def]
     quadratic).
 
     The seam weighs the gradients of the two with weights whose sum is 1, so L = max of theirs; a seam with an
-    escape-time fractal has 1.25 times that, one between several 3 times (measured).
+    escape-time fractal has 1.25 times that, one between several 3 times (measured; `guarded_union` does
+    better).
     """
     h = maximum(smooth - absolute(a - b), 0.0)
     return minimum(a, b) - h * h / (4.0 * smooth)
+
+
+def guarded_union(a, b, smooth, steepest):  # type: ignore[no-untyped-def]
+    """What bounds the distance to a union with a seam, of fields that bound distances to their own surfaces.
+
+    The seam lies on other level sets than the surfaces: where both are below 5/4 of its width. Fields of
+    escape-time fractals are steeper there (`Facts.steepening`), by about the factor `steepest`; elsewhere
+    they need not be trusted less for the sake of a seam. L = max of theirs.
+    """
+    h = maximum(smooth - absolute(a - b), 0.0)
+    low, high = minimum(a, b), maximum(a, b)
+    return minimum(low, maximum(low - h * h / (4.0 * smooth), high - 1.25 * smooth) / steepest)
 
 
 def hard_union(a, b):  # type: ignore[no-untyped-def]
@@ -54,14 +67,36 @@ def hard_difference(a, b):  # type: ignore[no-untyped-def]
     return maximum(a, -b)
 
 
+def _is_sharp(node: Node) -> bool:
+    return bool(node["smooth"] < SMALLEST)
+
+
 def _sharp_when_zero(formula: Formula, hard) -> None:  # type: ignore[no-untyped-def]
-    formula.select(lambda node: formula.function if node["smooth"] >= SMALLEST else hard)
-    formula.arguments(lambda node: {"smooth": node["smooth"]} if node["smooth"] >= SMALLEST else {})
+    formula.select(lambda node: hard if _is_sharp(node) else formula.function)
+    formula.arguments(lambda node: {} if _is_sharp(node) else {"smooth": node["smooth"]})
 
 
-_sharp_when_zero(union, hard_union)
 _sharp_when_zero(intersection, hard_intersection)
 _sharp_when_zero(difference, hard_difference)
+
+
+def _is_guarded(node: Node) -> bool:
+    """Whether it is a union that `guarded_union` stands for."""
+    weak = any(child.facts.weak for child in node.children)
+    return node.guarded and node.formula is union and weak and not _is_sharp(node)
+
+
+@union.select
+def _(node: Node):  # type: ignore[no-untyped-def]
+    return hard_union if _is_sharp(node) else guarded_union if _is_guarded(node) else union.function
+
+
+@union.arguments
+def _(node: Node) -> dict[str, object]:
+    if _is_sharp(node):
+        return {}
+    steepest = 1 + 1.5 * node["smooth"] * node.facts.steepening
+    return {"smooth": node["smooth"], **({"steepest": steepest} if _is_guarded(node) else {})}
 
 
 def _slope(node: Node) -> float:
@@ -71,7 +106,7 @@ def _slope(node: Node) -> float:
     than its bound says. How much is measured (`docs/accuracy.md`): for one such field, and for several.
     """
     fields = [child.facts for child in node.children]
-    weak = sum(f.weak for f in fields) if node["smooth"] >= SMALLEST else 0
+    weak = 0 if _is_sharp(node) or _is_guarded(node) else sum(f.weak for f in fields)
     return max(f.lipschitz for f in fields) * (1.0, 1.25, 3.0)[min(weak, 2)]
 
 

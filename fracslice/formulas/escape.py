@@ -45,6 +45,22 @@ def potential_distance(r2, slope2, level, first_level, last_level, least):  # ty
     return (height - level) * level * quotient / damping
 
 
+def sure_distance(apart, slope, bend):  # type: ignore[no-untyped-def]
+    """A radius around the start point within which the orbit's n-th point cannot have moved by `apart`.
+
+    slope: a bound of the norm of the derivative of w_n there. bend: the sum over the steps k < n of
+    ``slope_k (p - 1) / (2 |w_k|)``.
+
+    w^p moves by at most ``(r + e)^p - r^p <= a e / (1 - b e)`` when w, |w| = r, moves by e < 1/b, with
+    ``a = p r^(p-1)`` and ``b = (p - 1) / (2 r)``: term by term of the binomial series. Bounds of this form
+    stay of this form under a further step and the addition of the start point: a is multiplied and bend
+    grows by slope * b. So e is at least ``apart / (slope + bend * apart)``: the method of majorants (Cauchy
+    1842). It needs no connected set, but is several times less than what the potential says of one.
+    """
+    apart = maximum(apart, 1e-30)
+    return apart / minimum(slope + bend * apart, 1e30)
+
+
 def levels(
     power: float, iterations: int, bailout: float, escaped: float
 ) -> tuple[float, float, float, float]:
@@ -53,3 +69,11 @@ def levels(
     last = 2 * math.log(bailout)
     escape = max(bailout, escaped ** (1 / power))
     return last / power**steps, last, escape**2, bailout**2 * math.exp(-0.2 / bailout)
+
+
+def farthest(power: float, bailout: float, constant: float) -> float:
+    """How far from the origin the solid of any number of steps may reach, |constant| being added in each."""
+    first = radius = (bailout + constant) ** (1 / power)
+    for _ in range(100):
+        radius = (radius + constant) ** (1 / power)
+    return float(max(first, radius))

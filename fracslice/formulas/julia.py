@@ -92,6 +92,11 @@ def _falls_apart(c: Sequence[float], iterations: int, bailout: float, escape2: f
     return abs(w) > bailout
 
 
+@julia.steepening
+def _(node: Node) -> float:
+    return 2.0
+
+
 @julia.bounds
 def _(node: Node) -> Box:
     # |w_n+1| >= |w_n|^2 - |c|, so |w_N| <= R bounds |w_n| backwards, down to the point itself.

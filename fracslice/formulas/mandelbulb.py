@@ -5,10 +5,24 @@ from __future__ import annotations
 import math
 
 from .box import Box, Triple
-from .escape import CORE, levels, potential_distance
+from .escape import CORE, farthest, levels, potential_distance, sure_distance
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
-from .vocabulary import absolute, any_of, atan2, cos, exp, log, maximum, orbit, rsqrt, sin, sqrt, where
+from .vocabulary import (
+    absolute,
+    any_of,
+    atan2,
+    cos,
+    exp,
+    log,
+    maximum,
+    minimum,
+    orbit,
+    rsqrt,
+    sin,
+    sqrt,
+    where,
+)
 
 ESCAPED = 1e4
 """How large |w| is one step past the escape circle; the map of a neighbourhood counts as radial there."""
@@ -50,6 +64,12 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     fixed_c,
     loose,
     least,
+    bailout,
+    reach,
+    half_less,
+    torn,
+    torn_within,
+    curved,
     whole,
 ):
     """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
@@ -63,8 +83,10 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
     it is taken here, faded out towards the escape radius, where the map of a whole neighbourhood is radial.
     There is no theorem for three dimensions; L = 2 is measured, for whole powers at 10^7 points
-    (`docs/accuracy.md`). A power that is not whole tears space where the azimuth jumps from pi to -pi: no
-    bound holds across the tear.
+    (`docs/accuracy.md`). Where a set falls apart (a constant far out) that fails, and the field is also kept
+    below twice a sure distance, `escape.sure_distance`. A power that is not whole tears space where the
+    azimuth jumps from pi to -pi: no bound holds across the tear, and the guarded field stays below the sure
+    distance from it.
     """
     cx, cy, cz = x, y, z
     grow = 1.0
@@ -77,6 +99,12 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     level = 0.0 * x + first_level
     end_r2, slope = r2, dr
     alive = r2 < escape2
+    if curved:
+        bend = 0.0 * x
+    if loose:
+        sure = sqrt(minimum(r2, 1e30)) - reach
+    if torn:
+        tear = 0.0 * x + 1e30
     for _ in range(iterations):
         if not any_of(alive):
             break
@@ -117,7 +145,14 @@ def mandelbulb(  # type: ignore[no-untyped-def]
             meridian = rn * rsqrt(safe)
         if loose:
             meridian = maximum(meridian, least)
-        latitude = absolute(im) * (1.0 - r2 * over_escape2)
+            latitude = absolute(im)
+        else:
+            latitude = absolute(im) * (1.0 - r2 * over_escape2)
+        if torn:
+            apart = maximum(where(x < 0.0, absolute(y), rho), sqrt(r2) - torn_within)
+            tear = where(alive, minimum(tear, 2.0 * sure_distance(apart, slope, bend)), tear)
+        if curved:
+            bend = where(alive, bend + slope * half_less * rsqrt(maximum(r2, CORE)), bend)
         dr = power * maximum(meridian, latitude) * dr + grow
         s = im * rho
         x = s * cu + cx
@@ -129,8 +164,17 @@ def mandelbulb(  # type: ignore[no-untyped-def]
         end_r2 = where(alive, r2, end_r2)
         slope = where(alive, maximum(dr, slope), slope)
         level = where(alive, level * power, level)
+        if loose:
+            radius = sqrt(r2)
+            apart = where(level < 0.75 * last_level, radius - reach, radius - bailout)
+            sure = where(alive, maximum(sure, sure_distance(apart, slope, bend)), sure)
         alive = alive & (r2 < escape2)
-    return potential_distance(end_r2, slope * slope, level, first_level, last_level, least_r2)
+    f = potential_distance(end_r2, slope * slope, level, first_level, last_level, least_r2)
+    if loose:
+        f = minimum(2.0 * sure, f)
+    if torn:
+        f = minimum(tear, maximum(-tear, f))
+    return f
 
 
 def _digits(n: int) -> tuple[int, ...]:
@@ -142,6 +186,8 @@ def _digits(n: int) -> tuple[int, ...]:
 def _(node: Node) -> dict[str, object]:
     power = node["power"]
     first, last, escape2, least_r2 = levels(power, node["iterations"], node["bailout"], ESCAPED)
+    loose, torn = _falls_apart(node, escape2), bool(node.guarded and power % 1)
+    constant = _constant(node)
     return {
         "power": power,
         "iterations": node["iterations"],
@@ -152,10 +198,21 @@ def _(node: Node) -> dict[str, object]:
         "over_escape2": 1 / escape2,
         "c": node["julia"] or (0.0, 0.0, 0.0),
         "fixed_c": Fixed(node["julia"] is not None),
-        "loose": Fixed(_falls_apart(node, escape2)),
+        "loose": Fixed(loose),
         "least": CORE ** ((power - 1) / 2),
+        "bailout": node["bailout"],
+        "reach": farthest(power, node["bailout"], constant),
+        "half_less": (power - 1) / 2,
+        "torn": Fixed(torn),
+        "torn_within": (math.sqrt(escape2) + constant) ** (1 / power),
+        "curved": Fixed(loose or torn),
         **_products(power),
     }
+
+
+def _constant(node: Node) -> float:
+    """The largest |c| of all points of the solid."""
+    return math.hypot(*node["julia"]) if node["julia"] else node.facts.box.hi[0]
 
 
 def _falls_apart(node: Node, escape2: float) -> bool:
@@ -189,6 +246,11 @@ def _products(power: float) -> dict[str, Fixed]:
         "even": Fixed(n % 2 == 0),
         "linear": Fixed(n == 2),
     }
+
+
+@mandelbulb.steepening
+def _(node: Node) -> float:
+    return float(node["power"])
 
 
 @mandelbulb.check

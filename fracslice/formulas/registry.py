@@ -11,7 +11,7 @@ of a scene tree.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Literal
@@ -41,11 +41,14 @@ class Facts:
     ``f(p) / L`` away from the surface.
     weak: True if there is an escape-time fractal in it. Its inside values are much smaller than the distance
     to the surface, and bound nothing: the inside cannot be recognised from afar.
+    steepening: of a weak field, about how much larger its slopes may be where it is h, ``1 + steepening * h``
+    times those at the surface.
     """
 
     box: Box
     lipschitz: float
     weak: bool
+    steepening: float = 0.0
 
 
 Hook = Callable[["Node"], Any]
@@ -108,6 +111,10 @@ class Formula:
         """The Lipschitz bound, where it depends on parameters or children."""
         return self._hook("slope", hook)
 
+    def steepening(self, hook: Callable[[Node], float]) -> Callable[[Node], float]:
+        """`Facts.steepening`, where it is not the largest of the children's."""
+        return self._hook("steepening", hook)
+
     def arguments(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
         """The function's arguments after points or values, where they are not the parameters themselves."""
         return self._hook("arguments", hook)
@@ -135,12 +142,15 @@ class Formula:
 
 @dataclass(frozen=True)
 class Node:
-    """A formula with its parameters and children: one element of a scene. `place` is "file:line"."""
+    """A formula with its parameters and children: one element of a scene. `place` is "file:line"; `guarded`
+    is told by `guard`.
+    """
 
     formula: Formula
     values: Mapping[str, Any]
     children: tuple[Node, ...] = ()
     place: str | None = field(default=None, compare=False)
+    guarded: bool = False
 
     def __getitem__(self, parameter: str) -> Any:
         return self.values[parameter]
@@ -163,6 +173,13 @@ class Node:
         kept = self.children if children is None else children
         return self.formula(*kept, place=self.place, **{**_given(self), **values})
 
+    def guard(self) -> Node:
+        """The scene by whose field space may be skipped, where its own exceeds its bound: beside the tears of
+        powers that are not whole, and at seams with an escape-time fractal. Only its positive values say
+        something: as much, divided by its own Lipschitz bound, is the distance from the surface at least.
+        """
+        return replace(self, guarded=True, children=tuple(child.guard() for child in self.children))
+
     def fail(self, message: str) -> SceneError:
         """The error to raise about this node: file, line and element, then `message`."""
         return SceneError(f"{self.place + ': ' if self.place else ''}<{self.formula.name}> {message}")
@@ -177,7 +194,12 @@ class Node:
             if "slope" in hooks
             else max([self.formula.lipschitz, *(b.lipschitz for b in below)])
         )
-        return Facts(box, slope, self.formula.weak or any(b.weak for b in below))
+        steepening = (
+            hooks["steepening"](self)
+            if "steepening" in hooks
+            else max((b.steepening for b in below), default=0.0)
+        )
+        return Facts(box, slope, self.formula.weak or any(b.weak for b in below), steepening)
 
     @property
     def arguments(self) -> dict[str, Any]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..formulas.box import Box
-from ..formulas.registry import Node
-from ..kernel import Compilable, compile_scene
+from ..formulas.registry import Facts, Node
+from ..kernel import Compilable, Kernel, compile_scene
 from ..kernel.depth import resolve_depths
 from ..kernel.devices import compile_for
 from ..store import Arrays, stored
@@ -65,7 +65,8 @@ def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
     fresh: list[Bricks] = []
 
     def made() -> Arrays:
-        bricks = sample(compile_for(work.device, planned.root), planned.root.facts, lattice, work)
+        kernel, facts, guard = _fields(planned, work)
+        bricks = sample(kernel, facts, lattice, work, guard)
         fresh.append(bricks)
         return {"ijk": bricks.ijk, "values": bricks.values, "index": bricks.index}
 
@@ -79,4 +80,12 @@ def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
     """As `sample_scene`, of each sample only its sign."""
     work = work or Work()
     lattice = Lattice.around(planned.outer, planned.voxel)
-    return sample_signs(compile_for(work.device, planned.root), planned.root.facts, lattice, work)
+    kernel, facts, guard = _fields(planned, work)
+    return sample_signs(kernel, facts, lattice, work, guard)
+
+
+def _fields(planned: Plan, work: Work) -> tuple[Kernel, Facts, Kernel]:
+    """What is sampled, the facts of what is pruned by, and what is pruned by: mostly the same."""
+    root = planned.root
+    guard = root.guard() if isinstance(root, Node) else root
+    return compile_for(work.device, root), guard.facts, compile_for(work.device, guard)

@@ -37,18 +37,21 @@ AUDITS = 8
 FAR_AUDITS = 1 << 15
 
 
-def sample(kernel: Kernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> Bricks:
+def sample(
+    kernel: Kernel, facts: Facts, lattice: Lattice, work: Work | None = None, guard: Kernel | None = None
+) -> Bricks:
     """Samples a scene's field around its surface.
 
-    kernel: the scene's float32 kernel. facts: the scene's facts, whose Lipschitz bound prunes. Raises
-    `VolumeError` if there is no surface, or if it leaves the lattice; `Cancelled`.
+    kernel: the scene's float32 kernel. facts: the scene's facts, whose Lipschitz bound prunes. guard: the
+    kernel that is pruned by, where it is another; then facts are its own (`Node.guard`). Raises `VolumeError`
+    if there is no surface, or if it leaves the lattice; `Cancelled`.
     """
     values: list[np.ndarray] = []
 
     def keep(wave: np.ndarray) -> None:
         values.append(wave)
 
-    run = _Run(kernel, facts, lattice, work or Work(), keep)
+    run = _Run(kernel, guard or kernel, facts, lattice, work or Work(), keep)
     signs, order = run.signs()
     return Bricks(
         signs.origin,
@@ -62,15 +65,18 @@ def sample(kernel: Kernel, facts: Facts, lattice: Lattice, work: Work | None = N
     )
 
 
-def sample_signs(kernel: Kernel, facts: Facts, lattice: Lattice, work: Work | None = None) -> SignBricks:
+def sample_signs(
+    kernel: Kernel, facts: Facts, lattice: Lattice, work: Work | None = None, guard: Kernel | None = None
+) -> SignBricks:
     """The same bricks, in a 32nd of the memory: of each sample only its sign is kept."""
-    signs, _ = _Run(kernel, facts, lattice, work or Work(), None).signs()
+    signs, _ = _Run(kernel, guard or kernel, facts, lattice, work or Work(), None).signs()
     return signs
 
 
 @dataclass
 class _Run:
     kernel: Kernel
+    guard: Kernel
     facts: Facts
     lattice: Lattice
     work: Work
@@ -100,7 +106,7 @@ class _Run:
         size = COARSEST
         cells = _grid(*(-(-n // size) for n in self.lattice.bricks)) * size
         while True:
-            f = self.centres(cells, size)
+            f = self.centres(cells, size, self.guard)
             reach = self.reach(size * BRICK)
             full = (f < -reach) & (not self.facts.weak)
             for cell in cells[full]:
@@ -113,18 +119,19 @@ class _Run:
             cells = (cells[:, None] + _grid(2, 2, 2)[None] * size).reshape(-1, 3)
             cells = cells[(cells < self.lattice.bricks).all(1)]
         state[tuple(cells.T)] = CANDIDATE
-        outside[tuple(cells.T)] = ~(f < 0)
+        own = f if self.guard is self.kernel else self.centres(cells, 1, self.kernel)
+        outside[tuple(cells.T)] = ~(own < 0)
         return state, outside
 
-    def centres(self, cells: np.ndarray, size: int) -> np.ndarray:
-        """The field at the centres of cells of `size` bricks."""
-        return self.values_at(cells * BRICK + (size * BRICK - 1) / 2)
+    def centres(self, cells: np.ndarray, size: int, kernel: Kernel) -> np.ndarray:
+        """A field at the centres of cells of `size` bricks."""
+        return self.values_at(cells * BRICK + (size * BRICK - 1) / 2, kernel)
 
-    def values_at(self, indices: np.ndarray) -> np.ndarray:
-        """The field at positions given in grid indices, [n, 3]."""
+    def values_at(self, indices: np.ndarray, kernel: Kernel) -> np.ndarray:
+        """A field at positions given in grid indices, [n, 3]."""
         points = np.asarray(self.lattice.origin)[:, None] + self.lattice.voxel * indices.T
         self.evaluations += len(indices)
-        return values_at(self.kernel, points, self.work)
+        return values_at(kernel, points, self.work)
 
     def seeds(self, state: np.ndarray, outside: np.ndarray) -> np.ndarray:
         """The candidates to start from, int32 [n, 3] in bricks.
@@ -158,7 +165,7 @@ class _Run:
         """Which bricks are empty after all, looked at in eight cells: 8 evaluations to save 512."""
         size = BRICK // 2
         middle = _grid(2, 2, 2) * size + (size - 1) / 2
-        f = self.values_at((bricks[:, None] * BRICK + middle).reshape(-1, 3)).reshape(-1, 8)
+        f = self.values_at((bricks[:, None] * BRICK + middle).reshape(-1, 3), self.guard).reshape(-1, 8)
         empty: np.ndarray = np.all(f > self.reach(size), axis=1)
         return empty
 
@@ -216,7 +223,7 @@ class _Run:
         chosen = np.unravel_index(rng.choice(far, min(FAR_AUDITS, len(far)), replace=False), state.shape)
         bricks = np.concatenate([near, np.stack(chosen, 1)]).astype(np.int32)
         points = bricks * BRICK + rng.integers(0, BRICK, bricks.shape)
-        inside = self.values_at(points) < 0
+        inside = self.values_at(points, self.kernel) < 0
         wrong = inside != (state[tuple(bricks.T)] != EMPTY)
         self.audited += len(bricks)
         self.repaired += int(wrong.sum())

@@ -39,19 +39,23 @@ class Verdict:
         )
 
 
-def verdict(root: Node, count: int, seed: int = 0) -> Verdict:
-    """Tries `count` points. Raises `KernelError`.
+def verdict(root: Node, count: int, seed: int = 0, bound: float | None = None) -> Verdict:
+    """Tries `count` points against what space is skipped by: the guarded scene, and `bound`, or else its
+    own. Raises `KernelError`.
 
     Slopes of pairs: along the gradient, and in random directions at all distances. Of a field with an
     escape-time fractal in it, which only promises a ball of radius f / L around an outside point: whether the
     ball is free, along the gradient towards the surface, near it, and anywhere.
     """
-    field, rng = compile_scene(root, "float64").points, np.random.default_rng(seed)
-    test = _free_ball if root.facts.weak else _slopes
-    found = Verdict()
+    guard, rng = root.guard(), np.random.default_rng(seed)
+    field, guarded = (compile_scene(r, "float64").points for r in (root, guard))
+    bound, found = bound or guard.facts.lipschitz, Verdict()
     for start in range(0, count, CHUNK):
         p = points(root, min(CHUNK, count - start), rng)
-        found = found | test(field, p, root.facts.lipschitz, rng)
+        if root.facts.weak:
+            found = found | _free_ball(field, guarded, p, bound, rng)
+        else:
+            found = found | _slopes(field, p, bound, rng)
     return found
 
 
@@ -69,10 +73,12 @@ def _slopes(field: Field, a: np.ndarray, bound: float, rng: np.random.Generator)
     return _judged(a, steepest)
 
 
-def _free_ball(field: Field, a: np.ndarray, bound: float, rng: np.random.Generator) -> Verdict:
+def _free_ball(
+    field: Field, guarded: Field, a: np.ndarray, bound: float, rng: np.random.Generator
+) -> Verdict:
     fa = field(*a)
     a, fa = a[:, fa > 0], fa[fa > 0]
-    free = fa / bound
+    free = guarded(*a) / bound
     free = np.where(free > NEAREST * np.abs(a).max(0), free, 0)
     outward = _gradient(field, a, fa, 1e-7)
     worst = np.zeros(a.shape[1])

@@ -1,0 +1,98 @@
+"""The field that space is skipped by: the scene's own, but beside tears and at seams."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import Node, julia, mandelbulb, sphere, transform, union
+from fracslice.formulas.escape import sure_distance
+from fracslice.kernel import compile_scene, link, reference
+from fracslice.kernel.cpu import Precision
+from tests.examples import EXAMPLES
+
+TORN = mandelbulb(iterations=4, power=7.5)
+SEAM = union(mandelbulb(iterations=4), sphere(radius=1.02), smooth=0.1)
+DIFFERENT: dict[str, Node] = {
+    "torn": TORN,
+    "torn pieces": mandelbulb(iterations=3, power=7.5, julia=(1.0, -0.7, 0.4)),
+    "seam": SEAM,
+    "seam with a torn one": union(TORN, sphere(radius=1.02), smooth=0.1),
+    "example of the documentation": EXAMPLES["example of the documentation"],
+}
+SAME = sorted(set(EXAMPLES) - {"mandelbulb 7.5", *DIFFERENT})
+
+
+def anywhere(count: int = 40_000) -> np.ndarray:
+    points = np.random.default_rng(4).uniform(-1.4, 1.4, (3, count)).astype(np.float32)
+    return points.astype(np.float64)
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_most_scenes_are_their_own_guard(name: str) -> None:
+    """The same code and numbers: nothing is compiled for it."""
+    own, guard = link(EXAMPLES[name]), link(EXAMPLES[name].guard())
+    assert own.source == guard.source and np.array_equal(own.parameters, guard.parameters)
+
+
+@pytest.mark.parametrize("name", DIFFERENT)
+def test_a_guard_is_less_where_it_differs(name: str) -> None:
+    points, root = anywhere(), DIFFERENT[name]
+    own, guard = reference(root)(*points), reference(root.guard())(*points)
+    assert (own[guard > 0] >= 0).all()
+    assert (guard <= own + 1e-12)[own > 0].all() and (guard < own - 1e-3)[own > 0].any()
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("name", DIFFERENT)
+def test_the_kernel_is_the_reference(name: str, precision: Precision) -> None:
+    points, guard = anywhere(5000), DIFFERENT[name].guard()
+    got = compile_scene(guard, precision).points(*points)
+    limit = 1e-4 if precision == "float32" else 1e-11
+    np.testing.assert_allclose(got, reference(guard)(*points), rtol=limit, atol=limit)
+
+
+def test_a_guard_vanishes_on_the_tear() -> None:
+    """The half plane y = 0, x < 0: the solid goes on elsewhere on the other side."""
+    x, z = np.random.default_rng(0).uniform((-1.1, -0.5), (-0.7, 0.5), (500, 2)).T
+    own, guard = (reference(r)(x, np.full_like(x, 1e-7), z) for r in (TORN, TORN.guard()))
+    assert own.max() > 0.01 and 0 < guard[own > 0].max() < 1e-6
+
+
+def test_a_seam_costs_nothing_elsewhere() -> None:
+    """Far from one of the two, L is what it is without a seam, not 1.25 times that."""
+    far = union(mandelbulb(iterations=4), transform(sphere(), translate=(4, 0, 0)), smooth=0.1).guard()
+    points = anywhere()
+    own, alone = reference(far)(*points), reference(mandelbulb(iterations=4))(*points)
+    assert far.facts.lipschitz == 2.0
+    np.testing.assert_array_equal(own[alone > 0], alone[alone > 0])
+
+
+def test_steepening_is_per_length() -> None:
+    assert sphere().facts.steepening == 0 and julia().facts.steepening == 2
+    half = transform(mandelbulb(power=5), scale=(0.5,))
+    assert union(half, sphere()).facts.steepening == pytest.approx(10)
+
+
+@pytest.mark.parametrize("power", [2, 3, 8, 7.5, 12])
+def test_a_sure_distance_is_sure(power: float) -> None:
+    """Two steps of z^p + c in the complex plane: no point nearer than that is moved by `apart`."""
+    rng = np.random.default_rng(1)
+    start = rng.uniform(0.5, 1.1, 2000) * np.exp(1j * rng.uniform(-0.2, 0.2, 2000))
+    c = rng.uniform(0, 1, 2000) + 0.2j
+    slope, bend, w = np.ones(len(start)), np.zeros(len(start)), start
+    for _ in range(2):
+        bend = bend + slope * (power - 1) / (2 * np.abs(w))
+        slope = slope * power * np.abs(w) ** (power - 1)
+        w = _step(w, power, c)
+    apart = np.abs(w) * 10 ** rng.uniform(-3, 3, len(start))
+    sure = sure_distance(apart, slope, bend)
+    direction = np.exp(2j * np.pi * rng.uniform(size=(200, len(start))))
+    near = start + 0.999 * sure * direction
+    moved = np.abs(_step(_step(near, power, c), power, c) - w)
+    assert (moved < apart).all() and (moved > 0.8 * apart).any()
+
+
+def _step(w: np.ndarray, power: float, c: np.ndarray) -> np.ndarray:
+    found: np.ndarray = w**power + c
+    return found
