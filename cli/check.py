@@ -61,7 +61,7 @@ def check(
         scene = load_scene(source, settings)
         with working(threads, quiet) as work:
             result = make_mesh(scene, job_of(scene, **options), work)
-            solid = check_solid(result.bricks, result.place.scale, limits_of(options), work)
+            solid = check_solid(result.root, result.bricks, result.place.scale, limits_of(options), work)
         numbers = result.report.as_dict() | {"solid": solid.as_dict()}
         problems = (*result.report.problems, *solid.thin)
         line = os.linesep.join([summary(source, result.report), *(f"  {p}" for p in solid.thin)])

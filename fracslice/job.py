@@ -20,6 +20,8 @@ from .scene import Print, Scene, parse_length
 from .work import Work
 
 if TYPE_CHECKING:
+    from .formulas import Node
+    from .kernel import Compilable
     from .mesh import Mesh
     from .mesh.components import Removed
     from .volume import Bricks, Plan
@@ -111,11 +113,12 @@ class Placement:
 @dataclass(frozen=True, eq=False)
 class Result:
     """mesh: in mm, standing on z = 0, coordinates as a file holds them. bricks: its samples, in scene units.
-    place: the map from there to the mesh."""
+    root: the field that they are samples of. place: the map from there to the mesh."""
 
     mesh: Mesh
     report: Report
     bricks: Bricks
+    root: Node | Compilable
     place: Placement
 
     @property
@@ -187,7 +190,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         peak_rss_mb=peak_rss_mb(),
         simplified=simplified,
     )
-    return Result(mesh, report, bricks, place)
+    return Result(mesh, report, bricks, planned.root, place)
 
 
 def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Work) -> None:

@@ -14,6 +14,7 @@ from ..volume.grid import from_grid, to_grid
 from ..work import Work
 from .parts import parts_of
 from .samples import Samples
+from .slender import slender
 from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
 
@@ -47,8 +48,8 @@ class Limits:
 
 @dataclass(frozen=True)
 class SolidReport:
-    """What the samples told. voxel: mm between samples: lengths are right within one, and thinner walls may
-    not be seen. bodies, cavities: their volumes in mm^3, the largest first, without specks. walls, gaps,
+    """What the samples told, and the field of what is thinner. voxel: mm between samples: lengths are right
+    within one. bodies, cavities: their volumes in mm^3, the largest first, without specks. walls, gaps,
     floors: thicknesses up to 2 mm. thin_walls, thin_floors: how much surface is under the limits, mm^2.
     """
 
@@ -83,13 +84,18 @@ def check_object(
     wanted = ACROSS * longest * scale / max(min(limits.wall, limits.floor), 1e-6)
     lattice = Lattice.around(outer, longest / min(max(wanted, COARSE), FINE))
     bricks = sample(compile_scene(root), root.facts, lattice, work)
-    return check_solid(bricks, scale, limits, work)
+    return check_solid(root, bricks, scale, limits, work)
 
 
 def check_solid(
-    bricks: Bricks, scale: float, limits: Limits | None = None, work: Work | None = None
+    root: Node | Compilable,
+    bricks: Bricks,
+    scale: float,
+    limits: Limits | None = None,
+    work: Work | None = None,
 ) -> SolidReport:
-    """Checks a sampled solid: loose bodies, sealed cavities, thin walls and floors. scale: mm per scene unit.
+    """Checks a sampled solid: loose bodies, sealed cavities, thin walls and floors. root: what the bricks are
+    samples of. scale: mm per scene unit.
 
     Raises `VolumeError`, `Cancelled`.
     """
@@ -99,9 +105,11 @@ def check_solid(
     work.check()
     parts, cube = parts_of(solid.bricks), (bricks.voxel * scale) ** 3
     most = float(BINS[-1]) / scale
-    thick, between = walls(solid, most, work), walls(solid, most, work, gaps=True)
-    floors = walls(solid, most, work, direction=UP)
-    thin, bare = _under(thick, limits.wall, scale), _under(floors, limits.floor, scale)
+    thin = slender(root, solid, work)
+    thick, between = thin.beside(walls(solid, most, work), most), walls(solid, most, work, gaps=True)
+    floors = thin.beside(walls(solid, most, work, direction=UP), most, UP)
+    bare = _under(floors, limits.floor, scale)
+    narrow = _under(thick, limits.wall, scale)
     speck = max(limits.speck, SPECK * cube)
     bodies, cavities = (
         [v for v in (cube * parts.count[numbers]).tolist() if v >= speck]
@@ -112,13 +120,13 @@ def check_solid(
         problems.append(f"{len(bodies)} loose bodies")
     if cavities:
         problems.append(f"{len(cavities)} sealed cavities of {sum(cavities):.3g} mm3")
-    if thin >= limits.thin:
-        problems.append(f"{thin:.3g} mm2 of walls are thinner than {limits.wall:g} mm")
+    if narrow >= limits.thin:
+        problems.append(f"{narrow:.3g} mm2 of walls are thinner than {limits.wall:g} mm")
     if bare >= limits.thin:
         problems.append(f"{bare:.3g} mm2 of floors are thinner than {limits.floor:g} mm")
     told = [widths_of(w.width * scale, w.area * scale**2) for w in (thick, between, floors)]
     return SolidReport(
-        bricks.voxel * scale, bodies, cavities, told[0], told[1], told[2], thin, bare, problems
+        bricks.voxel * scale, bodies, cavities, told[0], told[1], told[2], narrow, bare, problems
     )
 
 

@@ -23,6 +23,7 @@ from .altered import altered
 from .bridges import struts
 from .parts import Parts, parts_of
 from .samples import Samples, positions, with_signs
+from .slender import slender
 from .strokes import strokes
 from .walls import walls
 
@@ -162,7 +163,8 @@ class _Run:
         faces.
         """
         solid, least = Samples(from_grid(self.distances(self.how.thickness))), self.how.thickness / self.scale
-        middle = walls(solid, least, self.work).middle
+        thin = slender(self.thing, solid, self.work)
+        middle = thin.beside(walls(solid, least, self.work), least).middle
         middle = middle[_apart(middle, solid.bricks.voxel)]
         return self.added(middle, middle, least / 2, solid.bricks)
 

@@ -22,6 +22,9 @@ OPPOSITE = -0.5
 """
 
 
+Direction = tuple[float, float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Walls:
     """Walls or gaps that are thinner than a limit. start, end: float64 [n, 3], on the two faces; width:
@@ -38,6 +41,22 @@ class Walls:
         """Halfway between the faces, float64 [n, 3]."""
         return np.asarray((self.start + self.end) / 2)
 
+    def chosen(self, which: np.ndarray) -> Walls:
+        """Some of them, bool [n]."""
+        return Walls(*(values[which] for values in vars(self).values()))
+
+    def __add__(self, more: Walls) -> Walls:
+        mine, others = vars(self).values(), vars(more).values()
+        return Walls(*(np.concatenate(pair) for pair in zip(mine, others, strict=True)))
+
+    def along(self, direction: Direction) -> Walls:
+        """Those whose faces look along a direction or against it, measured along it."""
+        way = self.end - self.start
+        share = way @ np.array(direction) / np.linalg.norm(way, axis=1)
+        width = self.width / np.maximum(np.abs(share), 1e-9)
+        end = self.start + np.copysign(width, share)[:, None] * np.array(direction)
+        return Walls(self.start, end, width, self.area).chosen(np.abs(share) > -OPPOSITE)
+
 
 def walls(
     solid: Samples,
@@ -45,25 +64,20 @@ def walls(
     work: Work,
     *,
     gaps: bool = False,
-    direction: tuple[float, float, float] | None = None,
+    direction: Direction | None = None,
 ) -> Walls:
     """Walls, or gaps, up to `limit` scene units thick, of a field of distances.
 
     direction: measure along it instead of the normal, through faces that look along it or against it. Right
-    within a voxel; what is thinner than one shows only where a sample lies in it.
+    within a voxel; what is thinner than one shows only where a sample lies in it, see `slender`.
     """
     b, towards = solid.bricks, -1.0 if gaps else 1.0
-    lower, axis = _crossed(solid)
-    start, step = np.asarray(b.origin), b.voxel * np.eye(3)
-    points, ends, normals = (np.empty((len(lower), 3)) for _ in range(3))
-    width, facing = np.empty(len(lower)), np.ones(len(lower))
+    points, axis = crossed(solid)
+    ends, normals = np.empty(points.shape), np.empty(points.shape)
+    width, facing = np.empty(len(points)), np.ones(len(points))
 
     def task(part: slice) -> None:
-        here = start + b.voxel * lower[part]
-        beyond = here + step[axis[part]]
-        f, g = solid.points(*here.T), solid.points(*beyond.T)
-        points[part] = here + (f / np.where(f == g, 1, f - g))[:, None] * (beyond - here)
-        normals[part] = _normals(solid, points[part])
+        normals[part] = normals_at(solid, points[part])
         ways = -towards * normals[part]
         if direction is not None:
             ways = np.copysign(1, ways @ np.array(direction))[:, None] * np.array(direction)
@@ -71,24 +85,27 @@ def walls(
         _through(points[part], ways, limit, towards, *frame, width[part])
         ends[part] = points[part] + width[part, None] * ways
         hit = part.start + np.flatnonzero(width[part] < limit)
-        facing[hit] = (_normals(solid, ends[hit]) * normals[hit]).sum(1)
+        facing[hit] = (normals_at(solid, ends[hit]) * normals[hit]).sum(1)
         if direction is not None:
             facing[part] = np.where(np.abs((normals[part] * ways).sum(1)) > -OPPOSITE, facing[part], 1)
 
-    work.map(task, chunks(len(lower), 1 << 13))
+    work.map(task, chunks(len(points), 1 << 13))
     thin = facing < OPPOSITE
     area = b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
     return Walls(points[thin], ends[thin], width[thin], area[thin])
 
 
-def _crossed(solid: Samples) -> tuple[np.ndarray, np.ndarray]:
-    """The lower grid points int64 [n, 3] and the axes int64 [n] of the edges that the surface crosses."""
+def crossed(solid: Samples) -> tuple[np.ndarray, np.ndarray]:
+    """Where the surface crosses the edges of the grid, float64 [n, 3], and their axes, int64 [n]."""
     b = solid.bricks
     frame = (b.ijk, b.voxel, b.index, solid.bounds, b.values)
     lower = np.empty((_edges(*frame, np.empty((0, 3), np.int64), np.empty(0, np.int64)), 3), np.int64)
     axis = np.empty(len(lower), np.int64)
     _edges(*frame, lower, axis)
-    return lower, axis
+    here = np.asarray(b.origin) + b.voxel * lower
+    beyond = here + (b.voxel * np.eye(3))[axis]
+    f, g = solid.points(*here.T), solid.points(*beyond.T)
+    return here + (f / np.where(f == g, 1, f - g))[:, None] * (beyond - here), axis
 
 
 @njit(cache=True, nogil=True)
@@ -107,7 +124,7 @@ def _edges(ijk, voxel, index, bounds, values, lower, axis):  # type: ignore[no-u
     return n
 
 
-def _normals(solid: Samples, points: np.ndarray) -> np.ndarray:
+def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
     """Unit normals by central differences over a voxel, [n, 3]."""
     half = solid.bricks.voxel / 2 * np.eye(3)
     slope = np.stack([solid.points(*(points + s).T) - solid.points(*(points - s).T) for s in half], 1)

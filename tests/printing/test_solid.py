@@ -169,6 +169,35 @@ def test_seeded_defects_are_found_and_clean_solids_not_blamed(root: Node, proble
     assert found == [] if problem is None else any(problem in p for p in found)
 
 
+@pytest.mark.parametrize("tilt", [0.0, 17.0])
+@pytest.mark.parametrize("voxels", [0.3, 0.6, 1.0, 2.0, 2.9])
+def test_walls_thinner_than_the_samples_are_found(voxels: float, tilt: float) -> None:
+    """A fin on a plate, its width in voxels of the check; and the fin's area, both faces."""
+    width = voxels * 2.1 / 96
+    fin = at(box(size=(1.4, width, 1.5)), 0, 0.003, 0.75)
+    planned = plan(transform(union(box(size=(2, 2, 0.5)), fin), rotate=(1, 0.3, 0.2, tilt)), 96)
+    scale = SIZE / max(planned.box.size)
+    report = check_object(
+        planned.root, planned.outer, scale, Limits(wall=4 * report_voxel(planned, scale), floor=1)
+    )
+    assert report.walls
+    assert report.walls.median == pytest.approx(width * scale, rel=0.02)
+    assert report.thin_walls == pytest.approx(2 * 1.4 * 1.25 * scale**2, rel=0.15)
+
+
+def report_voxel(planned: Plan, scale: float) -> float:
+    """Between the samples of a check that may be coarse, mm."""
+    return max(planned.outer.size) * scale / 96
+
+
+def test_walls_thinner_than_the_samples_are_thickened() -> None:
+    """A fin of 0.1 mm where samples are 0.25 mm apart."""
+    thin = union(box(size=(2, 2, 0.5)), at(box(size=(1.4, 0.01, 1.5)), 0, 0.003, 0.75))
+    after = measured(thin, thickness=1.5)
+    assert np.quantile(after, (0.02, 0.5)) == pytest.approx([1.5, 1.5], abs=0.2)
+    assert len(after) > 1000
+
+
 def test_time_is_linear_in_the_holes() -> None:
     """10^4 holes take at most a few times what 100 do, on as many samples."""
 
