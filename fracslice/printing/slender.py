@@ -147,7 +147,8 @@ class Raised:
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Field values at points, as `CpuKernel.points`."""
-        return self.kernel.points(x, y, z) - self.dtype.type(self.by)
+        f: np.ndarray = self.kernel.points(x, y, z) - self.dtype.type(self.by)
+        return f
 
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
