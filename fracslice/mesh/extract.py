@@ -65,8 +65,8 @@ class Piece:
     """The part of a surface in some layers of bricks, scene units.
 
     mesh: open where the surface goes on; pieces in turn meet in equal points, bit by bit. end: the x where
-    this piece ends. crossings: int64 [n], the number of each vertex among the crossings of the grid's edges
-    with the whole surface, the same in all pieces; -1 for a vertex in a cell or a cell's face.
+    this piece ends. crossings: int64 [k], the numbers of its first vertices among the crossings of the grid's
+    edges with the whole surface, the same in all pieces; the other vertices are in cells and cells' faces.
     """
 
     mesh: Mesh
@@ -100,13 +100,12 @@ def contour_pieces(
         rooms = partial(_rooms, features, ends, signs)
         moved, places = settle(root, features, rooms, signs.voxel, work)
         features[moved] = places
-        numbers = np.full(len(vertices), -1, np.int64)
-        numbers[:count] = cells.crossings_before(first) + np.arange(count)
+        numbers = cells.crossings_before(first) + np.arange(count)
         mesh = Mesh(vertices, triangles)
         if last < len(signs.index):  # The next piece has what this one numbers and does not use.
             used = np.zeros(len(vertices), bool)
             used[triangles] = True
-            mesh, numbers = mesh.selected(np.ones(len(triangles), bool)), numbers[used]
+            mesh, numbers = mesh.selected(np.ones(len(triangles), bool)), numbers[used[:count]]
         yield Piece(mesh, signs.origin[0] + signs.voxel * BRICK * last, numbers)
 
 

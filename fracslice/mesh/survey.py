@@ -50,11 +50,10 @@ class Survey:
     def _join_to_last(self, crossings: NDArray[np.int64], labels: NDArray[np.int64]) -> None:
         """Parts that share a crossing with the piece before are one; the surface passes no seam without."""
         numbers, before = self.border
-        own = crossings >= 0
-        _, theirs, mine = np.intersect1d(numbers, crossings[own], assume_unique=True, return_indices=True)
-        pairs = np.stack([before[theirs], labels[own][mine]], axis=1)
+        _, theirs, mine = np.intersect1d(numbers, crossings, assume_unique=True, return_indices=True)
+        pairs = np.stack([before[theirs], labels[mine]], axis=1)
         self.same.append(np.unique(pairs, axis=0))
-        self.border = crossings[own], labels[own]
+        self.border = crossings, labels[: len(crossings)]
 
     def shells(self) -> WholeShells:
         """What all pieces together are made of."""

@@ -3,6 +3,7 @@
 // the sums of the counts give.
 #include "contour.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -23,9 +24,40 @@ struct Features {
     Signs tips{};
     std::array<Signs, 3> corners{};
     std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that slab
-    std::vector<Feature> points;                        // the corners by axis, then the tips, in the order of their cells
+    Feature* points = nullptr;                          // the corners by axis, then the tips, in the order of their cells
+    uint32_t count = 0;                                 // of these
     uint32_t loops = 0;                                 // triangles that these cells would have without corners
     size_t tip_base = 0, corner_base = 0, triangles = 0;
+};
+
+// Where one thread finds features and keeps them.
+class Store {
+  public:
+    std::array<std::vector<Feature>, 4> found;  // of a brick: the corners by axis, then the tips
+
+    // Keeps what was found in a brick and is ready for the next one.
+    void keep(Features& of) {
+        size_t count = 0;
+        for (const auto& some : found) count += some.size();
+        if (count > room_) {
+            room_ = std::max(count, kBlock);
+            blocks_.emplace_back(room_, 1);
+            next_ = blocks_.back().data.get();
+        }
+        of.points = next_;
+        of.count = uint32_t(count);
+        for (auto& some : found) {
+            next_ = std::copy(some.begin(), some.end(), next_);
+            some.clear();
+        }
+        room_ -= count;
+    }
+
+  private:
+    static constexpr size_t kBlock = size_t(1) << 18;
+    std::vector<Array<Feature>> blocks_;
+    Feature* next_ = nullptr;
+    size_t room_ = 0;
 };
 
 // The face that two edges share: axis*2 + (0 lower, 1 upper).
@@ -221,8 +253,7 @@ class Contouring {
             data[seen++] = datum(vertex);
         });
         Features& own = features(i);
-        std::vector<Feature> tips;
-        std::array<std::vector<Feature>, 3> corners;
+        Store& store = stores_.local();
         for_each(near, i, [&](const Cell& cell) {
             const Case& type = kCases[cell.number];
             Loop loop;
@@ -230,19 +261,17 @@ class Contouring {
             if (bent(cell, data, loop) && (place(cell, data, loop), feature_point(loop.data(), type.loop_length, cell.lower, margin_, point))) {
                 own.tips[cell.x] |= cell.bit();
                 own.loops += type.loop_length;
-                tips.push_back({point, ends(cell, point, 3)});
+                store.found[3].push_back({point, ends(cell, point, 3)});
                 for (int axis = 0; axis < 3; ++axis) {
                     if (!corner_in(cell, loop, axis, point)) continue;
                     own.corners[axis][cell.x] |= cell.bit();
-                    corners[axis].push_back({point, ends(cell, point, axis)});
+                    store.found[axis].push_back({point, ends(cell, point, axis)});
                 }
                 return;
             }
             own.loops += type.triangles;
         });
-        own.points.reserve(corners[0].size() + corners[1].size() + corners[2].size() + tips.size());
-        for (const auto& some : corners) own.points.insert(own.points.end(), some.begin(), some.end());
-        own.points.insert(own.points.end(), tips.begin(), tips.end());
+        store.keep(own);
     }
 
     // The corner of the trace in a cell's lower face along `axis`, if there is one. A face that the loop passes twice has
@@ -263,8 +292,9 @@ class Contouring {
     // Keeps the corners between two cells with tips, and numbers them.
     void choose(size_t i) {
         Features& own = features(i);
-        if (own.points.empty()) return;
-        auto from = own.points.begin(), to = from;
+        if (!own.count) return;
+        const Feature* from = own.points;
+        Feature* to = own.points;
         for (int axis = 0; axis < 3; ++axis) {
             const Features* below = beside(i, axis, -1);
             Signs none{}, before = below ? below->tips : none;
@@ -280,15 +310,16 @@ class Contouring {
                 own.corner_base += size_t(popcount(own.corners[axis][x]));
             }
         }
-        own.points.erase(to, from);
+        to = std::copy(from, const_cast<const Feature*>(own.points + own.count), to);
+        own.count = uint32_t(to - own.points);
     }
 
     // A corner makes one more triangle in both of its cells.
     void count(size_t i) {
         Features& own = features(i);
         own.triangles = own.loops + own.corner_base;
-        own.tip_base = own.points.size() - own.corner_base;
-        if (own.points.empty()) return;
+        own.tip_base = own.count - own.corner_base;
+        if (!own.count) return;
         for (int axis = 0; axis < 3; ++axis) {
             const Features* above = beside(i, axis, 1);
             Signs none{}, after = above ? above->corners[axis] : none;
@@ -333,9 +364,9 @@ class Contouring {
         Near near(cells_, i);
         cells_.collect(near.octant, near.numbers);
         size_t tip = result_.crossings + result_.corners + own.tip_base;
-        for (size_t k = corners_of_brick(own), at = tip; k < own.points.size(); ++k) put(at++, own.points[k]);
+        for (size_t k = corners_of_brick(own), at = tip; k < own.count; ++k) put(at++, own.points[k]);
         std::array<const Features*, 3> above{};
-        if (!own.points.empty()) above = {beside(i, 0, 1), beside(i, 1, 1), beside(i, 2, 1)};
+        if (own.count) above = {beside(i, 0, 1), beside(i, 1, 1), beside(i, 2, 1)};
         for_each(near, i, [&](const Cell& cell) {
             if (own.tips[cell.x] & cell.bit()) {
                 out = write_fan(own, above, cell, tip++, out);
@@ -384,6 +415,7 @@ class Contouring {
     double margin_;
     size_t first_datum_, first_vertex_;
     std::vector<Features> features_;
+    tbb::enumerable_thread_specific<Store> stores_;
     Contour result_{};
 };
 

@@ -71,14 +71,7 @@ bool moved_inside(Vec3& point, const Vec3& lower, double margin) {
     return true;
 }
 
-bool fits(const Crossing* crossings, int count, const Vec3& point) {
-    double miss = 0;
-    for (int i = 0; i < count; ++i) {
-        double d = dot(crossings[i].normal, point - crossings[i].point);
-        miss += d * d;
-    }
-    return miss < kMiss * kMiss * count;
-}
+bool fits(double squares, int count) { return squares < kMiss * kMiss * count; }
 
 // The point of a line in the unit cell at `lower` that is nearest to `start`; where the line misses the cell by little, the
 // cell's point beside it.
@@ -106,9 +99,11 @@ bool feature_point(const Crossing* crossings, int count, const Vec3& lower, doub
     for (int i = 0; i < count; ++i) mean = mean + (1.0 / count) * crossings[i].point;
     Symmetric a;
     Vec3 b{};
+    double miss = 0;
     for (int i = 0; i < count; ++i) {
         const Vec3& n = crossings[i].normal;
         double d = dot(n, crossings[i].point - mean);
+        miss += d * d;
         for (int k = 0; k < 3; ++k) {
             a.diagonal[k] += n[k] * n[k];
             a.other[k] += n[(k + 1) % 3] * n[(k + 2) % 3];
@@ -121,15 +116,23 @@ bool feature_point(const Crossing* crossings, int count, const Vec3& lower, doub
     double determinant = dot(a.row(0), inverse[0]), minors = inverse[0][0] + inverse[1][1] + inverse[2][2];
     if (!(minors > 2 * kRank * count * count)) return false;
     if (determinant > kRank * minors * count) {
-        point = mean + (1 / determinant) * product(inverse, b);
-        if (fits(crossings, count, point) && moved_inside(point, lower, margin)) return true;
+        Vec3 best = (1 / determinant) * product(inverse, b);
+        if (!fits(miss - dot(b, best), count)) return false;
+        point = mean + best;
+        if (moved_inside(point, lower, margin)) return true;
     }
     double least = least_eigenvalue(count, minors, determinant), others = count - least;
     Vec3 along = eigenvector(a, inverse, count, least);
     // Across that direction the matrix solves its characteristic polynomial, which is so its inverse (Cayley and Hamilton).
     Vec3 across = b - dot(along, b) * along;
-    Vec3 line = mean + (1 / (minors - least * others)) * (others * across - product({a.row(0), a.row(1), a.row(2)}, across));
-    return clipped(line, along, lower, margin, point) && fits(crossings, count, point);
+    Vec3 best = (1 / (minors - least * others)) * (others * across - product({a.row(0), a.row(1), a.row(2)}, across));
+    if (!fits(miss - dot(b, best), count) || !clipped(mean + best, along, lower, margin, point)) return false;
+    miss = 0;
+    for (int i = 0; i < count; ++i) {
+        double d = dot(crossings[i].normal, point - crossings[i].point);
+        miss += d * d;
+    }
+    return fits(miss, count);
 }
 
 bool face_corner(const Crossing& a, const Crossing& b, int axis, const Vec3& lower, double margin, Vec3& corner) {

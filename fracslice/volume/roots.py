@@ -7,7 +7,7 @@ for itself: what it finds does not depend on its neighbours, nor on how the segm
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -137,20 +137,27 @@ class Roots:
 
     def found(self, segments: np.ndarray) -> np.ndarray:
         """The roots, [n], as shares of the segments; where the ends have one sign, the end nearer to zero."""
-        roots = np.empty(segments.shape[1], self.dtype)
-        self._functions["find"](self._frame, [*segments, roots])
-        return roots
+        roots = np.empty((1, segments.shape[1]), self.dtype)
+        self._functions["find"](self._frame, segments, roots)
+        found: np.ndarray = roots[0]
+        return found
 
     def polished(self, segments: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Roots brought nearer, [n], the field's unit normals there, [3, n], and |f| in voxels, [n]."""
         out = np.empty((5, len(roots)), self.dtype)
         out[0] = roots
-        self._functions["polish"](self._frame, [*segments, *out])
+        self._functions["polish"](self._frame, segments, out)
         return out[0], out[1:4], out[4]
 
 
-Run = Callable[[np.ndarray, list[np.ndarray]], None]
-"""A loop on its frame and rows."""
+Run = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
+"""A loop on its frame, the rows that it reads and those that it writes, both C-contiguous."""
+
+
+def _places(rows: np.ndarray) -> Iterable[int]:
+    """The addresses of the rows of an array."""
+    start, step = rows.ctypes.data, rows.strides[0]
+    return range(start, start + len(rows) * step, step)
 
 
 def _linked(root: Node, precision: Precision) -> tuple[int, dict[str, Run]]:
@@ -159,9 +166,9 @@ def _linked(root: Node, precision: Precision) -> tuple[int, dict[str, Run]]:
     width, parameters = lane_count(bits), np.ascontiguousarray(linked.parameters, precision)
 
     def runs(function: Callable[..., None]) -> Run:
-        def run(frame: np.ndarray, rows: list[np.ndarray]) -> None:
-            places = (row.ctypes.data for row in rows)
-            function(parameters.ctypes.data, frame.ctypes.data, *places, len(rows[0]))
+        def run(frame: np.ndarray, segments: np.ndarray, out: np.ndarray) -> None:
+            places = (*_places(segments), *_places(out))
+            function(parameters.ctypes.data, frame.ctypes.data, *places, segments.shape[1])
 
         return run
 
@@ -183,9 +190,9 @@ def _on_arrays(root: Compilable, precision: Precision) -> tuple[int, dict[str, R
     def runs(loop: Loop) -> Run:
         exec(loop.source, words)
 
-        def run(frame: np.ndarray, rows: list[np.ndarray]) -> None:
+        def run(frame: np.ndarray, segments: np.ndarray, out: np.ndarray) -> None:
             with np.errstate(all="ignore"):
-                words[loop.name](None, frame, *rows, len(rows[0]))
+                words[loop.name](None, frame, *segments, *out, segments.shape[1])
 
         return run
 
