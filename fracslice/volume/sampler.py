@@ -237,7 +237,10 @@ class _Run:
         index = np.where((state == EMPTY), OUTSIDE, INSIDE).astype(np.int32)
         kept = self.crossed(ijk // BRICK, signs, index)
         if not kept.any():
-            raise VolumeError("there is no surface: the scene is empty or smaller than a voxel")
+            raise VolumeError(
+                "there is no surface: the scene is empty, or all of it is thinner than a voxel of "
+                f"{self.lattice.voxel:.3g}; more voxels, or fewer levels or iterations, may show it"
+            )
         order = np.flatnonzero(kept)[np.lexsort(ijk[kept].T[::-1])]
         index[tuple(ijk[order].T // BRICK)] = np.arange(len(order))
         bricks = SignBricks(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import Cancelled, VolumeError
-from fracslice.formulas import Node, box, intersection, plane, shell, sphere, transform, union
+from fracslice.formulas import Node, box, intersection, menger, plane, shell, sphere, transform, union
 from fracslice.formulas.registry import Facts
 from fracslice.kernel import compile_scene
 from fracslice.volume import Bricks, Lattice, plan, sample, sample_scene
@@ -130,6 +130,11 @@ def test_hollow_shells_keep_their_cavity() -> None:
 def test_scenes_without_a_solid(root: Node, message: str) -> None:
     with pytest.raises(VolumeError, match=message):
         plan(root, 64)
+
+
+def test_what_is_too_thin_for_any_sample_says_so() -> None:
+    with pytest.raises(VolumeError, match=r"thinner than a voxel of 0\.0417; more voxels"):
+        sample_scene(plan(menger(level=10), 48))
 
 
 def test_too_fine_a_voxel_is_refused_before_starting() -> None:

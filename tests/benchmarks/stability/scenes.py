@@ -14,7 +14,7 @@ import numpy as np
 
 from fracslice.formulas import Node
 from fracslice.scene import library, read
-from tests.stability.draws import drawn, torn
+from tests.stability.draws import drawn
 from tests.stability.solids import Outcome, outcome
 
 SETTINGS, RESOLUTIONS = 20, (48.0, 80.0, 128.0)
@@ -28,14 +28,12 @@ def settings(name: str, count: int) -> list[Node]:
     return [root, *(drawn(root, rng, SPREAD) for _ in range(count))]
 
 
-def _kind(root: Node, found: Outcome) -> str:
+def _kind(found: Outcome) -> str:
     if found.refused:
         return "refused"
     if found.faults:
         return "faulty"
-    if found.repaired:
-        return "torn and repaired" if torn(root) else "repaired"
-    return "solid"
+    return "repaired" if found.repaired else "solid"
 
 
 def main() -> None:
@@ -54,7 +52,7 @@ def _tried(name: str, number: int, root: Node, resolution: float) -> str:
     if found != Outcome():
         what = found.refused or ", ".join(found.faults) or f"repaired {found.repaired}"
         print(f"{name} setting {number} at {resolution:g}: {what}\n    {root!r}", flush=True)
-    return _kind(root, found)
+    return _kind(found)
 
 
 if __name__ == "__main__":
