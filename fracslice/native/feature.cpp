@@ -71,6 +71,13 @@ bool moved_inside(Vec3& point, const Vec3& lower, double margin) {
     return true;
 }
 
+// Whether a point is in the unit cell at `lower`, `margin` from its faces.
+bool inside(const Vec3& point, const Vec3& lower, double margin) {
+    Vec3 p = point - lower;
+    return std::min({p[0], p[1], p[2]}) >= margin && std::max({p[0], p[1], p[2]}) <= 1 - margin;
+}
+
+// Whether a point whose distances from `count` planes have this sum of squares is near enough to them.
 bool fits(double squares, int count) { return squares < kMiss * kMiss * count; }
 
 // The point of a line in the unit cell at `lower` that is nearest to `start`; where the line misses the cell by little, the
@@ -126,7 +133,10 @@ bool feature_point(const Crossing* crossings, int count, const Vec3& lower, doub
     // Across that direction the matrix solves its characteristic polynomial, which is so its inverse (Cayley and Hamilton).
     Vec3 across = b - dot(along, b) * along;
     Vec3 best = (1 / (minors - least * others)) * (others * across - product({a.row(0), a.row(1), a.row(2)}, across));
-    if (!fits(miss - dot(b, best), count) || !clipped(mean + best, along, lower, margin, point)) return false;
+    if (!fits(miss - dot(b, best), count)) return false;
+    point = mean + best;
+    if (inside(point, lower, margin)) return true;
+    if (!clipped(mean + best, along, lower, margin, point)) return false;
     miss = 0;
     for (int i = 0; i < count; ++i) {
         double d = dot(crossings[i].normal, point - crossings[i].point);

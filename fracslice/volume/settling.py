@@ -17,7 +17,7 @@ NEAR = 1e-6
 """A point with |f| below this share of a voxel is where it should be: a corner has no gradient to follow."""
 
 FLAT = 0.1
-"""Slopes below this are taken for it, so that no step is longer than twenty times |f|."""
+"""Slopes below this are taken for it, so that no step is longer than ten times |f|."""
 
 REACH = 1e-2
 """The differences' step, in voxels: float32 tells it."""
@@ -49,7 +49,7 @@ def settle(
 
     points: float64 [n, 3], scene units. rooms: the rooms of those with these numbers, which are inside where
     the second argument says so. A point moves along the gradient if the field changes its sign there within
-    twice Newton's step and the box, else straight towards its room's point of the other sign. One that comes
+    four of Newton's steps and the box, else straight towards its room's point of the other sign. One that comes
     no nearer stays, and so does what lies on the surface already, such as an exact corner. Returns the
     numbers of those that did not, int64 [k], and where they are now, float64 [k, 3].
     """
@@ -91,7 +91,7 @@ def _ends(kernel: Kernel, p: np.ndarray, f: np.ndarray, room: Rooms, voxel: floa
     slope = (np.stack(ahead) - start) / reach
     space = np.where((slope > 0) == (f < 0), room.high - p, p - room.low)
     slope *= space > TIGHT * voxel
-    step = slope * (-2 * f / np.maximum((slope * slope).sum(0), FLAT**2))
+    step = slope * (-4 * f / np.maximum((slope * slope).sum(0), FLAT**2))
     with np.errstate(divide="ignore", invalid="ignore"):
         end: np.ndarray = p + step * (space / np.abs(step)).min(0, where=step != 0, initial=1.0)
     if room.other is None:
