@@ -49,8 +49,8 @@ def settle(
 
     points: float64 [n, 3], scene units. rooms: the rooms of those with these numbers, which are inside where
     the second argument says so. A point moves along the gradient if the field changes its sign there within
-    four of Newton's steps and the box, else straight towards its room's point of the other sign. One that comes
-    no nearer stays, and so does what lies on the surface already, such as an exact corner. Returns the
+    four of Newton's steps and the box, else straight towards its room's point of the other sign. One that
+    comes no nearer stays, and so does what lies on the surface already, such as an exact corner. Returns the
     numbers of those that did not, int64 [k], and where they are now, float64 [k, 3].
     """
     kernel, work = compile_scene(root, "float32"), work or Work()
