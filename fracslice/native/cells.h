@@ -137,7 +137,7 @@ class CellGrid {
     int64_t find(const Place& place, int x, int y, int z) const;
 
     // Calls visit(place in Numbers, vertex) for a brick's own crossings, in order, then for those on its neighbours' near
-    // sides.
+    // sides that its cells have.
     template <class Visit>
     void for_each_near(const Octant& near, const Visit& visit) const {
         for (int k = 0; k < 8; ++k) {
@@ -145,6 +145,7 @@ class CellGrid {
             const Crossings& owner = crossings_[size_t(near.rows[k])];
             Slab seen = (k & 2 ? kFirstY : ~Slab(0)) & (k & 4 ? kFirstZ : ~Slab(0));
             for (int axis = 0; axis < 3; ++axis) {
+                if (k >> axis & 1) continue;
                 for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) {
                     size_t place = number_at(axis, x + (k & 1) * 8, (k & 2) * 4, (k & 4) * 2);
                     uint32_t first = uint32_t(owner.base) + owner.rank[axis][x];
