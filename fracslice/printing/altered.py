@@ -49,6 +49,11 @@ class Altered:
         box = reduce(Box.__or__, added, own.box)
         return Facts(box, max(own.lipschitz, *slopes), own.weak)
 
+    def guard(self) -> Altered:
+        """What space is skipped by, as `Node.guard`. What is cut away is not: less of it is more of all."""
+        terms = tuple(t if t.does == "cut" else _guarded(t) for t in self.terms)
+        return Altered(self.root.guard(), terms)
+
     def compiled(self, precision: Precision) -> Composite:
         """Its kernel."""
         parts = [
@@ -56,6 +61,10 @@ class Altered:
         ]
         steps = tuple(zip(parts, (t.does for t in self.terms), strict=True))
         return Composite(compile_scene(self.root, precision), steps)
+
+
+def _guarded(term: Term) -> Term:
+    return Term(term.shape.guard(), term.does) if isinstance(term.shape, Node) else term
 
 
 def _box(term: Term) -> Box:

@@ -87,5 +87,5 @@ def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
 def _fields(planned: Plan, work: Work) -> tuple[Kernel, Facts, Kernel]:
     """What is sampled, the facts of what is pruned by, and what is pruned by: mostly the same."""
     root = planned.root
-    guard = root.guard() if isinstance(root, Node) else root
+    guard = root.guard()
     return compile_for(work.device, root), guard.facts, compile_for(work.device, guard)
