@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..formulas import vocabulary
 from ..formulas.registry import Node
 from ..kernel import Compilable, compile_scene
 from ..kernel.cpu import Precision, lane_count, load_functions
-from ..kernel.linker import link
+from ..kernel.linker import Linked, link
 from ..kernel.loops import Loop
 
 FIND = Loop(
@@ -128,7 +129,11 @@ class Roots:
     def __init__(self, root: Node | Compilable, precision: Precision, voxel: float) -> None:
         self.dtype = np.dtype(precision)
         self._frame = np.array([1 / voxel, *FINEST[precision], REACH * voxel], self.dtype)
-        made = _linked(root, precision) if isinstance(root, Node) else _on_arrays(root, precision)
+        if isinstance(root, Node):
+            linked = link(root)
+            made = _compiled(linked.source, linked.parameters.tobytes(), precision)
+        else:
+            made = _on_arrays(root, precision)
         self.width, self._functions = made
 
     def padded(self, index: np.ndarray) -> np.ndarray:
@@ -160,10 +165,11 @@ def _places(rows: np.ndarray) -> Iterable[int]:
     return range(start, start + len(rows) * step, step)
 
 
-def _linked(root: Node, precision: Precision) -> tuple[int, dict[str, Run]]:
+@lru_cache(maxsize=32)
+def _compiled(source: str, numbers: bytes, precision: Precision) -> tuple[int, dict[str, Run]]:
     """How many lanes the compiled loops take at once, and these by name."""
-    linked, bits = link(root), np.dtype(precision).itemsize * 8
-    width, parameters = lane_count(bits), np.ascontiguousarray(linked.parameters, precision)
+    parameters = np.frombuffer(numbers).astype(precision)
+    bits = parameters.dtype.itemsize * 8
 
     def runs(function: Callable[..., None]) -> Run:
         def run(frame: np.ndarray, segments: np.ndarray, out: np.ndarray) -> None:
@@ -172,8 +178,9 @@ def _linked(root: Node, precision: Precision) -> tuple[int, dict[str, Run]]:
 
         return run
 
-    loops = (FIND,) if bits == 32 else (FIND, POLISH)
-    return width, {name: runs(f) for name, f in load_functions(linked, bits, width, loops).items()}
+    loops, width = (FIND,) if bits == 32 else (FIND, POLISH), lane_count(bits)
+    functions = load_functions(Linked(source, parameters), bits, width, loops)
+    return width, {name: runs(function) for name, function in functions.items()}
 
 
 def _on_arrays(root: Compilable, precision: Precision) -> tuple[int, dict[str, Run]]:
