@@ -4,6 +4,7 @@
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/FastSweeping.h>
 #include <openvdb/tools/LevelSetUtil.h>
+#include <openvdb/tools/Prune.h>
 #include <openvdb/tools/Statistics.h>
 #include <openvdb/tools/ValueTransformer.h>
 #include <openvdb/tools/VolumeToMesh.h>
@@ -43,12 +44,16 @@ FloatGrid::Ptr redistance(const FloatGrid& grid) {
 FloatGrid::Ptr offset(const FloatGrid& grid, double distance) {
     // Two voxels beyond the new surface, so that every cell it passes has samples at all corners.
     int reach = int(std::ceil(std::fabs(distance) / grid.voxelSize()[0])) + 2;
-    auto moved = openvdb::tools::dilateSdf(grid, reach);
+    // Only to the side that the surface moves to.
+    using openvdb::tools::FastSweepingDomain;
+    auto side = distance < 0 ? FastSweepingDomain::SWEEP_LESS_THAN_ISOVALUE : FastSweepingDomain::SWEEP_GREATER_THAN_ISOVALUE;
+    auto moved = openvdb::tools::dilateSdf(grid, reach, openvdb::tools::NN_FACE, 1, side);
     if (!moved) throw std::invalid_argument("the grid holds no surface");
     fit_background(*moved);
     float by = float(distance);
     openvdb::tools::foreach(moved->beginValueOn(), [by](const FloatGrid::ValueOnIter& v) { v.setValue(*v - by); });
     fit_background(*moved);
+    openvdb::tools::pruneLevelSet(moved->tree());
     return moved;
 }
 

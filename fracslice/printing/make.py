@@ -118,18 +118,22 @@ class _Run:
         if how.hollow:
             yield "hollowing", self.hollowed
 
-    def distances(self, length: float = np.inf) -> Grid:
-        """Distances around the object as it is, fine enough for a length in mm."""
+    def sampled(self, length: float = np.inf) -> Bricks:
+        """Samples of the object as it is, fine enough for a length in mm."""
         samples = min(max(COARSE, SHARP * self.size / length), FINE)
         if length < 2 * self.size / samples:
             least = 2 * self.size / samples
             raise VolumeError(f"{length:g} mm in {self.size:g} mm: expected at least {least:.3g} mm, or 0")
         lattice = Lattice.around(self.planned.outer, max(self.planned.box.size) / samples)
-        return to_grid(sample(compile_scene(self.thing), self.thing.facts, lattice, self.work)).redistance()
+        return sample(compile_scene(self.thing), self.thing.facts, lattice, self.work)
+
+    def distances(self, length: float) -> Grid:
+        """The same as distances."""
+        return to_grid(self.sampled(length)).redistance()
 
     def filled(self) -> Node | Compilable:
         """The space that nothing reaches becomes solid."""
-        solid = from_grid(self.distances())
+        solid = self.sampled()
         parts = parts_of(solid)
         if not len(parts.cavities):
             return self.thing
@@ -137,7 +141,7 @@ class _Run:
 
     def largest(self) -> Node | Compilable:
         """Only the largest body stays."""
-        solid = from_grid(self.distances())
+        solid = self.sampled()
         parts = parts_of(solid)
         if len(parts.bodies) == 1:
             return self.thing
@@ -145,7 +149,7 @@ class _Run:
 
     def bridged(self) -> Node | Compilable:
         """Struts between bodies, as few and as short as can be."""
-        solid = from_grid(self.distances())
+        solid = self.sampled()
         parts = parts_of(solid)
         bodies = parts.bodies[parts.count[parts.bodies] > DUST * parts.count[parts.inside].sum()]
         return self.added(*struts(solid, parts, bodies), self.how.bridge / self.scale / 2, solid)

@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..formulas import Node
+from ..errors import VolumeError
+from ..formulas import Box, Node
+from ..formulas.registry import Facts
 from ..kernel import Compilable, Kernel, compile_scene
-from ..volume import Lattice, sample
+from ..volume import Bricks, Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
 from .samples import Samples
@@ -61,9 +63,7 @@ def slender(root: Node | Compilable, seen: Samples, work: Work) -> Slender:
     """
     b, kernel = seen.bricks, compile_scene(root)
     bound, reach = root.facts.lipschitz, NEAR * b.voxel * root.facts.lipschitz
-    box = root.facts.box | seen.box
-    facts = replace(root.facts, box=box.grown(2 * reach))
-    raised = Samples(sample(Raised(kernel, reach), facts, Lattice.around(facts.box, b.voxel), work))
+    raised = Samples(_raised(Raised(kernel, reach), root.facts, root.facts.box | seen.box, b.voxel, work))
     start, axis = crossed(raised)
     normals = normals_at(raised, start)
     area = b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
@@ -80,6 +80,17 @@ def slender(root: Node | Compilable, seen: Samples, work: Work) -> Slender:
     facing = (_slopes(kernel, ends[0], least, work) * _slopes(kernel, ends[1], least, work)).sum(1)
     found = Walls(ends[0], ends[1], leave - enter[rays], area[rays])
     return Slender(found.chosen(facing < OPPOSITE), 0.0 if root.facts.weak else THIN * b.voxel)
+
+
+def _raised(kernel: Raised, facts: Facts, box: Box, voxel: float, work: Work) -> Bricks:
+    """Samples of a raised field: the flatter it is, the farther its inside reaches beyond the box."""
+    for times in (2, 8, 32):
+        try:
+            wide = replace(facts, box=box.grown(times * kernel.by))
+            return sample(kernel, wide, Lattice.around(wide.box, voxel), work)
+        except VolumeError as error:
+            failure = error
+    raise failure
 
 
 Along = Callable[[np.ndarray, np.ndarray], np.ndarray]

@@ -18,6 +18,7 @@ from fracslice.formulas import (
     cylinder,
     difference,
     julia,
+    mandelbulb,
     repeat,
     shell,
     sphere,
@@ -196,6 +197,15 @@ def test_walls_thinner_than_the_samples_are_thickened() -> None:
     after = measured(thin, thickness=1.5)
     assert np.quantile(after, (0.02, 0.5)) == pytest.approx([1.5, 1.5], abs=0.2)
     assert len(after) > 1000
+
+
+def test_fractals_are_thickened() -> None:
+    """Their values are far smaller than distances, so the raised field reaches far."""
+    volumes = []
+    for how in (Print(), Print(thickness=1.5)):
+        thing = scene(mandelbulb(iterations=6), size="40mm", printing=how)
+        volumes.append(make_mesh(thing, MeshJob(resolution=48)).report.mesh.volume_mm3)
+    assert volumes[1] > 1.005 * volumes[0]
 
 
 def test_time_is_linear_in_the_holes() -> None:
