@@ -68,7 +68,7 @@ def levels(
     steps = min(iterations, int(30 / math.log10(power)))
     last = 2 * math.log(bailout)
     escape = max(bailout, escaped ** (1 / power))
-    return last / power**steps, last, escape**2, bailout**2 * math.exp(-0.2 / bailout)
+    return last / power**steps, last, escape**2, bailout**2 * math.exp(-max(0.2 / bailout, 1e-4))
 
 
 def farthest(power: float, bailout: float, constant: float) -> float:

@@ -48,8 +48,14 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
 
     resolution: voxels along the object's longest side (need not be whole). Raises `VolumeError`.
     """
-    rough = resolve_depths(root, max(root.facts.box.size) / resolution) if root.facts.box.finite else root
-    found = extent(compile_scene(rough), rough.facts, work)
+    size, finite = max(root.facts.box.size), root.facts.box.finite
+    while True:
+        rough = resolve_depths(root, size / resolution) if finite else root
+        found = extent(compile_scene(rough), rough.facts, work)
+        # A step more makes a solid of a large bailout much smaller, and then its depth was chosen too low.
+        if rough is root or max(found.box.size) > size / 4:
+            break
+        size = max(found.box.size)
     voxel = max(found.box.size) / resolution
     return Plan(resolve_depths(root, voxel), found.box, found.outer, voxel)
 

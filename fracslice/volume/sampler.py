@@ -223,10 +223,11 @@ class _Run:
         chosen = np.unravel_index(rng.choice(far, min(FAR_AUDITS, len(far)), replace=False), state.shape)
         bricks = np.concatenate([near, np.stack(chosen, 1)]).astype(np.int32)
         points = bricks * BRICK + rng.integers(0, BRICK, bricks.shape)
-        inside = self.values_at(points, self.kernel) < 0
-        wrong = inside != (state[tuple(bricks.T)] != EMPTY)
+        inside, assumed = self.values_at(points, self.kernel) < 0, state[tuple(bricks.T)]
+        wrong = inside != (assumed != EMPTY)
         self.audited += len(bricks)
-        self.repaired += int(wrong.sum())
+        # A candidate is in doubt: what is outside in it is a pocket that nothing led to, and no bound denied.
+        self.repaired += int((wrong & (assumed != CANDIDATE)).sum())
         return distinct(bricks[wrong], state.shape)
 
     # --- the result -----------------------------------------------------------------------------------------

@@ -74,6 +74,16 @@ def test_steepening_is_per_length() -> None:
     assert union(half, sphere()).facts.steepening == pytest.approx(10)
 
 
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize(
+    "root", [mandelbulb(power=2, bailout=5e5, iterations=3), julia(bailout=1e6, iterations=4)]
+)
+def test_inside_is_inside_for_large_bailouts(root: Node, precision: Precision) -> None:
+    points = anywhere(5000)
+    inside = reference(root)(*points) < 0
+    assert inside.any() and ((compile_scene(root, precision).points(*points) < 0) == inside).all()
+
+
 @pytest.mark.parametrize("power", [2, 3, 8, 7.5, 12])
 def test_a_sure_distance_is_sure(power: float) -> None:
     """Two steps of z^p + c in the complex plane: no point nearer than that is moved by `apart`."""

@@ -10,10 +10,23 @@ import numpy as np
 import pytest
 
 from fracslice.errors import Cancelled, VolumeError
-from fracslice.formulas import Node, box, intersection, menger, plane, shell, sphere, transform, union
+from fracslice.formulas import (
+    Node,
+    box,
+    difference,
+    intersection,
+    mandelbulb,
+    menger,
+    plane,
+    repeat,
+    shell,
+    sphere,
+    transform,
+    union,
+)
 from fracslice.formulas.registry import Facts
 from fracslice.kernel import compile_scene
-from fracslice.volume import Bricks, Lattice, plan, sample, sample_scene
+from fracslice.volume import Bricks, Lattice, extent, plan, sample, sample_scene
 from fracslice.volume.bricks import INSIDE, OUTSIDE
 from fracslice.work import Work
 from tests.examples import EXAMPLES
@@ -100,6 +113,23 @@ def test_the_audit_finds_what_nothing_leads_to() -> None:
     lying = sample(kernel, Facts(root.facts.box, 0.05, False), lattice)
     assert truthful.repaired == 0 and lying.repaired > 0 and truthful.audited > 0
     assert len(lying) == len(truthful) and open_edges(lying) == 0
+
+
+def test_a_pocket_breaks_no_bound() -> None:
+    """Bubbles between the centres of bricks, in what cannot be recognised as inside from afar."""
+    bubbles = repeat(sphere(radius=0.03), period=(0.16, 0.16, 0.16), count=(5, 5, 5))
+    root, voxel = difference(box(size=(1.6, 1.6, 1.6)), bubbles), 0.02
+    lattice = Lattice((-0.89, -0.89, -0.89), voxel, (11, 11, 11))
+    bricks = sample(compile_scene(root), Facts(root.facts.box, 1.0, True), lattice)
+    inside, _ = unfolded(bricks)
+    assert bricks.repaired == 0 and not inside[10:78, 10:78, 10:78].all()
+
+
+def test_the_voxel_is_that_of_the_object() -> None:
+    """One step less and this one is 20 times as large."""
+    planned = plan(mandelbulb(power=2, bailout=5e5), 64)
+    own = extent(compile_scene(planned.root), planned.root.facts).box
+    assert max(own.size) / planned.voxel == pytest.approx(64, rel=0.05)
 
 
 def test_inside_is_not_filled() -> None:
