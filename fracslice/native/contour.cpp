@@ -227,10 +227,15 @@ class Contouring {
     // Fills in the normals of a cell's loop of crossings; returns whether two of them make a feature.
     static bool bent(const Cell& cell, const Data& data, Loop& loop) {
         const Case& type = kCases[cell.number];
-        bool found = false;
+        double least = 1;
         for (int a = 0; a < type.loop_length; ++a) {
             loop[a].normal = data[cell.at(type.loop[a])].normal;
-            for (int b = 0; b < a; ++b) found |= sharp(loop[a], loop[b]);
+            least = std::min(least, dot(loop[0].normal, loop[a].normal));
+        }
+        if (least > kHalfSharp) return false;
+        bool found = least < kSharp;
+        for (int a = 2; a < type.loop_length && !found; ++a) {
+            for (int b = 1; b < a; ++b) found |= sharp(loop[a], loop[b]);
         }
         return found;
     }

@@ -24,6 +24,9 @@ struct Crossing {
 // Unit normals further apart than this (25 degrees) make a feature; Kobbelt et al. 2001 use the same.
 constexpr double kSharp = 0.9;
 
+// The cosine of half that angle: normals all nearer to one of them make none.
+constexpr double kHalfSharp = 0.975;
+
 inline bool sharp(const Crossing& a, const Crossing& b) { return dot(a.normal, b.normal) < kSharp; }
 
 // The point of a cell nearest to all the planes, in the least squares sense and no further from their points' mean than
