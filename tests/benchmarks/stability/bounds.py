@@ -41,7 +41,7 @@ def rows(tries: int, wanted: str) -> Iterator[list[str]]:
             found = tried(name, tries)
             kind = "free ball" if root.facts.weak else "slope"
             points = f"{found.points:.2g}".replace("e+0", "e")
-            bound = f"{root.facts.lipschitz:.3g}"
+            bound = f"{root.guard().facts.lipschitz:.3g}"
             worst = f"{found.worst:.6f}" if found.worst else "< 0.5"
             yield [name, kind, bound, points, str(found.violations), worst]
 
