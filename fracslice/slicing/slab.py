@@ -1,18 +1,19 @@
 """A few neighbouring layers, from the field to the samples around their contours.
 
 The work is `fracslice._slices`; here is what it must know of a field. Top down, blocks of 64, 32 and 16
-pixels over all layers of the slab, of 8 over half of them, then of 8, 4 and 2 pixels in each layer are
-dropped where ``|f| > bound * reach`` at their middle says that no sample in them has the other sign. What is
-left is closed: where two neighbours differ in sign and one of them is only implied by a probe, it is
-evaluated. Every probe within a layer is a sample itself, so nothing is evaluated twice.
+pixels over all layers of the slab and of 8 over a few of them are dropped where ``|f| > bound * reach``
+at their middle says that no sample in them has the other sign. In the tiles of each layer that are left,
+samples in the middles of blocks of 4 and 2 pixels and single ones are evaluated, as long as no value
+reaches them. Then follows closure: where two neighbours differ in sign and one of them is only implied by
+another, it is evaluated. Nothing within a layer is evaluated twice.
 
-From 8 pixels up over several layers the bound is the formula's own, which is proven or measured with a
-margin. It is far from what escape-time fractals do: their values are a fifth of the distance outside and a
-fiftieth inside (means on Mandelbulbs and Julia sets), and going down to single pixels by it would cost more
-than the contours. In a scene of nothing else the blocks within a layer are dropped by how steep the field is
-there, but not below `LIKELY`; what is lost, specks of a pixel or two, is below 0.1 % of the area
-(tests/slicing/test_layers.py). Where a scene mixes them with other shapes, probing ends at blocks of `STOP`
-pixels instead, and parts smaller than that which touch no probe are not found.
+For 16 pixels and more the bound is the formula's own, which is proven or measured with a margin. It is
+far from what escape-time fractals do: their values are a fifth of the distance outside and a fiftieth
+inside (means on Mandelbulbs and Julia sets), and going down to single pixels by it would cost more than
+the contours. In a scene of nothing else smaller blocks are dropped by how steep the field is there, but
+not below `LIKELY`; what is lost, specks of a pixel or two, is below 0.1 % of the area
+(tests/slicing/test_layers.py). Where a scene mixes them with other shapes, probing ends at blocks of
+`STOP` pixels instead, and parts smaller than that which touch no probe are not found.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from ..formulas.registry import Facts, Node
 from ..kernel import Compilable, CpuKernel, Kernel
 
 LIKELY = 0.075, 0.01
-"""The least bounds within a layer of a fractal, outside and inside, as shares of its own."""
+"""The least bounds for small blocks of a fractal, outside and inside, as shares of its own."""
 
 STOP = 2, 4
 """Pixels, outside and inside."""

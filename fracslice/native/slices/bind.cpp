@@ -86,7 +86,8 @@ nb::bytes bind_deflated(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device
     std::vector<uint8_t> data;
     {
         nb::gil_scoped_release released;
-        data = deflated({const_cast<uint8_t*>(image.data()), int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)});
+        auto* first = const_cast<uint8_t*>(image.data());
+        data = deflated({first, int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)});
     }
     return bytes(data);
 }
@@ -135,7 +136,8 @@ NB_MODULE(_slices, module) {
         .def("__init__",
              [](Slab* self, std::shared_ptr<Memory> memory, std::shared_ptr<Field> field, const Bounds& bounds,
                 std::array<double, 4> f, std::vector<double> z, int ny, int nx) {
-                 new (self) Slab(std::move(memory), std::move(field), bounds, {f[0], f[1], f[2], f[3]}, std::move(z), ny, nx);
+                 const Frame frame{f[0], f[1], f[2], f[3]};
+                 new (self) Slab(std::move(memory), std::move(field), bounds, frame, std::move(z), ny, nx);
              },
              "memory"_a, "field"_a, "bounds"_a, "frame"_a, "z"_a, "ny"_a, "nx"_a)
         .def("sample", &Slab::sample, "layer"_a, nb::call_guard<nb::gil_scoped_release>())

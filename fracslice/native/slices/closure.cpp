@@ -15,13 +15,13 @@ int32_t Slab::add(int layer, int y, int x) {
 // Tiles said to be full beside ones said to be empty, where a bound is wrong.
 void Slab::mend(int layer) {
     for (int y = 1; y < ty_ - 1; ++y) {
-        const int32_t* row = spot(layer, y, 0);
+        const int32_t *row = spot(layer, y, 0), *below = row - tx_, *above = row + tx_;
         auto torn = [&](int x) {
-            bool beside = (row[x - 1] == kEmpty) | (row[x + 1] == kEmpty) | (row[x - tx_] == kEmpty) | (row[x + tx_] == kEmpty);
+            bool beside = (row[x - 1] == kEmpty) | (row[x + 1] == kEmpty) | (below[x] == kEmpty) | (above[x] == kEmpty);
             return (row[x] == kFull) & beside;
         };
-        int any = 0;
-        for (int x = 1; x < tx_ - 1; ++x) any |= torn(x);
+        int32_t any = 0;
+        for (int x = 1; x < tx_ - 1; ++x) any |= -int32_t(torn(x));
         for (int x = 1; any && x < tx_ - 1; ++x)
             if (torn(x)) add(layer, y, x);
     }

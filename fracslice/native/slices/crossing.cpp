@@ -7,23 +7,15 @@ namespace fracslice {
 namespace {
 
 constexpr size_t kFew = 128;
-
-// One sample in eight, one in each row of a tile; which ones follows the place.
-uint64_t eighth(const Place& p) {
-    uint64_t word = 0;
-    for (int row = 0, column = p.x + 5 * p.y; row < kTile; ++row, column += 3) word |= uint64_t(1) << (kTile * row + (column & 7));
-    return word;
-}
+constexpr int32_t kEvery = 8;
 
 }  // namespace
 
-// Crossed edges of the layer: all, or about an eighth.
+// Crossed edges of the layer: of all tiles, or of one in eight.
 std::vector<Slab::Edge> Slab::edges(bool all) const {
     std::vector<Edge> found;
-    for (int32_t t = first_; t < int32_t(count()); ++t)
-        crossed(t, all ? kAll : eighth(place[t]), [&](int number, float first, float second) {
-            found.push_back({t, number, first, second});
-        });
+    for (int32_t t = first_; t < int32_t(count()); t += all ? 1 : kEvery)
+        crossed(t, kAll, [&](int number, float first, float second) { found.push_back({t, number, first, second}); });
     return found;
 }
 
@@ -37,7 +29,8 @@ float Slab::inside_scale(int layer) {
     for (const Edge& e : some) {
         const Place& p = place[e.tile];
         double up = e.number >> 6;
-        spots.push_back({kTile * (p.x - 1) + (e.number & 7) + 0.5 * (1 - up), kTile * (p.y - 1) + (e.number >> 3 & 7) + 0.5 * up});
+        spots.push_back({kTile * (p.x - 1) + (e.number & 7) + 0.5 * (1 - up),
+                         kTile * (p.y - 1) + (e.number >> 3 & 7) + 0.5 * up});
     }
     std::vector<float> middles = values_at(layer, spots), quotients;
     for (const Edge& e : some) quotients.push_back(std::max(e.first, e.second) / -std::min(e.first, e.second));

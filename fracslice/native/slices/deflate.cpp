@@ -7,35 +7,24 @@
 namespace fracslice {
 namespace {
 
-constexpr int kLiterals = 256, kEnd = 256, kSymbols = 286, kMostBits = 15;
-constexpr int kShortest = 3, kWhole = 258;  // bytes that a match repeats
+constexpr int kEnd = 256, kSymbols = 286, kMostBits = 15;
+constexpr uint32_t kMost = (1 << 23) - 1;     // longest matches of a part
 constexpr uint32_t kModulus = 65521;
-
-// What of a run is literals and what matches: one(), whole(n) matches of 258 bytes, match(length).
-template <class One, class Whole, class Match>
-inline void split(uint32_t length, const One& one, const Whole& whole, const Match& match) {
-    one();
-    if (--length >= kWhole) whole(length / kWhole), length %= kWhole;
-    if (length >= kShortest)
-        match(length);
-    else
-        for (; length; --length) one();
-}
 
 // The code of a length: a symbol, and bits after it.
 struct Length {
     uint16_t symbol;
     uint8_t extra, bits;
 };
-const std::array<Length, kWhole + 1> kLengths = [] {
-    std::array<Length, kWhole + 1> lengths{};
+const std::array<Length, kLongest + 1> kLengths = [] {
+    std::array<Length, kLongest + 1> lengths{};
     uint16_t symbol = kEnd + 1;
-    for (int length = kShortest, wide = 0; length < kWhole; ++symbol) {
+    for (int length = kShortest, wide = 0; length < kLongest; ++symbol) {
         // Four symbols for each number of extra bits, eight for none.
         wide = std::max(0, (symbol - kEnd - 1) / 4 - 1);
-        for (int i = 0; i < 1 << wide && length < kWhole; ++i, ++length) lengths[length] = {symbol, uint8_t(wide), uint8_t(i)};
+        for (int i = 0; i < 1 << wide && length < kLongest; ++i, ++length) lengths[length] = {symbol, uint8_t(wide), uint8_t(i)};
     }
-    lengths[kWhole] = {kSymbols - 1, 0, 0};
+    lengths[kLongest] = {kSymbols - 1, 0, 0};
     return lengths;
 }();
 
@@ -106,6 +95,13 @@ class Bits {
         word_ >>= size_ / 8 * 8;
         size_ %= 8;
     }
+    void repeat(const Code& code, uint32_t n) {
+        Code many{0, 0};
+        const uint32_t at_once = 56 / code.size;
+        for (uint32_t i = 0; i < at_once; ++i) many = many.then(code.bits, code.size);
+        for (; n >= at_once; n -= at_once) put(many);
+        for (; n; --n) put(code);
+    }
     uint8_t* end() {
         if (size_) put({0, 8 - size_});
         return out_;
@@ -136,60 +132,77 @@ void put_head(Bits& out, const Sizes& sizes) {
     put_size(1);
 }
 
+// With d_i the n bytes: 1 + sum d_i, and n + sum (n - i) d_i, modulo 65521 (RFC 1950), run by run.
+class Adler {
+ public:
+    void add(uint64_t value, uint64_t length) {
+        sum_ += value * length;
+        weighted_ += value * (length * at_ + length * (length - 1) / 2);
+        at_ += length;
+        if (++adds_ % 1024 == 0 || length > kLongest) sum_ %= kModulus, weighted_ %= kModulus, at_ %= kModulus;
+    }
+    uint32_t value() const {
+        const uint64_t sum = sum_ % kModulus, at = at_ % kModulus;
+        return uint32_t((at + at * sum + kModulus - weighted_ % kModulus) % kModulus << 16 | (1 + sum) % kModulus);
+    }
+
+ private:
+    uint64_t at_ = 0, sum_ = 0, weighted_ = 0;  // modulo 65521, now and then
+    uint32_t adds_ = 0;
+};
+
 }  // namespace
+
+void Runs::split() {
+    if (!length_) return;
+    uint64_t more = length_ - 1, longest = more / kLongest;
+    more %= kLongest;
+    for (; more > 0 && more < kShortest; --more) parts_.push_back({value_, 0, 0});
+    parts_.push_back({value_, uint32_t(more), 0});
+    for (; longest > 0; longest -= std::min<uint64_t>(longest, kMost))
+        parts_.push_back({value_, uint32_t(std::min<uint64_t>(longest, kMost)), 1});
+}
 
 std::vector<uint8_t> Runs::zlib() {
     close();
+    std::array<uint32_t, 256> literals{};
+    std::array<uint64_t, kLongest + 1> matches{};
+    Adler sum;
+    for (const Part& part : parts_) {
+        literals[part.value] += !part.longest;
+        matches[part.longest ? kLongest : part.more] += part.longest ? part.more : 1;
+        sum.add(part.value, part.length());
+    }
     Counts counts{};
     counts[kEnd] = 1;
-    for (const Run& run : runs_)
-        split(run.length, [&] { ++counts[run.value]; }, [&](uint32_t n) { counts[kSymbols - 1] += n; },
-              [&](uint32_t length) { ++counts[kLengths[length].symbol]; });
+    std::copy(literals.begin(), literals.end(), counts.begin());
+    for (int length = kShortest; length <= kLongest; ++length) counts[kLengths[length].symbol] += matches[length];
     const Sizes sizes = sizes_of(counts);
     const std::array<Code, kSymbols> codes = codes_of(sizes);
-    std::array<Code, kWhole + 1> matches;
-    for (int length = kShortest; length <= kWhole; ++length) {
+    std::array<Code, kLongest + 1> again{};  // none of no length
+    for (int length = kShortest; length <= kLongest; ++length) {
         const Length& l = kLengths[length];
-        matches[length] = codes[l.symbol].then(l.bits, l.extra).then(0, 1);
+        again[length] = codes[l.symbol].then(l.bits, l.extra).then(0, 1);
     }
-    Code many{0, 0};  // as many whole matches as are put at once
-    uint32_t at_once = matches[kWhole].size ? 56 / matches[kWhole].size : 1;
-    for (uint32_t i = 0; i < at_once; ++i) many = many.then(matches[kWhole].bits, matches[kWhole].size);
 
     uint64_t bits = 8 * 256;
     for (int s = 0; s < kSymbols; ++s) bits += counts[s] * (sizes[s] + 6);
     std::vector<uint8_t> data(bits / 8);
     Bits out(data.data());
     put_head(out, sizes);
-    for (const Run& run : runs_)
-        split(run.length, [&] { out.put(codes[run.value]); },
-              [&](uint32_t n) {
-                  for (; n >= at_once; n -= at_once) out.put(many);
-                  for (; n; --n) out.put(matches[kWhole]);
-              },
-              [&](uint32_t length) { out.put(matches[length]); });
+    for (const Part& part : parts_) {
+        if (part.longest) {
+            out.repeat(again[kLongest], part.more);
+        } else {
+            const Code &first = codes[part.value], &rest = again[part.more];
+            out.put(first.then(rest.bits, rest.size));
+        }
+    }
     out.put(codes[kEnd]);
     uint8_t* end = out.end();
-    uint32_t sum = adler();
-    for (int shift = 24; shift >= 0; shift -= 8) *end++ = uint8_t(sum >> shift);
+    for (int shift = 24; shift >= 0; shift -= 8) *end++ = uint8_t(sum.value() >> shift);
     data.resize(size_t(end - data.data()));
     return data;
-}
-
-// With d_i the bytes: 1 + sum d_i, and n + sum (n - i) d_i (RFC 1950), run by run.
-uint32_t Runs::adler() const {
-    uint64_t at = 0, sum = 0, weighted = 0;  // `at` and the sums modulo 65521, now and then
-    int n = 0;
-    for (const Run& run : runs_) {
-        uint64_t length = run.length, value = run.value;
-        sum += value * length;
-        weighted += value * (length * at + length * (length - 1) / 2);
-        at += length;
-        if (++n % 1024 == 0 || length > kWhole) sum %= kModulus, weighted %= kModulus, at %= kModulus;
-    }
-    sum %= kModulus, weighted %= kModulus, at %= kModulus;
-    uint64_t second = (at + at * sum + kModulus - weighted) % kModulus;
-    return uint32_t(second << 16 | (1 + sum) % kModulus);
 }
 
 }  // namespace fracslice

@@ -50,14 +50,15 @@ struct Axis {
 // Eight rows of a picture between the first and the last tile: which pixels are wholly inside, which are cut, and how much.
 class Band {
  public:
-    explicit Band(int tiles) : stride_(tiles / 8 * 8 + 8), whole_(kTile * stride_), cut_(kTile * stride_), levels_(64 * tiles) {}
+    explicit Band(int tiles)
+        : stride_(tiles / 8 * 8 + 8), whole_(kTile * stride_), cut_(kTile * stride_), levels_(64 * (tiles + 1)) {}
 
     void clear() {
         std::fill(whole_.begin(), whole_.end(), 0), std::fill(cut_.begin(), cut_.end(), 0);
-        for (int row = 0; row < kTile; ++row) end_[row] = &levels_[row * levels_.size() / kTile];
+        for (int row = 0; row < kTile; ++row) end_[row] = &levels_[row * (levels_.size() / kTile)];
     }
-    void fill(int tile) {
-        for (int row = 0; row < kTile; ++row) whole_[row * stride_ + tile] = 255;
+    void fill(int tile, int n) {
+        for (int row = 0; row < kTile; ++row) std::memset(&whole_[row * stride_ + tile], 255, size_t(n));
     }
     void put(int tile, uint64_t whole, uint64_t cut) {
         for (int row = 0; row < kTile; ++row) {
@@ -65,11 +66,17 @@ class Band {
             cut_[row * stride_ + tile] = uint8_t(cut >> kTile * row);
         }
     }
-    // Of the next cut pixel of a row.
-    void push(int row, uint8_t level) { *end_[row]++ = level; }
+    // The levels of cut pixels of the next tile.
+    void push(uint64_t cut, const uint8_t* levels) {
+        for (int row = 0; row < kTile; ++row) {
+            const int n = __builtin_popcountll(cut >> kTile * row & 0xFF);
+            std::memcpy(end_[row], levels, kTile);
+            end_[row] += n, levels += n;
+        }
+    }
 
     void write(int row, int first, int last, Runs& runs) const {
-        const uint8_t* level = &levels_[row * levels_.size() / kTile];
+        const uint8_t* level = &levels_[row * (levels_.size() / kTile)];
         uint64_t whole_before = 0, cut_before = 0;
         uint8_t value = 0;
         int begin = first;  // of the run of this value
@@ -86,7 +93,10 @@ class Band {
             each(changes, [&](int bit) {
                 runs.add(value, uint64_t(at + bit - begin));
                 begin = at + bit;
-                value = cut >> bit & 1 ? *level++ : whole >> bit & 1 ? 255 : 0;
+                const bool is_cut = cut >> bit & 1;
+                const uint8_t filled = uint8_t(-(whole >> bit & 1));
+                value = is_cut ? *level : filled;
+                level += is_cut;
             });
         }
         runs.add(value, uint64_t(last - begin));
@@ -137,19 +147,27 @@ class Shown {
 
     // Reads the tiles of eight rows; false if they are empty.
     bool read(int tile) {
-        const int along = down_.tiles - tile;  // as counted in the slab
+        const int along = down_.tiles - tile, step = view_.backwards ? -1 : 1;
+        auto place = [&](int i) {
+            const int beside = view_.backwards ? across_.tiles - i : i + 1;
+            return view_.transposed ? Place{layer_, beside, along} : Place{layer_, along, beside};
+        };
+        const Place p = place(0);
+        const int32_t* at = slab_.spot(p.layer, p.y, p.x);
+        const ptrdiff_t next = step * (view_.transposed ? slab_.columns() : 1);
+        const int n = across_.tiles;
         bool any = false;
         band_.clear();
-        for (int i = 0; i < across_.tiles; ++i) {
-            int beside = view_.backwards ? across_.tiles - i : i + 1;
-            Place p = view_.transposed ? Place{layer_, beside, along} : Place{layer_, along, beside};
-            int32_t t = slab_.at(p.layer, p.y, p.x);
-            if (t == kEmpty) continue;
-            any = true;
-            if (t == kFull)
-                band_.fill(i), painted_.area += kTile * kTile;
+        for (int i = 0; i < n;) {
+            const int32_t t = at[next * i];
+            int end = i + 1;
+            if (t >= kTiles)
+                read(place(i), t, i);
             else
-                read(p, t, i);
+                while (end < n && at[next * end] == t) ++end;
+            if (t == kFull) band_.fill(i, end - i), painted_.area += kTile * kTile * (end - i);
+            any |= t != kEmpty;
+            i = end;
         }
         return any;
     }
@@ -159,15 +177,23 @@ class Shown {
         const uint64_t sharp = slab_.sharp[t], whole = corners.whole() & ~sharp, cut = turn_(corners.mixed() | sharp);
         band_.put(i, turn_(whole), cut);
         const Cells cells(slab_, p);
+        float areas[64];
+        uint8_t levels[64 + kTile];
+        int n = 0;
+        each(cut, [&](int bit) { areas[n++] = cells.area(turn_.from(bit), corners.signs(turn_.from(bit))); });
+        if (sharp) sharpen(t, cut, areas);
         float inside = float(__builtin_popcountll(whole));
-        each(cut, [&](int bit) {
-            int from = turn_.from(bit);
-            float area = coverage(slab_, cells, t, from, corners.signs(from));
-            band_.push(bit >> 3, view_.levels[uint8_t(255 * area + 0.5f)]);
-            inside += area;
-        });
+        for (int i = 0; i < n; ++i) inside += areas[i], levels[i] = view_.levels[uint8_t(255 * areas[i] + 0.5f)];
+        band_.push(cut, levels);
         painted_.area += inside;
-        painted_.partly += __builtin_popcountll(cut);
+        painted_.partly += n;
+    }
+
+    void sharpen(int32_t t, uint64_t cut, float* area) const {
+        each(cut, [&](int bit) {
+            *area = slab_.sharpened(t, turn_.from(bit), *area);
+            ++area;
+        });
     }
 
     const Slab& slab_;

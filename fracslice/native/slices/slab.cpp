@@ -8,10 +8,11 @@
 namespace fracslice {
 namespace {
 
-constexpr int kCoarsest = 8;  // tiles along a block of the first level
-constexpr int32_t kChunk = 256;   // tiles that stay in a near cache
+constexpr int kCoarsest = 8;        // tiles along a block of the first level
+constexpr int32_t kChunk = 256;     // tiles that stay in a near cache
 constexpr double kSteep = 0.7;
-constexpr double kThick = 2.2;     // pixels from the middle of a group to its last layer, at most
+constexpr double kAside = 1.25;      // how much farther a likely bound must reach into layers aside
+constexpr double kThick = 2.2;       // pixels from the middle of a group to its last layer, at most
 constexpr double kSurely = 0.99999;  // squared distances are rounded
 constexpr int kMiddle = kTile * kTile / 2 + kTile / 2;
 
@@ -131,7 +132,8 @@ void Slab::fill(const Block& block) {
 // The places whose middle, halfway between two layers, leaves open what is around it in them and between.
 std::vector<Slab::Column> Slab::columns(int first, int last) {
     double height = (z_[last] - z_[first]) / 2;
-    double reach = length(length(frame_.dx, frame_.dy) * kTile / 2, height);
+    const double margin = bounds_.even ? kAside : 1;
+    double reach = margin * length(length(frame_.dx, frame_.dy) * kTile / 2, height);
     std::vector<float> middles(size_t(ty_) * tx_, NAN);
     auto where = [&](size_t i, double& column, double& row, double& z) {
         column = (blocks_[i].x - 0.5) * kTile, row = (blocks_[i].y - 0.5) * kTile, z = z_[first] + height;
@@ -170,7 +172,7 @@ void Slab::begin(int layer, double height) {
         reach[t] = factor(c.outside, frame_);
         inside[t] = c.value < 0 ? kAll : 0;
         float d2 = c.value * c.value * (c.value < 0 ? inside_reach : reach[t]) - aside;
-        if (d2 > 0) decided[t] = discs_(d2, kMiddle);
+        if (d2 > 0 && !bounds_.even) decided[t] = discs_(d2, kMiddle);
         if (height == 0) {
             known[t] = uint64_t(1) << kMiddle, decided[t] |= known[t];
             values[t][kMiddle] = c.value;

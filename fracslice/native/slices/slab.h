@@ -1,5 +1,6 @@
 // The samples around the contours of a few neighbouring layers, from the field.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -29,12 +30,12 @@ struct Frame {
     double x0, y0, dx, dy;
 };
 
-// How far a value reaches: a block is decided where |f| exceeds a bound times the distance to its farthest sample.
+// How far a value reaches: what is nearer than |f| over a bound has its sign.
 struct Bounds {
-    double proven;           // for blocks of 16 pixels and more, and whole tiles if nothing better is known
-    double outside, inside;  // for tiles and what is in them, by the value's sign
+    double proven;           // for blocks of 16 pixels and more, and of 8 if nothing better is known
+    double outside, inside;  // for smaller ones, by the value's sign
     int stop_outside, stop_inside;  // blocks of so many samples are not cut any more
-    bool even;  // a fractal: values inside are of another scale than outside, one in the whole slab; see `halve`
+    bool even;  // a fractal: values inside are of another scale than outside, of one scale in a layer, see `inside_scale`
 };
 
 // A place on the lattice.
@@ -85,7 +86,10 @@ class Slab : public Tiles {
     std::vector<std::array<int32_t, 2>> span;
     // How many times smaller inside values are than outside ones in each layer; 0 where `cross` says where edges are crossed.
     std::vector<float> scale;
-    float tip(int32_t tile, int bit) const;
+    // The inside area of a cell with the corner that it has.
+    float sharpened(int32_t tile, int bit, float area) const {
+        return sharp[tile] >> bit & 1 ? std::clamp(area + tip(tile, bit), 0.f, 1.f) : area;
+    }
     int64_t evaluations = 0;
 
  private:
@@ -142,6 +146,7 @@ class Slab : public Tiles {
     float inside_scale(int layer);
     void settle(int layer, const std::vector<Edge>& edges);
     void sharpen(int layer);
+    float tip(int32_t tile, int bit) const;
     void put_tip(int layer, int row, int column, float area);
 
     std::shared_ptr<Memory> memory_;

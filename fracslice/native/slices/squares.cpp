@@ -27,7 +27,7 @@ void fill(const Canvas& canvas, int y0, int x0, uint64_t whole) {
 }
 
 // The outline of a cell's inside, counter-clockwise, leaves along one edge and comes back along another.
-void link(const std::array<float, 4>& sides, int signs, const int32_t* e, std::vector<Crossing>& edges) {
+void link(const Sides& sides, int signs, const int32_t* e, std::vector<Crossing>& edges) {
     bool alone = (signs == 5 && !Cells::joined(sides, 0)) || (signs == 10 && !Cells::joined(sides, 1));
     for (int q = 0; q < 4; ++q) {
         int g = (q + 1) & 3;
@@ -69,7 +69,7 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
             for (uint64_t mixed = t >= kTiles ? corners.mixed() | sharp : 0; mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed), r = y0 + (bit >> 3), c = x0 + (bit & 7);
                 if (r >= canvas.rows || c >= canvas.columns) continue;
-                float area = coverage(slab, cells, t, bit, corners.signs(bit));
+                float area = slab.sharpened(t, bit, cells.area(bit, corners.signs(bit)));
                 canvas.data[r * canvas.down + c * canvas.across] = uint8_t(255 * area + 0.5f);
                 painted.area += area;
                 ++painted.partly;
