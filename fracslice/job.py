@@ -153,7 +153,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         refuse_what_does_not_fit(scene, voxels, what.size(scene), work)
         planned, scale = plan(scene.root, voxels, work), None
     if not how.whole:
-        from .printing import printable  # it needs Numba, whose import takes as long as a small mesh
+        from .printing import printable
 
         with clock("changing"):
             size_of = partial(_mesh_box, what=what, how=how, size=what.size(scene), work=work)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from ..formulas import Box, Node, difference, intersection, union
 from ..formulas.registry import Facts
 from ..kernel import Compilable, Kernel, compile_scene
 from ..kernel.cpu import Precision
-from .samples import LIPSCHITZ, Samples
+
+if TYPE_CHECKING:
+    from .samples import Samples  # it needs Numba, whose import takes as long as a small mesh
 
 Does = Literal["cut", "add", "keep"]
 _FOLDED = {"cut": difference, "add": union, "keep": intersection}
@@ -44,7 +46,9 @@ class Altered:
     def facts(self) -> Facts:
         """Of all together; the box encloses what is added."""
         added = [_box(term) for term in self.terms if term.does == "add"]
-        slopes = [t.shape.facts.lipschitz if isinstance(t.shape, Node) else LIPSCHITZ for t in self.terms]
+        slopes = [
+            t.shape.facts.lipschitz if isinstance(t.shape, Node) else t.shape.lipschitz for t in self.terms
+        ]
         own = self.root.facts
         box = reduce(Box.__or__, added, own.box)
         return Facts(box, max(own.lipschitz, *slopes), own.weak)

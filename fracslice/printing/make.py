@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,12 +21,11 @@ from ..volume import Bricks, Lattice, Plan, extent, sample
 from ..volume.grid import from_grid, to_grid
 from ..work import Work
 from .altered import altered
-from .bridges import struts
-from .parts import Parts, parts_of
-from .samples import Samples, positions, with_signs
-from .slender import slender
-from .strokes import strokes
-from .walls import walls
+
+# What measures needs Numba and SciPy, which take as long to load as a small mesh: only where it is used.
+if TYPE_CHECKING:
+    from .parts import Parts
+    from .samples import Samples
 
 COARSE, FINE = 128, 640
 """Samples along the longest side that distances are measured on, at least and at most."""
@@ -133,6 +133,8 @@ class _Run:
 
     def filled(self) -> Node | Compilable:
         """The space that nothing reaches becomes solid."""
+        from .parts import parts_of
+
         solid = self.sampled()
         parts = parts_of(solid)
         if not len(parts.cavities):
@@ -141,6 +143,8 @@ class _Run:
 
     def largest(self) -> Node | Compilable:
         """Only the largest body stays."""
+        from .parts import parts_of
+
         solid = self.sampled()
         parts = parts_of(solid)
         if len(parts.bodies) == 1:
@@ -149,6 +153,9 @@ class _Run:
 
     def bridged(self) -> Node | Compilable:
         """Struts between bodies, as few and as short as can be."""
+        from .bridges import struts
+        from .parts import parts_of
+
         solid = self.sampled()
         parts = parts_of(solid)
         bodies = parts.bodies[parts.count[parts.bodies] > DUST * parts.count[parts.inside].sum()]
@@ -156,6 +163,9 @@ class _Run:
 
     def closed(self) -> Node | Compilable:
         """Gaps are filled from face to face."""
+        from .samples import Samples
+        from .walls import walls
+
         solid = Samples(from_grid(self.distances(self.how.gap)))
         found = walls(solid, self.how.gap / self.scale, self.work, gaps=True)
         one = _apart(found.middle, solid.bricks.voxel)
@@ -166,6 +176,10 @@ class _Run:
         with such a ball would take away (Serra 1982), along the part of the medial axis between opposite
         faces.
         """
+        from .samples import Samples
+        from .slender import slender
+        from .walls import walls
+
         solid, least = Samples(from_grid(self.distances(self.how.thickness))), self.how.thickness / self.scale
         thin = slender(self.thing, solid, self.work)
         middle = thin.beside(walls(solid, least, self.work), least).middle
@@ -174,11 +188,15 @@ class _Run:
 
     def added(self, start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Node | Compilable:
         """With strokes, if there are any."""
+        from .strokes import strokes
+
         self.planned = replace(self.planned, outer=self.planned.outer.grown(2 * radius))
         return altered(self.thing, "add", strokes(start, end, radius, like)) if len(start) else self.thing
 
     def hollowed(self) -> Node | Compilable:
         """Everything farther inside than the walls are thick is taken away, and two holes made."""
+        from .samples import Samples, positions
+
         hollow = from_grid(self.distances(self.how.hollow).offset(-self.how.hollow / self.scale))
         rows, offsets = np.nonzero((hollow.values < 0) & (hollow.values > -hollow.voxel))
         if not len(rows):
@@ -217,6 +235,8 @@ def _nearer(solid: Bricks, parts: Parts, these: np.ndarray, others: np.ndarray) 
     """Negative where it is nearer to these parts than to the others: half the difference of the distances. So
     the border lies midway between them, and the surfaces of both stay as they are.
     """
+    from .samples import Samples, positions, with_signs
+
     near, far = (
         Samples(from_grid(to_grid(with_signs(solid, *parts.masks(p))).redistance())) for p in (these, others)
     )

@@ -25,6 +25,8 @@ class Samples:
     distance, with its sign, from how many bricks away the nearest samples are. May be used from many threads.
     """
 
+    lipschitz = LIPSCHITZ
+
     def __init__(self, bricks: Bricks) -> None:
         self.bricks = bricks
         self.bounds = _bounds(bricks)

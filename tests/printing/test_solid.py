@@ -4,6 +4,8 @@ of them; meshes and slices of the same scene agree.
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -249,6 +251,18 @@ def test_layers_are_as_large_as_asked() -> None:
     points = next(Slicer(stack).map(lambda layer: layer.contours.points, [len(stack.z) // 2]))
     np.testing.assert_allclose(np.ptp(points, axis=0), stack.size[:2], atol=2e-3)
     assert max(stack.size) == pytest.approx(40, abs=1e-3)
+
+
+def test_a_base_loads_no_numba() -> None:
+    code = """
+import sys
+from fracslice import MeshJob, make_mesh
+from fracslice.formulas import sphere
+from fracslice.scene import Print, scene
+make_mesh(scene(sphere(), size="20mm", printing=Print(base=1, raft=1)), MeshJob(resolution=32))
+print("numba" in sys.modules)"""
+    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert said.stdout == "False\n"
 
 
 def test_a_raft_that_no_voxel_holds_is_refused() -> None:
