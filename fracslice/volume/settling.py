@@ -19,8 +19,8 @@ NEAR = 1e-6
 FLAT = 0.1
 """Slopes below this are taken for it, so that no step is longer than ten times |f|."""
 
-REACH = 1e-2
-"""The differences' step, in voxels: float32 tells it."""
+REACH = 1e-4
+"""The step of the differences, in voxels. They are central, so that at an edge neither side is preferred."""
 
 
 TIGHT = 1e-6
@@ -53,9 +53,9 @@ def settle(
     comes no nearer stays, and so does what lies on the surface already, such as an exact corner. Returns the
     numbers of those that did not, int64 [k], and where they are now, float64 [k, 3].
     """
-    kernel, work = compile_scene(root, "float32"), work or Work()
+    kernel, work = compile_scene(root, "float64"), work or Work()
     guess, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-    values = values_at(compile_scene(root, "float64"), points.T, work)
+    values = values_at(kernel, points.T, work)
     away = np.flatnonzero(np.abs(values) > NEAR * voxel)
     settled = np.empty((len(away), 3))
 
@@ -86,9 +86,10 @@ def anywhere(which: np.ndarray, inside: np.ndarray) -> Rooms:
 def _ends(kernel: Kernel, p: np.ndarray, f: np.ndarray, room: Rooms, voxel: float) -> np.ndarray:
     """How far points [3, n] with these values are to be looked at, [3, n]."""
     x, y, z = p
-    reach, start = REACH * voxel, kernel.points(x, y, z)
-    ahead = kernel.points(x + reach, y, z), kernel.points(x, y + reach, z), kernel.points(x, y, z + reach)
-    slope = (np.stack(ahead) - start) / reach
+    e = REACH * voxel
+    ahead = kernel.points(x + e, y, z), kernel.points(x, y + e, z), kernel.points(x, y, z + e)
+    behind = kernel.points(x - e, y, z), kernel.points(x, y - e, z), kernel.points(x, y, z - e)
+    slope = (np.stack(ahead) - np.stack(behind)) / (2 * e)
     space = np.where((slope > 0) == (f < 0), room.high - p, p - room.low)
     slope *= space > TIGHT * voxel
     step = slope * (-4 * f / np.maximum((slope * slope).sum(0), FLAT**2))
