@@ -1,4 +1,4 @@
-"""Marching cubes: closed, manifold and without crossings whatever the samples, and right where it is known."""
+"""Marching cubes: closed, manifold and without crossings whatever the samples, right where it is known."""
 
 from __future__ import annotations
 
