@@ -16,8 +16,9 @@ def summary(path: str, report: Report) -> str:
         done = report.simplified
         off = max(done.bound_mm, done.back_mm)
         fewer = f"simplified from {done.from_triangles:,} triangles, at most {off:.3g} mm off\n"
+    notes = "".join(f"{note}\n" for note in report.notes)
     return (
-        f"{path}: {found(report.mesh)}\n"
+        f"{path}: {found(report.mesh)}\n{notes}"
         f"{fewer}vertices {error.mean * 1000:.2g} um from the surface (99 %: {error.p99 * 1000:.2g} um), "
         f"voxel {report.voxel_mm:.3g} mm, {report.seconds['total']:.1f} s, {report.peak_rss_mb:.0f} MB"
     )

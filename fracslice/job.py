@@ -189,6 +189,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         seconds=clock.seconds,
         peak_rss_mb=peak_rss_mb(),
         simplified=simplified,
+        notes=planned.notes,
     )
     return Result(mesh, report, bricks, planned.root, place)
 

@@ -22,7 +22,9 @@ class SurfaceError:
 
 @dataclass(frozen=True)
 class Report:
-    """What was made, how good it is and what it took. seconds: of each stage, and in total."""
+    """What was made, how good it is and what it took. seconds: of each stage, and in total. notes: what the
+    voxel was too large for, in words.
+    """
 
     scene: str
     scene_hash: str
@@ -37,6 +39,7 @@ class Report:
     seconds: dict[str, float]
     peak_rss_mb: float
     simplified: Simplified | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def problems(self) -> tuple[str, ...]:

@@ -92,6 +92,7 @@ def stream_mesh(
         bricks=len(signs),
         seconds=clock.seconds,
         peak_rss_mb=peak_rss_mb(),
+        notes=planned.notes,
     )
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from .box import Box
 from .parameters import Count
 from .registry import Node, shape
 from .vocabulary import absolute, floor, maximum, minimum, orbit, sqrt
 
 
-@shape(level=Count(3, "how many times holes are cut; level 0 is a cube", most=20))
+@shape(level=Count(3, "how often holes are cut; meshes and layers stop at bars of a voxel", most=20))
 def menger(x, y, z, level):  # type: ignore[no-untyped-def]
     """The Menger sponge of any level in the cube [-1, 1]^3.
 
@@ -53,3 +55,14 @@ def menger(x, y, z, level):  # type: ignore[no-untyped-def]
 @menger.bounds
 def _(node: Node) -> Box:
     return Box.centred(1.0)
+
+
+@menger.visible
+def _(node: Node, voxel: float) -> Node:
+    """The deepest level whose bars, a cell wide, are wider than a voxel: thinner ones fall between samples.
+
+    The sponge has all edges of its cells, so that no point of the solid shown is farther than sqrt(2) / 6
+    cells, 0.71 voxels, from the one meant.
+    """
+    deepest = max(math.ceil(math.log(2.0 / voxel, 3.0) - 1e-6) - 1, 0)
+    return node if node["level"] <= deepest else node.changed(level=deepest)

@@ -51,7 +51,7 @@ class Facts:
     steepening: float = 0.0
 
 
-Hook = Callable[["Node"], Any]
+Hook = Callable[..., Any]
 
 
 @dataclass(eq=False)
@@ -126,6 +126,10 @@ class Formula:
     def identity(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
         """True if the node changes nothing and can be left out."""
         return self._hook("identity", hook)
+
+    def visible(self, hook: Callable[[Node, float], Node]) -> Callable[[Node, float], Node]:
+        """The node with no more detail than voxels of a size in its own units can show."""
+        return self._hook("visible", hook)
 
     def check(self, hook: Callable[[Node], None]) -> Callable[[Node], None]:
         """Raises `SceneError` for values that are possible alone but not together."""
@@ -212,6 +216,13 @@ class Node:
         """The function to compile for this node."""
         hook = self.formula.hooks.get("select")
         return hook(self) if hook else self.formula.function
+
+    def visible(self, voxel: float) -> Node:
+        """This node without detail that a voxel, in its own units, is too large for; its children as they
+        are.
+        """
+        hook = self.formula.hooks.get("visible")
+        return hook(self, voxel) if hook else self
 
     @property
     def is_identity(self) -> bool:

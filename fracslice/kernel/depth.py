@@ -1,4 +1,4 @@
-"""``iterations="auto"``: the depth of an escape-time fractal whose finest detail is about a voxel."""
+"""How deep a fractal is for a voxel: ``iterations="auto"``, and levels that are too fine to be shown."""
 
 from __future__ import annotations
 
@@ -21,12 +21,35 @@ def resolve_depths(root: Node, voxel: float) -> Node:
     surface by less than half a voxel (its own, where a transform scales it). Deeper detail is smaller than
     the samples can show.
     """
-    if root.formula.name == "transform":
-        voxel = voxel / float(np.linalg.svd(affine(root)[0], compute_uv=False)[-1])
+    voxel = _within(root, voxel)
     children = tuple(resolve_depths(child, voxel) for child in root.children)
     if AUTO in (v for v in root.values.values() if isinstance(v, str)):
         return root.changed(iterations=_depth(root, voxel))
     return root if children == root.children else root.changed(children)
+
+
+def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
+    """The scene without parts that fall between samples a voxel apart, and what was left out of it, in words.
+
+    What a formula says of itself (`Node.visible`); seams, walls and bends around it are not looked at.
+    """
+    found = root.visible(voxel)
+    told = [
+        f"{root.formula.name}: {name} {found[name]} of {value}; what is finer is thinner than a voxel"
+        for name, value in root.values.items()
+        if found[name] != value
+    ]
+    shown = [visible(child, _within(root, voxel)) for child in root.children]
+    children = tuple(child for child, _ in shown)
+    whole = found if children == root.children else found.changed(children)
+    return whole, tuple(dict.fromkeys([*told, *(note for _, notes in shown for note in notes)]))
+
+
+def _within(node: Node, voxel: float) -> float:
+    """A voxel in the units of a node's children: the largest, where a transform stretches."""
+    if node.formula.name != "transform":
+        return voxel
+    return voxel / float(np.linalg.svd(affine(node)[0], compute_uv=False)[-1])
 
 
 def _depth(node: Node, voxel: float) -> int:

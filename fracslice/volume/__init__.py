@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..formulas.box import Box
 from ..formulas.registry import Facts, Node
 from ..kernel import Compilable, Kernel, compile_scene
-from ..kernel.depth import resolve_depths
+from ..kernel.depth import resolve_depths, visible
 from ..kernel.devices import compile_for
 from ..store import Arrays, stored
 from ..work import Work
@@ -35,12 +35,13 @@ __all__ = [
 @dataclass(frozen=True)
 class Plan:
     """What is about to be sampled: the scene with all depths known, the object's box, a box that surely
-    encloses it, and the voxel, all in scene units."""
+    encloses it, and the voxel, all in scene units. notes: what the voxel is too large for, in words."""
 
     root: Node | Compilable
     box: Box
     outer: Box
     voxel: float
+    notes: tuple[str, ...] = ()
 
 
 def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
@@ -57,7 +58,8 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
             break
         size = max(found.box.size)
     voxel = max(found.box.size) / resolution
-    return Plan(resolve_depths(root, voxel), found.box, found.outer, voxel)
+    shown, notes = visible(resolve_depths(root, voxel), voxel)
+    return Plan(shown, found.box, found.outer, voxel, notes)
 
 
 def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
