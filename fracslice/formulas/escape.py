@@ -42,7 +42,7 @@ def potential_distance(r2, slope2, level, first_level, last_level, least):  # ty
     height = log(r2)
     damping = 2.0 * level + (2.0 * first_level) * height
     quotient = maximum(sqrt(r2 / slope2), 1e-30)  # where slope2 has overflown, something to carry the sign
-    return (height - level) * level * quotient / damping
+    return (height - level) * (level * quotient) / damping
 
 
 def sure_distance(apart, slope, bend):  # type: ignore[no-untyped-def]

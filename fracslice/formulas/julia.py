@@ -36,34 +36,35 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat,
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
     1989, "Ray Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is
     Koebe's bound for connected complex Julia sets; one that falls apart has its derivative taken at a larger
-    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/accuracy.md`. The real part of q^2
-    is 2 x^2 - |q|^2.
+    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/accuracy.md`. What is returned is
+    held still from the escape on; w itself runs on, and its lanes are not looked at.
     """
     cr, ci, cj, ck = c
-    r2 = x * x + y * y + z * z
+    imaginary2 = y * y + z * z
+    r2 = x * x + imaginary2
     d2 = 0.0 * x + 1.0
     k = 0.0 * x
     level = 0.0 * x + first_level
-    end_r2, slope2 = r2, d2
+    slope2 = d2
     alive = r2 < escape2
     for _ in range(iterations):
         if not any_of(alive):
             break
-        d2 = 2.0 * (maximum(r2, CORE) if loose else r2) * (2.0 * d2)
+        d2 = where(alive, 2.0 * (maximum(r2, CORE) if loose else r2) * (2.0 * d2), d2)
+        slope2 = maximum(d2, slope2)
+        level = where(alive, level + level, level)
         twice = x + x
-        x = twice * x + (cr - r2)
+        x = (x * x + cr) - imaginary2
         y = twice * y + ci
         z = twice * z + cj
-        r2 = y * y + z * z + x * x
+        imaginary2 = y * y + z * z
         if not flat:
             k = twice * k + ck
-            r2 = r2 + k * k
+            imaginary2 = imaginary2 + k * k
+        r2 = where(alive, x * x + imaginary2, r2)
         orbit(r2, alive)
-        end_r2 = where(alive, r2, end_r2)
-        slope2 = where(alive, maximum(d2, slope2), slope2)
-        level = where(alive, level + level, level)
-        alive = alive & (r2 < escape2)
-    return potential_distance(end_r2, slope2, level, first_level, last_level, least)
+        alive = r2 < escape2
+    return potential_distance(r2, slope2, level, first_level, last_level, least)
 
 
 @julia.arguments

@@ -36,16 +36,11 @@ def rsqrt(a: np.ndarray) -> np.ndarray:
     return found
 
 
-def inverse(a: np.ndarray) -> np.ndarray:
-    """1/a of a positive, finite argument, faster than a division on the lanes."""
-    return 1.0 / a
-
-
 def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
     """Marks a step of an orbit that is r2 = |w|^2 away from the origin where `alive`; only pictures with
     palettes look.
     """
 
 
-_FUNCTIONS = ("where", "sqrt", "rsqrt", "inverse", "log", "exp", "sin", "cos", "atan2", "floor")
+_FUNCTIONS = ("where", "sqrt", "rsqrt", "log", "exp", "sin", "cos", "atan2", "floor")
 NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import FunctionType
@@ -63,9 +64,12 @@ def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> byt
 
 
 def _exported(function: Any, signature: object, name: str) -> str:
-    """Optimised LLVM assembly of one C function, under its own name."""
+    """Optimised LLVM assembly of one C function, under its own name.
+
+    Its stack is aligned to whole registers: those that are kept there would lie across two cache lines else.
+    """
     compiled: Any = cfunc(signature, error_model="numpy")(function)
-    text = compiled._library.get_llvm_str()
+    text = re.sub(r"(?m)^attributes #\d+ = {", r'\g<0> "stackrealign"', compiled._library.get_llvm_str())
     module = llvm.parse_assembly(text)
     for f in module.functions:
         if f.name == compiled._wrapper_name:

@@ -118,7 +118,6 @@ else:
 
     sqrt = _word(1, "sqrt.approx.ftz.f32", "sqrt.rn.f64")
     rsqrt = _word(1, "rsqrt.approx.ftz.f32", "__nv_rsqrt")
-    inverse = _word(1, "rcp.approx.ftz.f32", "rcp.rn.f64")
     divide = _word(2, "div.full.ftz.f32", "div.rn.f64")
     log = _word(1, _log, "__nv_log")
     exp = _word(1, "__nv_expf", "__nv_exp")

@@ -164,7 +164,6 @@ def _function(emit: Callable[..., Vec]) -> Any:
 
 sqrt = _function(lanes_math.sqrt)
 rsqrt = _function(lanes_math.rsqrt)
-inverse = _function(lanes_math.inverse)
 log = _function(lanes_math.log)
 exp = _function(lanes_math.exp)
 sin = _function(lanes_math.sin)

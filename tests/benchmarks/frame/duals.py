@@ -89,7 +89,6 @@ def _atan2(y: Any, x: Any) -> Dual:
 inverse = _chain(lambda v: 1 / v, lambda v: -1 / (v * v))
 WORDS = {
     "where": where,
-    "inverse": inverse,
     "atan2": _atan2,
     "minimum": lambda a, b: where(lifted(a) < b, a, b),
     "maximum": lambda a, b: where(lifted(a) > b, a, b),
