@@ -41,15 +41,12 @@ void Slab::close(int layer) {
             again.push_back(t);
         };
         for (int32_t t : again) marked[t - first_] = 1;
-        evaluate(layer, asks_, [&](const Ask& ask, const float* f) {
+        const Rim none{0, reach.data(), INFINITY};
+        evaluate(layer, asks_, none, [&](const Ask& ask, const Found& found) {
             const int32_t t = ask.tile;
-            const float* begin = f;
-            uint64_t negative = 0;
-            float* kept = values[t].data();
-            each(ask.samples, [&](int bit) { negative |= uint64_t(*f < 0) << bit, kept[bit] = *f++; });
-            uint64_t turned = (inside[t] ^ negative) & ask.samples;
+            const uint64_t turned = (inside[t] ^ found.negative) & ask.samples;
             known[t] |= ask.samples;
-            if (!turned) return f - begin;
+            if (!turned) return;
             inside[t] ^= turned;
             const int32_t* here = spot(layer, place[t].y, place[t].x);
             mark(t);
@@ -57,7 +54,6 @@ void Slab::close(int layer) {
             if (turned & kFirstColumn) mark(here[-1]);
             if (turned & kLastRow) mark(here[tx_]);
             if (turned & kFirstRow) mark(here[-tx_]);
-            return f - begin;
         });
         std::swap(active, again);
     }
@@ -68,6 +64,7 @@ void Slab::close(int layer) {
 void Slab::ask(std::vector<int32_t>& active, std::vector<int32_t>& again) {
     constexpr uint64_t faces[] = {kLastColumn, kFirstColumn, kLastRow, kFirstRow};
     constexpr int dy[] = {0, 0, 1, -1}, dx[] = {1, -1, 0, 0};
+    size_t asked = 0;
     for (size_t a = 0; a < active.size(); ++a) {
         const int32_t t = active[a];
         const Place p = place[t];
@@ -76,7 +73,10 @@ void Slab::ask(std::vector<int32_t>& active, std::vector<int32_t>& again) {
         const uint64_t s = inside[t], kept = known[t];
         const uint64_t differing[] = {s ^ rights(s, inside[beside[0]]), s ^ lefts(s, inside[beside[1]]),
                                       s ^ uppers(s, inside[beside[2]]), s ^ lowers(s, inside[beside[3]])};
-        if (uint64_t samples = (differing[0] | differing[1] | differing[2] | differing[3]) & ~kept) asks_.push_back({t, samples});
+        // Whether a tile has any is hard to foretell: all are written, and those without written over.
+        if (asked == asks_.size()) asks_.resize(asked + active.size());
+        asks_[asked] = {t, (differing[0] | differing[1] | differing[2] | differing[3]) & ~kept};
+        asked += asks_[asked].samples != 0;
         uint64_t open = 0;
         for (int side = 0; side < 4; ++side) open |= beside[side] < kTiles ? differing[side] & faces[side] : 0;
         for (int side = 0; open && side < 4; ++side) {
@@ -91,6 +91,7 @@ void Slab::ask(std::vector<int32_t>& active, std::vector<int32_t>& again) {
                 again.push_back(t);
         }
     }
+    asks_.resize(asked);
 }
 
 // Tiles of which the contour cuts nothing but the last cell, at the corner.

@@ -7,11 +7,11 @@
 
 namespace fracslice {
 
-constexpr size_t kBatch = 1024;
+constexpr size_t kBatch = 2048;
 
 // Points, and what the field is there.
 struct Batch {
-    alignas(64) float x[kBatch], y[kBatch], z[kBatch], f[kBatch];
+    alignas(64) float x[kBatch + kSlack], y[kBatch + kSlack], z[kBatch + kSlack], f[kBatch + kSlack];
 
     void values(const Field& field, size_t n) {
         size_t padded = (n + 63) / 64 * 64;
@@ -22,42 +22,33 @@ struct Batch {
     }
 };
 
-// where(i, column, row, z) sets the place of point i on the lattice; take(i, f) gets its value.
+// where(i, x, y, z) sets the place of point i, scene units; take(i, f) gets its value.
 template <class Where, class Take>
 void Slab::evaluate(size_t n, const Where& where, const Take& take) {
     Batch batch;
     evaluations += int64_t(n);
     for (size_t begin = 0; begin < n; begin += kBatch) {
         size_t m = std::min(kBatch, n - begin);
-        for (size_t i = 0; i < m; ++i) {
-            double column, row, height;
-            where(begin + i, column, row, height);
-            batch.x[i] = float(frame_.x0 + frame_.dx * column);
-            batch.y[i] = float(frame_.y0 + frame_.dy * row);
-            batch.z[i] = float(height);
-        }
+        for (size_t i = 0; i < m; ++i) where(begin + i, batch.x[i], batch.y[i], batch.z[i]);
         batch.values(*field_, m);
         for (size_t i = 0; i < m; ++i) take(begin + i, batch.f[i]);
     }
 }
 
-// Of samples; keeps the values. take(ask, f) gets those of a tile's samples, and says which are inside.
+// Of samples; keeps the values. take(ask, found) for each tile.
 template <class Take>
-void Slab::evaluate(int layer, const std::vector<Ask>& asks, const Take& take) {
+void Slab::evaluate(int layer, const std::vector<Ask>& asks, const Rim& rim, const Take& take) {
     Batch batch;
+    std::array<Found, kBatch> found;
     std::fill(batch.z, batch.z + kBatch, float(z_[layer]));
-    auto next = asks.begin();
-    while (next != asks.end()) {
-        auto first = next;
+    for (size_t begin = 0, end = 0; begin < asks.size(); begin = end) {
         size_t n = 0;
-        for (; next != asks.end() && n + 64 <= kBatch; ++next) {
-            const float *x = &x_[kTile * (place[next->tile].x - 1)], *y = &y_[kTile * (place[next->tile].y - 1)];
-            each(next->samples, [&](int bit) { batch.x[n] = x[bit & 7], batch.y[n] = y[bit >> 3], ++n; });
-        }
+        for (; end < asks.size() && n + kTile * kTile <= kBatch; ++end) n += size_t(__builtin_popcountll(asks[end].samples));
+        gather(&asks[begin], end - begin, *this, x_.data(), y_.data(), batch.x, batch.y);
         batch.values(*field_, n);
         evaluations += int64_t(n);
-        const float* f = batch.f;
-        for (; first != next; ++first) f += take(*first, f);
+        scatter(&asks[begin], end - begin, batch.f, rim, *this, found.data());
+        for (size_t i = begin; i < end; ++i) take(asks[i], found[i - begin]);
     }
 }
 

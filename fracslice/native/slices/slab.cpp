@@ -36,6 +36,26 @@ void group(const std::vector<double>& z, int first, int last, double thick, std:
     }
 }
 
+// The bound for outside values around the middle of a tile in an even field: how steep it is between it and those beside it, a
+// part of that, for the steepest way is seldom the one to the contour; the proven one where none are beside it.
+class Likely {
+ public:
+    Likely(const Bounds& bounds, const Frame& frame, int columns)
+        : row_(columns), across_(float(kSteep / (kTile * frame.dx))), along_(float(kSteep / (kTile * frame.dy))),
+          least_(float(bounds.outside)), most_(float(bounds.proven)) {}
+    float operator()(const float* middle) const {
+        const float x = across_ * most(middle, 1), y = along_ * most(middle, row_), steep = std::sqrt(x * x + y * y);
+        return (x > 0) & (y > 0) & (steep < most_) ? std::max(steep, least_) : most_;
+    }
+
+ private:
+    static float step(float f) { return f == f ? std::fabs(f) : 0; }
+    static float most(const float* f, ptrdiff_t to) { return std::max(step(*f - f[-to]), step(*f - f[to])); }
+
+    ptrdiff_t row_;  // from a middle to the one above
+    float across_, along_, least_, most_;
+};
+
 }  // namespace
 
 Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const Bounds& bounds, const Frame& frame,
@@ -77,7 +97,7 @@ void Slab::sample(int layer) {
     if (bounds_.even) {
         scale[layer] = inside_scale(layer);
     } else {
-        settle(layer, edges(true));
+        settle(layer, edges());
         sharpen(layer);
         span[layer][1] = int32_t(count());
     }
@@ -85,8 +105,8 @@ void Slab::sample(int layer) {
 
 std::vector<float> Slab::values_at(int layer, const std::vector<Spot>& spots) {
     std::vector<float> found(spots.size());
-    auto where = [&](size_t i, double& column, double& row, double& height) {
-        column = spots[i].column, row = spots[i].row, height = z_[layer];
+    auto where = [&](size_t i, float& x, float& y, float& z) {
+        x = float(frame_.x0 + frame_.dx * spots[i].column), y = float(frame_.y0 + frame_.dy * spots[i].row), z = float(z_[layer]);
     };
     evaluate(spots.size(), where, [&](size_t i, float f) { found[i] = f; });
     return found;
@@ -101,9 +121,9 @@ std::vector<Slab::Block> Slab::coarse() {
     double width = length(frame_.dx, frame_.dy) * kTile / 2, height = (z_.back() - z_[0]) / 2;
     for (int size = kCoarsest; size > 1; size /= 2) {
         cut.clear();
-        auto middle = [&](size_t i, double& column, double& row, double& z) {
-            column = (blocks[i].x - 1 + size / 2.0) * kTile, row = (blocks[i].y - 1 + size / 2.0) * kTile;
-            z = z_[0] + height;
+        auto middle = [&](size_t i, float& x, float& y, float& z) {
+            x = float(frame_.x0 + frame_.dx * kTile * (blocks[i].x - 1 + size / 2.0));
+            y = float(frame_.y0 + frame_.dy * kTile * (blocks[i].y - 1 + size / 2.0)), z = float(z_[0] + height);
         };
         evaluate(blocks.size(), middle, [&](size_t i, float f) {
             const Block& b = blocks[i];
@@ -134,42 +154,37 @@ std::vector<Slab::Column> Slab::columns(int first, int last) {
     double height = (z_[last] - z_[first]) / 2;
     const double margin = bounds_.even ? kAside : 1;
     double reach = margin * length(length(frame_.dx, frame_.dy) * kTile / 2, height);
-    std::vector<float> middles(size_t(ty_) * tx_, NAN);
-    auto where = [&](size_t i, double& column, double& row, double& z) {
-        column = (blocks_[i].x - 0.5) * kTile, row = (blocks_[i].y - 0.5) * kTile, z = z_[first] + height;
+    middles_.resize(size_t(ty_) * tx_, NAN);
+    auto middle = [&](const Block& b) { return &middles_[size_t(b.y) * tx_ + b.x]; };
+    const float between = float(z_[first] + height);
+    auto where = [&](size_t i, float& x, float& y, float& z) {
+        x = x_[kTile * (blocks_[i].x - 1) + kTile / 2], y = y_[kTile * (blocks_[i].y - 1) + kTile / 2], z = between;
     };
-    evaluate(blocks_.size(), where, [&](size_t i, float f) { middles[size_t(blocks_[i].y) * tx_ + blocks_[i].x] = f; });
+    evaluate(blocks_.size(), where, [&](size_t i, float f) { *middle(blocks_[i]) = f; });
+    const Likely likely(bounds_, frame_, tx_);
     std::vector<Column> open;
     for (const Block& b : blocks_) {
-        const float* f = &middles[size_t(b.y) * tx_ + b.x];
-        double outside = bounds_.even ? likely(f) : bounds_.outside;
-        if (std::fabs(*f) <= (*f < 0 ? bounds_.inside : outside) * reach)
-            open.push_back({b.y, b.x, *f, float(outside)});
+        const float* f = middle(b);
+        const float outside = bounds_.even ? likely(f) : float(bounds_.outside);
+        if (std::fabs(*f) <= (*f < 0 ? bounds_.inside : double(outside)) * reach)
+            open.push_back({b.y, b.x, *f, factor(outside, frame_)});
         else if (*f < 0)
             fill({b.y, b.x, 1, first, last});
     }
+    for (const Block& b : blocks_) *middle(b) = NAN;
     return open;
-}
-
-// The bound for outside values around a middle in an even field: how steep it is between it and those beside it; a part of
-// that, for the steepest way is seldom the one to the contour.
-double Slab::likely(const float* middle) const {
-    double steep[2] = {-1, -1}, step[2] = {kTile * frame_.dx, kTile * frame_.dy};
-    for (int axis = 0; axis < 2; ++axis)
-        for (int side : {-1, 1}) {
-            float other = middle[side * (axis ? tx_ : 1)];
-            if (!std::isnan(other)) steep[axis] = std::max(steep[axis], std::fabs(*middle - other) / step[axis]);
-        }
-    if (steep[0] < 0 || steep[1] < 0) return bounds_.proven;
-    return std::min(std::max(kSteep * length(steep[0], steep[1]), bounds_.outside), bounds_.proven);
 }
 
 // The tiles of a layer that is `height` above the middles of columns.
 void Slab::begin(int layer, double height) {
     float inside_reach = factor(bounds_.inside, frame_), aside = float(square(height)) * factor(1, frame_);
-    for (const Column& c : columns_) {
-        int32_t t = add(layer, c.y, c.x);
-        reach[t] = factor(c.outside, frame_);
+    grow(columns_.size());
+    for (size_t i = 0; i < columns_.size(); ++i) {
+        const Column& c = columns_[i];
+        const size_t t = first_ + i;
+        place[t] = {layer, c.y, c.x};
+        where[(size_t(layer) * ty_ + c.y) * tx_ + c.x] = int32_t(t);
+        reach[t] = c.reach;
         inside[t] = c.value < 0 ? kAll : 0;
         float d2 = c.value * c.value * (c.value < 0 ? inside_reach : reach[t]) - aside;
         if (d2 > 0 && !bounds_.even) decided[t] = discs_(d2, kMiddle);
@@ -186,33 +201,24 @@ void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
     asks_.clear();
     for (int32_t t = chunk.first; t < chunk.last; ++t)
         if (uint64_t samples = among & ~decided[t]) asks_.push_back({t, samples});
-    const float inside_reach = factor(bounds_.inside, frame_), farthest = float(size * size * farthest_);
+    const Rim rim{factor(bounds_.inside, frame_), reach.data(), float(size * size * farthest_)};
     const int back = size / 2 * (kTile + 1);
     const uint64_t own = uint64_t(1) << back, least_in = size <= bounds_.stop_inside ? block(size) : own,
                    least_out = size <= bounds_.stop_outside ? block(size) : own;
-    evaluate(chunk.layer, asks_, [&](const Ask& ask, const float* f) {
-        float* kept = values[ask.tile].data();
-        const float outside_reach = reach[ask.tile], *begin = f;
-        uint64_t negative = 0, reached = 0, within = 0;
-        auto reach_of = [&](float v) { return v * v * (v < 0 ? inside_reach : outside_reach); };
+    evaluate(chunk.layer, asks_, rim, [&](const Ask& ask, const Found& found) {
+        uint64_t reached = 0, within = 0;
         if (bounds_.even) {
-            each(ask.samples, [&](int bit) {
-                negative |= uint64_t(*f < 0) << bit;
-                reached |= uint64_t(reach_of(*f) > farthest) << bit;
-                kept[bit] = *f++;
-            });
-            within = ((reached & negative) >> back) * block(size), reached = (reached >> back) * block(size);
+            reached = (found.beyond >> back) * block(size), within = ((found.beyond & found.negative) >> back) * block(size);
         } else {
+            const float *kept = values[ask.tile].data(), outside = reach[ask.tile];
             each(ask.samples, [&](int bit) {
-                uint64_t near = discs_(reach_of(*f), bit) | (*f < 0 ? least_in : least_out) << (bit - back);
-                negative |= uint64_t(*f < 0) << bit;
-                within = *f < 0 ? within | near : within & ~near;
+                const float v = kept[bit], d2 = v * v * (v < 0 ? rim.inside : outside);
+                uint64_t near = discs_(d2, bit) | (v < 0 ? least_in : least_out) << (bit - back);
+                within = v < 0 ? within | near : within & ~near;
                 reached |= near;
-                kept[bit] = *f++;
             });
         }
-        set(ask, negative, reached, within);
-        return f - begin;
+        set(ask, found.negative, reached, within);
     });
 }
 

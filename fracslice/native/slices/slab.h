@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "bits.h"
-#include "tiles.h"
+#include "samples.h"
 
 namespace fracslice {
 
@@ -96,20 +96,19 @@ class Slab : public Tiles {
     struct Block {
         int y, x, size, first, last;
     };
-    // A place whose tiles are open from layer to layer: the value in its middle, and the bound for outside values around.
+    // A place whose tiles are open from layer to layer: the value in its middle, and how far outside values around it reach.
     struct Column {
         int y, x;
-        float value, outside;
+        float value, reach;
+    };
+    // The middle of a crossed edge, and how many times the value outside is that inside.
+    struct Middle {
+        float x, y, quotient;
     };
     // Tiles of a layer.
     struct Chunk {
         int layer;
         int32_t first, last;
-    };
-    // Samples of a tile.
-    struct Ask {
-        int32_t tile;
-        uint64_t samples;
     };
     // A crossed edge: of which sample, to its right or (64 more) upwards, and the values at its ends.
     struct Edge {
@@ -125,13 +124,12 @@ class Slab : public Tiles {
     template <class Where, class Take>
     void evaluate(size_t n, const Where& where, const Take& take);
     template <class Take>
-    void evaluate(int layer, const std::vector<Ask>& asks, const Take& take);
+    void evaluate(int layer, const std::vector<Ask>& asks, const Rim& rim, const Take& take);
     std::vector<float> values_at(int layer, const std::vector<Spot>& spots);
 
     std::vector<Block> coarse();
     void fill(const Block& block);
     std::vector<Column> columns(int first, int last);
-    double likely(const float* middle) const;
     void begin(int layer, double height);
     void probe(const Chunk& chunk, int size, uint64_t among);
     void set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t within);
@@ -142,7 +140,8 @@ class Slab : public Tiles {
     void ask(std::vector<int32_t>& active, std::vector<int32_t>& again);
     void corners();
 
-    std::vector<Edge> edges(bool all) const;
+    std::vector<Edge> edges() const;
+    std::vector<Middle> middles(int32_t step) const;
     float inside_scale(int layer);
     void settle(int layer, const std::vector<Edge>& edges);
     void sharpen(int layer);
@@ -161,6 +160,7 @@ class Slab : public Tiles {
     std::vector<Block> blocks_;  // of 16 pixels, that are not decided
     std::vector<Column> columns_;  // of the group whose first layer is `group_`
     int group_ = -1;
+    std::vector<float> middles_;   // values in the middles of places, NaN between uses
     std::vector<Ask> asks_;  // for use within a step
     std::vector<Tip> tips_;  // ascending
     int32_t first_ = kTiles;  // tile of the layer that is sampled

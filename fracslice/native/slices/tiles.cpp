@@ -6,13 +6,19 @@
 namespace fracslice {
 
 void Tiles::push(const Place& at, uint64_t signs) {
-    place.push_back(at);
-    inside.push_back(signs);
-    known.push_back(0);
-    decided.push_back(0);
-    sharp.push_back(0);
-    reach.push_back(0);
-    values.emplace_back();
+    grow(1);
+    place.back() = at, inside.back() = signs;
+}
+
+void Tiles::grow(size_t n) {
+    const size_t more = count() + n;
+    if (more > place.capacity()) {
+        const size_t room = more + more / 2;
+        place.reserve(room), inside.reserve(room), known.reserve(room), decided.reserve(room), sharp.reserve(room);
+        reach.reserve(room), values.reserve(room);
+    }
+    place.resize(more), inside.resize(more), known.resize(more), decided.resize(more), sharp.resize(more), reach.resize(more);
+    values.resize(more);
 }
 
 void Tiles::clear(size_t places) {

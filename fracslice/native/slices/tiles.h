@@ -53,6 +53,7 @@ struct Tiles {
 
     size_t count() const { return place.size(); }
     void push(const Place& at, uint64_t signs);
+    void grow(size_t n);  // by so many tiles with no place yet, nothing known of them
     void clear(size_t places);  // all of them empty
 };
 
