@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, TypeVar
 
 from .errors import Cancelled
@@ -41,8 +42,8 @@ class Work:
             raise Cancelled("cancelled")
 
     def map(self, task: Callable[[T], None], items: Sequence[T]) -> None:
-        """Runs `task` on every item, in parallel. Tasks write to places of their own; their order must not
-        matter.
+        """Runs `task` on every item, in this thread and others. Tasks write to places of their own, and their
+        order must not matter.
         """
         if self.threads == 1 or len(items) <= 1:
             for item in items:
@@ -53,23 +54,36 @@ class Work:
         lock = threading.Lock()
 
         def drain() -> None:
-            while not self.cancel.is_set():
-                with lock:
-                    item = next(queue, None)
-                if item is None:
-                    return
-                task(item)
-
-        with ThreadPoolExecutor(self.threads) as pool:
-            futures = [pool.submit(drain) for _ in range(min(self.threads, len(items)))]
+            nonlocal queue
             try:
-                finished, _ = wait(futures, return_when=FIRST_EXCEPTION)
+                while not self.cancel.is_set():
+                    with lock:
+                        item = next(queue, None)
+                    if item is None:
+                        return
+                    task(item)
             except BaseException:
-                self.cancel.set()
+                queue = iter(())
                 raise
-            for future in finished:
-                future.result()
+
+        helpers = [_pool().submit(drain) for _ in range(min(self.threads, len(items)) - 1)]
+        try:
+            drain()
+        except KeyboardInterrupt:
+            self.cancel.set()
+            raise
+        finally:
+            begun = [helper for helper in helpers if not helper.cancel()]
+            wait(begun)
+        for helper in begun:
+            helper.result()
         self.check()
+
+
+@lru_cache(maxsize=1)
+def _pool() -> ThreadPoolExecutor:
+    """Threads that help, started when first needed and kept: starting one takes longer than many a task."""
+    return ThreadPoolExecutor(256, "fracslice")
 
 
 def chunks(count: int, size: int) -> list[slice]:

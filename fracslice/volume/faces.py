@@ -27,19 +27,19 @@ class SignFaces:
 
     @cached_property
     def slabs(self) -> np.ndarray:
-        """A word for each x, uint64 [n, 8]."""
-        return self.signs.reshape(-1, 64).view("<u8")
+        """A word for each x, uint64 [8, n]."""
+        return np.ascontiguousarray(self.signs.reshape(-1, 64).view("<u8").T)
 
     @cached_property
     def either(self) -> np.ndarray:
         """The bits set in any slab, uint64 [n]."""
-        found: np.ndarray = np.bitwise_or.reduce(self.slabs, axis=1)
+        found: np.ndarray = np.bitwise_or.reduce(self.slabs)
         return found
 
     @cached_property
     def both(self) -> np.ndarray:
         """The bits set in all slabs, uint64 [n]."""
-        found: np.ndarray = np.bitwise_and.reduce(self.slabs, axis=1)
+        found: np.ndarray = np.bitwise_and.reduce(self.slabs)
         return found
 
     @property
@@ -50,20 +50,7 @@ class SignFaces:
     def shown(self, axis: int, step: int) -> tuple[np.ndarray, np.ndarray]:
         """The same for the outermost layer of samples on one side."""
         if axis == 0:
-            layer = self.slabs[:, 7 if step > 0 else 0]
+            layer = self.slabs[7 if step > 0 else 0]
             return layer != 0, layer != ALL
         bits = _OF_A_SLAB[axis, step]
         return (self.either & bits) != 0, (self.both & bits) != bits
-
-
-def beside(bricks: np.ndarray, axis: int, step: int) -> np.ndarray:
-    """The neighbours of bricks, int32 [n, 3], on one side."""
-    moved = bricks.copy()
-    moved[:, axis] += step
-    return moved
-
-
-def distinct(bricks: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Bricks of a grid of this shape in order, each once, int32 [n, 3]."""
-    numbers = np.unique(np.ravel_multi_index(tuple(bricks.T), shape))
-    return np.stack(np.unravel_index(numbers, shape), axis=1).astype(np.int32)

@@ -14,7 +14,8 @@ from there. All results depend on the field only, not on threads or order.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -25,14 +26,14 @@ from ..formulas.registry import Facts
 from ..kernel import Kernel
 from ..work import Work, chunks
 from .bricks import INSIDE, OUTSIDE, Bricks, SignBricks
-from .faces import FACES, SignFaces, beside, distinct
+from .faces import FACES, SignFaces
 from .lattice import BRICK, Lattice
+from .states import BORDER, CANDIDATE, EMPTY, FULL, QUEUED, States
 from .values import values_at
 
 COARSEST = 16
 """Bricks along a cell of the first level: 128 voxels, as in OpenVDB's tree."""
 
-EMPTY, CANDIDATE, FULL, QUEUED = 0, 1, 2, 3
 AUDITS = 8
 FAR_AUDITS = 1 << 15
 
@@ -84,89 +85,92 @@ class _Run:
     evaluations: int = 0
     repaired: int = 0
     audited: int = 0
-    corners: list[np.ndarray] = field(default_factory=list)
+    numbers: list[np.ndarray] = field(default_factory=list)
     bits: list[np.ndarray] = field(default_factory=list)
 
     def signs(self) -> tuple[SignBricks, np.ndarray]:
         """The sampled bricks that the surface needs, and which rows of all sampled ones these are."""
-        state, outside = self.probe()
-        front = self.seeds(state, outside)
+        states, outside = self.probe()
+        front = self.seeds(states, outside)
         for turn in range(AUDITS):
-            self.explore(state, front)
-            front = self.audit(state, turn)
+            self.explore(states, front)
+            front = self.audit(states, turn)
             if not len(front):
                 break
-        return self.finished(state)
+        return self.finished(states)
 
     # --- top down -------------------------------------------------------------------------------------------
-    def probe(self) -> tuple[np.ndarray, np.ndarray]:
-        """state uint8 [bx, by, bz] of every brick, and a bool array: candidates whose centre is outside."""
-        state = np.full(self.lattice.bricks, EMPTY, np.uint8)
-        outside = np.zeros(self.lattice.bricks, bool)
+    def probe(self) -> tuple[States, np.ndarray]:
+        """The state of every brick, and of the candidates in order whether their centre is outside."""
         size = COARSEST
-        cells = _grid(*(-(-n // size) for n in self.lattice.bricks)) * size
+        grid = np.full([-(-n // size) for n in self.lattice.bricks], CANDIDATE, np.uint8)
         while True:
-            f = self.centres(cells, size, self.guard)
-            reach = self.reach(size * BRICK)
+            cells = np.nonzero(grid == CANDIDATE)
+            f, reach = self.centres(cells, size, self.guard), self.reach(size * BRICK)
             full = (f < -reach) & (not self.facts.weak)
-            for cell in cells[full]:
-                state[tuple(slice(c, c + size) for c in cell)] = FULL
             near = ~((f > reach) | full)
-            cells, f = cells[near], f[near]
+            grid[cells] = np.where(near, CANDIDATE, np.where(full, FULL, EMPTY))
             if size == 1:
                 break
             size //= 2
-            cells = (cells[:, None] + _grid(2, 2, 2)[None] * size).reshape(-1, 3)
-            cells = cells[(cells < self.lattice.bricks).all(1)]
-        state[tuple(cells.T)] = CANDIDATE
-        own = f if self.guard is self.kernel else self.centres(cells, 1, self.kernel)
-        outside[tuple(cells.T)] = ~(own < 0)
-        return state, outside
+            shape = tuple(slice(-(-n // size)) for n in self.lattice.bricks)
+            grid = grid.repeat(2, 0).repeat(2, 1).repeat(2, 2)[shape]
+        if self.guard is self.kernel:
+            own = f[near]
+        else:
+            own = self.centres(tuple(c[near] for c in cells), 1, self.kernel)
+        return States.within(grid), ~(own < 0)
 
-    def centres(self, cells: np.ndarray, size: int, kernel: Kernel) -> np.ndarray:
+    def centres(self, cells: tuple[np.ndarray, ...], size: int, kernel: Kernel) -> np.ndarray:
         """A field at the centres of cells of `size` bricks."""
-        return self.values_at(cells * BRICK + (size * BRICK - 1) / 2, kernel)
+        return self.values_at([size * BRICK * c + (size * BRICK - 1) / 2 for c in cells], kernel)
 
-    def values_at(self, indices: np.ndarray, kernel: Kernel) -> np.ndarray:
-        """A field at positions given in grid indices, [n, 3]."""
-        points = np.asarray(self.lattice.origin)[:, None] + self.lattice.voxel * indices.T
-        self.evaluations += len(indices)
+    def values_at(self, indices: Sequence[np.ndarray], kernel: Kernel) -> np.ndarray:
+        """A field at positions given in grid indices, three arrays [n]."""
+        points = np.empty((3, len(indices[0])))
+        for row, start, along in zip(points, self.lattice.origin, indices, strict=True):
+            np.add(start, self.lattice.voxel * along, out=row)
+        self.evaluations += points.shape[1]
         return values_at(kernel, points, self.work)
 
-    def seeds(self, state: np.ndarray, outside: np.ndarray) -> np.ndarray:
-        """The candidates to start from, int32 [n, 3] in bricks.
+    def seeds(self, states: States, outside: np.ndarray) -> np.ndarray:
+        """The candidates to start from.
 
         Where the inside is as recognisable as the outside, these are all of them.
         """
-        candidate = state == CANDIDATE
+        flat = states.flat
+        candidates = np.flatnonzero(flat == CANDIDATE)
+        edge = states.beside((flat == EMPTY) | (flat == BORDER))
         if self.facts.weak:
-            candidate &= _touching(state == EMPTY, True) | outside
+            candidates = candidates[edge[candidates] | outside]
         # Said to be full next to what is said to be empty: the bound is wrong there.
-        wrong = (state == FULL) & _touching(state == EMPTY, True)
-        self.repaired += int(wrong.sum())
-        return np.argwhere(candidate | wrong).astype(np.int32)
+        wrong = np.flatnonzero((flat == FULL) & edge)
+        self.repaired += len(wrong)
+        return np.concatenate([candidates, wrong])
 
     # --- outside in -----------------------------------------------------------------------------------------
-    def explore(self, state: np.ndarray, front: np.ndarray) -> None:
+    def explore(self, states: States, front: np.ndarray) -> None:
         """Samples the front, then what it shows a sign change to, until the samples are closed."""
+        flat = states.flat
         while len(front):
-            empty = self.emptied(front) & (state[tuple(front.T)] == CANDIDATE)
+            empty = self.emptied(states.places(front)) & (flat[front] == CANDIDATE)
             bare, front = front[empty], front[~empty]
-            state[tuple(bare.T)] = EMPTY
-            state[tuple(front.T)] = QUEUED
-            signs = self.sampled(front)
+            flat[bare], flat[front] = EMPTY, QUEUED
+            signs = self.sampled(states.places(front))
+            self.numbers.append(front)
             self.bits.append(signs)
-            known = int((state == QUEUED).sum())
-            self.work.progress("sampling", known / max(known + int((state == CANDIDATE).sum()), 1))
-            front = np.concatenate([self.neighbours(state, front, signs), _around(state, bare)])
-            front = distinct(front, state.shape)
+            known, left = sum(map(len, self.numbers)), int(np.count_nonzero(flat == CANDIDATE))
+            self.work.progress("sampling", known / max(known + left, 1))
+            near = np.concatenate([bare + states.step(*face) for face in FACES])
+            found = self.neighbours(states, front, signs)
+            front = states.distinct(np.concatenate([found, near[flat[near] == CANDIDATE]]))
 
-    def emptied(self, bricks: np.ndarray) -> np.ndarray:
+    def emptied(self, places: np.ndarray) -> np.ndarray:
         """Which bricks are empty after all, looked at in eight cells: 8 evaluations to save 512."""
         size = BRICK // 2
-        middle = _grid(2, 2, 2) * size + (size - 1) / 2
-        f = self.values_at((bricks[:, None] * BRICK + middle).reshape(-1, 3), self.guard).reshape(-1, 8)
-        empty: np.ndarray = np.all(f > self.reach(size), axis=1)
+        middle = np.indices((2, 2, 2)).reshape(3, 8, 1) * size + (size - 1) / 2
+        f = self.values_at((places[:, None] * BRICK + middle).reshape(3, -1), self.guard)
+        empty: np.ndarray = f.reshape(8, -1).min(0) > self.reach(size)
         return empty
 
     def reach(self, size: int) -> float:
@@ -175,11 +179,11 @@ class _Run:
         """
         return self.facts.lipschitz * float(np.sqrt(3)) * self.lattice.voxel * (size + 1) / 2
 
-    def sampled(self, bricks: np.ndarray) -> np.ndarray:
+    def sampled(self, places: np.ndarray) -> np.ndarray:
         """Samples bricks; returns their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set where inside."""
-        corners = np.ascontiguousarray(bricks * BRICK, np.int32)
-        values = np.empty((len(bricks) if self.keep else 0, BRICK**3), np.float32)
-        signs = np.empty((len(bricks), 64), np.uint8)
+        corners = np.ascontiguousarray(places.T * BRICK, np.int32)
+        values = np.empty((len(corners) if self.keep else 0, BRICK**3), np.float32)
+        signs = np.empty((len(corners), 64), np.uint8)
 
         def task(part: slice) -> None:
             out = values[part] if self.keep else np.empty((part.stop - part.start, BRICK**3), np.float32)
@@ -188,90 +192,84 @@ class _Run:
                 np.nan_to_num(out, copy=False, nan=self.lattice.voxel)
             signs[part] = np.packbits(out < 0, axis=1, bitorder="little")
 
-        self.work.map(task, chunks(len(bricks), self.kernel.batch // BRICK**3))
-        self.evaluations += len(bricks) * BRICK**3
-        self.corners.append(corners)
+        self.work.map(task, chunks(len(corners), self.kernel.batch // BRICK**3))
+        self.evaluations += len(corners) * BRICK**3
         if self.keep:
             self.keep(values)
         return signs.reshape(-1, 8, 8)
 
-    def neighbours(self, state: np.ndarray, bricks: np.ndarray, signs: np.ndarray) -> np.ndarray:
+    def neighbours(self, states: States, bricks: np.ndarray, signs: np.ndarray) -> np.ndarray:
         """The bricks that must be sampled because of what these show on their faces."""
-        found, faces = [np.empty((0, 3), np.int32)], SignFaces(signs)
+        found, faces = [], SignFaces(signs)
         for axis, step in FACES:
             inside, outside = faces.shown(axis, step)
-            near = beside(bricks, axis, step)
-            within = (near[:, axis] >= 0) & (near[:, axis] < state.shape[axis])
-            if not within.all():
-                if (inside & ~within).any():
-                    raise VolumeError(
-                        "the solid reaches the border of what is sampled; give it finite <bounds>"
-                    )
-                near, inside, outside = near[within], inside[within], outside[within]
-            there = state[tuple(near.T)]
+            near = bricks + states.step(axis, step)
+            there = states.flat[near]
+            if (inside & (there == BORDER)).any():
+                raise VolumeError("the solid reaches the border of what is sampled; give it finite <bounds>")
             lost = (there == EMPTY) & inside | (there == FULL) & outside
             found.append(near[lost | (there == CANDIDATE) & outside])
-            self.repaired += int(lost.sum())
+            self.repaired += int(np.count_nonzero(lost))
         return np.concatenate(found)
 
-    def audit(self, state: np.ndarray, turn: int) -> np.ndarray:
+    def audit(self, states: States, turn: int) -> np.ndarray:
         """Bricks without samples, with a sample of the other sign than assumed; always the same points."""
-        rng = np.random.default_rng(turn)
-        bare = state != QUEUED
-        near = np.argwhere(bare & _touching(~bare, False))
-        far = np.flatnonzero(bare)
-        chosen = np.unravel_index(rng.choice(far, min(FAR_AUDITS, len(far)), replace=False), state.shape)
-        bricks = np.concatenate([near, np.stack(chosen, 1)]).astype(np.int32)
-        points = bricks * BRICK + rng.integers(0, BRICK, bricks.shape)
-        inside, assumed = self.values_at(points, self.kernel) < 0, state[tuple(bricks.T)]
+        rng, flat = np.random.default_rng(turn), states.flat
+        bare = flat < QUEUED
+        near = np.flatnonzero(bare & states.beside(flat == QUEUED))
+        few = math.prod(self.lattice.bricks) <= FAR_AUDITS
+        far = np.arange(flat.size) if few else rng.integers(flat.size, size=FAR_AUDITS)
+        bricks = np.concatenate([near, far[bare[far]]])
+        points = states.places(bricks) * BRICK + rng.integers(0, BRICK, (3, len(bricks)), np.uint8)
+        inside, assumed = self.values_at(points, self.kernel) < 0, flat[bricks]
         wrong = inside != (assumed != EMPTY)
         self.audited += len(bricks)
         # A candidate is in doubt: what is outside in it is a pocket that nothing led to, and no bound denied.
-        self.repaired += int((wrong & (assumed != CANDIDATE)).sum())
-        return distinct(bricks[wrong], state.shape)
+        self.repaired += int(np.count_nonzero(wrong & (assumed != CANDIDATE)))
+        return states.distinct(bricks[wrong])
 
     # --- the result -----------------------------------------------------------------------------------------
-    def finished(self, state: np.ndarray) -> tuple[SignBricks, np.ndarray]:
+    def finished(self, states: States) -> tuple[SignBricks, np.ndarray]:
         """The bricks that a crossing edge touches, in order, and their rows."""
-        ijk = np.concatenate([np.empty((0, 3), np.int32), *self.corners])
+        numbers = np.concatenate([np.empty(0, np.intp), *self.numbers])
         signs = np.concatenate([np.empty((0, 8, 8), np.uint8), *self.bits])
-        index = np.where((state == EMPTY), OUTSIDE, INSIDE).astype(np.int32)
-        kept = self.crossed(ijk // BRICK, signs, index)
+        index = np.where(states.flat == EMPTY, OUTSIDE, INSIDE).astype(np.int32)
+        kept = self.crossed(states, numbers, signs, index)
         if not kept.any():
             raise VolumeError(
                 "there is no surface: the scene is empty, or all of it is thinner than a voxel of "
                 f"{self.lattice.voxel:.3g}; more voxels, or fewer levels or iterations, may show it"
             )
-        order = np.flatnonzero(kept)[np.lexsort(ijk[kept].T[::-1])]
-        index[tuple(ijk[order].T // BRICK)] = np.arange(len(order))
+        order = np.flatnonzero(kept)
+        order = order[np.argsort(numbers[order])]
+        index[numbers[order]] = np.arange(len(order))
         bricks = SignBricks(
             self.lattice.origin,
             self.lattice.voxel,
-            np.ascontiguousarray(ijk[order]),
+            np.ascontiguousarray(states.places(numbers[order]).T * BRICK, np.int32),
             signs[order],
-            index,
+            states.inner(index),
             evaluations=self.evaluations,
             repaired=self.repaired,
             audited=self.audited,
         )
         return bricks, order
 
-    def crossed(self, bricks: np.ndarray, signs: np.ndarray, index: np.ndarray) -> np.ndarray:
+    def crossed(
+        self, states: States, numbers: np.ndarray, signs: np.ndarray, index: np.ndarray
+    ) -> np.ndarray:
         """Which sampled bricks have a sign change in them or to a neighbour; the others' sign is written to
         `index`.
         """
         faces = SignFaces(signs)
         any_in, any_out = faces.anywhere
-        index[tuple(bricks.T)] = np.where(any_in, INSIDE, OUTSIDE)
+        index[numbers] = np.where(any_in, INSIDE, OUTSIDE)
         row = np.full(index.shape, -1, np.int32)
-        row[tuple(bricks.T)] = np.arange(len(bricks))
+        row[numbers] = np.arange(len(numbers))
         kept: np.ndarray = any_in & any_out
         plain = np.flatnonzero(~kept)
         for axis, step in FACES:
-            near = beside(bricks[plain], axis, step)
-            within = (near[:, axis] >= 0) & (near[:, axis] < index.shape[axis])
-            other = np.full(len(plain), -1, np.int32)
-            other[within] = row[tuple(near[within].T)]
+            other = row[numbers[plain] + states.step(axis, step)]
             facing_in, facing_out = faces.shown(axis, -step)
             kept[plain] |= (other >= 0) & np.where(any_in[plain], facing_out[other], facing_in[other])
         return kept
@@ -291,30 +289,3 @@ def _gathered(waves: list[np.ndarray], order: np.ndarray, work: Work) -> np.ndar
 
 def _copy(out: np.ndarray, wave: np.ndarray, to: np.ndarray, rows: np.ndarray, part: slice) -> None:
     out[to[part]] = wave[rows[part]]
-
-
-def _grid(*shape: int) -> np.ndarray:
-    """All indices of a small grid, int32 [n, 3]."""
-    return np.ascontiguousarray(np.indices(shape, np.int32).reshape(len(shape), -1).T)
-
-
-def _around(state: np.ndarray, bricks: np.ndarray) -> np.ndarray:
-    """The candidates on the faces of bricks."""
-    near = np.concatenate([beside(bricks, axis, step) for axis, step in FACES])
-    near = near[((near >= 0) & (near < state.shape)).all(1)]
-    found: np.ndarray = near[state[tuple(near.T)] == CANDIDATE]
-    return found
-
-
-def _touching(cells: np.ndarray, beyond: bool) -> np.ndarray:
-    """Which cells of a boolean grid have a true neighbour on a face; `beyond` stands for what is outside the
-    grid.
-    """
-    padded = np.pad(cells, 1, constant_values=beyond)
-    found = np.zeros_like(cells)
-    for axis in range(3):
-        for start in (0, 2):
-            part = [slice(1, -1)] * 3
-            part[axis] = slice(start, start + cells.shape[axis])
-            found |= padded[tuple(part)]
-    return found

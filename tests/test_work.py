@@ -1,0 +1,59 @@
+"""Threads: everything done once, errors and stops passed on, maps within maps."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from fracslice.errors import Cancelled
+from fracslice.work import Work
+
+
+@pytest.mark.parametrize("threads", [1, 2, 7])
+def test_every_item_is_done_once(threads: int) -> None:
+    done: list[int] = []
+    Work(threads).map(done.append, range(1000))
+    assert sorted(done) == list(range(1000))
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_an_error_is_raised_and_ends_the_work(threads: int) -> None:
+    done: list[int] = []
+
+    def task(item: int) -> None:
+        if item == 10:
+            raise IndexError(item)
+        done.append(item)
+        threading.Event().wait(1e-3)
+
+    work = Work(threads)
+    with pytest.raises(IndexError):
+        work.map(task, range(1000))
+    assert len(done) < 100
+    work.map(done.append, range(3))  # which was no cancellation
+
+
+def test_several_threads_work_at_once() -> None:
+    meeting = threading.Barrier(3, timeout=20)
+    Work(3).map(lambda _: meeting.wait() and None, range(3))
+
+
+def test_maps_within_maps() -> None:
+    done: list[tuple[int, int]] = []
+    work = Work(4)
+    work.map(lambda i: work.map(lambda j: done.append((i, j)), range(20)), range(20))
+    assert len(set(done)) == len(done) == 400
+
+
+def test_cancelled_work_stops() -> None:
+    done: list[int] = []
+    work = Work(2)
+
+    def task(item: int) -> None:
+        done.append(item)
+        work.cancel.set()
+
+    with pytest.raises(Cancelled):
+        work.map(task, range(1000))
+    assert len(done) <= 2
