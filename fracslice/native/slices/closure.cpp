@@ -12,8 +12,14 @@ int32_t Slab::add(int layer, int y, int x) {
     return here = int32_t(count() - 1);
 }
 
-// Tiles said to be full beside ones said to be empty, where a bound is wrong.
+// Tiles said to be full beside ones said to be empty, where a bound is wrong; the same in all layers of a group.
 void Slab::mend(int layer) {
+    if (!torn_) torn_ = torn(layer);
+    for (const Column& c : *torn_) add(layer, c.y, c.x);
+}
+
+std::vector<Slab::Column> Slab::torn(int layer) const {
+    std::vector<Column> found;
     for (int y = 1; y < ty_ - 1; ++y) {
         const int32_t *row = spot(layer, y, 0), *below = row - tx_, *above = row + tx_;
         auto torn = [&](int x) {
@@ -23,8 +29,9 @@ void Slab::mend(int layer) {
         int32_t any = 0;
         for (int x = 1; x < tx_ - 1; ++x) any |= -int32_t(torn(x));
         for (int x = 1; any && x < tx_ - 1; ++x)
-            if (torn(x)) add(layer, y, x);
+            if (torn(x)) found.push_back({y, x, 0, 0});
     }
+    return found;
 }
 
 void Slab::close(int layer) {

@@ -80,7 +80,7 @@ Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, c
 void Slab::sample(int layer) {
     if (group_ < 0) blocks_ = coarse();
     auto [first, last] = *std::find_if(groups_.begin(), groups_.end(), [&](const auto& g) { return layer <= g.second; });
-    if (first != group_) columns_ = columns(first, last), group_ = first;
+    if (first != group_) columns_ = columns(first, last), torn_.reset(), group_ = first;
     first_ = int32_t(count());
     begin(layer, z_[layer] - (z_[first] + z_[last]) / 2);
     for (int32_t t = first_, end = int32_t(count()); t < end; t += kChunk) {

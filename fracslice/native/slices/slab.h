@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -101,9 +102,9 @@ class Slab : public Tiles {
         int y, x;
         float value, reach;
     };
-    // The middle of a crossed edge, and how many times the value outside is that inside.
-    struct Middle {
-        float x, y, quotient;
+    // The middles of crossed edges, and how many times the values outside are those inside.
+    struct Middles {
+        std::vector<float> x, y, quotients;
     };
     // Tiles of a layer.
     struct Chunk {
@@ -136,12 +137,13 @@ class Slab : public Tiles {
 
     int32_t add(int layer, int y, int x);
     void mend(int layer);
+    std::vector<Column> torn(int layer) const;
     void close(int layer);
     void ask(std::vector<int32_t>& active, std::vector<int32_t>& again);
     void corners();
 
     std::vector<Edge> edges() const;
-    std::vector<Middle> middles(int32_t step) const;
+    Middles middles(int32_t step) const;
     float inside_scale(int layer);
     void settle(int layer, const std::vector<Edge>& edges);
     void sharpen(int layer);
@@ -159,6 +161,7 @@ class Slab : public Tiles {
     double farthest_;  // from the middle of a block to its farthest sample, squared, as `reach` has it, if its size is one
     std::vector<Block> blocks_;  // of 16 pixels, that are not decided
     std::vector<Column> columns_;  // of the group whose first layer is `group_`
+    std::optional<std::vector<Column>> torn_;  // of that group, once they are known
     int group_ = -1;
     std::vector<float> middles_;   // values in the middles of places, NaN between uses
     std::vector<Ask> asks_;  // for use within a step
