@@ -46,6 +46,14 @@ def dense(what: Workload, resolution: int, work: Work) -> Made:
     """Every point of the cube by our kernel, then scikit-image's marching cubes."""
     from skimage.measure import marching_cubes
 
+    values, spacing = grid(what, resolution, work), (what.voxel(resolution),) * 3
+    points, triangles, *_ = marching_cubes(values, 0.0, spacing=spacing)  # type: ignore[no-untyped-call]
+    mesh = Mesh(points.astype(np.float64) - what.half, triangles.astype(np.int32))
+    return mesh, values.size, values.size
+
+
+def grid(what: Workload, resolution: int, work: Work) -> np.ndarray:
+    """The field at every point of the cube, float32 [resolution + 1] * 3, by axes x, y, z."""
     kernel, axis = compile_scene(what.root), np.linspace(-what.half, what.half, resolution + 1)
     values = np.empty((len(axis),) * 3, np.float32)
     y, z = (a.ravel().astype(np.float32) for a in np.meshgrid(axis, axis, indexing="ij"))
@@ -54,10 +62,7 @@ def dense(what: Workload, resolution: int, work: Work) -> Made:
         values[i] = kernel.points(np.full_like(y, axis[i]), y, z).reshape(values[i].shape)
 
     work.map(layer, range(len(axis)))
-    spacing = (what.voxel(resolution),) * 3
-    points, triangles, *_ = marching_cubes(values, 0.0, spacing=spacing)  # type: ignore[no-untyped-call]
-    mesh = Mesh(points.astype(np.float64) - what.half, triangles.astype(np.int32))
-    return mesh, values.size, values.size
+    return values
 
 
 METHODS: dict[str, Callable[[Workload, int, Work], Made]] = {

@@ -165,7 +165,8 @@ def _line(method: str, methods: list[str]) -> Line2D:
 
     i, marks = methods.index(method), "osD^vPX*"
     colour, mark = COLOURS[i % len(COLOURS)], marks[i % len(marks)]
-    return Line2D([], [], color=colour, marker=mark, markersize=4.5, lw=1.4, label=method)
+    style = "-" if i < len(COLOURS) else "--"
+    return Line2D([], [], color=colour, marker=mark, ls=style, markersize=4.5, lw=1.4, label=method)
 
 
 def _unique(names: Iterable[str]) -> list[str]:

@@ -23,6 +23,8 @@ from .methods import METHODS
 from .workloads import WORKLOADS
 
 PLACES = ("{workload}", "{resolution}", "{output}")
+TOLD = ("wall_s", "cpu_s", "peak_mb", "evaluations")
+"""What a peer may know better than the process around it."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,7 @@ def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
         output, used = _run(words, "", work)
         with suppress(ValueError, IndexError):
             told = json.loads(output.splitlines()[-1])
-            used |= {key: float(told[key]) for key in ("wall_s", "cpu_s", "evaluations") if key in told}
+            used |= {key: float(told[key]) for key in TOLD if key in told}
         if not path.exists():
             raise _FailedError(f"{words[0]} wrote no mesh")
         return used | _child(about | {"mesh": str(path)}, work)
