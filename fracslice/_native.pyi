@@ -50,28 +50,31 @@ class Cells:
     def crossings_before(self, layer: int) -> int:
         """How many crossings the bricks before a layer number."""
 
-    def crossed_edges(self, first: int, last: int) -> tuple[NDArray[int32], NDArray[uint8]]:
-        """The grid edges that the surface crosses, in the order of the vertices of `marching_cubes`, of some
-        layers: lower grid points int32 [3, n] and axes uint8 [n]."""
+    def segments(
+        self, begin: int, end: int, origin: Point, voxel: float, lanes: int = 1
+    ) -> NDArray[float64]:
+        """The grid edges that the surface crosses, numbers `begin` to `end` - 1 in the order of the vertices
+        of `marching_cubes`: float64 [6, n], where each starts and from there to its end, scene units; the
+        last one repeated up to a multiple of `lanes`. Raises ValueError where there are no such crossings."""
 
     def contour(
         self,
         first: int,
         last: int,
         t: NDArray[float64],
-        normals: NDArray[float64],
+        normals: NDArray[float32],
         origin: Point,
         voxel: float,
         clamp: float,
     ) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8]]:
         """The surface of `marching_cubes` in some layers through exact crossings, its edges and corners kept.
 
-        t: where on each edge of ``crossed_edges(first - 1, last + 2)`` the surface crosses it, [n]; normals:
-        unit, outward, [3, n]. Returns vertices and triangles as `marching_cubes`, how many vertices are
-        crossings (the first: those of the layers `first` to `last`), and for each of the others, in faces and
-        cells, grid points of its face or cell near it, dx + 2 dy + 4 dz: an inside one, and 8 times an
-        outside one, uint8. Raises ValueError for other than n crossings, and for more than 2^31 vertices or
-        triangles.
+        t: where on its edge the surface crosses each of those that the layers `first` - 1 to `last` + 1
+        number, [n]; normals: unit, outward, [3, n]. Returns vertices and triangles as `marching_cubes`, how
+        many vertices are crossings (the first: those of the layers `first` to `last`), and for each of the
+        others, in faces and cells, grid points of its face or cell near it, dx + 2 dy + 4 dz: an inside one,
+        and 8 times an outside one, uint8. Raises ValueError for other than n crossings, and for more than
+        2^31 vertices or triangles.
         """
 
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:

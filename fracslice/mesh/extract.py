@@ -84,13 +84,11 @@ def contour_pieces(
     signs = bricks.signs if isinstance(bricks, Bricks) else bricks
     cells = _called(Cells, signs.ijk, signs.signs, signs.index, work.threads)
     placement = tuple(float(v) for v in signs.origin), float(signs.voxel), clamp(signs)
-    known, start = Crossings(np.empty(0), np.empty((3, 0))), 0
+    known, start = Crossings(np.empty(0), np.empty((3, 0), np.float32)), 0
     for first, last in _layers(signs, most):
         begin, done = cells.crossings_before(first - 1), start + len(known.t)
-        lower, axis = cells.crossed_edges(first - 1, last + 2)
-        fresh = refine_crossings(
-            root, signs.origin, signs.voxel, lower[:, done - begin :], axis[done - begin :], work
-        )
+        numbers = done, cells.crossings_before(last + 2)
+        fresh = refine_crossings(root, cells, numbers, signs.origin, signs.voxel, work)
         known = known.after(begin - start).joined(fresh)
         start = begin
         vertices, triangles, count, ends = _called(

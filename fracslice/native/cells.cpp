@@ -67,6 +67,22 @@ CellGrid::CellGrid(const Layout& layout, std::vector<Signs> signs)
     for (const Place& place : ghosts(layout, signs_)) places_.push_back(place);
 }
 
+void CellGrid::segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, size_t stride,
+                        double* rows) const {
+    auto after = [](size_t number, const Crossings& brick) { return number < brick.base; };
+    size_t row = size_t(std::upper_bound(crossings_.begin(), crossings_.end(), begin, after) - crossings_.begin());
+    for (row = row ? row - 1 : 0; row < sampled() && crossings_[row].base < end; ++row) {
+        for_each_own_edge(row, [&](const CellEdge& edge) {
+            if (edge.vertex < begin || edge.vertex >= end) return;
+            double* to = rows + (edge.vertex - begin);
+            for (int k = 0; k < 3; ++k) {
+                to[size_t(k) * stride] = origin[k] + voxel * edge.lower[k];
+                to[size_t(k + 3) * stride] = edge.axis == k ? voxel : 0;
+            }
+        });
+    }
+}
+
 void CellGrid::collect(const Octant& near, Numbers& numbers) const {
     for_each_near(near, [&](size_t place, uint32_t vertex) { numbers[place] = vertex; });
 }

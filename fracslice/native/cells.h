@@ -160,6 +160,11 @@ class CellGrid {
         }
     }
 
+    // The grid edges of the crossings `begin` to `end` - 1, as six rows of `stride` numbers: where each starts, and from there
+    // to its end.
+    void segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, size_t stride,
+                  double* rows) const;
+
     // The numbers of these crossings; the rest is not written.
     void collect(const Octant& near, Numbers& numbers) const;
 

@@ -1,26 +1,9 @@
 #pragma once
-#include "feature.h"
 #include "cells.h"
+#include "features.h"
 #include "marching_cubes.h"
 
 namespace fracslice {
-
-// Grid edges that the surface crosses, in the order of marching_cubes' vertices.
-struct CrossedEdges {
-    Array<int32_t> lower;  // [3, n], their lower grid points ...
-    Array<uint8_t> axis;   // [n], ... and directions
-};
-
-// Those that the bricks of some layers number.
-CrossedEdges crossed_edges(const CellGrid& cells, Layers layers);
-
-// Where on its grid edge each of some crossings, in the order of crossed_edges, exactly lies, and the surface's unit normal
-// there, [3, count].
-struct Hermite {
-    const double* t;
-    const double* normals;
-    size_t count;
-};
 
 struct Contour {
     Array<double> vertices;    // [crossings + corners + tips, 3], origin + voxel * (grid position)

@@ -16,6 +16,10 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
+using Normal = std::array<float, 3>;
+
+inline double dot(const Normal& a, const Normal& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
 // A crossing: where the surface meets a grid edge, in grid units, and its normal there.
 struct Crossing {
     Vec3 point, normal;

@@ -1,4 +1,6 @@
 // The extension module fracslice._native. Its Python face and its documentation are in ../_native.pyi.
+#include <algorithm>
+
 #include "contour.h"
 #include "numpy.h"
 #include "signs.h"
@@ -22,10 +24,19 @@ class Cells {
         : ijk_(ijk), index_(index), threads_(threads),
           grid_(unlocked(threads, [&] { return CellGrid(layout(ijk, index), words(ijk, signs)); })) {}
 
-    nb::tuple crossed_edges(int first, int last) const {
-        CrossedEdges found = unlocked(threads_, [&] { return fracslice::crossed_edges(grid_, {first, last}); });
-        size_t n = found.axis.rows;
-        return nb::make_tuple(to_numpy(std::move(found.lower), {3, n}), to_numpy(std::move(found.axis), {n}));
+    nb::object segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, size_t lanes) const {
+        if (begin > end || end > grid_.vertices() || !lanes) throw nb::value_error("no such crossings");
+        size_t count = end - begin, whole = (count + lanes - 1) / lanes * lanes;
+        Array<double> rows(6, whole);
+        {
+            nb::gil_scoped_release released;
+            double* data = rows.data.get();
+            grid_.segments(begin, end, origin, voxel, whole, data);
+            for (size_t k = 0; count && k < 6; ++k) {
+                std::fill(data + k * whole + count, data + (k + 1) * whole, data[k * whole + count - 1]);
+            }
+        }
+        return to_numpy(std::move(rows), {6, whole});
     }
 
     nb::tuple contour(int first, int last, const RootsArray& t, const NormalsArray& normals,
@@ -84,7 +95,7 @@ NB_MODULE(_native, module) {
     nanobind::class_<Cells>(module, "Cells")
         .def(nanobind::init<const fracslice::IjkArray&, const fracslice::SignsArray&, const fracslice::IndexArray&, int>(),
              "ijk"_a, "signs"_a, "index"_a, "threads"_a = 0)
-        .def("crossed_edges", &Cells::crossed_edges, "first"_a, "last"_a)
+        .def("segments", &Cells::segments, "begin"_a, "end"_a, "origin"_a, "voxel"_a, "lanes"_a = 1)
         .def("contour", &Cells::contour, "first"_a, "last"_a, "t"_a, "normals"_a, "origin"_a, "voxel"_a, "clamp"_a)
         .def("crossings_before", &Cells::crossings_before, "layer"_a);
     fracslice::bind_grid(module);

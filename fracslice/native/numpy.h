@@ -17,7 +17,7 @@ using IjkArray = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::
 using ValuesArray = nb::ndarray<const float, nb::shape<-1, kSamples>, nb::c_contig, nb::device::cpu>;
 using SignsArray = nb::ndarray<const uint8_t, nb::shape<-1, kSide, kSide>, nb::c_contig, nb::device::cpu>;
 using RootsArray = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using NormalsArray = nb::ndarray<const double, nb::shape<3, -1>, nb::c_contig, nb::device::cpu>;
+using NormalsArray = nb::ndarray<const float, nb::shape<3, -1>, nb::c_contig, nb::device::cpu>;
 using IndexArray = nb::ndarray<const int32_t, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 inline Layout layout(const IjkArray& ijk, const IndexArray& index) {

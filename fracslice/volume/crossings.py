@@ -10,18 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._native import Cells
 from ..formulas.registry import Node
 from ..kernel import Compilable
 from ..work import Work, chunks
 from .roots import Roots
 
-PRECISION = 1e-8
-"""A root is exact where |f| is this part of a voxel."""
+SURE = 1e-4
+"""A root is exact where Newton's last step was shorter, as a share of a voxel: the error is of the order of
+its square."""
 
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """t: float64 [n], where along each grid edge the surface crosses it. normals: float64 [3, n], outward,
+    """t: float64 [n], where along each grid edge the surface crosses it. normals: float32 [3, n], outward,
     unit.
     """
 
@@ -41,36 +43,36 @@ class Crossings:
 
 def refine_crossings(
     root: Node | Compilable,
+    cells: Cells,
+    numbers: tuple[int, int],
     origin: tuple[float, float, float],
     voxel: float,
-    lower: np.ndarray,
-    axis: np.ndarray,
     work: Work | None = None,
 ) -> Crossings:
     """The exact crossings of grid edges whose ends have opposite signs, in the float64 field.
 
-    lower: int32 [3, n], the lower grid point of each edge; axis: uint8 [n]. Roots are looked for by the
-    float32 kernel and made exact by the float64 one, from its own signs where that one's misled. Where the
-    float64 field does not change its sign (it is smaller than float32 can tell at one end) t is that end.
+    numbers: the first crossing's, and the one after the last. Roots are looked for by the float32 kernel and
+    made exact by the float64 one, from its own signs where that one's misled. Where the float64 field does
+    not change its sign (it is smaller than float32 can tell at one end) t is that end.
     """
     fast, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-    n = len(axis)
-    t, normals = np.empty(n), np.empty((3, n))
+    first, last = numbers
+    t, normals = np.empty(last - first), np.empty((3, last - first), np.float32)
+    x, y, z = origin
+    placement = (float(x), float(y), float(z)), float(voxel), fast.width
 
     def task(part: slice) -> None:
-        count = part.stop - part.start
-        edges = np.empty((6, -(-count // fast.width) * fast.width))
-        for k in range(3):
-            edges[k, :count] = origin[k] + voxel * lower[k, part]
-            edges[k + 3, :count] = voxel * (axis[part] == k)
-        edges[:, count:] = edges[:, count - 1 : count]
+        edges = cells.segments(first + part.start, first + part.stop, *placement)
         found, facing, miss = exact.polished(edges, fast.found(edges.astype(np.float32)))
-        left = np.flatnonzero(miss > PRECISION)
+        left = np.flatnonzero(~(miss <= SURE))
         if len(left):
             left = exact.padded(left)
             slow = edges.take(left, 1)
-            found[left], facing[:, left], _ = exact.polished(slow, exact.found(slow))
+            roots = exact.found(slow)
+            moved, facing[:, left], miss = exact.polished(slow, roots)
+            found[left] = np.where(miss <= SURE, moved, roots)
+        count = part.stop - part.start
         t[part], normals[:, part] = found[:count], facing[:, :count]
 
-    (work or Work()).map(task, chunks(n, 1 << 14))
+    (work or Work()).map(task, chunks(last - first, 1 << 13))
     return Crossings(t, normals)

@@ -18,105 +18,15 @@ from ..kernel import Compilable, compile_scene
 from ..kernel.cpu import Precision, lane_count, load_functions
 from ..kernel.linker import Linked, link
 from ..kernel.loops import Loop
+from .root_loops import AIM, FIND, LEAD, POLISH
 
-FIND = Loop(
-    "find",
-    "rrrrrrrrrn",
-    """
-def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, n):
-    over = FRAME[0]
-    small = FRAME[1]
-    near = FRAME[2]
-    for i in range(0, n, WIDTH):
-        x = load(X, i)
-        y = load(Y, i)
-        z = load(Z, i)
-        dx = load(DX, i)
-        dy = load(DY, i)
-        dz = load(DZ, i)
-        fa = over * field(x, y, z, P)
-        fb = over * field(x + dx, y + dy, z + dz, P)
-        a = 0.0 * x
-        b = a + 1.0
-        t = where((fa < 0.0) & (fb < 0.0), where(fa > fb, a, b), where(fa < fb, a, b))
-        open = ((fa < 0.0) & (fb >= 0.0)) | ((fa >= 0.0) & (fb < 0.0))
-        u = fa / (fa - fb)
-        for step in range(40):
-            if not any_of(open):
-                break
-            t = where(open, a + u * (b - a), t)
-            f = over * field(x + t * dx, y + t * dy, z + t * dz, P)
-            same = ((f < 0.0) & (fa < 0.0)) | ((f >= 0.0) & (fa >= 0.0))
-            c = where(same, a, b)
-            fc = where(same, fa, fb)
-            b = where(same, b, a)
-            fb = where(same, fb, fa)
-            a = t
-            fa = f
-            place = (a - b) / (c - b)
-            share = (fa - fb) / (fc - fb)
-            bent = (share * share < place) & ((1.0 - share) * (1.0 - share) < 1.0 - place)
-            ab = fb - fa
-            ac = fc - fa
-            u = fa * (place * fc * ac + (1.0 - place) * fb * ab) / (place * ab * ac * (fb - fc))
-            least = 0.5 * near / absolute(b - a)
-            u = minimum(maximum(where(bent, u, 0.5), least), 1.0 - least)
-            open = open & (absolute(f) > small) & (absolute(b - a) > near)
-        store(T, i, t)
-""",
-)
-"""The root T on each of n segments, from X, Y, Z to as much further as DX, DY, DZ say, as a share of it;
-where the ends have one sign, the end nearer to zero. Inverse quadratic interpolation wherever it is safe,
-else bisection (Chandrupatla 1997, "A new hybrid quadratic/bisection algorithm for finding the zero of a
-nonlinear function without using derivatives"), from the secant's point on.
+FRAMES = {"float32": (1e-6, 1e-5, 1e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-5, 1e-6, 1e-7)}
+"""FRAME but for its first number, the lengths in voxels."""
 
-FRAME: what f is multiplied by, one over a voxel; a root is where |f| is below the second number, or known to
-the third.
-"""
+QUICK, MOST = 8, 48
+"""Steps towards a root that all segments are given, and those that then are left."""
 
-POLISH = Loop(
-    "polish",
-    "rrrrrrrrrrrrrn",
-    """
-def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
-    over = FRAME[0]
-    e = FRAME[3]
-    for i in range(0, n, WIDTH):
-        x0 = load(X, i)
-        y0 = load(Y, i)
-        z0 = load(Z, i)
-        dx = load(DX, i)
-        dy = load(DY, i)
-        dz = load(DZ, i)
-        t = load(T, i)
-        x = x0 + t * dx
-        y = y0 + t * dy
-        z = z0 + t * dz
-        f = field(x, y, z, P)
-        gx = field(x + e, y, z, P) - f
-        gy = field(x, y + e, z, P) - f
-        gz = field(x, y, z + e, P) - f
-        over_length = rsqrt(maximum(gx * gx + gy * gy + gz * gz, 1e-200))
-        store(NX, i, gx * over_length)
-        store(NY, i, gy * over_length)
-        store(NZ, i, gz * over_length)
-        moved = t - e * f / (gx * dx + gy * dy + gz * dz)
-        moved = minimum(maximum(moved, 0.0), 1.0)
-        there = field(x0 + moved * dx, y0 + moved * dy, z0 + moved * dz, P)
-        nearer = absolute(there) < absolute(f)
-        store(T, i, where(nearer, moved, t))
-        store(MISS, i, over * absolute(where(nearer, there, f)))
-""",
-)
-"""One of Newton's steps along the segment from T, kept if it comes nearer; the unit normal where it started,
-by differences over FRAME[3]; and |f| where it ended, times FRAME[0].
-"""
-
-FINEST = {"float32": (1e-5, 1e-5), "float64": (1e-8, 1e-7)}
-"""When a root is found: |f| in voxels, and what is left of the segment, where f jumps or nearly does."""
-
-REACH = 1e-5
-"""The differences' step, in voxels."""
+LOOPS = {"float32": (FIND, LEAD), "float64": (FIND, POLISH, AIM)}
 
 
 class Roots:
@@ -128,7 +38,8 @@ class Roots:
 
     def __init__(self, root: Node | Compilable, precision: Precision, voxel: float) -> None:
         self.dtype = np.dtype(precision)
-        self._frame = np.array([1 / voxel, *FINEST[precision], REACH * voxel], self.dtype)
+        small, near, reach, tight, close = FRAMES[precision]
+        self._frame = np.array([1 / voxel, small, near, reach * voxel, tight * voxel, close], self.dtype)
         if isinstance(root, Node):
             linked = link(root)
             made = _compiled(linked.source, linked.parameters.tobytes(), precision)
@@ -142,21 +53,45 @@ class Roots:
 
     def found(self, segments: np.ndarray) -> np.ndarray:
         """The roots, [n], as shares of the segments; where the ends have one sign, the end nearer to zero."""
+        roots = self._stepped(segments, QUICK)
+        slow = np.flatnonzero(roots > 1)
+        if len(slow):
+            slow = self.padded(slow)
+            left = self._stepped(segments.take(slow, 1), MOST)
+            roots[slow] = np.where(left > 1, left - 2, left)
+        return roots
+
+    def _stepped(self, segments: np.ndarray, steps: int) -> np.ndarray:
         roots = np.empty((1, segments.shape[1]), self.dtype)
-        self._functions["find"](self._frame, segments, roots)
+        self._functions["find"](self._frame, segments, roots, steps)
         found: np.ndarray = roots[0]
         return found
 
     def polished(self, segments: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Roots brought nearer, [n], the field's unit normals there, [3, n], and |f| in voxels, [n]."""
+        """Roots after one of Newton's steps, [n], the field's unit normals where they were, [3, n], and how
+        far they moved, [n]."""
         out = np.empty((5, len(roots)), self.dtype)
         out[0] = roots
         self._functions["polish"](self._frame, segments, out)
         return out[0], out[1:4], out[4]
 
+    def aimed(self, segments: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Roots brought nearer, [n], and |f| in voxels, [n]."""
+        out = np.empty((2, len(roots)), self.dtype)
+        out[0] = roots
+        self._functions["aim"](self._frame, segments, out)
+        return out[0], out[1]
 
-Run = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
-"""A loop on its frame, the rows that it reads and those that it writes, both C-contiguous."""
+    def lead(self, rooms: np.ndarray) -> np.ndarray:
+        """The ways, [3, n], from points to the surface. rooms: [12, n]: the points, the room below and above
+        them, and the ways to somewhere of the other sign, NaN if there is none."""
+        ways = np.empty((3, rooms.shape[1]), self.dtype)
+        self._functions["lead"](self._frame, rooms, ways)
+        return ways
+
+
+Run = Callable[..., None]
+"""A loop on its frame, the rows that it reads, those that it writes, both C-contiguous, and its numbers."""
 
 
 def _places(rows: np.ndarray) -> Iterable[int]:
@@ -172,14 +107,14 @@ def _compiled(source: str, numbers: bytes, precision: Precision) -> tuple[int, d
     bits = parameters.dtype.itemsize * 8
 
     def runs(function: Callable[..., None]) -> Run:
-        def run(frame: np.ndarray, segments: np.ndarray, out: np.ndarray) -> None:
-            places = (*_places(segments), *_places(out))
-            function(parameters.ctypes.data, frame.ctypes.data, *places, segments.shape[1])
+        def run(frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
+            places = (*_places(rows), *_places(out))
+            function(parameters.ctypes.data, frame.ctypes.data, *places, *numbers, rows.shape[1])
 
         return run
 
-    loops, width = (FIND,) if bits == 32 else (FIND, POLISH), lane_count(bits)
-    functions = load_functions(Linked(source, parameters), bits, width, loops)
+    width = lane_count(bits)
+    functions = load_functions(Linked(source, parameters), bits, width, LOOPS[precision])
     return width, {name: runs(function) for name, function in functions.items()}
 
 
@@ -197,10 +132,10 @@ def _on_arrays(root: Compilable, precision: Precision) -> tuple[int, dict[str, R
     def runs(loop: Loop) -> Run:
         exec(loop.source, words)
 
-        def run(frame: np.ndarray, segments: np.ndarray, out: np.ndarray) -> None:
+        def run(frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
             with np.errstate(all="ignore"):
-                words[loop.name](None, frame, *segments, *out, segments.shape[1])
+                words[loop.name](None, frame, *rows, *out, *numbers, rows.shape[1])
 
         return run
 
-    return 1, {loop.name: runs(loop) for loop in (FIND, POLISH)}
+    return 1, {loop.name: runs(loop) for loop in LOOPS[precision]}

@@ -8,23 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..formulas.registry import Node
-from ..kernel import Compilable, Kernel, compile_scene
+from ..kernel import Compilable, compile_scene
 from ..work import Work, chunks
 from .roots import Roots
-from .values import values_at
 
-NEAR = 1e-6
-"""A point with |f| below this share of a voxel is where it should be: a corner has no gradient to follow."""
-
-FLAT = 0.1
-"""Slopes below this are taken for it, so that no step is longer than ten times |f|."""
-
-REACH = 1e-4
-"""The step of the differences, in voxels. They are central, so that at an edge neither side is preferred."""
-
-
-TIGHT = 1e-6
-"""A point nearer to its box' border, in voxels, slides along it."""
+NEAR, FOUND = 1e-6, 1e-7
+"""A point with |f| below this share of a voxel is where it should be, for a corner has no gradient to follow;
+one that is brought there shall have |f| below the other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,27 +45,35 @@ def settle(
     """
     kernel, work = compile_scene(root, "float64"), work or Work()
     guess, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-    values = values_at(kernel, points.T, work)
-    away = np.flatnonzero(np.abs(values) > NEAR * voxel)
-    settled = np.empty((len(away), 3))
+    parts = chunks(len(points), 1 << 13)
+    moved = {}
 
     def task(part: slice) -> None:
-        which = guess.padded(away[part])
-        p, f = np.ascontiguousarray(points[which].T), values[which]
-        room = rooms(which, f < 0)
-        ways = np.concatenate([p, _ends(kernel, p, f, room, voxel) - p])
-        t, _, miss = exact.polished(ways, guess.found(ways.astype(np.float32)))
-        left = np.flatnonzero(miss > NEAR)
+        values = kernel.points(*points[part].T)
+        away = np.flatnonzero(np.abs(values) > NEAR * voxel)
+        if len(away):
+            own = guess.padded(away)
+            settled = brought(part.start + own, values[own])
+            moved[part.start] = part.start + away, settled[:, : len(away)].T
+
+    def brought(which: np.ndarray, f: np.ndarray) -> np.ndarray:
+        p, room = np.ascontiguousarray(points[which].T), rooms(which, f < 0)
+        ways = np.concatenate([p, guess.lead(_relative(p, room))])
+        t, miss = exact.aimed(ways, guess.found(ways.astype(np.float32)))
+        left = np.flatnonzero(miss > FOUND)
         if len(left):
             left = exact.padded(left)
             slow = ways.take(left, 1)
-            t[left], _, miss[left] = exact.polished(slow, exact.found(slow))
-        moved = np.clip(p + t * ways[3:], room.low, room.high)
-        nearer = miss * voxel < np.abs(f)
-        settled[part] = np.where(nearer, moved, p).T[: part.stop - part.start]
+            t[left], miss[left] = exact.aimed(slow, exact.found(slow))
+        there = np.clip(p + t * ways[3:], room.low, room.high)
+        return np.where(miss * voxel < np.abs(f), there, p)
 
-    work.map(task, chunks(len(away), 1 << 13))
-    return away, settled
+    work.map(task, parts)
+    found = [moved[part.start] for part in parts if part.start in moved]
+    if not found:
+        return np.empty(0, np.int64), np.empty((0, 3))
+    numbers, places = zip(*found, strict=True)
+    return np.concatenate(numbers), np.concatenate(places)
 
 
 def anywhere(which: np.ndarray, inside: np.ndarray) -> Rooms:
@@ -83,20 +81,9 @@ def anywhere(which: np.ndarray, inside: np.ndarray) -> Rooms:
     return Rooms(np.full((3, len(which)), -np.inf), np.full((3, len(which)), np.inf))
 
 
-def _ends(kernel: Kernel, p: np.ndarray, f: np.ndarray, room: Rooms, voxel: float) -> np.ndarray:
-    """How far points [3, n] with these values are to be looked at, [3, n]."""
-    x, y, z = p
-    e = REACH * voxel
-    ahead = kernel.points(x + e, y, z), kernel.points(x, y + e, z), kernel.points(x, y, z + e)
-    behind = kernel.points(x - e, y, z), kernel.points(x, y - e, z), kernel.points(x, y, z - e)
-    slope = (np.stack(ahead) - np.stack(behind)) / (2 * e)
-    space = np.where((slope > 0) == (f < 0), room.high - p, p - room.low)
-    slope *= space > TIGHT * voxel
-    step = slope * (-4 * f / np.maximum((slope * slope).sum(0), FLAT**2))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        end: np.ndarray = p + step * (space / np.abs(step)).min(0, where=step != 0, initial=1.0)
-    if room.other is None:
-        return end
-    changes = (kernel.points(*end) < 0) != (f < 0)
-    found: np.ndarray = np.where(changes, end, room.other)
-    return found
+def _relative(p: np.ndarray, room: Rooms) -> np.ndarray:
+    """What `Roots.lead` takes: float32 holds distances better than places."""
+    rows = np.empty((12, p.shape[1]), np.float32)
+    rows[:3], rows[3:6], rows[6:9] = p, p - room.low, room.high - p
+    rows[9:] = np.nan if room.other is None else room.other - p
+    return rows

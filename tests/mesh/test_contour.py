@@ -125,10 +125,10 @@ def cells_of(bricks: Bricks) -> Cells:
 @pytest.mark.parametrize("seed", range(12))
 def test_a_solid_for_any_crossings_and_normals(seed: int) -> None:
     cells, rng = cells_of(noise(seed)), np.random.default_rng(100 + seed)
-    n = len(cells.crossed_edges(-1, 2)[1])
+    n = cells.crossings_before(2)
     t = rng.choice([rng.uniform(0, 1, n), rng.integers(0, 2, n)])
     normals = rng.normal(size=(3, n))
-    normals /= np.linalg.norm(normals, axis=0)
+    normals = (normals / np.linalg.norm(normals, axis=0)).astype(np.float32)
     vertices, triangles, crossings, ends = cells.contour(-1, 2, t, normals, (0.0, 0.0, 0.0), 1.0, 1e-3)
     assert n == crossings and len(ends) > 0 and len(vertices) == crossings + len(ends)
     assert_solid(Mesh(vertices, triangles))
@@ -145,9 +145,11 @@ def test_threads_do_not_matter() -> None:
 def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
     planned = plan(torus(radius=1, tube=0.3), 64)
     bricks = sample_scene(planned)
-    lower, axis = cells_of(bricks).crossed_edges(0, len(bricks.index))
-    exact = refine_crossings(planned.root, bricks.origin, bricks.voxel, lower, axis)
-    points = np.array(bricks.origin) + bricks.voxel * (lower.T + exact.t[:, None] * np.eye(3)[axis])
+    cells, placement = cells_of(bricks), (bricks.origin, bricks.voxel)
+    numbers = 0, cells.crossings_before(len(bricks.index))
+    exact = refine_crossings(planned.root, cells, numbers, *placement)
+    edges = cells.segments(*numbers, *placement)
+    points = (edges[:3] + exact.t * edges[3:]).T
     assert np.abs(reference(planned.root)(*points.T)).max() < 1e-7 * bricks.voxel
     ring = points * [1, 1, 0]
     truth = (points - ring / np.linalg.norm(ring, axis=1, keepdims=True)) / 0.3
@@ -156,7 +158,9 @@ def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
 
 def test_the_wrong_number_of_crossings_is_refused() -> None:
     with pytest.raises(ValueError, match="crossings"):
-        cells_of(noise(0)).contour(-1, 2, np.zeros(3), np.zeros((3, 3)), (0.0, 0.0, 0.0), 1.0, 1e-3)
+        cells_of(noise(0)).contour(
+            -1, 2, np.zeros(3), np.zeros((3, 3), np.float32), (0.0, 0.0, 0.0), 1.0, 1e-3
+        )
 
 
 def test_bricks_out_of_order_are_refused() -> None:

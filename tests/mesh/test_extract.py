@@ -123,8 +123,9 @@ def test_vertices_lie_on_the_crossed_edges_in_their_order() -> None:
     bricks = bricks_of(noise(5, 16, spread=4))
     vertices, _ = marching_cubes(bricks.ijk, bricks.values, bricks.index, (0, 0, 0), 1.0, 1e-4)
     cells = Cells(bricks.ijk, bricks.signs.signs, bricks.index)
-    lower, axis = cells.crossed_edges(0, len(bricks.index))
-    lower = lower.T
+    count = cells.crossings_before(len(bricks.index))
+    edges = cells.segments(0, count, (0, 0, 0), 1.0).astype(int)
+    lower, axis = edges[:3].T, edges[3:].argmax(0)
     along = vertices - lower
     rows = np.arange(len(axis))
     t = along[rows, axis].copy()
@@ -136,6 +137,10 @@ def test_vertices_lie_on_the_crossed_edges_in_their_order() -> None:
     upper = lower + np.eye(3, dtype=np.int32)[axis]
     assert (inside[tuple(lower.T)] != inside[tuple(upper.T)]).all()
     assert len(np.unique(np.column_stack([lower, axis]), axis=0)) == len(axis)
+    part = cells.segments(7, 20, (0, 0, 0), 1.0, 8)
+    assert (part[:, :13] == edges[:, 7:20]).all() and (part[:, 13:] == edges[:, 19:20]).all()
+    with pytest.raises(ValueError, match="no such"):
+        cells.segments(0, count + 1, (0, 0, 0), 1.0)
 
 
 def test_threads_do_not_change_a_byte() -> None:

@@ -1,0 +1,189 @@
+"""The loops over a compiled field that find its roots on segments, in the words of `kernel.loops`.
+
+FRAME, in all of them: one over a voxel; when a root is found, |f| in voxels and what is left of the segment;
+the differences' step and what room is none, scene units; how short a step is the last, as a share of the
+segment.
+"""
+
+from __future__ import annotations
+
+from ..kernel.loops import Loop
+
+FIND = Loop(
+    "find",
+    "rrrrrrrrrnn",
+    """
+def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
+    over = FRAME[0]
+    small = FRAME[1]
+    near = FRAME[2]
+    close = FRAME[5]
+    for i in range(0, n, WIDTH):
+        x = load(X, i)
+        y = load(Y, i)
+        z = load(Z, i)
+        dx = load(DX, i)
+        dy = load(DY, i)
+        dz = load(DZ, i)
+        fa = 0.0 * x
+        fb = fa
+        for end in range(2):
+            fa = fb
+            fb = over * field(x + end * dx, y + end * dy, z + end * dz, P)
+        a = 0.0 * x
+        b = a + 1.0
+        t = where((fa < 0.0) & (fb < 0.0), where(fa > fb, a, b), where(fa < fb, a, b))
+        open = ((fa < 0.0) & (fb >= 0.0)) | ((fa >= 0.0) & (fb < 0.0))
+        u = fa / (fa - fb)
+        for step in range(steps):
+            if not any_of(open):
+                break
+            t = where(open, a + u * (b - a), t)
+            f = over * field(x + t * dx, y + t * dy, z + t * dz, P)
+            same = ((f < 0.0) & (fa < 0.0)) | ((f >= 0.0) & (fa >= 0.0))
+            c = where(same, a, b)
+            fc = where(same, fa, fb)
+            b = where(same, b, a)
+            fb = where(same, fb, fa)
+            a = t
+            fa = f
+            u = fa * (c - a) / ((fa - fc) * (b - a))
+            within = (u > 0.0) & (u < 1.0)
+            last = a + u * (b - a)
+            off = where(within, absolute(last - a), 1.0)
+            t = where(open & (off <= close), last, t)
+            open = open & (off > close) & (absolute(f) > small) & (absolute(b - a) > near)
+            least = 0.5 * near / absolute(b - a)
+            u = where(within, minimum(maximum(u, least), 1.0 - least), 0.5)
+            if step > 8 and step % 2 > 0:
+                u = 0.5 + 0.0 * x
+        store(T, i, where(open, t + 2.0, t))
+""",
+)
+"""The root T on each of n segments, from X, Y, Z to as much further as DX, DY, DZ say, as a share of it;
+where the ends have one sign, the end nearer to zero; 2 more where that takes more than so many steps.
+
+Fields are steep on one side of their surface and flat on the other, so the secant goes through the last two
+points on one side. Where it leaves the bracket that is halved, and every other time when many steps are done.
+"""
+
+POLISH = Loop(
+    "polish",
+    "rrrrrrrrrrrrrn",
+    """
+def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
+    e = FRAME[3]
+    for i in range(0, n, WIDTH):
+        dx = load(DX, i)
+        dy = load(DY, i)
+        dz = load(DZ, i)
+        t = load(T, i)
+        x = load(X, i) + t * dx
+        y = load(Y, i) + t * dy
+        z = load(Z, i) + t * dz
+        f = field(x, y, z, P)
+        gx = 0.0 * x
+        gy = gx
+        gz = gx
+        for k in range(3):
+            gx = gy
+            gy = gz
+            gz = field(x + e * (k == 0), y + e * (k == 1), z + e * (k == 2), P) - f
+        over_length = rsqrt(maximum(gx * gx + gy * gy + gz * gz, 1e-200))
+        store(NX, i, gx * over_length)
+        store(NY, i, gy * over_length)
+        store(NZ, i, gz * over_length)
+        moved = minimum(maximum(t - e * f / (gx * dx + gy * dy + gz * dz), 0.0), 1.0)
+        store(T, i, moved)
+        store(MISS, i, absolute(moved - t))
+""",
+)
+"""One of Newton's steps along the segment from T, and how far it was; the unit normal where it started."""
+
+AIM = Loop(
+    "aim",
+    "rrrrrrrrrrn",
+    """
+def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
+    over = FRAME[0]
+    for i in range(0, n, WIDTH):
+        x = load(X, i)
+        y = load(Y, i)
+        z = load(Z, i)
+        dx = load(DX, i)
+        dy = load(DY, i)
+        dz = load(DZ, i)
+        t = load(T, i)
+        e = FRAME[3] * rsqrt(maximum(dx * dx + dy * dy + dz * dz, 1e-200))
+        f = field(x + t * dx, y + t * dy, z + t * dz, P)
+        best = t
+        least = f
+        s = t + e
+        for step in range(2):
+            there = field(x + s * dx, y + s * dy, z + s * dz, P)
+            nearer = absolute(there) < absolute(least)
+            best = where(nearer, s, best)
+            least = where(nearer, there, least)
+            s = minimum(maximum(t - e * f / (there - f), 0.0), 1.0)
+        store(T, i, best)
+        store(MISS, i, over * absolute(least))
+""",
+)
+"""One of Newton's steps along the segment from T, if it comes nearer to zero; and |f| where it ended, in
+voxels.
+"""
+
+LEAD = Loop(
+    "lead",
+    "rrrrrrrrrrrrrrrrrn",
+    """
+def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, DX, DY, DZ, n):
+    e = FRAME[3]
+    tight = FRAME[4]
+    for i in range(0, n, WIDTH):
+        x = load(X, i)
+        y = load(Y, i)
+        z = load(Z, i)
+        gx = 0.0 * x
+        gy = gx
+        gz = gx
+        f = gx
+        for k in range(7):
+            ex = (k == 0) - 1.0 * (k == 1)
+            ey = (k == 2) - 1.0 * (k == 3)
+            ez = (k == 4) - 1.0 * (k == 5)
+            f = field(x + e * ex, y + e * ey, z + e * ez, P)
+            gx = gx + ex * f
+            gy = gy + ey * f
+            gz = gz + ez * f
+        sign = where(f < 0.0, 1.0 + 0.0 * x, -1.0)
+        lx = where(sign * gx > 0.0, load(HX, i), load(LX, i))
+        ly = where(sign * gy > 0.0, load(HY, i), load(LY, i))
+        lz = where(sign * gz > 0.0, load(HZ, i), load(LZ, i))
+        gx = where(lx > tight, gx, 0.0)
+        gy = where(ly > tight, gy, 0.0)
+        gz = where(lz > tight, gz, 0.0)
+        size = 8.0 * e * f / maximum(gx * gx + gy * gy + gz * gz, 0.04 * e * e)
+        gx = -size * gx
+        gy = -size * gy
+        gz = -size * gz
+        share = minimum(1.0, where(absolute(gx) > 0.0, lx / absolute(gx), 1.0))
+        share = minimum(share, where(absolute(gy) > 0.0, ly / absolute(gy), 1.0))
+        share = minimum(share, where(absolute(gz) > 0.0, lz / absolute(gz), 1.0))
+        gx = share * gx
+        gy = share * gy
+        gz = share * gz
+        there = field(x + gx, y + gy, z + gz, P)
+        ox = load(OX, i)
+        away = ((there < 0.0) & (f < 0.0)) | ((there >= 0.0) & (f >= 0.0))
+        away = away & (ox == ox)
+        store(DX, i, where(away, ox, gx))
+        store(DY, i, where(away, load(OY, i), gy))
+        store(DZ, i, where(away, load(OZ, i), gz))
+""",
+)
+"""Where to look for the surface from n points: the way to go, D. Along the gradient, by central differences
+so that at an edge neither side is preferred, four of Newton's steps or as far as L and H, the room below and
+above each point, allow; where the sign does not change there, O, if that is no NaN. A coordinate without room
+is kept; slopes below 0.1 are taken for it, so that no step is longer than ten times |f|.
+"""
