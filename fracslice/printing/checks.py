@@ -106,7 +106,9 @@ def check_solid(
     parts, cube = parts_of(solid.bricks), (bricks.voxel * scale) ** 3
     most = float(BINS[-1]) / scale
     thin = slender(root, solid, work)
-    thick, between = thin.beside(walls(solid, most, work), most), walls(solid, most, work, gaps=True)
+    narrow_gaps = slender(root, solid, work, gaps=True)
+    thick = thin.beside(walls(solid, most, work), most)
+    between = narrow_gaps.beside(walls(solid, most, work, gaps=True), most)
     floors = thin.beside(walls(solid, most, work, direction=UP), most, UP)
     bare = _under(floors, limits.floor, scale)
     narrow = _under(thick, limits.wall, scale)

@@ -164,10 +164,12 @@ class _Run:
     def closed(self) -> Node | Compilable:
         """Gaps are filled from face to face."""
         from .samples import Samples
+        from .slender import slender
         from .walls import walls
 
-        solid = Samples(from_grid(self.distances(self.how.gap)))
-        found = walls(solid, self.how.gap / self.scale, self.work, gaps=True)
+        solid, most = Samples(from_grid(self.distances(self.how.gap))), self.how.gap / self.scale
+        thin = slender(self.thing, solid, self.work, gaps=True)
+        found = thin.beside(walls(solid, most, self.work, gaps=True), most)
         one = _apart(found.middle, solid.bricks.voxel)
         return self.added(found.start[one], found.end[one], solid.bricks.voxel, solid.bricks)
 

@@ -1,8 +1,8 @@
-"""Walls too thin for samples: they pass between them, or show in some only.
+"""Walls and gaps too thin for samples: they pass between them, or show in some only.
 
 The field is sampled once more, less `NEAR` voxels, so that each wall is as much thicker on both sides and no
 longer fits between samples. From there rays follow the normal inwards, now on the field itself: to where the
-object begins, and on to where it ends.
+object begins, and on to where it ends. For gaps all is the other way round.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ THIN = 3.0
 """Voxels: what is thicker is measured by samples."""
 
 STEP = 0.05
-"""Voxels: the least step along a ray; a wall as thin as that may still be missed."""
+"""Voxels: the least step along a ray; a wall or gap as thin as that may still be missed."""
 
 ROUNDS = 400
 HALVINGS = 16
@@ -40,7 +40,7 @@ HALVINGS = 16
 
 @dataclass(frozen=True, eq=False)
 class Slender:
-    """Walls up to `THIN` voxels thick, right within a hundredth of one. replaces: below which width (scene
+    """Walls, or gaps, up to `THIN` voxels thick, right within a hundredth of one. replaces: below which width (scene
     units) they stand for what the samples tell; 0 where the samples are right, and these are what they miss.
     """
 
@@ -55,28 +55,31 @@ class Slender:
         return sampled.chosen(sampled.width >= self.replaces) + mine.chosen(mine.width < limit)
 
 
-def slender(root: Node | Compilable, seen: Samples, work: Work) -> Slender:
-    """The thin walls of an object, also those that its samples miss.
+def slender(root: Node | Compilable, seen: Samples, work: Work, *, gaps: bool = False) -> Slender:
+    """The thin walls or gaps of an object, also those that its samples miss.
 
     root: all depths known. seen: the distances that were sampled of it. The values of escape-time fractals
-    are far from distances: there the samples are better, and only what they miss is looked for.
+    are far from distances: there the samples are better, and only what they miss is looked for. A gap between
+    walls that are themselves thinner than a voxel or two is not found: there is nothing to look from.
     """
-    b, kernel = seen.bricks, compile_scene(root)
+    b, kernel, towards = seen.bricks, compile_scene(root), -1.0 if gaps else 1.0
     bound, reach = root.facts.lipschitz, NEAR * b.voxel * root.facts.lipschitz
-    raised = Samples(_raised(Raised(kernel, reach), root.facts, root.facts.box | seen.box, b.voxel, work))
+    moved = Raised(kernel, towards * reach)
+    raised = Samples(_raised(moved, root.facts, root.facts.box | seen.box, b.voxel, work))
     start, axis = crossed(raised)
     normals = normals_at(raised, start)
+    ways = -towards * normals
     area = b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
-    field = _along(kernel, start, -normals, work)
+    field = _along(kernel, start, ways, work)
     least = STEP * b.voxel
     far = 2 * reach + 2 * b.voxel
-    enter = _first(field, np.arange(len(start)), np.zeros(len(start)), far, 1.0, bound, least)
-    unknown = np.abs(seen.points(*(start - enter[:, None] * normals).T)) > AWAY * b.voxel
+    enter = _first(field, np.arange(len(start)), np.zeros(len(start)), far, towards, bound, least)
+    unknown = np.abs(seen.points(*(start + enter[:, None] * ways).T)) > AWAY * b.voxel
     rays = np.flatnonzero((enter < far) & (unknown | (not root.facts.weak)))
-    leave = _first(field, rays, enter[rays], enter[rays] + THIN * b.voxel, -1.0, bound, least)
+    leave = _first(field, rays, enter[rays], enter[rays] + THIN * b.voxel, -towards, bound, least)
     thin = leave < enter[rays] + THIN * b.voxel
     rays, leave = rays[thin], leave[thin]
-    ends = [start[rays] - s[:, None] * normals[rays] for s in (enter[rays], leave)]
+    ends = [start[rays] + s[:, None] * ways[rays] for s in (enter[rays], leave)]
     facing = (_slopes(kernel, ends[0], least, work) * _slopes(kernel, ends[1], least, work)).sum(1)
     found = Walls(ends[0], ends[1], leave - enter[rays], area[rays])
     return Slender(found.chosen(facing < OPPOSITE), 0.0 if root.facts.weak else THIN * b.voxel)
@@ -86,7 +89,7 @@ def _raised(kernel: Raised, facts: Facts, box: Box, voxel: float, work: Work) ->
     """Samples of a raised field: the flatter it is, the farther its inside reaches beyond the box."""
     for times in (2, 8, 32):
         try:
-            wide = replace(facts, box=box.grown(times * kernel.by))
+            wide = replace(facts, box=box.grown(times * abs(kernel.by)))
             return sample(kernel, wide, Lattice.around(wide.box, voxel), work)
         except VolumeError as error:
             failure = error
@@ -143,7 +146,7 @@ def _slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> np.n
 
 
 class Raised:
-    """A kernel whose values are lower by a constant: its inside reaches farther."""
+    """A kernel whose values are lower by a constant: its inside reaches farther, or less far if that is below 0."""
 
     def __init__(self, kernel: Kernel, by: float) -> None:
         self.kernel, self.by = kernel, by

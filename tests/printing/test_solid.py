@@ -28,6 +28,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
+from fracslice.kernel import compile_scene
 from fracslice.printing import printable
 from fracslice.printing.checks import Limits, SolidReport, check_object
 from fracslice.printing.parts import parts_of
@@ -188,6 +189,21 @@ def test_walls_thinner_than_the_samples_are_found(voxels: float, tilt: float) ->
     assert report.thin_walls == pytest.approx(2 * 1.4 * 1.25 * scale**2, rel=0.15)
 
 
+@pytest.mark.parametrize("tilt", [0.0, 17.0])
+@pytest.mark.parametrize("voxels", [0.3, 0.6, 1.0, 2.0, 2.9])
+def test_gaps_thinner_than_the_samples_are_found(voxels: float, tilt: float) -> None:
+    """A slot through a block, its width in voxels of the check; and the slot's area, both faces."""
+    width = voxels * 2.1 / 96
+    slot = at(box(size=(3, width, 2)), 0, 0.003, 1)
+    planned = plan(transform(difference(box(size=(2, 2, 1.5)), slot), rotate=(1, 0.3, 0.2, tilt)), 96)
+    scale = SIZE / max(planned.box.size)
+    limits = Limits(wall=4 * report_voxel(planned, scale))
+    report = check_object(planned.root, planned.outer, scale, limits)
+    assert report.gaps
+    assert report.gaps.median == pytest.approx(width * scale, rel=0.02)
+    assert sum(report.gaps.counts) == pytest.approx(2 * 2 * 0.75 * scale**2, rel=0.15)
+
+
 def report_voxel(planned: Plan, scale: float) -> float:
     """Between the samples of a check that may be coarse, mm."""
     return max(planned.outer.size) * scale / 96
@@ -199,6 +215,16 @@ def test_walls_thinner_than_the_samples_are_thickened() -> None:
     after = measured(thin, thickness=1.5)
     assert np.quantile(after, (0.02, 0.5)) == pytest.approx([1.5, 1.5], abs=0.2)
     assert len(after) > 1000
+
+
+def test_gaps_thinner_than_the_samples_are_closed() -> None:
+    """A gap of 0.1 mm where samples are 0.2 mm apart."""
+    apart = union(at(box(size=(1, 1, 0.995)), 0, 0, 0.5025), at(box(size=(1, 1, 0.995)), 0, 0, -0.5025))
+    thing, _ = printable(plan(apart, 96), SIZE, Print(gap=0.5))
+    middle = compile_scene(thing.root, "float64").points(
+        *np.array([[0.0, 0.2, -0.4], [0, 0.3, 0.1], [0, 0, 0]])
+    )
+    assert (middle < 0).all()
 
 
 def test_fractals_are_thickened() -> None:
