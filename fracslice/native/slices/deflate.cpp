@@ -1,15 +1,41 @@
 #include "deflate.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
-#include <numeric>
 
 namespace fracslice {
 namespace {
 
-constexpr int kEnd = 256, kSymbols = 286, kMostBits = 15;
-constexpr uint32_t kMost = (1 << 23) - 1;     // longest matches of a part
+constexpr int kEnd = 256, kCodes = 286, kMostBits = 15;
 constexpr uint32_t kModulus = 65521;
+
+// Symbols of `Runs` that are not bytes: so many bytes more, as a match of that length; that of two and three longest ones;
+// and none.
+constexpr int kMatches = 256 - kShortest, kTwice = kMatches + kLongest + 1, kThrice = kTwice + 1, kNothing = kThrice + 1,
+              kSymbols = kNothing + 1;
+
+// Writes a run: its byte, the rest of it as far as it is no longest matches, and those. Returns the end; three symbols more
+// may be written.
+inline uint16_t* put(uint8_t value, uint64_t length, uint16_t* end) {
+    int64_t more = int64_t(length) - 1, longest = 0;
+    if (more > kLongest) longest = more / kLongest, more %= kLongest;
+    const bool match = more >= kShortest;
+    end[0] = value, end[1] = match ? uint16_t(kMatches + more) : value, end[2] = value;
+    end += match ? 2 : more + 1;
+    for (; longest > 0; longest -= 3) *end++ = longest == 1 ? kMatches + kLongest : longest == 2 ? kTwice : kThrice;
+    return end;
+}
+
+// Bytes to symbols.
+inline void widen(const uint8_t* from, uint16_t* to) {
+    using Bytes = uint8_t __attribute__((vector_size(Runs::kAtOnce)));
+    using Symbols = uint16_t __attribute__((vector_size(2 * Runs::kAtOnce)));
+    Bytes bytes;
+    std::memcpy(&bytes, from, sizeof bytes);
+    const Symbols symbols = __builtin_convertvector(bytes, Symbols);
+    std::memcpy(to, &symbols, sizeof symbols);
+}
 
 // The code of a length: a symbol, and bits after it.
 struct Length {
@@ -24,24 +50,24 @@ const std::array<Length, kLongest + 1> kLengths = [] {
         wide = std::max(0, (symbol - kEnd - 1) / 4 - 1);
         for (int i = 0; i < 1 << wide && length < kLongest; ++i, ++length) lengths[length] = {symbol, uint8_t(wide), uint8_t(i)};
     }
-    lengths[kLongest] = {kSymbols - 1, 0, 0};
+    lengths[kLongest] = {kCodes - 1, 0, 0};
     return lengths;
 }();
 
-using Counts = std::array<uint64_t, kSymbols>;
-using Sizes = std::array<uint8_t, kSymbols>;
+using Counts = std::array<uint32_t, kCodes>;
+using Sizes = std::array<uint8_t, kCodes>;
 
 // How many bits each symbol takes (Huffman 1952), at most 15: rare ones are made less rare until they do.
 Sizes sizes_of(Counts counts) {
-    std::vector<int> used;
-    for (int s = 0; s < kSymbols; ++s)
-        if (counts[s]) used.push_back(s);
-    const int n = int(used.size());
-    std::vector<uint64_t> weight(2 * n - 1);
-    std::vector<int> parent(2 * n - 1), depth(2 * n - 1);
+    std::array<uint64_t, kCodes> used;  // the count, then the symbol
+    std::array<uint64_t, 2 * kCodes> weight;
+    std::array<int, 2 * kCodes> parent, depth;
     for (;;) {
-        std::sort(used.begin(), used.end(), [&](int a, int b) { return counts[a] != counts[b] ? counts[a] < counts[b] : a < b; });
-        for (int i = 0; i < n; ++i) weight[i] = counts[used[i]];
+        int n = 0;
+        for (int s = 0; s < kCodes; ++s)
+            if (counts[s]) used[n++] = uint64_t(counts[s]) << 16 | uint64_t(s);
+        std::sort(used.begin(), used.begin() + n);
+        for (int i = 0; i < n; ++i) weight[i] = used[i] >> 16;
         // Leaves and the nodes made of them both ascend: the least is the first of either.
         for (int leaf = 0, node = n, made = n; made < 2 * n - 1; ++made) {
             weight[made] = 0;
@@ -52,41 +78,44 @@ Sizes sizes_of(Counts counts) {
         }
         depth[2 * n - 2] = 0;
         for (int i = 2 * n - 3; i >= 0; --i) depth[i] = depth[parent[i]] + 1;
-        if (*std::max_element(depth.begin(), depth.begin() + n) <= kMostBits) break;
-        for (int s : used) counts[s] = counts[s] / 2 + 1;
+        if (depth[0] <= kMostBits) {
+            Sizes sizes{};
+            for (int i = 0; i < n; ++i) sizes[used[i] & 0xFFFF] = uint8_t(depth[i]);
+            return sizes;
+        }
+        for (uint32_t& count : counts) count = count ? count / 2 + 1 : 0;
     }
-    Sizes sizes{};
-    for (int i = 0; i < n; ++i) sizes[used[i]] = uint8_t(depth[i]);
-    return sizes;
 }
 
+// Bits, the first lowest: at most 56 of them.
 struct Code {
     uint64_t bits;
     int size;
 
-    Code then(uint64_t more, int wide) const { return {bits | more << size, size + wide}; }
+    Code then(const Code& next) const { return {bits | next.bits << size, size + next.size}; }
 };
 
-// The canonical codes of those sizes, first bit lowest.
-std::array<Code, kSymbols> codes_of(const Sizes& sizes) {
-    std::array<Code, kSymbols> codes{};
-    uint32_t next = 0;
-    for (int size = 1; size <= kMostBits; ++size, next <<= 1)
-        for (int s = 0; s < kSymbols; ++s)
-            if (sizes[s] == size) {
-                uint64_t bits = 0;
-                for (int b = 0; b < size; ++b) bits |= uint64_t(next >> b & 1) << (size - 1 - b);
-                codes[s] = {bits, size};
-                ++next;
-            }
+constexpr uint32_t reversed(uint32_t bits, int size) {
+    uint32_t turned = 0;
+    for (int b = 0; b < size; ++b) turned |= (bits >> b & 1) << (size - 1 - b);
+    return turned;
+}
+
+// The canonical codes of those sizes.
+std::array<Code, kCodes> codes_of(const Sizes& sizes) {
+    std::array<uint32_t, kMostBits + 2> next{};
+    for (uint8_t size : sizes) next[size + 1] += size > 0;
+    for (int size = 1; size <= kMostBits; ++size) next[size] = (next[size - 1] + next[size]) * 2;
+    std::array<Code, kCodes> codes{};
+    for (int s = 0; s < kCodes; ++s)
+        if (const int size = sizes[s]) codes[s] = {reversed(next[size]++, size), size};
     return codes;
 }
 
-// Bits after bits, the first lowest.
+// Bits after bits.
 class Bits {
  public:
     explicit Bits(uint8_t* out) : out_(out) {}
-    // At most 56.
     void put(const Code& code) {
         word_ |= code.bits << size_;
         size_ += code.size;
@@ -94,13 +123,6 @@ class Bits {
         out_ += size_ / 8;
         word_ >>= size_ / 8 * 8;
         size_ %= 8;
-    }
-    void repeat(const Code& code, uint32_t n) {
-        Code many{0, 0};
-        const uint32_t at_once = 56 / code.size;
-        for (uint32_t i = 0; i < at_once; ++i) many = many.then(code.bits, code.size);
-        for (; n >= at_once; n -= at_once) put(many);
-        for (; n; --n) put(code);
     }
     uint8_t* end() {
         if (size_) put({0, 8 - size_});
@@ -118,90 +140,140 @@ class Bits {
 void put_head(Bits& out, const Sizes& sizes) {
     out.put({0x0178, 16});           // deflate, a window of 32 kB; fastest
     out.put({1 | 2 << 1, 3});        // the last block, dynamic
-    out.put({kSymbols - 257, 5});
+    out.put({kCodes - 257, 5});
     out.put({0, 5});
     out.put({19 - 4, 4});
     constexpr int order[] = {16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15};
     for (int s : order) out.put({s < 16 ? 4u : 0u, 3});
-    auto put_size = [&](int size) {
-        uint64_t bits = 0;
-        for (int b = 0; b < 4; ++b) bits |= uint64_t(size >> b & 1) << (3 - b);
-        out.put({bits, 4});
-    };
-    for (uint8_t size : sizes) put_size(size);
-    put_size(1);
+    for (uint8_t size : sizes) out.put({reversed(size, 4), 4});
+    out.put({reversed(1, 4), 4});
 }
-
-// With d_i the n bytes: 1 + sum d_i, and n + sum (n - i) d_i, modulo 65521 (RFC 1950), run by run.
-class Adler {
- public:
-    void add(uint64_t value, uint64_t length) {
-        sum_ += value * length;
-        weighted_ += value * (length * at_ + length * (length - 1) / 2);
-        at_ += length;
-        if (++adds_ % 1024 == 0 || length > kLongest) sum_ %= kModulus, weighted_ %= kModulus, at_ %= kModulus;
-    }
-    uint32_t value() const {
-        const uint64_t sum = sum_ % kModulus, at = at_ % kModulus;
-        return uint32_t((at + at * sum + kModulus - weighted_ % kModulus) % kModulus << 16 | (1 + sum) % kModulus);
-    }
-
- private:
-    uint64_t at_ = 0, sum_ = 0, weighted_ = 0;  // modulo 65521, now and then
-    uint32_t adds_ = 0;
-};
 
 }  // namespace
 
-void Runs::split() {
-    if (!length_) return;
-    uint64_t more = length_ - 1, longest = more / kLongest;
-    more %= kLongest;
-    for (; more > 0 && more < kShortest; --more) parts_.push_back({value_, 0, 0});
-    parts_.push_back({value_, uint32_t(more), 0});
-    for (; longest > 0; longest -= std::min<uint64_t>(longest, kMost))
-        parts_.push_back({value_, uint32_t(std::min<uint64_t>(longest, kMost)), 1});
+inline void Runs::Adler::run(uint64_t value, uint64_t length) {
+    const uint64_t all = value * length;
+    sum += all;
+    weighted += all * at + value * (length * (length - 1) / 2);
+    at += length;
+}
+
+// The first n of eight bytes: sums of words of four 16 bit numbers, by multiplication.
+inline void Runs::Adler::word(uint64_t bytes, uint64_t n) {
+    constexpr uint64_t low = 0x00FF00FF00FF00FF, ones = 0x0001000100010001, places = 0x0000000100020003;
+    bytes &= n < 8 ? ~(kAll << 8 * n) : kAll;
+    const uint64_t odd = bytes >> 8 & low, both = (bytes & low) + odd, all = both * ones >> 48;
+    sum += all;
+    weighted += at * all + 2 * (both * places >> 48) + (odd * ones >> 48);
+    at += n;
+}
+
+void Runs::Adler::reduce() { sum %= kModulus, weighted %= kModulus, at %= kModulus; }
+
+uint32_t Runs::Adler::value() {
+    reduce();
+    return uint32_t((at + at * sum + kModulus - weighted) % kModulus << 16 | (1 + sum) % kModulus);
+}
+
+// For so many symbols more.
+void Runs::reserve(size_t symbols) {
+    sum_.reduce();
+    symbols += count_ + kAtOnce;
+    if (symbols > symbols_.size()) symbols_.resize(2 * symbols);
+}
+
+void Runs::close() {
+    reserve(length_ / kLongest + 4);
+    uint16_t* end = &symbols_[count_];
+    count_ += size_t(put(value_, length_, end) - end);
+    sum_.run(value_, length_);
+    length_ = 0;
+}
+
+void Runs::add(const Span* spans, size_t count, const uint8_t* bytes) {
+    if (!count) return;
+    add(spans[0].value, spans[0].length);
+    close();
+    size_t room = 0;
+    for (size_t i = 0; i < count; ++i) room += spans[i].length / kLongest + 4 + spans[i].n;
+    reserve(room);
+    uint16_t* __restrict end = &symbols_[count_];
+    Adler sum = sum_;
+    for (size_t i = 0; i < count; ++i) {
+        const Span span = spans[i];
+        const uint8_t* __restrict from = bytes + span.at;
+        if (i) {
+            end = put(span.value, span.length, end);
+            sum.run(span.value, span.length);
+        }
+        if (span.n <= kAtOnce) {
+            uint64_t word;
+            std::memcpy(&word, from, 8);
+            widen(from, end);
+            end += span.n;
+            sum.word(word, span.n);
+        } else {
+            count_ = size_t(end - symbols_.data()), sum_ = sum;
+            compare(from, span.n);
+            end = &symbols_[count_], sum = sum_;
+        }
+    }
+    count_ = size_t(end - symbols_.data()), sum_ = sum;
+}
+
+// Bytes among which there may be runs.
+void Runs::compare(const uint8_t* bytes, uint32_t n) {
+    for (uint32_t begin = 0, end = 0; begin < n; begin = end) {
+        while (++end < n && bytes[end] == bytes[begin]) {}
+        add(bytes[begin], end - begin);
+    }
+    close();
 }
 
 std::vector<uint8_t> Runs::zlib() {
     close();
-    std::array<uint32_t, 256> literals{};
-    std::array<uint64_t, kLongest + 1> matches{};
-    Adler sum;
-    for (const Part& part : parts_) {
-        literals[part.value] += !part.longest;
-        matches[part.longest ? kLongest : part.more] += part.longest ? part.more : 1;
-        sum.add(part.value, part.length());
-    }
+    while (count_ % 4) symbols_[count_++] = kNothing;
+    const uint16_t *symbols = symbols_.data(), *end = symbols + count_;
+    // Two counts, for the same symbol may come twice in a row.
+    uint32_t uses[2][kSymbols] = {};
+    for (const uint16_t* s = symbols; s != end; s += 2) ++uses[0][s[0]], ++uses[1][s[1]];
+    for (int s = 0; s < kSymbols; ++s) uses[0][s] += uses[1][s];
+
     Counts counts{};
     counts[kEnd] = 1;
-    std::copy(literals.begin(), literals.end(), counts.begin());
-    for (int length = kShortest; length <= kLongest; ++length) counts[kLengths[length].symbol] += matches[length];
+    std::copy_n(uses[0], 256, counts.begin());
+    for (int length = kShortest; length <= kLongest; ++length) counts[kLengths[length].symbol] += uses[0][kMatches + length];
+    counts[kCodes - 1] += 2 * uses[0][kTwice] + 3 * uses[0][kThrice];
     const Sizes sizes = sizes_of(counts);
-    const std::array<Code, kSymbols> codes = codes_of(sizes);
-    std::array<Code, kLongest + 1> again{};  // none of no length
+    const std::array<Code, kCodes> codes = codes_of(sizes);
+
+    std::array<Code, kSymbols> says;
+    std::copy_n(codes.begin(), 256, says.begin());
     for (int length = kShortest; length <= kLongest; ++length) {
         const Length& l = kLengths[length];
-        again[length] = codes[l.symbol].then(l.bits, l.extra).then(0, 1);
+        says[kMatches + length] = codes[l.symbol].then({l.bits, l.extra}).then({0, 1});
     }
+    const Code longest = says[kMatches + kLongest];
+    says[kTwice] = longest.then(longest), says[kThrice] = says[kTwice].then(longest);
+    says[kNothing] = {0, 0};
 
     uint64_t bits = 8 * 256;
-    for (int s = 0; s < kSymbols; ++s) bits += counts[s] * (sizes[s] + 6);
+    for (int s = 0; s < kCodes; ++s) bits += uint64_t(counts[s]) * (sizes[s] + 6);
     std::vector<uint8_t> data(bits / 8);
     Bits out(data.data());
     put_head(out, sizes);
-    for (const Part& part : parts_) {
-        if (part.longest) {
-            out.repeat(again[kLongest], part.more);
+    for (const uint16_t* s = symbols; s != end; s += 4) {
+        const Code first = says[s[0]].then(says[s[1]]), second = says[s[2]].then(says[s[3]]);
+        if (first.size + second.size <= 56) {
+            out.put(first.then(second));
         } else {
-            const Code &first = codes[part.value], &rest = again[part.more];
-            out.put(first.then(rest.bits, rest.size));
+            for (int i = 0; i < 4; ++i) out.put(says[s[i]]);
         }
     }
     out.put(codes[kEnd]);
-    uint8_t* end = out.end();
-    for (int shift = 24; shift >= 0; shift -= 8) *end++ = uint8_t(sum.value() >> shift);
-    data.resize(size_t(end - data.data()));
+    uint8_t* last = out.end();
+    for (int shift = 24; shift >= 0; shift -= 8) *last++ = uint8_t(sum_.value() >> shift);
+    data.resize(size_t(last - data.data()));
     return data;
 }
 

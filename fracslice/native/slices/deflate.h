@@ -1,17 +1,28 @@
 // Runs of equal bytes, deflated without ever being laid out.
 #pragma once
-#include <array>
 #include <cstdint>
 #include <vector>
+
+#include "tiles.h"
 
 namespace fracslice {
 
 constexpr int kShortest = 3, kLongest = 258;  // bytes that a match repeats
 
+// A run of equal bytes, and n others after it, which are thought to differ: those from `at` on.
+struct Span {
+    uint8_t value;
+    uint32_t length, at, n;
+};
+
 // A string of bytes, said run by run; `zlib` writes it as RFC 1950 and 1951 have it, in one block with codes of its own.
 // Matches repeat the byte before them, no other is looked for.
 class Runs {
  public:
+    // Bytes that may be read after those of a span.
+    static constexpr int kAtOnce = 8;
+
+    // A run, or more of the last one.
     void add(uint8_t value, uint64_t n) {
         if (value != value_) {
             close();
@@ -19,27 +30,29 @@ class Runs {
         }
         length_ += n;
     }
+    // The first run may be more of the last one, the others differ from what is before them.
+    void add(const Span* spans, size_t n, const uint8_t* bytes);
     std::vector<uint8_t> zlib();
 
  private:
-    // A byte and how many times more it comes, which is what one match says or none; or so many longest matches of it.
-    struct Part {
-        uint32_t value : 8, more : 23, longest : 1;
+    // With d_i the n bytes: 1 + sum d_i, and n + sum (n - i) d_i, modulo 65521 (RFC 1950).
+    struct Adler {
+        uint64_t at = 0, sum = 0, weighted = 0;  // modulo 65521, now and then
 
-        uint64_t length() const { return longest ? uint64_t(more) * kLongest : more + uint64_t(1); }
+        void run(uint64_t value, uint64_t length);
+        void word(uint64_t bytes, uint64_t n);
+        void reduce();
+        uint32_t value();
     };
 
-    void close() {
-        const uint64_t more = length_ - 1;
-        if (more == 0 || (more >= kShortest && more <= kLongest))
-            parts_.push_back({value_, uint32_t(more), 0});
-        else
-            split();
-        length_ = 0;
-    }
-    void split();
+    void reserve(size_t symbols);
+    void close();
+    void compare(const uint8_t* bytes, uint32_t n);
 
-    std::vector<Part> parts_;
+    // Symbols: bytes; and how many times the byte before them comes again, two or three times the most among them.
+    Rows<uint16_t> symbols_;
+    size_t count_ = 0;
+    Adler sum_;
     uint64_t length_ = 0;
     uint8_t value_ = 0;
 };

@@ -4,8 +4,8 @@
 #include <cstring>
 #include <utility>
 
+#include "coverage.h"
 #include "deflate.h"
-#include "pixels.h"
 
 namespace fracslice {
 namespace {
@@ -13,23 +13,25 @@ namespace {
 // A word of signs as a screen shows it: its rows are rows of the picture, from above.
 class Turn {
  public:
-    explicit Turn(const View& view) : transposed_(view.transposed), reversed_(view.backwards) {
-        for (int bit = 0; bit < 64; ++bit) {
-            int down = kTile - 1 - (bit >> 3), across = reversed_ ? kTile - 1 - (bit & 7) : bit & 7;
-            from_[bit] = uint8_t(transposed_ ? kTile * across + down : kTile * down + across);
-        }
-    }
+    explicit Turn(const View& view) : transposed_(view.transposed), reversed_(view.backwards) {}
     uint64_t operator()(uint64_t word) const {
         if (transposed_) word = transposed(word);
         word = __builtin_bswap64(word);
         return reversed_ ? mirrored(word) : word;
     }
-    // The sample that comes to a place of the word.
-    int from(int bit) const { return from_[bit]; }
+    // Where samples come to, rows `down` apart.
+    Coverage::Spots spots(int down) const {
+        Coverage::Spots spots;
+        for (int bit = 0; bit < 64; ++bit) {
+            int row = bit >> 3, column = bit & 7;
+            if (transposed_) std::swap(row, column);
+            spots[bit] = down * (kTile - 1 - row) + (reversed_ ? kTile - 1 - column : column);
+        }
+        return spots;
+    }
 
  private:
     bool transposed_, reversed_;
-    std::array<uint8_t, 64> from_;
 };
 
 // The layer's pixels along a side of the picture, in its order, counted from the first tile's: those from `first` to before
@@ -47,72 +49,89 @@ struct Axis {
     int count() const { return last - first; }
 };
 
-// Eight rows of a picture between the first and the last tile: which pixels are wholly inside, which are cut, and how much.
+// Eight rows of a picture, from its column `first` to before `last`: of the tiles the first, those that are cut, and the one
+// after each of these. All else is as its left neighbour.
 class Band {
  public:
-    explicit Band(int tiles)
-        : stride_(tiles / 8 * 8 + 8), whole_(kTile * stride_), cut_(kTile * stride_), levels_(64 * (tiles + 1)) {}
+    Band(int tiles, int first, int last)
+        : first_(first), last_(last), room_(tiles / 8 * 8 + 16), column_(room_), whole_(room_), cut_(kTile * room_),
+          levels_(kTile * stride() + Runs::kAtOnce), ends_(kTile * room_ + 2) {}
 
-    void clear() {
-        std::fill(whole_.begin(), whole_.end(), 0), std::fill(cut_.begin(), cut_.end(), 0);
-        for (int row = 0; row < kTile; ++row) end_[row] = &levels_[row * (levels_.size() / kTile)];
+    // From row to row of the levels.
+    int stride() const { return kTile * room_; }
+    uint8_t* levels() { return levels_.data(); }
+    void clear() { n_ = 0; }
+    // The tile as the next one, if it is on the picture. Returns where its levels go.
+    ptrdiff_t put(int tile, uint64_t whole, uint64_t cut) {
+        const int column = kTile * tile;
+        if (column <= first_ - kTile || column >= last_) return kTile * (room_ - 1);
+        if (column < first_) cut &= kAll / 255 * (0xFF & 0xFF << (first_ - column));
+        if (column > last_ - kTile) cut &= kAll / 255 * (0xFF >> (column + kTile - last_));
+        column_[n_] = column, whole_[n_] = whole;
+        uint8_t* rows = &cut_[n_];
+        for (int row = 0; row < kTile; ++row) rows[row * room_] = uint8_t(cut >> kTile * row);
+        return kTile * n_++;
     }
-    void fill(int tile, int n) {
-        for (int row = 0; row < kTile; ++row) std::memset(&whole_[row * stride_ + tile], 255, size_t(n));
-    }
-    void put(int tile, uint64_t whole, uint64_t cut) {
-        for (int row = 0; row < kTile; ++row) {
-            whole_[row * stride_ + tile] = uint8_t(whole >> kTile * row);
-            cut_[row * stride_ + tile] = uint8_t(cut >> kTile * row);
-        }
-    }
-    // The levels of cut pixels of the next tile.
-    void push(uint64_t cut, const uint8_t* levels) {
-        for (int row = 0; row < kTile; ++row) {
-            const int n = __builtin_popcountll(cut >> kTile * row & 0xFF);
-            std::memcpy(end_[row], levels, kTile);
-            end_[row] += n, levels += n;
-        }
+    void close() {
+        column_[n_] = last_;
+        for (int row = 0; row < kTile; ++row) std::memset(&cut_[row * room_ + n_], 0, kTile);
     }
 
-    void write(int row, int first, int last, Runs& runs) const {
-        const uint8_t* level = &levels_[row * (levels_.size() / kTile)];
-        uint64_t whole_before = 0, cut_before = 0;
+    // Some of the rows, each after `before` zeros and before `after` ones.
+    void write(int row, int end, uint32_t before, uint32_t after, Runs& runs) {
+        spans_.resize(size_t(end - row) * (ends_.size() / 2 + 2));
+        Span* span = spans_.data();
         uint8_t value = 0;
-        int begin = first;  // of the run of this value
-        for (int at = 0; at < last; at += 64) {
-            uint64_t whole = word(whole_, row, at), cut = word(cut_, row, at);
-            uint64_t changes = cut | (cut << 1 | cut_before) | (whole ^ (whole << 1 | whole_before));
-            whole_before = whole >> 63, cut_before = cut >> 63;
-            if (at < first) {
-                uint64_t beside = first - at < 64 ? (uint64_t(1) << (first - at)) - 1 : kAll;
-                level += __builtin_popcountll(cut & beside);
-                changes = (changes | (beside + 1)) & ~beside;
+        uint32_t length = 0;  // of the run of this value, so far
+        auto is = [&](uint8_t next) {
+            if (value != next) *span++ = {value, length, 0, 0}, value = next, length = 0;
+        };
+        const int* column = column_.data();
+        const uint64_t* whole = whole_.data();
+        for (; row < end; ++row) {
+            auto filled = [&](int at) { return uint8_t(-(whole[at >> 3] >> (kTile * row + (at & 7)) & 1)); };
+            is(0);
+            length += before;
+            is(filled(first_ & 7));
+            int begin = first_ - int(length);
+            const int* ends = ends_.data();
+            for (const int* stop = turns(row); ends != stop; ends += 2) {
+                const int from = ends[0], to = ends[1];
+                *span++ = {value, uint32_t(column[from >> 3] + (from & 7) - begin), uint32_t(row * stride() + from), uint32_t(to - from)};
+                begin = column[to >> 3] + (to & 7), value = filled(to);
             }
-            if (last - at < 64) changes &= (uint64_t(1) << (last - at)) - 1;
-            each(changes, [&](int bit) {
-                runs.add(value, uint64_t(at + bit - begin));
-                begin = at + bit;
-                const bool is_cut = cut >> bit & 1;
-                const uint8_t filled = uint8_t(-(whole >> bit & 1));
-                value = is_cut ? *level : filled;
-                level += is_cut;
-            });
+            length = uint32_t(last_ - begin);
+            is(0);
+            length += after;
         }
-        runs.add(value, uint64_t(last - begin));
+        runs.add(spans_.data(), size_t(span - spans_.data()), levels_.data());
+        runs.add(0, length);
     }
 
  private:
-    uint64_t word(const std::vector<uint8_t>& bits, int row, int at) const {
-        uint64_t word;
-        std::memcpy(&word, &bits[row * stride_ + at / 8], 8);
-        return word;
+    // Where in a row pixels begin to be cut, and where they end to be, by turns; returns the end.
+    const int* turns(int row) {
+        const uint8_t* cut = &cut_[row * room_];
+        int* end = ends_.data();
+        uint64_t before = 0;
+        for (int i = 0; i <= n_; i += 8) {
+            uint64_t word;
+            std::memcpy(&word, cut + i, 8);
+            each(word ^ (word << 1 | before), [&](int bit) { *end++ = kTile * i + bit; });
+            before = word >> 63;
+        }
+        return end;
     }
 
-    size_t stride_;
-    std::vector<uint8_t> whole_, cut_, levels_;
-    std::array<uint8_t*, kTile> end_;
+    int first_, last_, room_, n_ = 0;
+    std::vector<int> column_;
+    std::vector<uint64_t> whole_;
+    std::vector<uint8_t> cut_, levels_;
+    std::vector<int> ends_;
+    Rows<Span> spans_;
 };
+
+constexpr int kAhead = 3;  // tiles
 
 // A layer on its way to a picture.
 class Shown {
@@ -121,7 +140,8 @@ class Shown {
         : slab_(slab), layer_(layer), view_(view), turn_(view),
           down_(side(view.transposed), view.shape[view.transposed], view.at[view.transposed], view.rows, true),
           across_(side(!view.transposed), view.shape[!view.transposed], view.at[!view.transposed], view.columns, view.backwards),
-          band_(across_.tiles) {}
+          band_(across_.tiles, across_.first, across_.last), coverage_(slab, layer, turn_.spots(band_.stride())),
+          open_(across_.tiles + 1) {}
 
     Picture picture() {
         const uint64_t row = uint64_t(view_.columns) + 1;
@@ -132,11 +152,7 @@ class Shown {
                 runs_.add(0, row * (to - from));
                 continue;
             }
-            for (int r = from; r < to; ++r) {
-                runs_.add(0, uint64_t(across_.at) + 1);
-                band_.write(r, across_.first, across_.last, runs_);
-                runs_.add(0, uint64_t(view_.columns - across_.at - across_.count()));
-            }
+            band_.write(from, to, uint32_t(across_.at) + 1, uint32_t(view_.columns - across_.at - across_.count()), runs_);
         }
         runs_.add(0, row * (view_.rows - down_.at - down_.count()));
         return {runs_.zlib(), painted_};
@@ -147,53 +163,52 @@ class Shown {
 
     // Reads the tiles of eight rows; false if they are empty.
     bool read(int tile) {
-        const int along = down_.tiles - tile, step = view_.backwards ? -1 : 1;
-        auto place = [&](int i) {
-            const int beside = view_.backwards ? across_.tiles - i : i + 1;
-            return view_.transposed ? Place{layer_, beside, along} : Place{layer_, along, beside};
-        };
-        const Place p = place(0);
-        const int32_t* at = slab_.spot(p.layer, p.y, p.x);
-        const ptrdiff_t next = step * (view_.transposed ? slab_.columns() : 1);
-        const int n = across_.tiles;
-        bool any = false;
-        band_.clear();
-        for (int i = 0; i < n;) {
-            const int32_t t = at[next * i];
-            int end = i + 1;
-            if (t >= kTiles)
-                read(place(i), t, i);
-            else
-                while (end < n && at[next * end] == t) ++end;
-            if (t == kFull) band_.fill(i, end - i), painted_.area += kTile * kTile * (end - i);
-            any |= t != kEmpty;
-            i = end;
+        const int n = across_.tiles, along = down_.tiles - tile, beside = view_.backwards ? n : 1;
+        const int32_t* first = view_.transposed ? slab_.spot(layer_, beside, along) : slab_.spot(layer_, along, beside);
+        const ptrdiff_t step = (view_.transposed ? slab_.columns() : 1) * (view_.backwards ? -1 : 1);
+        int full = 0, empty = 0, count = 0;
+        int* const open = open_.data();
+        for (int i = 0; i < n; ++i) {
+            const int32_t t = first[step * i];
+            full += t == kFull, empty += t == kEmpty;
+            open[count] = i, count += t >= kTiles;
         }
-        return any;
+        painted_.area += kTile * kTile * full;
+        if (empty == n) return false;
+
+        band_.clear();
+        int next = across_.first / kTile;  // tile that the band may lack
+        auto put = [&](int i) {
+            if (i == next && i < n) band_.put(i, turn_(slab_.inside[first[step * i]]), 0), ++next;
+        };
+        if (next < n && first[step * next] < kTiles) put(next);
+        for (int k = 0; k < count; ++k) {
+            fetch(first[step * open[std::min(k + kAhead, count - 1)]]);
+            const int i = open[k];
+            if (read(Quad(first + step * i, slab_.columns()), i)) next = std::max(next, i + 1);
+            put(i), put(k + 1 < count && open[k + 1] == i + 1 ? -1 : i + 1);
+        }
+        band_.close();
+        painted_.area += whole_ + coverage_.show(view_.levels.data(), band_.levels());
+        whole_ = 0;
+        return true;
     }
 
-    void read(const Place& p, int32_t t, int i) {
-        const Corners corners(slab_, p.layer, p.y, p.x);
-        const uint64_t sharp = slab_.sharp[t], whole = corners.whole() & ~sharp, cut = turn_(corners.mixed() | sharp);
-        band_.put(i, turn_(whole), cut);
-        const Cells cells(slab_, p);
-        float areas[64];
-        uint8_t levels[64 + kTile];
-        int n = 0;
-        each(cut, [&](int bit) { areas[n++] = cells.area(turn_.from(bit), corners.signs(turn_.from(bit))); });
-        if (sharp) sharpen(t, cut, areas);
-        float inside = float(__builtin_popcountll(whole));
-        for (int i = 0; i < n; ++i) inside += areas[i], levels[i] = view_.levels[uint8_t(255 * areas[i] + 0.5f)];
-        band_.push(cut, levels);
-        painted_.area += inside;
-        painted_.partly += n;
+    // A tile is needed soon.
+    void fetch(int32_t t) const {
+        const float* values = slab_.values[t].data();
+        for (int i = 0; i < 64; i += 16) __builtin_prefetch(values + i);
     }
 
-    void sharpen(int32_t t, uint64_t cut, float* area) const {
-        each(cut, [&](int bit) {
-            *area = slab_.sharpened(t, turn_.from(bit), *area);
-            ++area;
-        });
+    // Whether it is cut.
+    bool read(const Quad& tiles, int i) {
+        const Corners corners(slab_, tiles);
+        const uint64_t sharp = slab_.sharp[tiles.own], whole = corners.whole() & ~sharp, cut = corners.mixed() | sharp;
+        whole_ += __builtin_popcountll(whole);
+        if (!cut) return false;
+        coverage_.push(tiles, corners, cut, band_.put(i, turn_(whole), turn_(cut)));
+        painted_.partly += __builtin_popcountll(cut);
+        return true;
     }
 
     const Slab& slab_;
@@ -202,6 +217,9 @@ class Shown {
     Turn turn_;
     Axis down_, across_;
     Band band_;
+    Coverage coverage_;
+    std::vector<int> open_;  // tiles of eight rows that may be cut
+    int whole_ = 0;
     Runs runs_;
     Painted painted_{0, 0};
 };

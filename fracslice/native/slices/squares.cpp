@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
+#include <numeric>
 
-#include "pixels.h"
+#include "coverage.h"
 
 namespace fracslice {
 namespace {
@@ -26,6 +27,12 @@ void fill(const Canvas& canvas, int y0, int x0, uint64_t whole) {
                 canvas.data[(y0 + r) * canvas.down + x * canvas.across] = 255;
 }
 
+// The pixels of a tile that are on it.
+uint64_t on(const Canvas& canvas, int y0, int x0) {
+    const int rows = std::min(canvas.rows - y0, kTile), columns = std::min(canvas.columns - x0, kTile);
+    return kAll >> 8 * (kTile - rows) & kAll / 255 * (0xFF >> (kTile - columns));
+}
+
 // The outline of a cell's inside, counter-clockwise, leaves along one edge and comes back along another.
 void link(const Sides& sides, int signs, const int32_t* e, std::vector<Crossing>& edges) {
     bool alone = (signs == 5 && !Cells::joined(sides, 0)) || (signs == 10 && !Cells::joined(sides, 1));
@@ -42,6 +49,11 @@ void link(const Sides& sides, int signs, const int32_t* e, std::vector<Crossing>
 
 Painted paint(const Slab& slab, int k, const Canvas& canvas) {
     Painted painted{0, 0};
+    Coverage::Spots spots;
+    for (int bit = 0; bit < 64; ++bit) spots[bit] = int32_t((bit >> 3) * canvas.down + (bit & 7) * canvas.across);
+    Coverage coverage(slab, k, spots);
+    std::array<uint8_t, 256> levels;
+    std::iota(levels.begin(), levels.end(), uint8_t(0));
     for (int y = 1; y < slab.rows() - 1; ++y) {
         int y0 = kTile * (y - 1), full = 0;  // tiles before this one that are full
         if (y0 >= canvas.rows) break;
@@ -49,7 +61,8 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
             int32_t t = slab.at(k, y, x);
             int x0 = kTile * (x - 1);
             bool empty = t == kEmpty || x0 >= canvas.columns;
-            Corners corners(slab, k, y, empty ? 0 : x);
+            const Quad tiles(slab, {k, y, empty ? 0 : x});
+            const Corners corners(slab, tiles);
             uint64_t whole = empty ? 0 : corners.whole();
             uint64_t sharp = slab.sharp[t];
             if (whole == kAll && !sharp) {
@@ -65,16 +78,12 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
             if (empty) continue;
             painted.area += __builtin_popcountll(whole & ~sharp);
             fill(canvas, y0, x0, whole & ~sharp);
-            const Cells cells(slab, {k, y, x});
-            for (uint64_t mixed = t >= kTiles ? corners.mixed() | sharp : 0; mixed; mixed &= mixed - 1) {
-                int bit = lowest(mixed), r = y0 + (bit >> 3), c = x0 + (bit & 7);
-                if (r >= canvas.rows || c >= canvas.columns) continue;
-                float area = slab.sharpened(t, bit, cells.area(bit, corners.signs(bit)));
-                canvas.data[r * canvas.down + c * canvas.across] = uint8_t(255 * area + 0.5f);
-                painted.area += area;
-                ++painted.partly;
-            }
+            if (t < kTiles) continue;
+            const uint64_t cut = (corners.mixed() | sharp) & on(canvas, y0, x0);
+            coverage.push(tiles, corners, cut, y0 * canvas.down + x0 * canvas.across);
+            painted.partly += __builtin_popcountll(cut);
         }
+        painted.area += coverage.show(levels.data(), canvas.data);
     }
     return painted;
 }
@@ -102,8 +111,9 @@ Crossings crossings(const Slab& slab, int k) {
         for (int x = 1; x < slab.columns() - 1; ++x) {
             int32_t t = slab.at(k, y, x);
             if (t < kTiles) continue;
-            const Corners corners(slab, k, y, x);
-            const Cells cells(slab, {k, y, x});
+            const Quad tiles(slab, {k, y, x});
+            const Corners corners(slab, tiles);
+            const Cells cells(slab, slab.scale[k], tiles);
             for (uint64_t mixed = corners.mixed(); mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed);
                 int32_t right = (bit & 7) == 7 ? std::max(slab.at(k, y, x + 1), first) : t;
