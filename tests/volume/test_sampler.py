@@ -164,7 +164,7 @@ def test_scenes_without_a_solid(root: Node, message: str) -> None:
 
 def test_what_is_too_thin_for_any_sample_says_so() -> None:
     with pytest.raises(VolumeError, match=r"thinner than a voxel of 0\.0417; more voxels"):
-        sample_scene(plan(menger(level=10), 48))
+        sample_scene(plan(shell(sphere(), thickness=1e-3), 48))
 
 
 def test_too_fine_a_voxel_is_refused_before_starting() -> None:
