@@ -16,7 +16,6 @@ from fracslice.formulas import (
     difference,
     intersection,
     mandelbulb,
-    menger,
     plane,
     repeat,
     shell,
