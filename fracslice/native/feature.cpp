@@ -61,9 +61,8 @@ constexpr double kAlong = 1e-7;
 // How far outside its cell a feature may lie to be moved to the cell's border instead of being given up.
 constexpr double kNear = 0.4;
 
-// How far from its planes a feature may lie, root mean square: those of an edge bent with a radius of four voxels agree as well,
-// those of a rough surface seldom do.
-constexpr double kMiss = 0.03;
+// How far from its planes a feature may lie, root mean square.
+constexpr double kMiss = 0.06;
 
 // Moves a point to the border of the unit cell at `lower`, `margin` inside, if it is not further outside than kNear.
 bool moved_inside(Vec3& point, const Vec3& lower, double margin) {
