@@ -163,7 +163,7 @@ def _panel(panel: Axes, found: list[Measurement], methods: list[str], point: Poi
 def _line(method: str, methods: list[str]) -> Line2D:
     from matplotlib.lines import Line2D
 
-    i, marks = methods.index(method), "osD^vPX*"
+    i, marks = methods.index(method), "osD^vPX*<>hd"
     colour, mark = COLOURS[i % len(COLOURS)], marks[i % len(marks)]
     style = "-" if i < len(COLOURS) else "--"
     return Line2D([], [], color=colour, marker=mark, ls=style, markersize=4.5, lw=1.4, label=method)
