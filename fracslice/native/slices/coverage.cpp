@@ -78,7 +78,8 @@ double Coverage::show(const uint8_t* levels, uint8_t* picture) {
     const int n = count_;
     count_ = 0;
     if (!n) return 0;
-    measure(n, scale_ == 0 ? 1 : scale_, from_u_.data(), to_u_.data(), from_v_.data(), to_v_.data(), product_.data(), area_.data());
+    measure(n, scale_ == 0 ? 1 : scale_, from_u_.data(), to_u_.data(), from_v_.data(), to_v_.data(), product_.data(),
+            area_.data());
     for (const Rare& r : rare_) area_[r.at] = r.area;
     rare_.clear();
     std::fill_n(&area_[n], kLanes, 0.f);

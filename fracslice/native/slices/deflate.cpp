@@ -20,10 +20,10 @@ constexpr int kMatches = 256 - kShortest, kTwice = kMatches + kLongest + 1, kThr
 inline uint16_t* put(uint8_t value, uint64_t length, uint16_t* end) {
     int64_t more = int64_t(length) - 1, longest = 0;
     if (more > kLongest) longest = more / kLongest, more %= kLongest;
-    const bool match = more >= kShortest;
-    end[0] = value, end[1] = match ? uint16_t(kMatches + more) : value, end[2] = value;
-    end += match ? 2 : more + 1;
-    for (; longest > 0; longest -= 3) *end++ = longest == 1 ? kMatches + kLongest : longest == 2 ? kTwice : kThrice;
+    const int64_t match = -int64_t(more >= kShortest);  // a mask: which it is cannot be foretold
+    end[0] = value, end[1] = uint16_t(value + (match & (kMatches + more - value))), end[2] = value;
+    end += more + 1 + (match & (1 - more));
+    for (; longest > 0; longest -= 3) *end++ = uint16_t(kMatches + kLongest - 1 + std::min<int64_t>(longest, 3));
     return end;
 }
 

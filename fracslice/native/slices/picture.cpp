@@ -97,7 +97,8 @@ class Band {
             const int* ends = ends_.data();
             for (const int* stop = turns(row); ends != stop; ends += 2) {
                 const int from = ends[0], to = ends[1];
-                *span++ = {value, uint32_t(column[from >> 3] + (from & 7) - begin), uint32_t(row * stride() + from), uint32_t(to - from)};
+                const int at = column[from >> 3] + (from & 7);
+                *span++ = {value, uint32_t(at - begin), uint32_t(row * stride() + from), uint32_t(to - from)};
                 begin = column[to >> 3] + (to & 7), value = filled(to);
             }
             length = uint32_t(last_ - begin);

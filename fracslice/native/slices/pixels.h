@@ -11,7 +11,8 @@ namespace fracslice {
 struct Quad {
     int32_t own, right, upper, beyond;
 
-    Quad(const int32_t* spot, ptrdiff_t columns) : own(spot[0]), right(spot[1]), upper(spot[columns]), beyond(spot[columns + 1]) {}
+    Quad(const int32_t* spot, ptrdiff_t columns)
+        : own(spot[0]), right(spot[1]), upper(spot[columns]), beyond(spot[columns + 1]) {}
     Quad(const Slab& slab, const Place& p) : Quad(slab.spot(p.layer, p.y, p.x), slab.columns()) {}
 };
 
@@ -47,7 +48,8 @@ struct Side {
     bool back;  // to the left or down
 
     constexpr Side(int first, int second)
-        : from(kCorner[first]), to(kCorner[second]), number(uint8_t((first + 1) % 4 == second ? first : second)), back(from > to) {}
+        : from(kCorner[first]), to(kCorner[second]), number(uint8_t((first + 1) % 4 == second ? first : second)),
+          back(from > to) {}
     float share(const Sides& s) const { return back ? 1 - s[number] : s[number]; }
 
  private:
@@ -112,7 +114,6 @@ class Cells {
         float more = s[0] + s[3] - s[2] - s[1];
         return q == 0 ? more > 0 : more < 0;
     }
-
     // The inside part of a cell.
     float area(int bit, int signs) const {
         if (signs == 0 || signs == 15) return signs ? 1 : 0;
