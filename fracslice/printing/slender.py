@@ -40,8 +40,9 @@ HALVINGS = 16
 
 @dataclass(frozen=True, eq=False)
 class Slender:
-    """Walls, or gaps, up to `THIN` voxels thick, right within a hundredth of one. replaces: below which width (scene
-    units) they stand for what the samples tell; 0 where the samples are right, and these are what they miss.
+    """Walls, or gaps, up to `THIN` voxels thick, right within a hundredth of one. replaces: below which width
+    (scene units) they stand for what the samples tell; 0 where the samples are right, and these are what they
+    miss.
     """
 
     walls: Walls
@@ -146,7 +147,7 @@ def _slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> np.n
 
 
 class Raised:
-    """A kernel whose values are lower by a constant: its inside reaches farther, or less far if that is below 0."""
+    """A kernel whose values are lower by a constant: its inside reaches farther, or less far."""
 
     def __init__(self, kernel: Kernel, by: float) -> None:
         self.kernel, self.by = kernel, by
