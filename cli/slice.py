@@ -126,6 +126,8 @@ def slice_(
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape
         click.echo(f"{output}: {len(stack.z)} layers of {columns} x {rows} pixels, {size} mm")
+        for note in stack.notes:
+            click.echo(note)
     return 0
 
 

@@ -35,7 +35,7 @@ def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
     """
     found = root.visible(voxel)
     told = [
-        f"{root.formula.name}: {name} {found[name]} of {value}; what is finer is thinner than a voxel"
+        f"{root.formula.name}: {name} {found[name]} of {value}; finer parts are thinner than a voxel"
         for name, value in root.values.items()
         if found[name] != value
     ]

@@ -56,7 +56,7 @@ class Stack:
     position of the lattice point (0, 0) in scene units. pixel: mm (x, y). shape: pixels (ny, nx); there is
     one more lattice point along each. z: float64 [n], the heights at which the layers are cut, scene units.
     tops: float64 [n], the layers' upper faces in mm above the object's lowest point. size: the object's
-    size in mm.
+    size in mm. notes: what a pixel is too large for, in words.
     """
 
     root: Node | Compilable
@@ -68,6 +68,7 @@ class Stack:
     tops: np.ndarray
     size: tuple[float, float, float]
     outer: Box
+    notes: tuple[str, ...] = ()
 
     @property
     def heights(self) -> np.ndarray:
@@ -100,7 +101,8 @@ def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
         raise SliceError(f"{shape[1]} x {shape[0]} pixels: at most {MOST_PIXELS} along a side")
     z = found.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
-    return Stack(planned.root, scale, at, job.pixel, (shape[0], shape[1]), z, tops, size, outer)
+    pixels, notes = (shape[0], shape[1]), planned.notes
+    return Stack(planned.root, scale, at, job.pixel, pixels, z, tops, size, outer, notes)
 
 
 def _tops(height: float, layer: float) -> np.ndarray:

@@ -37,4 +37,4 @@ def test_a_deep_sponge_is_the_solid_that_the_voxel_shows():
     result = make_mesh(scene(menger(level=9), size="2mm"), MeshJob(resolution=40))
     assert result.mesh.volume == pytest.approx(8 * (20 / 27) ** 3, rel=1e-6)
     assert result.report.mesh.components == 1
-    assert result.report.notes == ("menger: level 3 of 9; what is finer is thinner than a voxel",)
+    assert result.report.notes == ("menger: level 3 of 9; finer parts are thinner than a voxel",)
