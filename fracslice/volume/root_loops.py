@@ -175,7 +175,7 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, DX, DY, DZ, n):
         gz = share * gz
         there = field(x + gx, y + gy, z + gz, P)
         ox = load(OX, i)
-        away = ((there < 0.0) & (f < 0.0)) | ((there >= 0.0) & (f >= 0.0))
+        away = (sign * there < 0.0) & (absolute(there) > 2e-5 * absolute(f))
         away = away & (ox == ox)
         store(DX, i, where(away, ox, gx))
         store(DY, i, where(away, load(OY, i), gy))
@@ -184,6 +184,7 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, DX, DY, DZ, n):
 )
 """Where to look for the surface from n points: the way to go, D. Along the gradient, by central differences
 so that at an edge neither side is preferred, four of Newton's steps or as far as L and H, the room below and
-above each point, allow; where the sign does not change there, O, if that is no NaN. A coordinate without room
-is kept; slopes below 0.1 are taken for it, so that no step is longer than ten times |f|.
+above each point, allow; where that does not lead to the surface (within rounding) or beyond it, O, if that is
+no NaN. A coordinate without room is kept; slopes below 0.1 are taken for it, so that no step is longer than
+ten times |f|.
 """
