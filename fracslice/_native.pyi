@@ -50,9 +50,7 @@ class Cells:
     def crossings_before(self, layer: int) -> int:
         """How many crossings the bricks before a layer number."""
 
-    def segments(
-        self, begin: int, end: int, origin: Point, voxel: float, lanes: int = 1
-    ) -> NDArray[float64]:
+    def segments(self, begin: int, end: int, origin: Point, voxel: float, lanes: int = 1) -> NDArray[float64]:
         """The grid edges that the surface crosses, numbers `begin` to `end` - 1 in the order of the vertices
         of `marching_cubes`: float64 [6, n], where each starts and from there to its end, scene units; the
         last one repeated up to a multiple of `lanes`. Raises ValueError where there are no such crossings."""
