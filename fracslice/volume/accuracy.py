@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from ..formulas.registry import Node
@@ -11,6 +13,11 @@ from ..work import Work, chunks
 REACH = 1e-4
 """The step of the differences, in voxels."""
 
+FLAT = 1e-5
+"""Voxels: what seems to be farther off is looked at again in all 26 directions."""
+
+WAYS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
+
 
 def surface_error(
     root: Node | Compilable, points: np.ndarray, voxel: float, work: Work | None = None
@@ -19,7 +26,8 @@ def surface_error(
 
     points: float [n, 3], scene units; voxel: scene units. Returns float64 [n], scene units, at most a voxel
     each (where the gradient vanishes it says nothing more). By the float64 kernel; along each axis the
-    steeper of the two one-sided differences, because at an edge or a corner they cancel.
+    steeper of the two one-sided differences, because at an edge or a corner they cancel. Where two solids
+    touch in an edge the axes lie in the surface: where they are flat, the steepest of all ways counts.
     """
     kernel, h = compile_scene(root, "float64"), REACH * voxel
     error = np.empty(len(points))
@@ -30,7 +38,14 @@ def surface_error(
         for step in h * np.eye(3):
             up, down = kernel.points(*(p + step[:, None])) - f, f - kernel.points(*(p - step[:, None]))
             square += (np.maximum(np.abs(up), np.abs(down)) / h) ** 2
-        error[part] = np.minimum(np.abs(f) / np.maximum(np.sqrt(square), 1e-30), voxel)
+        steep = np.sqrt(square)
+        flat = np.flatnonzero(np.abs(f) > FLAT * voxel * steep)
+        if len(flat):
+            for way in WAYS:
+                step = h / np.linalg.norm(way) * way
+                there = kernel.points(*(p[:, flat] + step[:, None]))
+                steep[flat] = np.maximum(steep[flat], np.abs(there - f[flat]) / h)
+        error[part] = np.minimum(np.abs(f) / np.maximum(steep, 1e-30), voxel)
 
     (work or Work()).map(task, chunks(len(points), 1 << 14))
     return error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracslice.formulas import Node, box, mandelbulb, sphere
+from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
 from fracslice.kernel import compile_scene
 from fracslice.volume.accuracy import surface_error
 from fracslice.volume.settling import Rooms, settle
@@ -67,3 +67,10 @@ def test_what_lies_on_the_surface_stays() -> None:
 def test_surface_error_is_a_distance_also_at_an_edge() -> None:
     points = np.array([[0.51, 0.0, 0.0], [0.5 - 1e-9, 0.5 - 1e-9, 0.1], [0.0, 0.47, 0.0]])
     assert np.allclose(surface_error(box(), points, 0.1), [0.01, 0.0, 0.03], atol=2e-5)
+
+
+def test_surface_error_is_a_distance_also_where_solids_touch_in_an_edge() -> None:
+    """There every axis lies in the surface."""
+    halves = [transform(box(), translate=(d, d, 0)) for d in (-0.5, 0.5)]
+    points = np.array([[1e-9, -1e-9, 0.1], [0.003, 0.003, -0.2]])
+    assert (surface_error(union(*halves), points, 0.1) < [2e-9, 0.004]).all()
