@@ -14,7 +14,7 @@ from ..volume.grid import from_grid, to_grid
 from ..work import Work
 from .parts import parts_of
 from .samples import Samples
-from .slender import slender
+from .slender import all_walls, slender
 from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
 
@@ -106,9 +106,8 @@ def check_solid(
     parts, cube = parts_of(solid.bricks), (bricks.voxel * scale) ** 3
     most = float(BINS[-1]) / scale
     thin = slender(root, solid, work)
-    narrow_gaps = slender(root, solid, work, gaps=True)
     thick = thin.beside(walls(solid, most, work), most)
-    between = narrow_gaps.beside(walls(solid, most, work, gaps=True), most)
+    between = all_walls(root, solid, most, work, gaps=True)
     floors = thin.beside(walls(solid, most, work, direction=UP), most, UP)
     bare = _under(floors, limits.floor, scale)
     narrow = _under(thick, limits.wall, scale)

@@ -164,12 +164,10 @@ class _Run:
     def closed(self) -> Node | Compilable:
         """Gaps are filled from face to face."""
         from .samples import Samples
-        from .slender import slender
-        from .walls import walls
+        from .slender import all_walls
 
-        solid, most = Samples(from_grid(self.distances(self.how.gap))), self.how.gap / self.scale
-        thin = slender(self.thing, solid, self.work, gaps=True)
-        found = thin.beside(walls(solid, most, self.work, gaps=True), most)
+        solid = Samples(from_grid(self.distances(self.how.gap)))
+        found = all_walls(self.thing, solid, self.how.gap / self.scale, self.work, gaps=True)
         one = _apart(found.middle, solid.bricks.voxel)
         return self.added(found.start[one], found.end[one], solid.bricks.voxel, solid.bricks)
 
@@ -179,12 +177,10 @@ class _Run:
         faces.
         """
         from .samples import Samples
-        from .slender import slender
-        from .walls import walls
+        from .slender import all_walls
 
         solid, least = Samples(from_grid(self.distances(self.how.thickness))), self.how.thickness / self.scale
-        thin = slender(self.thing, solid, self.work)
-        middle = thin.beside(walls(solid, least, self.work), least).middle
+        middle = all_walls(self.thing, solid, least, self.work).middle
         middle = middle[_apart(middle, solid.bricks.voxel)]
         return self.added(middle, middle, least / 2, solid.bricks)
 

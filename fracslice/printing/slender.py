@@ -20,7 +20,7 @@ from ..volume import Bricks, Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
 from .samples import Samples
-from .walls import OPPOSITE, Direction, Walls, crossed, normals_at
+from .walls import OPPOSITE, Direction, Walls, crossed, normals_at, walls
 
 NEAR = 0.9
 """Voxels: more than from any point to the nearest sample, half the diagonal."""
@@ -84,6 +84,13 @@ def slender(root: Node | Compilable, seen: Samples, work: Work, *, gaps: bool = 
     facing = (_slopes(kernel, ends[0], least, work) * _slopes(kernel, ends[1], least, work)).sum(1)
     found = Walls(ends[0], ends[1], leave - enter[rays], area[rays])
     return Slender(found.chosen(facing < OPPOSITE), 0.0 if root.facts.weak else THIN * b.voxel)
+
+
+def all_walls(
+    root: Node | Compilable, seen: Samples, limit: float, work: Work, *, gaps: bool = False
+) -> Walls:
+    """The walls or gaps up to `limit` scene units, whether the samples tell of them or the field alone."""
+    return slender(root, seen, work, gaps=gaps).beside(walls(seen, limit, work, gaps=gaps), limit)
 
 
 def _raised(kernel: Raised, facts: Facts, box: Box, voxel: float, work: Work) -> Bricks:

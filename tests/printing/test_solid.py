@@ -179,11 +179,7 @@ def test_walls_thinner_than_the_samples_are_found(voxels: float, tilt: float) ->
     """A fin on a plate, its width in voxels of the check; and the fin's area, both faces."""
     width = voxels * 2.1 / 96
     fin = at(box(size=(1.4, width, 1.5)), 0, 0.003, 0.75)
-    planned = plan(transform(union(box(size=(2, 2, 0.5)), fin), rotate=(1, 0.3, 0.2, tilt)), 96)
-    scale = SIZE / max(planned.box.size)
-    report = check_object(
-        planned.root, planned.outer, scale, Limits(wall=4 * report_voxel(planned, scale), floor=1)
-    )
+    report, scale = tilted(union(box(size=(2, 2, 0.5)), fin), tilt)
     assert report.walls
     assert report.walls.median == pytest.approx(width * scale, rel=0.02)
     assert report.thin_walls == pytest.approx(2 * 1.4 * 1.25 * scale**2, rel=0.15)
@@ -195,18 +191,18 @@ def test_gaps_thinner_than_the_samples_are_found(voxels: float, tilt: float) -> 
     """A slot through a block, its width in voxels of the check; and the slot's area, both faces."""
     width = voxels * 2.1 / 96
     slot = at(box(size=(3, width, 2)), 0, 0.003, 1)
-    planned = plan(transform(difference(box(size=(2, 2, 1.5)), slot), rotate=(1, 0.3, 0.2, tilt)), 96)
-    scale = SIZE / max(planned.box.size)
-    limits = Limits(wall=4 * report_voxel(planned, scale))
-    report = check_object(planned.root, planned.outer, scale, limits)
+    report, scale = tilted(difference(box(size=(2, 2, 1.5)), slot), tilt)
     assert report.gaps
     assert report.gaps.median == pytest.approx(width * scale, rel=0.02)
     assert sum(report.gaps.counts) == pytest.approx(2 * 2 * 0.75 * scale**2, rel=0.15)
 
 
-def report_voxel(planned: Plan, scale: float) -> float:
-    """Between the samples of a check that may be coarse, mm."""
-    return max(planned.outer.size) * scale / 96
+def tilted(root: Node, degrees: float) -> tuple[SolidReport, float]:
+    """A check of an object turned by so much, as coarse as may be, and its scale."""
+    planned = plan(transform(root, rotate=(1, 0.3, 0.2, degrees)), 96)
+    scale = SIZE / max(planned.box.size)
+    voxel = max(planned.outer.size) * scale / 96
+    return check_object(planned.root, planned.outer, scale, Limits(wall=4 * voxel, floor=1)), scale
 
 
 def test_walls_thinner_than_the_samples_are_thickened() -> None:

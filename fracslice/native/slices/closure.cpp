@@ -15,11 +15,11 @@ int32_t Slab::add(int layer, int y, int x) {
 // Tiles said to be full beside ones said to be empty, where a bound is wrong; the same in all layers of a group.
 void Slab::mend(int layer) {
     if (!torn_) torn_ = torn(layer);
-    for (const Column& c : *torn_) add(layer, c.y, c.x);
+    for (const Place& p : *torn_) add(layer, p.y, p.x);
 }
 
-std::vector<Slab::Column> Slab::torn(int layer) const {
-    std::vector<Column> found;
+std::vector<Place> Slab::torn(int layer) const {
+    std::vector<Place> found;
     for (int y = 1; y < ty_ - 1; ++y) {
         const int32_t *row = spot(layer, y, 0), *below = row - tx_, *above = row + tx_;
         auto torn = [&](int x) {
@@ -29,7 +29,7 @@ std::vector<Slab::Column> Slab::torn(int layer) const {
         int32_t any = 0;
         for (int x = 1; x < tx_ - 1; ++x) any |= -int32_t(torn(x));
         for (int x = 1; any && x < tx_ - 1; ++x)
-            if (torn(x)) found.push_back({y, x, 0, 0});
+            if (torn(x)) found.push_back({layer, y, x});
     }
     return found;
 }

@@ -137,7 +137,7 @@ class Slab : public Tiles {
 
     int32_t add(int layer, int y, int x);
     void mend(int layer);
-    std::vector<Column> torn(int layer) const;
+    std::vector<Place> torn(int layer) const;
     void close(int layer);
     void ask(std::vector<int32_t>& active, std::vector<int32_t>& again);
     void corners();
@@ -161,7 +161,7 @@ class Slab : public Tiles {
     double farthest_;  // from the middle of a block to its farthest sample, squared, as `reach` has it, if its size is one
     std::vector<Block> blocks_;  // of 16 pixels, that are not decided
     std::vector<Column> columns_;  // of the group whose first layer is `group_`
-    std::optional<std::vector<Column>> torn_;  // of that group, once they are known
+    std::optional<std::vector<Place>> torn_;  // of that group, once they are known
     int group_ = -1;
     std::vector<float> middles_;   // values in the middles of places, NaN between uses
     std::vector<Ask> asks_;  // for use within a step
