@@ -55,25 +55,25 @@ class Cells:
         of `marching_cubes`: float64 [6, n], where each starts and from there to its end, scene units; the
         last one repeated up to a multiple of `lanes`. Raises ValueError where there are no such crossings."""
 
-    def contour(
-        self,
-        first: int,
-        last: int,
-        t: NDArray[float64],
-        normals: NDArray[float32],
-        origin: Point,
-        voxel: float,
-        clamp: float,
-    ) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8]]:
-        """The surface of `marching_cubes` in some layers through exact crossings, its edges and corners kept.
+class Contouring:
+    """The surface of `marching_cubes` in some layers of cells, through exact crossings, its edges and corners
+    kept: made layer by layer, from the one before `first` to `last`. Raises ValueError for more than 2^31
+    vertices or triangles.
+    """
 
-        t: where on its edge the surface crosses each of those that the layers `first` - 1 to `last` + 1
-        number, [n]; normals: unit, outward, [3, n]. Returns vertices and triangles as `marching_cubes`, how
-        many vertices are crossings (the first: those of the layers `first` to `last`), and for each of the
-        others, in faces and cells, grid points of its face or cell near it, dx + 2 dy + 4 dz: an inside one,
-        and 8 times an outside one, uint8. Raises ValueError for other than n crossings, and for more than
-        2^31 vertices or triangles.
-        """
+    def __init__(
+        self, cells: Cells, first: int, last: int, origin: Point, voxel: float, clamp: float
+    ) -> None: ...
+    def advance(self, end: int, first: int, t: NDArray[float64], normals: NDArray[float32]) -> None:
+        """Goes on to the layer before `end`. t: where on its edge the surface crosses each of those numbered
+        from `first` on, [n]; normals: unit, outward, [3, n]: all of these layers and of the layer `end`, or
+        ValueError is raised."""
+
+    def finish(self) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8]]:
+        """Vertices and triangles as `marching_cubes`, how many vertices are crossings (the first: those of the
+        layers `first` to `last`), and for each of the others, in faces and cells, the case of its cell, of
+        the upper one at a face: bit dx + 2 dy + 4 dz set for an inside grid point. Raises ValueError while
+        layers are left."""
 
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:
     """How many grid edges with a sign change touch a point without a sample: 0 if the surface is closed."""

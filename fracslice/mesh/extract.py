@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,11 +14,14 @@ from ..formulas.registry import Node
 from ..kernel import Compilable
 from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
-from ..volume.crossings import Crossings, refine_crossings
+from ..volume.crossings import NONE, refine_crossings
 from ..volume.lattice import BRICK
 from ..volume.settling import Rooms, settle
 from ..work import Work
 from .model import Mesh
+
+if TYPE_CHECKING:
+    from .._native import Cells
 
 
 def extract(bricks: Bricks, threads: int = 0) -> Mesh:
@@ -78,24 +81,24 @@ def contour_pieces(
     root: Node | Compilable, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
 ) -> Iterator[Piece]:
     """The same surface, piece after piece along x, each of about `most` bricks: memory for one at a time."""
-    from .._native import Cells
+    from .._native import Cells, Contouring
 
     work = work or Work()
     signs = bricks.signs if isinstance(bricks, Bricks) else bricks
     cells = _called(Cells, signs.ijk, signs.signs, signs.index, work.threads)
-    placement = tuple(float(v) for v in signs.origin), float(signs.voxel), clamp(signs)
-    known, start = Crossings(np.empty(0), np.empty((3, 0), np.float32)), 0
+    x, y, z = signs.origin
+    placement = (float(x), float(y), float(z)), float(signs.voxel), clamp(signs)
+    known = NONE
     for first, last in _layers(signs, most):
-        begin, done = cells.crossings_before(first - 1), start + len(known.t)
-        numbers = done, cells.crossings_before(last + 2)
-        fresh = refine_crossings(root, cells, numbers, signs.origin, signs.voxel, work)
-        known = known.after(begin - start).joined(fresh)
-        start = begin
-        vertices, triangles, count, ends = _called(
-            cells.contour, first, last, known.t, known.normals, *placement
-        )
+        surface = Contouring(cells, first, last, *placement)
+        for begin, end in _batches(cells, first - 1, last + 1, work.threads << 16):
+            known = known.without(cells.crossings_before(min(begin, last - 1)))
+            numbers = known.end, cells.crossings_before(end + 1)
+            known = known.joined(refine_crossings(root, cells, numbers, signs.origin, signs.voxel, work))
+            _called(surface.advance, end, known.first, known.t, known.normals)
+        vertices, triangles, count, cases = surface.finish()
         features = vertices[count:]
-        rooms = partial(_rooms, features, ends, signs)
+        rooms = partial(_rooms, features, cases, signs)
         moved, places = settle(root, features, rooms, signs.voxel, work)
         features[moved] = places
         numbers = cells.crossings_before(first) + np.arange(count)
@@ -105,6 +108,16 @@ def contour_pieces(
             used[triangles] = True
             mesh, numbers = mesh.selected(np.ones(len(triangles), bool)), numbers[used[:count]]
         yield Piece(mesh, signs.origin[0] + signs.voxel * BRICK * last, numbers)
+
+
+def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[int, int]]:
+    """Layers first to last - 1 in parts of `least` crossings or little more, so that what is known of these
+    is still near when it is used: (begin, end) with end excluded."""
+    begin = first
+    for end in range(first + 1, last + 1):
+        if end == last or cells.crossings_before(end) - cells.crossings_before(begin) >= least:
+            yield begin, end
+            begin = end
 
 
 def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
@@ -122,23 +135,41 @@ def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
 
 
 def _rooms(
-    features: np.ndarray, ends: np.ndarray, bricks: SignBricks, which: np.ndarray, inside: np.ndarray
+    features: np.ndarray, cases: np.ndarray, bricks: SignBricks, which: np.ndarray, inside: np.ndarray
 ) -> Rooms:
     """How far vertices within cells, or within cells' faces, may move: strictly inside these; or towards the
     corner of theirs with the other sign.
     """
-    corners = np.where(inside, ends[which] >> 3, ends[which])
     origin, voxel, margin = np.array(bricks.origin)[:, None], bricks.voxel, clamp(bricks)
     there = np.ascontiguousarray(features[which].T)
     grid = (there - origin) / voxel
     whole = np.round(grid)
     flat = np.abs(grid - whole) < margin / 2
     cell = np.where(flat, whole, np.floor(grid))
+    octant = ((grid - cell > 0.5) << np.arange(3)[:, None]).sum(0)
+    face = np.where(flat.any(0), flat.argmax(0), 3)
+    corner = _nearest_corners()[face, cases[which], octant, ~inside * 1]
     return Rooms(
         np.where(flat, there, origin + voxel * (cell + margin)),
         np.where(flat, there, origin + voxel * (cell + (1 - margin))),
-        origin + voxel * (cell + (corners >> np.arange(3)[:, None] & 1)),
+        origin + voxel * (cell + (corner >> np.arange(3)[:, None] & 1)),
     )
+
+
+@lru_cache(maxsize=1)
+def _nearest_corners() -> np.ndarray:
+    """The corner of a cell, dx + 2 dy + 4 dz, to which the fewest edges lead: uint8 [4, 256, 8, 2]. By the axis
+    across the lower face that it shall be in (3: in any), the cell's case, the corner from which they lead,
+    and whether it shall be inside.
+    """
+    corner, axis = np.arange(8), np.arange(3)
+    away = ((corner[:, None] ^ corner)[..., None] >> axis & 1).sum(-1)
+    signs = np.arange(256)[:, None] >> corner & 1
+    right = np.stack([signs == 0, signs == 1], axis=1)
+    lower = np.vstack([corner >> axis[:, None] & 1 == 0, np.ones(8, bool)])
+    allowed = lower[:, None, None, None] & right[None, :, None]
+    found: np.ndarray = np.where(allowed, away[:, None], 4).argmin(-1).astype(np.uint8)
+    return found
 
 
 def clamp(bricks: Bricks | SignBricks) -> float:

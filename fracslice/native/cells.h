@@ -11,6 +11,8 @@ namespace fracslice {
 
 using Place = std::array<int, 3>;  // of a brick, in bricks
 
+inline int popcount(Slab bits) { return __builtin_popcountll(bits); }
+
 constexpr size_t kMostElements = size_t(std::numeric_limits<int32_t>::max());
 
 struct Edge {

@@ -1,145 +1,148 @@
-// Once the features are known, how many triangles they make; then vertices and triangles, each brick by itself, at the
-// places that the sums of the counts give.
+// Layer by layer, so that what is known of features is used while it is near: the features of the next layer are found and
+// its corners numbered, then a layer's tips, vertices and triangles, each brick by itself, at the places that the sums of the
+// counts give.
 #include "contour.h"
 
-#include <algorithm>
+#include <string>
+#include <utility>
 
 #include "faces.h"
-#include "features.h"
 
 namespace fracslice {
 namespace {
 
-int popcount(Slab bits) { return __builtin_popcountll(bits); }
+constexpr int64_t kNone = -1;
 
-class Contouring {
-  public:
-    Contouring(const CellGrid& cells, Layers layers, const Hermite& data, const Placement& placement)
-        : cells_(cells), layers_(layers), crossed_(cells, layers, data, placement.clamp),
-          features_(cells, layers, crossed_, placement.clamp), placement_(placement),
-          first_vertex_(cells.crossings_before(layers.first)) {}
-
-    Contour run() {
-        Span own = cells_.span(layers_), numbered = cells_.span({layers_.first, layers_.last + 1});
-        for_each_brick(own, [&](size_t i) { count_triangles(i); });
-        for_each_brick(numbered, [&](size_t i) { features_.of(i).corner_base = features_.of(i).corner_count; });
-        result_.crossings = cells_.crossings_before(layers_.last + 1) - first_vertex_;
-        result_.corners = features_.running_sum(&Features::corner_base, "vertices");
-        result_.tips = features_.running_sum(&Features::tip_base, "vertices");
-        result_.triangles = {features_.running_sum(&Features::triangles, "triangles"), 3};
-        size_t total = result_.crossings + result_.corners + result_.tips;
-        if (total > kMostElements) throw std::length_error("the surface has more than 2^31 vertices");
-        result_.vertices = {total, 3};
-        result_.ends = {result_.corners + result_.tips, 1};
-        for_each_brick(numbered, [&](size_t i) { write_vertices(i); });
-        for_each_brick(own, [&](size_t i) { write_triangles(i); });
-        return std::move(result_);
+// The loop of a cell's crossings and corners around its tip, or where it has none around the first corner.
+int32_t* write_fan(const Around& around, const Cell& cell, int64_t tip, int32_t* out) {
+    const Case& type = kCases[cell.number];
+    std::array<int64_t, 2 * sizeof(Case::loop) + 1> loop;
+    int count = 0, bit = cell.y * kSide + cell.z;
+    for (int k = 0; k < type.loop_length; ++k) {
+        loop[count++] = cell.at(type.loop[k]);
+        int face = kFaces[cell.number].after[k];
+        if (!(around.at(cell.x, face) >> bit & 1)) continue;
+        loop[count] = int64_t(around.corner(cell.x, face, bit).vertex());
+        if (tip == kNone) tip = loop[count];
+        ++count;
     }
-
-  private:
-    // A corner makes one more triangle in both of its cells.
-    void count_triangles(size_t i) {
-        Features& own = features_.of(i);
-        own.triangles = own.loops + own.corner_count;
-        own.tip_base = own.count - own.corner_count;
-        if (!own.count) return;
-        for (int axis = 0; axis < 3; ++axis) {
-            const Features* above = features_.beside(i, axis, 1);
-            Signs none{}, after = above ? above->corners[axis] : none;
-            for (int x = 0; x < kSide; ++x) {
-                Slab corners = own.corners[axis][x], upper = axis == 0   ? (x + 1 < kSide ? own.corners[0][x + 1] : after[0])
-                                                     : axis == 1 ? shift_y(corners, after[x])
-                                                                 : shift_z(corners, after[x]);
-                own.triangles += size_t(popcount(upper & own.tips[x]));
-            }
-        }
+    loop[count] = loop[0];
+    for (int k = 0; k < count; ++k) {
+        if (loop[k] == tip || loop[k + 1] == tip) continue;
+        *out++ = int32_t(loop[k]), *out++ = int32_t(loop[k + 1]), *out++ = int32_t(tip);
     }
+    return out;
+}
 
-    void put(size_t vertex, const Vec3& p) {
-        for (int k = 0; k < 3; ++k) {
-            result_.vertices.data[3 * vertex + k] = placement_.origin[k] + placement_.voxel * p[k];
-        }
-    }
+// How many crossings some layers number.
+size_t crossings_of(const CellGrid& cells, Layers layers) {
+    return cells.crossings_before(layers.last) - cells.crossings_before(layers.first);
+}
 
-    void put(size_t vertex, const Feature& feature) {
-        put(vertex, feature.point);
-        result_.ends.data[vertex - result_.crossings] = feature.ends;
-    }
-
-    void write_vertices(size_t i) {
-        cells_.for_each_own_edge(i, [&](const CellEdge& edge) {
-            Vec3 point = {double(edge.lower[0]), double(edge.lower[1]), double(edge.lower[2])};
-            point[edge.axis] += crossed_.root(edge.vertex);
-            put(edge.vertex - first_vertex_, point);
-        });
-        const Features& own = features_.of(i);
-        size_t corner = result_.crossings + own.corner_base;
-        for (size_t k = 0; k < own.corner_count; ++k) put(corner++, own.points[k]);
-    }
-
-    void write_triangles(size_t i) {
-        const Features& own = features_.of(i);
-        int32_t* out = result_.triangles.data.get() + 3 * own.triangles;
-        Near near(cells_, i);
-        cells_.for_each_near(near.octant,
-                             [&](size_t at, uint32_t vertex) { near.numbers[at] = uint32_t(vertex - first_vertex_); });
-        size_t tip = result_.crossings + result_.corners + own.tip_base;
-        for (size_t k = own.corner_count, at = tip; k < own.count; ++k) put(at++, own.points[k]);
-        Above above{};
-        if (own.count) above = {features_.beside(i, 0, 1), features_.beside(i, 1, 1), features_.beside(i, 2, 1)};
-        near.for_each([&](const Cell& cell) {
-            if (own.tips[cell.x] & cell.bit()) {
-                out = write_fan(own, above, cell, tip++, out);
-                return;
-            }
-            const Case& type = kCases[cell.number];
-            for (int k = 0; k < 3 * type.triangles; ++k) *out++ = int32_t(cell.at(type.corners[k]));
-        });
-    }
-
-    using Above = std::array<const Features*, 3>;
-
-    // The number of the corner in a face (axis*2 + upper) of a cell; -1 if there is none.
-    int64_t corner(const Features& own, const Above& above, const Cell& cell, int face) const {
-        int axis = face / 2, at[3] = {cell.x, cell.y, cell.z};
-        const Features* owner = &own;
-        if (face % 2 && ++at[axis] == kSide) at[axis] = 0, owner = above[axis];
-        if (!owner) return -1;
-        Slab corners = owner->corners[axis][at[0]], bit = Slab(1) << (at[1] * 8 + at[2]);
-        if (!(corners & bit)) return -1;
-        return int64_t(result_.crossings + owner->corner_base + owner->rank[axis][at[0]]) + popcount(corners & (bit - 1));
-    }
-
-    int32_t* write_fan(const Features& own, const Above& above, const Cell& cell, size_t tip, int32_t* out) const {
-        auto triangle = [&](size_t a, size_t b) {
-            *out++ = int32_t(a), *out++ = int32_t(b), *out++ = int32_t(tip);
-        };
-        const Case& type = kCases[cell.number];
-        for (int k = 0; k < type.loop_length; ++k) {
-            size_t a = cell.at(type.loop[k]), b = cell.at(type.loop[k + 1 < type.loop_length ? k + 1 : 0]);
-            int64_t between = corner(own, above, cell, kFaces[cell.number].after[k]);
-            if (between < 0) {
-                triangle(a, b);
-                continue;
-            }
-            triangle(a, size_t(between)), triangle(size_t(between), b);
-        }
-        return out;
-    }
-
-    const CellGrid& cells_;
-    Layers layers_;
-    Crossed crossed_;
-    FeatureGrid features_;
-    Placement placement_;
-    size_t first_vertex_;
-    Contour result_{};
-};
+// Room for at most so much. A crossing is in the loops of four cells. A loop has one tip, no more corners, each shared with
+// another loop, than crossings, and twice as many triangles; three crossings at least.
+Contour room(size_t crossings, size_t known) {
+    Contour room{{crossings + known * 10 / 3, 3}, {8 * known, 3}, {known * 10 / 3, 1}, crossings};
+    room.triangles.rows = room.cases.rows = 0;
+    return room;
+}
 
 }  // namespace
 
-Contour contour(const CellGrid& cells, Layers layers, const Hermite& data, const Placement& placement) {
-    return Contouring(cells, layers, data, placement).run();
+Contouring::Contouring(const CellGrid& cells, Layers layers, const Placement& placement)
+    : cells_(cells), layers_(layers), placement_(placement), features_(cells, layers), next_(layers.first - 1),
+      first_vertex_(cells.crossings_before(layers.first)),
+      result_(room(crossings_of(cells, {layers.first, layers.last + 1}),
+                   crossings_of(cells, {layers.first - 1, layers.last + 2}))) {}
+
+void Contouring::advance(int end, const Hermite& data) {
+    size_t first = cells_.crossings_before(next_), last = cells_.crossings_before(end + 1);
+    if (end > layers_.last + 1 || data.first > first || data.first + data.count < last) {
+        throw std::invalid_argument("expected the crossings " + std::to_string(first) + " to " + std::to_string(last));
+    }
+    for (; next_ < end; ++next_) {
+        features_.find(next_, data);
+        if (next_ < layers_.first) continue;
+        features_.choose(next_);
+        number(next_, &Features::corner_base, &Features::corner_count);
+        for_each_brick(cells_.span({next_, next_ + 1}), [&](size_t i) { write_vertices(i, data); });
+        if (next_ > layers_.first) write_layer(next_ - 1);
+    }
+}
+
+Contour Contouring::finish() {
+    if (next_ <= layers_.last) throw std::invalid_argument("there are layers left");
+    result_.vertices.rows = result_.crossings + result_.cases.rows;
+    return std::move(result_);
+}
+
+// Gives the corners or the tips of a layer their places, brick by brick.
+void Contouring::number(int layer, size_t Features::*base, uint32_t Features::*count) {
+    Span span = cells_.span({layer, layer + 1});
+    for (size_t k = 0; k < span.size(); ++k) {
+        Features& own = features_.of(span.brick(k));
+        own.*base = result_.crossings + result_.cases.rows;
+        result_.cases.rows += own.*count;
+    }
+    if (result_.crossings + result_.cases.rows > kMostElements) {
+        throw std::length_error("the surface has more than 2^31 vertices");
+    }
+}
+
+void Contouring::write_layer(int layer) {
+    Span span = cells_.span({layer, layer + 1});
+    features_.straighten(layer);
+    number(layer, &Features::tip_base, &Features::tip_count);
+    for (size_t k = 0; k < span.size(); ++k) {
+        size_t& count = features_.of(span.brick(k)).triangles;
+        count = std::exchange(result_.triangles.rows, result_.triangles.rows + count);
+    }
+    if (result_.triangles.rows > kMostElements) throw std::length_error("the surface has more than 2^31 triangles");
+    for_each_brick(span, [&](size_t i) { write_triangles(i); });
+}
+
+void Contouring::put(size_t vertex, const Vec3& point) {
+    for (int k = 0; k < 3; ++k) {
+        result_.vertices.data[3 * vertex + k] = placement_.origin[k] + placement_.voxel * point[k];
+    }
+}
+
+void Contouring::put(size_t vertex, const Feature& feature) {
+    put(vertex, feature.point);
+    result_.cases.data[vertex - result_.crossings] = feature.number;
+}
+
+void Contouring::write_vertices(size_t i, const Hermite& data) {
+    cells_.for_each_own_edge(i, [&](const CellEdge& edge) {
+        Vec3 point = {double(edge.lower[0]), double(edge.lower[1]), double(edge.lower[2])};
+        point[edge.axis] += data.root(edge.vertex);
+        put(edge.vertex - first_vertex_, point);
+    });
+    const Features& own = features_.of(i);
+    for (size_t k = 0; k < own.corner_count; ++k) put(own.corner_base + k, own.points[k]);
+}
+
+void Contouring::write_triangles(size_t i) {
+    const Features& own = features_.of(i);
+    int32_t* out = result_.triangles.data.get() + 3 * own.triangles;
+    Near near(cells_, i);
+    cells_.for_each_near(near.octant,
+                         [&](size_t at, uint32_t vertex) { near.numbers[at] = uint32_t(vertex - first_vertex_); });
+    Around around(features_, i);
+    const Feature* feature = own.points + own.corner_count;
+    size_t tip = own.tip_base;
+    near.for_each([&](const Cell& cell) {
+        const Case& type = kCases[cell.number];
+        if (!(own.cells[cell.x] & cell.bit())) {
+            for (int k = 0; k < 3 * type.triangles; ++k) *out++ = int32_t(cell.at(type.corners[k]));
+        } else if (own.straight[cell.x] & cell.bit()) {
+            ++feature;
+            out = write_fan(around, cell, kNone, out);
+        } else {
+            put(tip, *feature++);
+            out = write_fan(around, cell, int64_t(tip++), out);
+        }
+    });
 }
 
 }  // namespace fracslice

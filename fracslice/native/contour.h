@@ -6,12 +6,10 @@
 namespace fracslice {
 
 struct Contour {
-    Array<double> vertices;    // [crossings + corners + tips, 3], origin + voxel * (grid position)
+    Array<double> vertices;    // [crossings + features, 3], origin + voxel * (grid position)
     Array<int32_t> triangles;  // [m, 3], counter-clockwise seen from outside
-    // [corners + tips]: corners of the cell of each, or of its face, near it: one inside, and 8 times one outside; corner
-    // dx + 2 dy + 4 dz.
-    Array<uint8_t> ends;
-    size_t crossings, corners, tips;
+    Array<uint8_t> cases;      // [features], of their cells, or of the upper cells at their faces: bits dx + 2 dy + 4 dz
+    size_t crossings;
 };
 
 // The surface between the samples < 0 and the others with its edges and corners kept, after Ho, Wu, Chen, Chuang and
@@ -25,13 +23,41 @@ struct Contour {
 //   in that face stays a simple line from one crossing to the other.
 // - The loop of such a cell is then a simple closed line on the surface of a convex body, the tip strictly inside it: a fan
 //   of such a loop around such a point never meets itself.
+// - Where the tip would lie on the line between the only two corners of its loop, it is left out and the fan is around one of
+//   these. Of the loop just the two segments that end there lie in its face, so any other point of the loop is seen from it
+//   through the inside of the body, each in a direction of its own.
 //
 // The surface is that in the cells of `layers`: pieces of neighbouring layers meet in equal points, and all pieces together
-// are the whole. The first vertices are the crossings numbered by the bricks of these layers and of the next one. data: the
-// crossings of these layers, of the one before and of the next two, for features take two layers to agree.
+// are the whole. The first vertices are the crossings numbered by the bricks of these layers and of the next one.
 //
-// Order and results follow from the arguments alone. Throws std::invalid_argument for other than so many crossings,
-// std::length_error past 2^31 vertices or triangles.
-Contour contour(const CellGrid& cells, Layers layers, const Hermite& data, const Placement& placement);
+// Order and results follow from the arguments alone.
+class Contouring {
+  public:
+    Contouring(const CellGrid& cells, Layers layers, const Placement& placement);
+
+    // Goes on to the layer before `end`; the first is the one before `layers`, as features take two layers to agree, and the
+    // last the one after. data: the crossings of these layers and of the next one. Throws std::invalid_argument for others,
+    // std::length_error past 2^31 vertices or triangles.
+    void advance(int end, const Hermite& data);
+
+    // The surface; once, after the last layer.
+    Contour finish();
+
+  private:
+    void number(int layer, size_t Features::*base, uint32_t Features::*count);
+    void write_layer(int layer);
+    void write_vertices(size_t i, const Hermite& data);
+    void write_triangles(size_t i);
+    void put(size_t vertex, const Vec3& point);
+    void put(size_t vertex, const Feature& feature);
+
+    const CellGrid& cells_;
+    Layers layers_;
+    Placement placement_;
+    FeatureGrid features_;
+    int next_;
+    size_t first_vertex_;
+    Contour result_;
+};
 
 }  // namespace fracslice

@@ -64,31 +64,29 @@ constexpr double kNear = 0.4;
 // How far from its planes a feature may lie, root mean square.
 constexpr double kMiss = 0.06;
 
-// Moves a point to the border of the unit cell at `lower`, `margin` inside, if it is not further outside than kNear.
-bool moved_inside(Vec3& point, const Vec3& lower, double margin) {
-    for (int k = 0; k < 3; ++k) {
-        double inside = point[k] - lower[k];
-        if (!(inside > -kNear && inside < 1 + kNear)) return false;
-        point[k] = lower[k] + std::clamp(inside, margin, 1 - margin);
+// Moves a point to the border of the unit cell, `margin` inside, if it is not further outside than kNear.
+bool moved_inside(Vec3& point, double margin) {
+    for (double& x : point) {
+        if (!(x > -kNear && x < 1 + kNear)) return false;
+        x = std::clamp(x, margin, 1 - margin);
     }
     return true;
 }
 
-// Whether a point is in the unit cell at `lower`, `margin` from its faces.
-bool inside(const Vec3& point, const Vec3& lower, double margin) {
-    Vec3 p = point - lower;
+// Whether a point is in the unit cell, `margin` from its faces.
+bool inside(const Vec3& p, double margin) {
     return std::min({p[0], p[1], p[2]}) >= margin && std::max({p[0], p[1], p[2]}) <= 1 - margin;
 }
 
 // Whether a point whose distances from `count` planes have this sum of squares is near enough to them.
 bool fits(double squares, int count) { return squares < kMiss * kMiss * count; }
 
-// The point of a line in the unit cell at `lower` that is nearest to `start`; where the line misses the cell by little, the
+// The point of a line in the unit cell that is nearest to `start`; where the line misses the cell by little, the
 // cell's point beside it.
-bool clipped(const Vec3& start, const Vec3& direction, const Vec3& lower, double margin, Vec3& point) {
+bool clipped(const Vec3& start, const Vec3& direction, double margin, Vec3& point) {
     double first = -10, last = 10;
     for (int k = 0; k < 3; ++k) {
-        double low = lower[k] + margin - start[k], high = lower[k] + 1 - margin - start[k];
+        double low = margin - start[k], high = 1 - margin - start[k];
         if (std::abs(direction[k]) < 1e-9) {
             if (low > kNear || high < -kNear) return false;
             continue;
@@ -99,28 +97,44 @@ bool clipped(const Vec3& start, const Vec3& direction, const Vec3& lower, double
     }
     double at = first <= last ? std::clamp(0.0, first, last) : (first + last) / 2;
     point = start + at * direction;
-    return moved_inside(point, lower, margin);
+    return moved_inside(point, margin);
 }
 
-// feature_point for planes that are all across the axes, which solve for one coordinate each.
-bool meet_along_axes(const Vec3& mean, const Vec3& squares, const Vec3& b, double miss, int count, const Vec3& lower,
-                     double margin, Vec3& point) {
-    int known = 0;
-    point = mean;
-    for (int k = 0; k < 3; ++k) {
-        if (!(squares[k] > kRank * count)) continue;
-        ++known;
-        point[k] += b[k] / squares[k];
-        miss -= b[k] * b[k] / squares[k];
+// What planes across the axes ask of each coordinate: sums over the crossings.
+struct Across {
+    Vec3 points{}, weights{}, moments{}, squares{};
+    double mixed = 0;  // how far the planes are from being across the axes
+
+    void add(const Crossing& c) {
+        const Vec3& n = c.normal;
+        for (int k = 0; k < 3; ++k) {
+            double weight = n[k] * n[k], moment = weight * c.point[k];
+            points[k] += c.point[k], weights[k] += weight, moments[k] += moment, squares[k] += moment * c.point[k];
+        }
+        mixed += std::abs(n[0] * n[1]) + std::abs(n[1] * n[2]) + std::abs(n[2] * n[0]);
     }
-    return known > 1 && fits(miss, count) && inside(point, lower, margin);
-}
+
+    // feature_point, where these planes say one coordinate each.
+    bool meet(int count, double margin, Vec3& point) const {
+        int known = 0;
+        double miss = 0;
+        for (int k = 0; k < 3; ++k) {
+            bool told = weights[k] > kRank * count;
+            point[k] = told ? moments[k] / weights[k] : points[k] / count;
+            miss += told ? squares[k] - moments[k] * point[k] : 0;
+            known += told;
+        }
+        return known > 1 && fits(miss, count) && inside(point, margin);
+    }
+};
 
 }  // namespace
 
-bool feature_point(const Crossing* crossings, int count, const Vec3& lower, double margin, Vec3& point) {
-    Vec3 mean{};
-    for (int i = 0; i < count; ++i) mean = mean + (1.0 / count) * crossings[i].point;
+bool feature_point(const Crossing* crossings, int count, double margin, Vec3& point) {
+    Across across;
+    for (int i = 0; i < count; ++i) across.add(crossings[i]);
+    if (across.mixed < kAlong && across.meet(count, margin, point)) return true;
+    Vec3 mean = (1.0 / count) * across.points;
     Symmetric a;
     Vec3 b{};
     double miss = 0;
@@ -134,8 +148,6 @@ bool feature_point(const Crossing* crossings, int count, const Vec3& lower, doub
             b[k] += d * n[k];
         }
     }
-    bool along_axes = std::abs(a.other[0]) + std::abs(a.other[1]) + std::abs(a.other[2]) < kAlong;
-    if (along_axes && meet_along_axes(mean, a.diagonal, b, miss, count, lower, margin, point)) return true;
     // Where two planes meet is a line; a third direction, if the planes tell it, makes it a corner. The trace is `count`; the
     // determinant over the sum of the minors is the least eigenvalue, or a little less.
     auto inverse = adjugate(a);
@@ -145,17 +157,17 @@ bool feature_point(const Crossing* crossings, int count, const Vec3& lower, doub
         Vec3 best = (1 / determinant) * product(inverse, b);
         if (!fits(miss - dot(b, best), count)) return false;
         point = mean + best;
-        if (moved_inside(point, lower, margin)) return true;
+        if (moved_inside(point, margin)) return true;
     }
     double least = least_eigenvalue(count, minors, determinant), others = count - least;
     Vec3 along = eigenvector(a, inverse, count, least);
     // Across that direction the matrix solves its characteristic polynomial, which is so its inverse (Cayley and Hamilton).
-    Vec3 across = b - dot(along, b) * along;
-    Vec3 best = (1 / (minors - least * others)) * (others * across - product({a.row(0), a.row(1), a.row(2)}, across));
+    Vec3 rest = b - dot(along, b) * along;
+    Vec3 best = (1 / (minors - least * others)) * (others * rest - product({a.row(0), a.row(1), a.row(2)}, rest));
     if (!fits(miss - dot(b, best), count)) return false;
     point = mean + best;
-    if (inside(point, lower, margin)) return true;
-    if (!clipped(mean + best, along, lower, margin, point)) return false;
+    if (inside(point, margin)) return true;
+    if (!clipped(mean + best, along, margin, point)) return false;
     miss = 0;
     for (int i = 0; i < count; ++i) {
         double d = dot(crossings[i].normal, point - crossings[i].point);
@@ -164,19 +176,17 @@ bool feature_point(const Crossing* crossings, int count, const Vec3& lower, doub
     return fits(miss, count);
 }
 
-bool face_corner(const Crossing& a, const Crossing& b, int axis, const Vec3& lower, double margin, Vec3& corner) {
+bool face_corner(const Crossing& a, const Crossing& b, int axis, double margin, Vec3& corner) {
     int u = (axis + 1) % 3, v = (axis + 2) % 3;
     double au = a.normal[u], av = a.normal[v], bu = b.normal[u], bv = b.normal[v];
     double det = au * bv - av * bu, square = (au * au + av * av) * (bu * bu + bv * bv);
     if (!(det * det > 0.09 * square) || square < 0.0025) return false;
     double ca = au * a.point[u] + av * a.point[v], cb = bu * b.point[u] + bv * b.point[v];
-    corner = a.point;
+    corner[axis] = 0.5;
     corner[u] = (ca * bv - cb * av) / det;
     corner[v] = (au * cb - bu * ca) / det;
-    double level = corner[axis];
-    corner[axis] = lower[axis] + 0.5;
-    bool near = moved_inside(corner, lower, margin);
-    corner[axis] = level;
+    bool near = moved_inside(corner, margin);
+    corner[axis] = 0;
     return near;
 }
 

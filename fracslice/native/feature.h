@@ -18,9 +18,9 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
 
 using Normal = std::array<float, 3>;
 
-inline double dot(const Normal& a, const Normal& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+inline float dot(const Normal& a, const Normal& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// A crossing: where the surface meets a grid edge, in grid units, and its normal there.
+// A crossing: where the surface meets an edge of the unit cell, and its normal there.
 struct Crossing {
     Vec3 point, normal;
 };
@@ -29,18 +29,18 @@ struct Crossing {
 constexpr double kSharp = 0.9;
 
 // The cosine of half that angle: normals all nearer to one of them make none.
-constexpr double kHalfSharp = 0.975;
+constexpr float kHalfSharp = 0.975f;
 
 inline bool sharp(const Crossing& a, const Crossing& b) { return dot(a.normal, b.normal) < kSharp; }
 
-// The point of a cell nearest to all the planes, in the least squares sense and no further from their points' mean than
-// they ask for (Kobbelt, Botsch, Schwanecke and Seidel 2001, "Feature sensitive surface extraction"; the quadratic error
-// of Garland and Heckbert 1997). lower: the cell's lower corner. The point lies strictly inside the cell, `margin` from its
-// faces. Returns false where the planes do not meet in one point of the cell: then there is no feature but roughness.
-bool feature_point(const Crossing* crossings, int count, const Vec3& lower, double margin, Vec3& point);
+// The point of the unit cell nearest to all the planes, in the least squares sense and no further from their points' mean
+// than they ask for (Kobbelt, Botsch, Schwanecke and Seidel 2001, "Feature sensitive surface extraction"; the quadratic error
+// of Garland and Heckbert 1997). The point lies strictly inside the cell, `margin` from its faces. Returns false where the
+// planes do not meet in one point of the cell: then there is no feature but roughness.
+bool feature_point(const Crossing* crossings, int count, double margin, Vec3& point);
 
-// Where the surface's trace in a cell face has its corner: the two crossings' tangents in the face intersected. axis: the
-// face's normal; lower: its lower corner. Returns false where they do not meet within the face, `margin` from its edges.
-bool face_corner(const Crossing& a, const Crossing& b, int axis, const Vec3& lower, double margin, Vec3& corner);
+// Where the surface's trace in the cell's lower face along `axis` has its corner: the two crossings' tangents in the face
+// intersected. Returns false where they do not meet within the face, `margin` from its edges.
+bool face_corner(const Crossing& a, const Crossing& b, int axis, double margin, Vec3& corner);
 
 }  // namespace fracslice

@@ -1,5 +1,5 @@
-// Passes over the bricks, each brick by itself: which cells have tips, and where their faces may have corners; then which of
-// these are corners, for both cells must have tips.
+// Passes over the bricks of a layer, each brick by itself: which cells have features, and where their faces may have corners;
+// then which of these are corners, for both cells must have features; then which cells have two that are enough.
 #include "features.h"
 
 #include <tbb/enumerable_thread_specific.h>
@@ -12,135 +12,101 @@
 namespace fracslice {
 namespace {
 
-// Where one thread finds features and keeps them.
-class Store {
-  public:
-    std::vector<Array<Feature>> blocks;
-
-    // Notes a feature in a cell's lower face along axis 0, 1 or 2, or in the cell (3).
-    void add(int axis, const Feature& feature) { found_[axis][count_[axis]++] = feature; }
-
-    // Keeps what was found in a brick and is ready for the next one.
-    void keep(Features& of) {
-        size_t count = 0;
-        for (size_t some : count_) count += some;
-        if (count > room_) {
-            room_ = std::max(count, kBlock);
-            blocks.emplace_back(room_, 1);
-            next_ = blocks.back().data.get();
-        }
-        of.points = next_;
-        of.count = uint32_t(count);
-        for (int axis = 0; axis < 4; ++axis) {
-            next_ = std::copy(found_[axis].begin(), found_[axis].begin() + std::exchange(count_[axis], 0), next_);
-        }
-        room_ -= count;
-    }
-
-  private:
-    static constexpr size_t kBlock = size_t(1) << 18;
-    std::array<std::array<Feature, kSamples>, 4> found_;
-    std::array<size_t, 4> count_{};
-    Feature* next_ = nullptr;
-    size_t room_ = 0;
-};
-
 // What is known of a crossing; a brick's are laid side by side, for its cells look at each up to four times.
 struct Datum {
     double t;
     Normal normal;
 };
 
-// The ends of a feature in a cell's lower face along axis 0, 1 or 2, or in the cell (3), by case and the octant it is in: the
-// corner with fewest steps to that octant's, of either sign.
-using Ends = std::array<std::array<std::array<uint8_t, 8>, 256>, 4>;
+// The loop of crossings of a case: where Numbers holds them for the cell at 0, 0, 0, the first one again in what is left.
+constexpr size_t kLongest = sizeof(Case::loop), kUsual = 6;
+struct Loop {
+    std::array<uint16_t, kLongest> places{};
+};
 
-constexpr Ends make_ends() {
-    Ends ends{};
-    for (int axis = 0; axis < 4; ++axis) {
-        for (int number = 0; number < 256; ++number) {
-            for (int octant = 0; octant < 8; ++octant) {
-                int least[2] = {4, 4}, nearest[2] = {0, 0};
-                for (int k = 0; k < 8; ++k) {
-                    int outside = !(number >> k & 1), d = k ^ octant, steps = (d & 1) + (d >> 1 & 1) + (d >> 2);
-                    if (k >> axis & 1 || steps >= least[outside]) continue;
-                    least[outside] = steps, nearest[outside] = k;
-                }
-                ends[axis][number][octant] = uint8_t(nearest[0] | nearest[1] << 3);
-            }
-        }
+constexpr std::array<Loop, 256> make_loops() {
+    std::array<Loop, 256> loops{};
+    for (int c = 0; c < 256; ++c) {
+        for (size_t k = 0; k < kLongest; ++k) loops[c].places[k] = kPlaces[kCases[c].loop[k < kCases[c].loop_length ? k : 0]];
     }
-    return ends;
+    return loops;
 }
-constexpr Ends kEnds = make_ends();
+constexpr std::array<Loop, 256> kLoops = make_loops();
 
-uint8_t ends_of(const Cell& cell, const Vec3& point, int axis) {
-    int octant = 0;
-    for (int k = 0; k < 3; ++k) octant |= int(point[k] - cell.lower[k] > 0.5) << k;
-    return kEnds[axis][cell.number][octant];
+// An edge of the unit cell.
+struct Way {
+    Vec3 start{}, along{};
+};
+
+constexpr std::array<Way, 12> make_ways() {
+    std::array<Way, 12> ways{};
+    for (int e = 0; e < 12; ++e) {
+        ways[e].start = {double(kEdges[e].dx), double(kEdges[e].dy), double(kEdges[e].dz)};
+        ways[e].along[kEdges[e].axis] = 1;
+    }
+    return ways;
 }
+constexpr std::array<Way, 12> kWays = make_ways();
 
 // The features of one brick.
 class Finder {
   public:
-    Finder(const CellGrid& cells, const Crossed& crossed, double margin, size_t i) : near_(cells, i), margin_(margin) {
+    Finder(const CellGrid& cells, Hermite data, size_t i) : near_(cells, i), margin_(data.margin) {
         uint32_t seen = 0;
         cells.for_each_near(near_.octant, [&](size_t at, uint32_t vertex) {
             near_.numbers[at] = seen;
-            data_[seen++] = {crossed.root(vertex), crossed.normal(vertex)};
+            data_[seen++] = {data.root(vertex), data.normal(vertex)};
         });
     }
 
-    void find(Features& own, Store& store) {
+    void find(Features& own, FeatureStore& store) {
         near_.for_each([&](const Cell& cell) {
             const Case& type = kCases[cell.number];
             Vec3 tip;
-            if (!bent(cell) || !(place(cell), feature_point(loop_.data(), type.loop_length, cell.lower, margin_, tip))) {
+            if (!type.loop_length || !bent(cell) || !meet(cell, tip)) {
                 own.loops += type.triangles;
                 return;
             }
             own.loops += type.loop_length;
-            own.tips[cell.x] |= cell.bit();
-            store.add(3, {tip, ends_of(cell, tip, 3)});
+            own.cells[cell.x] |= cell.bit();
+            store.add(3, {cell.lower + tip, cell.number});
             for (int axis = 0; axis < 3; ++axis) {
                 Vec3 corner;
                 if (!corner_in(cell, axis, corner)) continue;
                 own.corners[axis][cell.x] |= cell.bit();
-                store.add(axis, {corner, ends_of(cell, corner, axis)});
+                store.add(axis, {cell.lower + corner, cell.number});
             }
         });
         store.keep(own);
     }
 
   private:
+    const Datum& datum(const Cell& cell, size_t k) const { return data_[cell.numbers[kLoops[cell.number].places[k]]]; }
+
     // Whether two normals of a cell's loop of crossings make a feature.
     bool bent(const Cell& cell) const {
-        const Case& type = kCases[cell.number];
-        std::array<const Datum*, sizeof(Case::loop)> loop;
-        double least = 1;
-        for (int a = 0; a < type.loop_length; ++a) {
-            loop[a] = &data_[cell.at(type.loop[a])];
-            least = std::min(least, dot(loop[0]->normal, loop[a]->normal));
-        }
+        const Normal& first = datum(cell, 0).normal;
+        size_t length = kCases[cell.number].loop_length;
+        float least = 1;
+        for (size_t k = 1; k < length; ++k) least = std::min(least, dot(first, datum(cell, k).normal));
         if (least > kHalfSharp) return false;
         bool found = least < kSharp;
-        for (int a = 2; a < type.loop_length && !found; ++a) {
-            for (int b = 1; b < a; ++b) found |= dot(loop[a]->normal, loop[b]->normal) < kSharp;
+        for (size_t a = 2; a < length && !found; ++a) {
+            for (size_t b = 1; b < a; ++b) found |= dot(datum(cell, a).normal, datum(cell, b).normal) < kSharp;
         }
         return found;
     }
 
-    // Lays a cell's loop of crossings out.
-    void place(const Cell& cell) {
+    // Where the planes of a cell's crossings meet, if they do.
+    bool meet(const Cell& cell, Vec3& tip) {
         const Case& type = kCases[cell.number];
-        for (int a = 0; a < type.loop_length; ++a) {
-            const Edge& edge = kEdges[type.loop[a]];
-            const Datum& datum = data_[cell.at(type.loop[a])];
-            Crossing& to = loop_[a];
-            to.point = cell.lower + Vec3{double(edge.dx), double(edge.dy), double(edge.dz)};
-            to.point[edge.axis] += datum.t;
-            for (int k = 0; k < 3; ++k) to.normal[k] = datum.normal[k];
+        for (int k = 0; k < type.loop_length; ++k) {
+            const Datum& from = datum(cell, size_t(k));
+            const Way& way = kWays[type.loop[k]];
+            loop_[k].point = way.start + from.t * way.along;
+            for (int j = 0; j < 3; ++j) loop_[k].normal[j] = from.normal[j];
         }
+        return feature_point(loop_.data(), type.loop_length, margin_, tip);
     }
 
     // The corner of the trace in a cell's lower face along `axis`, if there is one. A face that the loop passes twice has
@@ -149,60 +115,140 @@ class Finder {
         int k = kFaces[cell.number].lower[axis];
         if (k < 0) return false;
         const Crossing &a = loop_[k], &b = loop_[k + 1 < kCases[cell.number].loop_length ? k + 1 : 0];
-        return sharp(a, b) && face_corner(a, b, axis, cell.lower, margin_, corner);
+        return sharp(a, b) && face_corner(a, b, axis, margin_, corner);
     }
 
     Near near_;
     double margin_;
     std::array<Datum, std::tuple_size<Numbers>::value> data_;
-    std::array<Crossing, sizeof(Case::loop)> loop_;
+    std::array<Crossing, kLongest> loop_;
 };
 
 // The slab read one step against y or z; `before` is the slab of the neighbour on that side.
 Slab from_y(Slab slab, Slab before) { return slab << 8 | before >> 56; }
 Slab from_z(Slab slab, Slab before) { return (slab << 1 & ~kFirstZ) | (before >> 7 & kFirstZ); }
 
-// Keeps the corners between two cells with tips, and numbers them. below: the brick's neighbours on the lower sides.
-void choose(Features& own, const std::array<const Features*, 3>& below) {
+// Keeps the corners between two cells with features. below: the brick's neighbours on the lower sides.
+void keep_corners(Features& own, const std::array<const Features*, 3>& below) {
     const Feature* from = own.points;
     Feature* to = own.points;
     for (int axis = 0; axis < 3; ++axis) {
-        Signs none{}, before = below[axis] ? below[axis]->tips : none;
+        Signs none{}, before = below[axis] ? below[axis]->cells : none;
         for (int x = 0; x < kSide; ++x) {
-            Slab tips = own.tips[x], other = axis == 0   ? (x ? own.tips[x - 1] : before[kSide - 1])
-                                             : axis == 1 ? from_y(tips, before[x])
-                                                         : from_z(tips, before[x]);
+            Slab cells = own.cells[x], other = axis == 0   ? (x ? own.cells[x - 1] : before[kSide - 1])
+                                               : axis == 1 ? from_y(cells, before[x])
+                                                           : from_z(cells, before[x]);
             for (Slab bits = own.corners[axis][x]; bits; bits &= bits - 1, ++from) {
                 if (bits & -bits & other) *to++ = *from;
             }
             own.corners[axis][x] &= other;
             own.rank[axis][x] = uint16_t(own.corner_count);
-            own.corner_count += uint32_t(__builtin_popcountll(own.corners[axis][x]));
+            own.corner_count += uint32_t(popcount(own.corners[axis][x]));
         }
     }
-    to = std::copy(from, const_cast<const Feature*>(own.points + own.count), to);
-    own.count = uint32_t(to - own.points);
+    std::copy(from, const_cast<const Feature*>(from + own.cell_count), to);
+}
+
+// How far from the line between its two corners a tip may lie to be left out, in voxels: as rounding has it.
+constexpr double kStraight = 1e-6;
+
+// Whether a point lies on the line from a to b.
+bool between(const Vec3& point, const Vec3& a, const Vec3& b) {
+    Vec3 along = b - a, off = cross(point - a, along);
+    return dot(off, off) <= kStraight * kStraight * dot(along, along);
+}
+
+// The cells of slab x whose features lie between their two corners.
+Slab straight_cells(const Features& own, const Around& around, int x, const Feature* features) {
+    Slab one = 0, two = 0, more = 0, straight = 0;
+    for (int face = 0; face < 6; ++face) {
+        Slab corners = around.at(x, face);
+        more |= two & corners;
+        two = (two & ~corners) | (one & corners);
+        one = (one ^ corners) & ~(two | more);
+    }
+    for (int face = 1; face < 6; ++face) {
+        for (int other = 0; other < face; ++other) {
+            for (Slab cells = two & around.at(x, face) & around.at(x, other); cells; cells &= cells - 1) {
+                int bit = __builtin_ctzll(cells);
+                const Vec3& point = features[popcount(own.cells[x] & ((Slab(1) << bit) - 1))].point;
+                if (between(point, around.corner(x, face, bit).point(), around.corner(x, other, bit).point())) {
+                    straight |= Slab(1) << bit;
+                }
+            }
+        }
+    }
+    return straight;
 }
 
 }  // namespace
 
-Crossed::Crossed(const CellGrid& cells, Layers layers, const Hermite& data, double margin)
-    : data_(data), margin_(margin), first_(cells.crossings_before(layers.first - 1)) {
-    size_t wanted = cells.crossings_before(layers.last + 2) - first_;
-    if (data.count != wanted) {
-        throw std::invalid_argument("expected " + std::to_string(wanted) + " crossings, found " + std::to_string(data.count));
+void FeatureStore::keep(Features& of) {
+    size_t count = 0;
+    for (size_t some : count_) count += some;
+    if (block_ == blocks_.size() || used_ + count > blocks_[block_].rows) {
+        if (block_ < blocks_.size()) ++block_;
+        if (block_ == blocks_.size()) blocks_.emplace_back(kBlock, 1);
+        used_ = 0;
+    }
+    Feature* next = of.points = blocks_[block_].data.get() + used_;
+    of.cell_count = uint32_t(count_[3]);
+    used_ += count;
+    for (int axis = 0; axis < 4; ++axis) {
+        next = std::copy(found_[axis].begin(), found_[axis].begin() + std::exchange(count_[axis], 0), next);
     }
 }
 
-FeatureGrid::FeatureGrid(const CellGrid& cells, Layers layers, const Crossed& crossed, double margin)
-    : cells_(cells), near_(cells.span({layers.first - 1, layers.last + 1})), features_(near_.size()) {
-    tbb::enumerable_thread_specific<Store> stores;
-    for_each_brick(near_, [&](size_t i) { Finder(cells, crossed, margin, i).find(of(i), stores.local()); });
-    for (Store& store : stores) std::move(store.blocks.begin(), store.blocks.end(), std::back_inserter(blocks_));
-    for_each_brick(cells.span({layers.first, layers.last + 1}), [&](size_t i) {
+FeatureGrid::FeatureGrid(const CellGrid& cells, Layers layers)
+    : cells_(cells), near_(cells.span({layers.first - 1, layers.last + 1})), features_(near_.size()) {}
+
+void FeatureGrid::find(int layer, const Hermite& data) {
+    Stores& stores = stores_[size_t(layer + 3) % 3];
+    for (FeatureStore& store : stores) store.forget();
+    for_each_brick(cells_.span({layer, layer + 1}),
+                   [&](size_t i) { Finder(cells_, data, i).find(of(i), stores.local()); });
+}
+
+void FeatureGrid::choose(int layer) {
+    for_each_brick(cells_.span({layer, layer + 1}), [&](size_t i) {
         Features& own = of(i);
-        if (own.count) choose(own, {beside(i, 0, -1), beside(i, 1, -1), beside(i, 2, -1)});
+        if (own.cell_count) keep_corners(own, {beside(i, 0, -1), beside(i, 1, -1), beside(i, 2, -1)});
     });
+}
+
+void FeatureGrid::straighten(int layer) {
+    for_each_brick(cells_.span({layer, layer + 1}), [&](size_t i) {
+        Features& own = of(i);
+        own.triangles = own.loops;
+        if (!own.cell_count) return;
+        Around around(*this, i);
+        const Feature* features = own.points + own.corner_count;
+        for (int x = 0; x < kSide; ++x) {
+            for (int face = 0; face < 6; ++face) own.triangles += size_t(popcount(around.at(x, face)));
+            own.straight[x] = straight_cells(own, around, x, features);
+            own.tip_count += uint32_t(popcount(own.cells[x] & ~own.straight[x]));
+            features += popcount(own.cells[x]);
+        }
+        own.triangles -= 2 * (own.cell_count - own.tip_count);
+    });
+}
+
+Around::Around(const FeatureGrid& grid, size_t i) : own_(&grid.of(i)) {
+    static const Features none;
+    for (int axis = 0; axis < 3; ++axis) {
+        const Features* above = grid.beside(i, axis, 1);
+        above_[axis] = above ? above : &none;
+    }
+    for (int x = 0; x < kSide; ++x) {
+        const Signs& after = above_[0]->corners[0];
+        Slab upper[] = {x + 1 < kSide ? own_->corners[0][x + 1] : after[0],
+                        shift_y(own_->corners[1][x], above_[1]->corners[1][x]),
+                        shift_z(own_->corners[2][x], above_[2]->corners[2][x])};
+        for (int axis = 0; axis < 3; ++axis) {
+            faces_[x][2 * axis] = own_->corners[axis][x];
+            faces_[x][2 * axis + 1] = upper[axis] & own_->cells[x];
+        }
+    }
 }
 
 const Features* FeatureGrid::beside(size_t i, int axis, int step) const {

@@ -1,65 +1,84 @@
 // The vertices of a surface that lie in cells and in their faces: found brick by brick, then matched between neighbours.
 #pragma once
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+
+#include <algorithm>
 
 #include "array.h"
 #include "near.h"
 
 namespace fracslice {
 
-// Where on its grid edge each of some crossings, in the order of CellGrid's numbers, exactly lies, and the surface's unit
-// normal there, [3, count].
+// Where on its grid edge each of some crossings, `first` to `first + count - 1` as CellGrid numbers them, exactly lies, and
+// the surface's unit normal there, [3, count].
 struct Hermite {
+    size_t first, count;
     const double* t;
     const float* normals;
-    size_t count;
-};
+    double margin;  // how near the ends of its edge a crossing may come
 
-// A vertex that is no crossing, and corners of its cell near it: one inside, and 8 times one outside.
-struct Feature {
-    Vec3 point;
-    uint8_t ends;
-};
-
-// The features of a brick's cells: bit y*8 + z of slab x for each cell with a tip, and for its lower face along each axis.
-struct Features {
-    Signs tips{};
-    std::array<Signs, 3> corners{};
-    std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that slab
-    Feature* points = nullptr;                          // the corners by axis, then the tips, in the order of their cells
-    uint32_t count = 0;                                 // of these
-    uint32_t corner_count = 0;
-    uint32_t loops = 0;  // triangles that these cells would have without corners
-    size_t tip_base = 0, corner_base = 0, triangles = 0;
-};
-
-// The crossings of some layers and of those around them, as CellGrid numbers them.
-class Crossed {
-  public:
-    // Throws std::invalid_argument unless the data are those of the layers, of the one before and of the next two.
-    Crossed(const CellGrid& cells, Layers layers, const Hermite& data, double margin);
-
-    // Where a crossing lies on its grid edge, `margin` from its ends.
-    double root(size_t vertex) const {
-        double t = data_.t[vertex - first_];
-        return t > margin_ ? (t < 1 - margin_ ? t : 1 - margin_) : margin_;
-    }
+    double root(size_t vertex) const { return std::clamp(t[vertex - first], margin, 1 - margin); }
 
     Normal normal(size_t vertex) const {
-        const float* n = data_.normals + (vertex - first_);
-        return {n[0], n[data_.count], n[2 * data_.count]};
+        const float* n = normals + (vertex - first);
+        return {n[0], n[count], n[2 * count]};
     }
-
-  private:
-    Hermite data_;
-    double margin_;
-    size_t first_;
 };
 
+// A vertex that is no crossing, and the case of its cell; where it lies in a face, of the upper cell there.
+struct Feature {
+    Vec3 point;
+    uint8_t number;
+};
+
+// The features of a brick's cells: bit y*8 + z of slab x for each cell that has one, and for its lower face along each axis.
+struct Features {
+    Signs cells{};
+    std::array<Signs, 3> corners{};
+    Signs straight{};  // cells whose two corners say all that a tip would
+    std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that slab
+    Feature* points = nullptr;                          // the corners by axis, then one a cell, in order
+    uint32_t cell_count = 0, corner_count = 0, tip_count = 0;
+    uint32_t loops = 0;  // triangles that these cells would have without corners
+    size_t corner_base = 0, tip_base = 0, triangles = 0;
+};
+
+// Where a thread finds features and keeps them, until it is told that nobody needs them.
+class FeatureStore {
+  public:
+    // Notes a feature in a cell's lower face along axis 0, 1 or 2, or in the cell (3).
+    void add(int axis, const Feature& feature) { found_[axis][count_[axis]++] = feature; }
+
+    // Keeps what was found in a brick and is ready for the next one.
+    void keep(Features& of);
+
+    void forget() { block_ = used_ = 0; }
+
+  private:
+    static constexpr size_t kBlock = size_t(1) << 14;
+    std::array<std::array<Feature, kSamples>, 4> found_;
+    std::array<size_t, 4> count_{};
+    std::vector<Array<Feature>> blocks_;
+    size_t block_ = 0, used_ = 0;
+};
+
+// The features of the bricks of a layer after the other: the points of the last three layers are kept.
 class FeatureGrid {
   public:
-    // Finds the features of the cells in `layers` and of the corners that these share with the next layer.
-    FeatureGrid(const CellGrid& cells, Layers layers, const Crossed& crossed, double margin);
+    // For the features of some layers and, as these share corners with them, of the one before and the one after.
+    FeatureGrid(const CellGrid& cells, Layers layers);
+
+    // Finds the features of a layer's cells; those of the layers before it are known. data: crossings of this layer and the
+    // next one.
+    void find(int layer, const Hermite& data);
+
+    // Finds out which corners of a layer are in two cells that both have a feature, and numbers them. Its features and those
+    // of the layer before it are known.
+    void choose(int layer);
+
+    // Finds out which cells of a layer need no tip, and counts triangles. Corners of the layer and of the next one are chosen.
+    void straighten(int layer);
 
     Features& of(size_t brick) { return features_[near_.place_of(brick)]; }
     const Features& of(size_t brick) const { return features_[near_.place_of(brick)]; }
@@ -67,17 +86,49 @@ class FeatureGrid {
     // Those of the brick one step from brick i along an axis; null if the surface passes no cell of it.
     const Features* beside(size_t i, int axis, int step) const;
 
-    // Replaces counts by the sums of those before; returns the whole sums.
-    template <class Member>
-    size_t running_sum(Member member, const char* what) {
-        return fracslice::running_sum(features_, member, what);
-    }
-
   private:
+    using Stores = tbb::enumerable_thread_specific<FeatureStore>;
+
     const CellGrid& cells_;
     Span near_;
     std::vector<Features> features_;
-    std::vector<Array<Feature>> blocks_;
+    std::array<Stores, 3> stores_;
+};
+
+// The corners in all faces (axis*2 + upper) of a brick's cells that have a feature. Null neighbours have none.
+class Around {
+  public:
+    Around(const FeatureGrid& grid, size_t i);
+
+    // The cells of slab x with a corner in that face.
+    Slab at(int x, int face) const { return faces_[x][face]; }
+
+    // A corner of a brick.
+    struct Corner {
+        const Features* owner;
+        size_t index;
+
+        const Vec3& point() const { return owner->points[index].point; }
+        size_t vertex() const { return owner->corner_base + index; }
+    };
+
+    // The one in a face of the cell at that bit of slab x, where there is one.
+    Corner corner(int x, int face, int bit) const {
+        int axis = face / 2, at = x * 64 + bit, step = 64 >> 3 * axis;
+        const Features* owner = own_;
+        if (face % 2) {
+            bool leaves = (at / step) % kSide == kSide - 1;
+            at += leaves ? (1 - kSide) * step : step;
+            if (leaves) owner = above_[axis];
+        }
+        Slab before = (Slab(1) << at % 64) - 1;
+        return {owner, owner->rank[axis][at / 64] + size_t(popcount(owner->corners[axis][at / 64] & before))};
+    }
+
+  private:
+    const Features* own_;
+    std::array<const Features*, 3> above_;
+    std::array<std::array<Slab, 6>, kSide> faces_;
 };
 
 // Calls act(brick) for the bricks of a span, in parallel.

@@ -39,19 +39,10 @@ class Cells {
         return to_numpy(std::move(rows), {6, whole});
     }
 
-    nb::tuple contour(int first, int last, const RootsArray& t, const NormalsArray& normals,
-                      const std::array<double, 3>& origin, double voxel, double clamp) const {
-        if (t.shape(0) != normals.shape(1)) throw nb::value_error("t and normals differ in length");
-        Hermite data{t.data(), normals.data(), t.shape(0)};
-        Contour surface = unlocked(
-            threads_, [&] { return fracslice::contour(grid_, {first, last}, data, {origin, voxel, clamp}); });
-        size_t n = surface.vertices.rows, m = surface.triangles.rows;
-        size_t k = surface.ends.rows;
-        return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
-                              surface.crossings, to_numpy(std::move(surface.ends), {k}));
-    }
-
     size_t crossings_before(int layer) const { return grid_.crossings_before(layer); }
+
+    const CellGrid& grid() const { return grid_; }
+    int threads() const { return threads_; }
 
   private:
     static std::vector<Signs> words(const IjkArray& ijk, const SignsArray& signs) {
@@ -65,6 +56,31 @@ class Cells {
     IndexArray index_;
     int threads_;
     CellGrid grid_;
+};
+
+// The surface in some layers of cells, while it is made.
+class Surfacing {
+  public:
+    Surfacing(const Cells& cells, int first, int last, const std::array<double, 3>& origin, double voxel, double clamp)
+        : threads_(cells.threads()), clamp_(clamp), made_(cells.grid(), {first, last}, {origin, voxel, clamp}) {}
+
+    void advance(int end, size_t first, const RootsArray& t, const NormalsArray& normals) {
+        if (t.shape(0) != normals.shape(1)) throw nb::value_error("t and normals differ in length");
+        Hermite data{first, t.shape(0), t.data(), normals.data(), clamp_};
+        unlocked(threads_, [&] { return made_.advance(end, data), 0; });
+    }
+
+    nb::tuple finish() {
+        Contour surface = made_.finish();
+        size_t n = surface.vertices.rows, m = surface.triangles.rows, k = surface.cases.rows;
+        return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
+                              surface.crossings, to_numpy(std::move(surface.cases), {k}));
+    }
+
+  private:
+    int threads_;
+    double clamp_;
+    Contouring made_;
 };
 
 nb::object bind_signs(const ValuesArray& values, int threads) {
@@ -96,8 +112,13 @@ NB_MODULE(_native, module) {
         .def(nanobind::init<const fracslice::IjkArray&, const fracslice::SignsArray&, const fracslice::IndexArray&, int>(),
              "ijk"_a, "signs"_a, "index"_a, "threads"_a = 0)
         .def("segments", &Cells::segments, "begin"_a, "end"_a, "origin"_a, "voxel"_a, "lanes"_a = 1)
-        .def("contour", &Cells::contour, "first"_a, "last"_a, "t"_a, "normals"_a, "origin"_a, "voxel"_a, "clamp"_a)
         .def("crossings_before", &Cells::crossings_before, "layer"_a);
+    using fracslice::Surfacing;
+    nanobind::class_<Surfacing>(module, "Contouring")
+        .def(nanobind::init<const Cells&, int, int, const std::array<double, 3>&, double, double>(),
+             nanobind::keep_alive<1, 2>(), "cells"_a, "first"_a, "last"_a, "origin"_a, "voxel"_a, "clamp"_a)
+        .def("advance", &Surfacing::advance, "end"_a, "first"_a, "t"_a, "normals"_a)
+        .def("finish", &Surfacing::finish);
     fracslice::bind_grid(module);
     fracslice::bind_mesh(module);
 }

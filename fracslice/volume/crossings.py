@@ -23,22 +23,30 @@ its square."""
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """t: float64 [n], where along each grid edge the surface crosses it. normals: float32 [3, n], outward,
-    unit.
+    """first: the number of the first one. t: float64 [n], where along each grid edge the surface crosses it.
+    normals: float32 [3, n], outward, unit.
     """
 
+    first: int
     t: np.ndarray
     normals: np.ndarray
 
-    def after(self, count: int) -> Crossings:
-        """Those left without the first ones."""
-        return Crossings(self.t[count:], self.normals[:, count:])
+    @property
+    def end(self) -> int:
+        """The number after the last one."""
+        return self.first + len(self.t)
+
+    def without(self, number: int) -> Crossings:
+        """Those from that number on."""
+        gone = number - self.first
+        return Crossings(number, self.t[gone:], self.normals[:, gone:])
 
     def joined(self, more: Crossings) -> Crossings:
-        """These, then others."""
-        if not len(self.t):
-            return more
-        return Crossings(np.append(self.t, more.t), np.append(self.normals, more.normals, axis=1))
+        """These, then the next ones."""
+        return Crossings(self.first, np.append(self.t, more.t), np.append(self.normals, more.normals, axis=1))
+
+
+NONE = Crossings(0, np.empty(0), np.empty((3, 0), np.float32))
 
 
 def refine_crossings(
@@ -74,5 +82,5 @@ def refine_crossings(
         count = part.stop - part.start
         t[part], normals[:, part] = found[:count], facing[:, :count]
 
-    (work or Work()).map(task, chunks(last - first, 1 << 13))
-    return Crossings(t, normals)
+    (work or Work()).map(task, chunks(last - first, 1 << 14))
+    return Crossings(first, t, normals)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fracslice._native import Cells
+from fracslice._native import Cells, Contouring
 from fracslice.errors import MeshError
 from fracslice.formulas import (
     Node,
@@ -122,6 +122,10 @@ def cells_of(bricks: Bricks) -> Cells:
     return Cells(bricks.ijk, bricks.signs.signs, bricks.index)
 
 
+def contouring(cells: Cells) -> Contouring:
+    return Contouring(cells, -1, 2, (0.0, 0.0, 0.0), 1.0, 1e-3)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_a_solid_for_any_crossings_and_normals(seed: int) -> None:
     cells, rng = cells_of(noise(seed)), np.random.default_rng(100 + seed)
@@ -129,8 +133,10 @@ def test_a_solid_for_any_crossings_and_normals(seed: int) -> None:
     t = rng.choice([rng.uniform(0, 1, n), rng.integers(0, 2, n)])
     normals = rng.normal(size=(3, n))
     normals = (normals / np.linalg.norm(normals, axis=0)).astype(np.float32)
-    vertices, triangles, crossings, ends = cells.contour(-1, 2, t, normals, (0.0, 0.0, 0.0), 1.0, 1e-3)
-    assert n == crossings and len(ends) > 0 and len(vertices) == crossings + len(ends)
+    made = contouring(cells)
+    made.advance(3, 0, t, normals)
+    vertices, triangles, crossings, cases = made.finish()
+    assert n == crossings and len(cases) > 0 and len(vertices) == crossings + len(cases)
     assert_solid(Mesh(vertices, triangles))
 
 
@@ -158,9 +164,12 @@ def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
 
 def test_the_wrong_number_of_crossings_is_refused() -> None:
     with pytest.raises(ValueError, match="crossings"):
-        cells_of(noise(0)).contour(
-            -1, 2, np.zeros(3), np.zeros((3, 3), np.float32), (0.0, 0.0, 0.0), 1.0, 1e-3
-        )
+        contouring(cells_of(noise(0))).advance(3, 0, np.zeros(3), np.zeros((3, 3), np.float32))
+
+
+def test_a_surface_without_its_last_layer_is_refused() -> None:
+    with pytest.raises(ValueError, match="layers"):
+        contouring(cells_of(noise(0))).finish()
 
 
 def test_bricks_out_of_order_are_refused() -> None:
@@ -201,3 +210,15 @@ def test_open_samples_are_refused() -> None:
     )
     with pytest.raises(MeshError, match="not closed"):
         contour(sphere(), open_bricks)
+
+
+def test_a_straight_edge_takes_no_vertex_in_its_cells() -> None:
+    """Of a box whose faces lie beside the grid's planes: vertices on grid edges, in cells' faces on its edges,
+    and 8 in cells."""
+    mesh = made(box(size=(1, 1.2, 0.8)), 40.3)
+    planned = plan(box(size=(1, 1.2, 0.8)), 40.3)
+    grid = (mesh.vertices - sample_scene(planned).origin) / planned.voxel
+    along = (np.abs(grid - np.round(grid)) < 1e-9).sum(1)
+    assert (along == 0).sum() == 8
+    ends = np.abs(np.abs(mesh.vertices) - (0.5, 0.6, 0.4)) < 1e-9
+    assert (ends[along == 0].all(1)).all() and (ends[along == 1].sum(1) == 2).all()

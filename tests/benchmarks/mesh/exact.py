@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from fracslice._native import Cells
+from fracslice._native import Cells, Contouring
 from fracslice.kernel import compile_scene
 from fracslice.mesh.extract import clamp, contour, extract
 from fracslice.scene.reader import read
 from fracslice.volume import plan, sample_scene
-from fracslice.volume.crossings import refine_crossings
+from fracslice.volume.crossings import Crossings, refine_crossings
 
 SCENES = Path(__file__).parents[3] / "scenes"
 RUNS = 5
@@ -35,6 +35,20 @@ def timed(acts: list[Callable[[], Any]]) -> np.ndarray:
             spent = time.process_time() - start[0], time.perf_counter() - start[1]
             seconds[:, k] = np.minimum(seconds[:, k], spent)
     return seconds
+
+
+def triangles(
+    cells: Cells,
+    last: int,
+    known: Crossings,
+    origin: tuple[float, float, float],
+    voxel: float,
+    clamped: float,
+) -> None:
+    """All layers through crossings that are known."""
+    surface = Contouring(cells, -1, last, origin, voxel, clamped)
+    surface.advance(last + 1, 0, known.t, known.normals)
+    surface.finish()
 
 
 def main() -> None:
@@ -68,7 +82,7 @@ def main() -> None:
                 partial(extract, bricks),
                 partial(contour, planned.root, bricks),
                 refining,
-                partial(cells.contour, -1, last, found.t, found.normals, *place, clamp(signs)),
+                partial(triangles, cells, last, found, *place, clamp(signs)),
             ]
         )
         samples, plain, exact = seconds[:, :3].T
