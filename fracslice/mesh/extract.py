@@ -158,9 +158,9 @@ def _rooms(
 
 @lru_cache(maxsize=1)
 def _nearest_corners() -> np.ndarray:
-    """The corner of a cell, dx + 2 dy + 4 dz, to which the fewest edges lead: uint8 [4, 256, 8, 2]. By the axis
-    across the lower face that it shall be in (3: in any), the cell's case, the corner from which they lead,
-    and whether it shall be inside.
+    """The corner of a cell, dx + 2 dy + 4 dz, to which the fewest edges lead, uint8 [4, 256, 8, 2]: by the
+    axis across the lower face that it shall be in (3: in any), the cell's case, the corner from which they
+    lead, and whether it shall be inside.
     """
     corner, axis = np.arange(8), np.arange(3)
     away = ((corner[:, None] ^ corner)[..., None] >> axis & 1).sum(-1)
