@@ -14,7 +14,7 @@ from ..formulas.registry import Node
 from ..kernel import Compilable
 from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
-from ..volume.crossings import NONE, refine_crossings
+from ..volume.crossings import NONE, Refiner
 from ..volume.lattice import BRICK
 from ..volume.settling import Rooms, settle
 from ..work import Work
@@ -88,13 +88,12 @@ def contour_pieces(
     cells = _called(Cells, signs.ijk, signs.signs, signs.index, work.threads)
     x, y, z = signs.origin
     placement = (float(x), float(y), float(z)), float(signs.voxel), clamp(signs)
-    known = NONE
+    known, refiner = NONE, Refiner(root, cells, signs.origin, signs.voxel, work)
     for first, last in _layers(signs, most):
         surface = Contouring(cells, first, last, *placement)
         for begin, end in _batches(cells, first - 1, last + 1, work.threads << 16):
-            known = known.without(cells.crossings_before(min(begin, last - 1)))
-            numbers = known.end, cells.crossings_before(end + 1)
-            known = known.joined(refine_crossings(root, cells, numbers, signs.origin, signs.voxel, work))
+            known = known.since(cells.crossings_before(min(begin, last - 1)))
+            known = refiner.extended(known, cells.crossings_before(end + 1))
             _called(surface.advance, end, known.first, known.t, known.normals)
         vertices, triangles, count, cases = surface.finish()
         features = vertices[count:]

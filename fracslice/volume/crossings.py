@@ -21,6 +21,9 @@ SURE = 1e-4
 its square."""
 
 
+CHUNK = 1 << 14
+
+
 @dataclass(frozen=True, eq=False)
 class Crossings:
     """first: the number of the first one. t: float64 [n], where along each grid edge the surface crosses it.
@@ -31,56 +34,63 @@ class Crossings:
     t: np.ndarray
     normals: np.ndarray
 
-    @property
-    def end(self) -> int:
-        """The number after the last one."""
-        return self.first + len(self.t)
-
-    def without(self, number: int) -> Crossings:
+    def since(self, number: int) -> Crossings:
         """Those from that number on."""
         gone = number - self.first
         return Crossings(number, self.t[gone:], self.normals[:, gone:])
-
-    def joined(self, more: Crossings) -> Crossings:
-        """These, then the next ones."""
-        return Crossings(self.first, np.append(self.t, more.t), np.append(self.normals, more.normals, axis=1))
 
 
 NONE = Crossings(0, np.empty(0), np.empty((3, 0), np.float32))
 
 
-def refine_crossings(
-    root: Node | Compilable,
-    cells: Cells,
-    numbers: tuple[int, int],
-    origin: tuple[float, float, float],
-    voxel: float,
-    work: Work | None = None,
-) -> Crossings:
-    """The exact crossings of grid edges whose ends have opposite signs, in the float64 field.
+class Refiner:
+    """Finds the exact crossings of grid edges whose ends have opposite signs, in the float64 field.
 
-    numbers: the first crossing's, and the one after the last. Roots are looked for by the float32 kernel and
-    made exact by the float64 one, from its own signs where that one's misled. Where the float64 field does
-    not change its sign (it is smaller than float32 can tell at one end) t is that end.
+    origin, voxel: of the grid, scene units. Roots are looked for by the float32 kernel and made exact by the
+    float64 one, from its own signs where that one's misled. Where the float64 field does not change its sign
+    (it is smaller than float32 can tell at one end) t is that end.
     """
-    fast, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-    first, last = numbers
-    t, normals = np.empty(last - first), np.empty((3, last - first), np.float32)
-    x, y, z = origin
-    placement = (float(x), float(y), float(z)), float(voxel), fast.width
 
-    def task(part: slice) -> None:
-        edges = cells.segments(first + part.start, first + part.stop, *placement)
-        found, facing, miss = exact.polished(edges, fast.found(edges.astype(np.float32)))
-        left = np.flatnonzero(~(miss <= SURE))
-        if len(left):
-            left = exact.padded(left)
-            slow = edges.take(left, 1)
-            roots = exact.found(slow)
-            moved, facing[:, left], miss = exact.polished(slow, roots)
-            found[left] = np.where(miss <= SURE, moved, roots)
-        count = part.stop - part.start
-        t[part], normals[:, part] = found[:count], facing[:, :count]
+    def __init__(
+        self,
+        root: Node | Compilable,
+        cells: Cells,
+        origin: tuple[float, float, float],
+        voxel: float,
+        work: Work | None = None,
+    ) -> None:
+        self._fast, self._exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
+        x, y, z = origin
+        self._placement = (float(x), float(y), float(z)), float(voxel), self._fast.width
+        self._cells, self._work = cells, work or Work()
 
-    (work or Work()).map(task, chunks(last - first, 1 << 14))
-    return Crossings(first, t, normals)
+    def extended(self, known: Crossings, end: int) -> Crossings:
+        """Crossings that are known, and those after them up to the number `end` - 1. Raises `Cancelled`."""
+        size, old = end - known.first, len(known.t)
+        t, normals = np.empty(size), np.empty((3, size), np.float32)
+        t[:old], normals[:, :old] = known.t, known.normals
+        left: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+        def quick(part: slice) -> None:
+            first, last = old + part.start, old + part.stop
+            edges = self._cells.segments(known.first + first, known.first + last, *self._placement)
+            found, facing, miss = self._exact.polished(edges, self._fast.found(edges.astype(np.float32)))
+            count = last - first
+            t[first:last], normals[:, first:last] = found[:count], facing[:, :count]
+            unsure = np.flatnonzero(~(miss[:count] <= SURE))
+            left[first] = first + unsure, edges.take(unsure, 1)
+
+        def slow(part: slice) -> None:
+            edges = segments.take(self._exact.padded(np.arange(len(which))[part]), 1)
+            roots = self._exact.found(edges)
+            moved, facing, miss = self._exact.polished(edges, roots)
+            count = part.stop - part.start
+            t[which[part]] = np.where(miss <= SURE, moved, roots)[:count]
+            normals[:, which[part]] = facing[:, :count]
+
+        self._work.map(quick, chunks(size - old, CHUNK))
+        if left:
+            numbers, rows = zip(*(left[first] for first in sorted(left)), strict=True)
+            which, segments = np.concatenate(numbers), np.concatenate(rows, axis=1)
+            self._work.map(slow, chunks(len(which), CHUNK))
+        return Crossings(known.first, t, normals)

@@ -31,7 +31,7 @@ from fracslice.mesh.check import check
 from fracslice.mesh.extract import Piece, contour, contour_pieces, extract
 from fracslice.volume import Bricks, plan, sample_scene
 from fracslice.volume.accuracy import surface_error
-from fracslice.volume.crossings import refine_crossings
+from fracslice.volume.crossings import NONE, Refiner
 from fracslice.work import Work
 
 
@@ -153,7 +153,7 @@ def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
     bricks = sample_scene(planned)
     cells, placement = cells_of(bricks), (bricks.origin, bricks.voxel)
     numbers = 0, cells.crossings_before(len(bricks.index))
-    exact = refine_crossings(planned.root, cells, numbers, *placement)
+    exact = Refiner(planned.root, cells, *placement).extended(NONE, numbers[1])
     edges = cells.segments(*numbers, *placement)
     points = (edges[:3] + exact.t * edges[3:]).T
     assert np.abs(reference(planned.root)(*points.T)).max() < 1e-7 * bricks.voxel
@@ -213,7 +213,7 @@ def test_open_samples_are_refused() -> None:
 
 
 def test_a_straight_edge_takes_no_vertex_in_its_cells() -> None:
-    """Of a box whose faces lie beside the grid's planes: vertices on grid edges, in cells' faces on its edges,
+    """Of a box whose faces lie beside the grid's planes: vertices on grid edges, on its edges in cells' faces,
     and 8 in cells."""
     mesh = made(box(size=(1, 1.2, 0.8)), 40.3)
     planned = plan(box(size=(1, 1.2, 0.8)), 40.3)

@@ -19,7 +19,7 @@ from fracslice.kernel import compile_scene
 from fracslice.mesh.extract import clamp, contour, extract
 from fracslice.scene.reader import read
 from fracslice.volume import plan, sample_scene
-from fracslice.volume.crossings import Crossings, refine_crossings
+from fracslice.volume.crossings import NONE, Crossings, Refiner
 
 SCENES = Path(__file__).parents[3] / "scenes"
 RUNS = 5
@@ -73,8 +73,8 @@ def main() -> None:
         bricks = sample_scene(planned)
         signs, last = bricks.signs, len(bricks.index)
         cells = Cells(signs.ijk, signs.signs, signs.index)
-        place, numbers = (bricks.origin, bricks.voxel), (0, cells.crossings_before(last))
-        refining = partial(refine_crossings, planned.root, cells, numbers, *place)
+        place = bricks.origin, bricks.voxel
+        refining = partial(Refiner(planned.root, cells, *place).extended, NONE, cells.crossings_before(last))
         found = refining()
         seconds = timed(
             [
