@@ -6,7 +6,7 @@ from functools import reduce
 
 from .box import Box
 from .parameters import REQUIRED, SMALLEST, Number
-from .registry import Formula, Node, blend
+from .registry import Node, blend
 from .vocabulary import absolute, maximum, minimum
 
 SMOOTH = Number(
@@ -67,23 +67,18 @@ def hard_difference(a, b):  # type: ignore[no-untyped-def]
     return maximum(a, -b)
 
 
+def guarded_difference(a, b):  # type: ignore[no-untyped-def]
+    """What bounds the distance to a difference where the inside of what is taken away bounds nothing."""
+    return maximum(a, minimum(-b, 0.0))
+
+
 def _is_sharp(node: Node) -> bool:
     return bool(node["smooth"] < SMALLEST)
 
 
-def _sharp_when_zero(formula: Formula, hard) -> None:  # type: ignore[no-untyped-def]
-    formula.select(lambda node: hard if _is_sharp(node) else formula.function)
-    formula.arguments(lambda node: {} if _is_sharp(node) else {"smooth": node["smooth"]})
-
-
-_sharp_when_zero(intersection, hard_intersection)
-_sharp_when_zero(difference, hard_difference)
-
-
 def _is_guarded(node: Node) -> bool:
-    """Whether it is a union that `guarded_union` stands for."""
-    weak = any(child.facts.weak for child in node.children)
-    return node.guarded and node.formula is union and weak and not _is_sharp(node)
+    """Whether it is a seam with an escape-time fractal, and space is to be skipped by it."""
+    return node.guarded and not _is_sharp(node) and any(child.facts.weak for child in node.children)
 
 
 @union.select
@@ -95,8 +90,33 @@ def _(node: Node):  # type: ignore[no-untyped-def]
 def _(node: Node) -> dict[str, object]:
     if _is_sharp(node):
         return {}
-    steepest = 1 + 1.5 * node["smooth"] * node.facts.steepening
+    steepest = 1 + node.facts.steepening / 8
     return {"smooth": node["smooth"], **({"steepest": steepest} if _is_guarded(node) else {})}
+
+
+@intersection.select
+def _(node: Node):  # type: ignore[no-untyped-def]
+    return hard_intersection if _is_cut_sharp(node) else intersection.function
+
+
+@difference.select
+def _(node: Node):  # type: ignore[no-untyped-def]
+    if node.guarded and any(child.facts.weak for child in node.children[1:]):
+        return guarded_difference
+    return hard_difference if _is_cut_sharp(node) else difference.function
+
+
+def _is_cut_sharp(node: Node) -> bool:
+    """A seam only takes away from the sharp solid: a ball that is free of that one is free."""
+    return _is_sharp(node) or _is_guarded(node)
+
+
+def _cut_arguments(node: Node) -> dict[str, object]:
+    return {} if _is_cut_sharp(node) else {"smooth": node["smooth"]}
+
+
+intersection.arguments(_cut_arguments)
+difference.arguments(_cut_arguments)
 
 
 def _slope(node: Node) -> float:
@@ -139,6 +159,16 @@ def _(node: Node) -> Box:
 def shell(a, thickness):  # type: ignore[no-untyped-def]
     """The element made hollow: what is deeper inside than the thickness is taken out. L = the element's."""
     return maximum(a, -(a + thickness))
+
+
+def guarded_shell(a, thickness):  # type: ignore[no-untyped-def]
+    """What bounds the distance to a wall of an element whose inside bounds nothing."""
+    return maximum(a, minimum(-(a + thickness), 0.0))
+
+
+@shell.select
+def _(node: Node):  # type: ignore[no-untyped-def]
+    return guarded_shell if node.guarded and node.facts.weak else shell.function
 
 
 @shell.bounds

@@ -61,7 +61,9 @@ def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-d
     """The element grown or shrunk; exact where its field is a distance.
 
     A field that underestimates distances would grow further than it should; it is cut off at the grown box.
-    L = the element's, at least 1, the box'; four times that around an escape-time fractal (measured).
+    L = the element's, at least 1, the box'; more around an escape-time fractal, whose field is steeper away
+    from its surface (`Facts.steepening`; measured). What is shrunk lies in the element: where that is a
+    fractal, whose inside bounds nothing, space is skipped by its own field.
     """
     cx, cy, cz = centre
     hx, hy, hz = half
@@ -71,7 +73,9 @@ def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-d
 
 @offset.arguments
 def _(node: Node) -> dict[str, object]:
-    return {"distance": node["distance"], **_frame(node.facts.box)}
+    only_grown = node.guarded and node.facts.weak
+    distance = max(node["distance"], 0.0) if only_grown else node["distance"]
+    return {"distance": distance, **_frame(node.facts.box)}
 
 
 @offset.bounds
@@ -81,9 +85,8 @@ def _(node: Node) -> Box:
 
 @offset.slope
 def _(node: Node) -> float:
-    # Away from its surface the field of an escape-time fractal is steeper: measured, see docs/accuracy.md.
     inner = node.children[0].facts
-    return max(1.0, inner.lipschitz * (4.0 if inner.weak and node["distance"] > 0 else 1.0))
+    return max(1.0, inner.lipschitz * (1 + (inner.steepening / 4 if node["distance"] > 0 else 0.0)))
 
 
 @offset.identity

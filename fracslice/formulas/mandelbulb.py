@@ -25,7 +25,12 @@ from .vocabulary import (
 )
 
 ESCAPED = 1e4
-"""How large |w| is one step past the escape circle; the map of a neighbourhood counts as radial there."""
+"""How large |w| is one step past the escape circle."""
+
+CALM = 3.0
+"""At this |w|^2, in units of the farthest of the solid, only radii count. A shorter way there costs fewer
+evaluations, but makes the levels steeper that seams lie on.
+"""
 
 
 @shape(
@@ -55,7 +60,8 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     last_level,
     escape2,
     least_r2,
-    over_escape2,
+    fade,
+    fading,
     c,
     digits,
     half_digits,
@@ -68,7 +74,6 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     reach,
     half_less,
     torn,
-    torn_within,
     curved,
     whole,
 ):
@@ -81,12 +86,12 @@ def mandelbulb(  # type: ignore[no-untyped-def]
 
     The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
     latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
-    it is taken here, faded out towards the escape radius, where the map of a whole neighbourhood is radial.
-    There is no theorem for three dimensions; L = 2 is measured, for whole powers at 10^7 points
-    (`docs/accuracy.md`). Where a set falls apart (a constant far out) that fails, and the field is also kept
-    below twice a sure distance, `escape.sure_distance`. A power that is not whole tears space where the
-    azimuth jumps from pi to -pi: no bound holds across the tear, and the guarded field stays below the sure
-    distance from it.
+    it is taken here, as far out as a point of the solid can come (`escape.farthest`). Beyond, each step leads
+    farther away whatever its direction, so that only how radii stretch matters; there it is faded out.
+    There is no theorem for three dimensions; L = 2 is measured (`docs/accuracy.md`). Where a set falls apart
+    (a constant far out) that fails, and the field is also kept below twice a sure distance,
+    `escape.sure_distance`. A power that is not whole tears space where the azimuth jumps from pi to -pi: no
+    bound holds across the tear, and the guarded field stays below the sure distance from it.
     """
     cx, cy, cz = x, y, z
     grow = 1.0
@@ -147,10 +152,10 @@ def mandelbulb(  # type: ignore[no-untyped-def]
             meridian = maximum(meridian, least)
             latitude = absolute(im)
         else:
-            latitude = absolute(im) * (1.0 - r2 * over_escape2)
+            latitude = absolute(im) * minimum(1.0, fade - r2 * fading)
         if torn:
-            apart = maximum(where(x < 0.0, absolute(y), rho), sqrt(r2) - torn_within)
-            tear = where(alive, minimum(tear, 2.0 * sure_distance(apart, slope, bend)), tear)
+            beside = 2.0 * sure_distance(where(x < 0.0, absolute(y), rho), slope, bend)
+            tear = where(alive, minimum(tear, beside), tear)
         if curved:
             bend = where(alive, bend + slope * half_less * rsqrt(maximum(r2, CORE)), bend)
         dr = power * maximum(meridian, latitude) * dr + grow
@@ -188,6 +193,8 @@ def _(node: Node) -> dict[str, object]:
     first, last, escape2, least_r2 = levels(power, node["iterations"], node["bailout"], ESCAPED)
     loose, torn = _falls_apart(node, escape2), bool(node.guarded and power % 1)
     constant = _constant(node)
+    reach = farthest(power, node["bailout"], constant)
+    fading = 1 / (min(CALM * reach**2, escape2) - reach**2)
     return {
         "power": power,
         "iterations": node["iterations"],
@@ -195,16 +202,16 @@ def _(node: Node) -> dict[str, object]:
         "last_level": last,
         "escape2": escape2,
         "least_r2": least_r2,
-        "over_escape2": 1 / escape2,
+        "fade": 1 + reach**2 * fading,
+        "fading": fading,
         "c": node["julia"] or (0.0, 0.0, 0.0),
         "fixed_c": Fixed(node["julia"] is not None),
         "loose": Fixed(loose),
         "least": CORE ** ((power - 1) / 2),
         "bailout": node["bailout"],
-        "reach": farthest(power, node["bailout"], constant),
+        "reach": reach,
         "half_less": (power - 1) / 2,
         "torn": Fixed(torn),
-        "torn_within": (math.sqrt(escape2) + constant) ** (1 / power),
         "curved": Fixed(loose or torn),
         **_products(power),
     }

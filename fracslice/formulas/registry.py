@@ -41,8 +41,9 @@ class Facts:
     ``f(p) / L`` away from the surface.
     weak: True if there is an escape-time fractal in it. Its inside values are much smaller than the distance
     to the surface, and bound nothing: the inside cannot be recognised from afar.
-    steepening: of a weak field, about how much larger its slopes may be where it is h, ``1 + steepening * h``
-    times those at the surface.
+    steepening: of a weak field, the highest power n in it. Along circles of latitude the derivative changes
+    n times within 2/n of the poles; so level sets other than the surface are steeper, up to 1 + n/4 times
+    (measured: `docs/accuracy.md`).
     """
 
     box: Box

@@ -73,11 +73,6 @@ def _(node: Node) -> None:
         raise node.fail("scale or matrix: expected a map that does not flatten space")
 
 
-@transform.steepening
-def _(node: Node) -> float:
-    return node.children[0].facts.steepening / float(np.linalg.svd(affine(node)[0], compute_uv=False)[-1])
-
-
 @transform.identity
 def _(node: Node) -> bool:
     linear, offset = affine(node)

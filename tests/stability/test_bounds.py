@@ -5,7 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.formulas import Node, get, julia, mandelbulb, names, offset, shell, sphere, union
+from fracslice.formulas import (
+    Node,
+    difference,
+    get,
+    intersection,
+    julia,
+    mandelbulb,
+    names,
+    offset,
+    plane,
+    shell,
+    sphere,
+    union,
+)
+from fracslice.kernel import compile_scene
 from tests.examples import EXAMPLES
 
 from .bounds import verdict
@@ -28,6 +42,15 @@ HARD: dict[str, Node] = {
     "torn": mandelbulb(iterations=3, power=10.6, bailout=1.58, julia=(0.85, 0.32, 0.16)),
     "torn dust": mandelbulb(iterations=3, power=5.68, bailout=17, julia=(-0.09, 0.15, 1)),
     "torn seam": union(mandelbulb(iterations=4, power=6.4), sphere(radius=0.95), smooth=0.1),
+    "cut out seamlessly": intersection(
+        mandelbulb(iterations=7, power=27.66, bailout=2.68), plane(normal=(0.39, 1.83, 0.03)), smooth=0.47
+    ),
+    "cut off by a deep one": difference(
+        sphere(radius=1.207), mandelbulb(iterations=6, power=27, bailout=2.557)
+    ),
+    "shrunk": offset(mandelbulb(iterations=14, power=27), distance=-0.018),
+    "torn and shrunk": offset(mandelbulb(iterations=6, power=25.2), distance=-0.0015),
+    "torn and grown": shell(offset(mandelbulb(iterations=13, power=25.7), distance=0.1), thickness=0.07),
 }
 """Where bounds were once exceeded."""
 
@@ -47,6 +70,22 @@ def test_the_bound_holds_with_other_numbers(name: str) -> None:
 def test_the_bound_holds_where_it_did_not(name: str) -> None:
     found = verdict(HARD[name], 200_000, seed=1)
     assert found.violations == 0 and found.points > 100_000
+
+
+@pytest.mark.parametrize(
+    ("power", "bailout", "point"),
+    [
+        (21, 1.5653262568878086, (0.2835015297720734, -0.28350168124467423, -0.7676105501439598)),
+        (25, 1.4471935185939413, (0.18696972825606856, 0.1869688908965394, 0.8477419649182849)),
+        (25, 1.4471935185939413, (-0.2970785318283784, 0.00016299669530456357, 0.870277545354547)),
+    ],
+)
+def test_many_steps_near_the_poles(power: float, bailout: float, point: tuple[float, ...]) -> None:
+    """Circles of latitude stretch more than meridians in most steps: dr multiplies what is forgotten."""
+    field = compile_scene(mandelbulb(power=power, iterations=11, bailout=bailout), "float64").points
+    centre, way = np.array(point)[:, None], np.random.default_rng(0).normal(size=(3, 20_000))
+    ball = field(*centre) / 2 * np.random.default_rng(1).uniform(0, 1, 20_000) / np.linalg.norm(way, axis=0)
+    assert field(*centre) > 0 and (field(*(centre + ball * way)) > 0).all()
 
 
 def test_a_bound_that_is_too_small_is_found() -> None:
