@@ -146,7 +146,55 @@ def crossing_triangles(
     low: NDArray[float64],
     high: NDArray[float64],
     threads: int = 0,
+    among: NDArray[bool_] | None = None,
 ) -> NDArray[bool_]: ...
+
+class Reduction:
+    """`fracslice.mesh.collapse.Collapse`; it looks into these arrays as long as it lives."""
+
+    def __init__(self, vertices: NDArray[float64], triangles: NDArray[int32], tolerance: float) -> None: ...
+    def renew(self) -> None:
+        """All vertices are looked at by the next sweeps."""
+
+    def sweep(self, first: int, last: int, share: float) -> int:
+        """Takes out such of the vertices first to last - 1 as can go with an error of a share of the tolerance,
+        and returns how many; a sweep begins with first = 0."""
+
+    def undo(self, faulty: NDArray[bool_], for_good: bool) -> None: ...
+    def state(
+        self,
+    ) -> tuple[NDArray[int32], NDArray[bool_], NDArray[int32], NDArray[bool_], NDArray[int32]]:
+        """`fracslice.mesh.collapse.Collapsed`."""
+
+class Nearest:
+    """`fracslice.mesh.nearest.Nearest`; it looks into these arrays as long as it lives."""
+
+    def __init__(
+        self,
+        vertices: NDArray[float64],
+        triangles: NDArray[int32],
+        order: NDArray[int64],
+        low: NDArray[float64],
+        high: NDArray[float64],
+        closed: bool = False,
+    ) -> None: ...
+    def bounds(
+        self,
+        vertices: NDArray[float64],
+        triangles: NDArray[int32],
+        hints: NDArray[int32],
+        tolerance: float,
+        threads: int = 0,
+    ) -> tuple[NDArray[float64], NDArray[bool_]]: ...
+    def samples(
+        self,
+        vertices: NDArray[float64],
+        triangles: NDArray[int32],
+        spacing: float,
+        enough: float,
+        threads: int = 0,
+    ) -> NDArray[float64]: ...
+
 def nesting(
     vertices: NDArray[float64],
     triangles: NDArray[int32],

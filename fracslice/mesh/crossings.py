@@ -15,11 +15,16 @@ from fracslice.mesh.model import Mesh
 from fracslice.mesh.tree import Tree, build
 
 
-def crossing_triangles(mesh: Mesh, tree: Tree | None = None, threads: int | None = None) -> NDArray[np.bool_]:
+def crossing_triangles(
+    mesh: Mesh,
+    tree: Tree | None = None,
+    threads: int | None = None,
+    among: NDArray[np.bool_] | None = None,
+) -> NDArray[np.bool_]:
     """Which triangles meet another one in more than the vertices both have by index, bool [m].
 
     Triangles without area are passed over. Vertices must be finite, with equal positions welded to one index.
-    threads: all cores if None; the result is the same for any number. Raises ValueError for indices out of
-    range and for the tree of another mesh.
+    threads: all cores if None; the result is the same for any number. among: bool [m], only pairs with one of
+    these are looked at. Raises ValueError for indices out of range and for the tree of another mesh.
     """
-    return _crossing_triangles(mesh.vertices, mesh.triangles, *(tree or build(mesh)), threads or 0)
+    return _crossing_triangles(mesh.vertices, mesh.triangles, *(tree or build(mesh)), threads or 0, among)

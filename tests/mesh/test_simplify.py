@@ -11,8 +11,11 @@ from fracslice.errors import Cancelled, MeshError
 from fracslice.formulas import mandelbulb, menger
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check
+from fracslice.mesh.collapse import Collapse
+from fracslice.mesh.crossings import crossing_triangles
 from fracslice.mesh.extract import contour
-from fracslice.mesh.nearest import distance_bounds, sampled_distances
+from fracslice.mesh.links import links
+from fracslice.mesh.nearest import Nearest
 from fracslice.mesh.rounding import rounded
 from fracslice.mesh.simplify import simplify
 from fracslice.volume import plan, sample_scene
@@ -72,17 +75,20 @@ def test_a_rough_fractal_stays_a_solid_without_crossings():
     assert len(few.triangles) < 0.8 * len(bulb.triangles)
     before, after = check(bulb), check(few)
     assert (after.problems, after.genus, after.components) == ((), before.genus, before.components)
-    assert distance_bounds(bulb, few, 0.1, Work()).max() == pytest.approx(done.bound_mm, rel=1e-3)
-    assert sampled_distances(few, bulb, 0.05, Work()).max() < 0.15, "the other way: near it, not promised"
+    assert Nearest(few).bounds(bulb, 0.1, Work())[0].max() <= 0.1, "proved once more, from nothing"
+    edge = np.median(np.linalg.norm(bulb.corners[:, 0] - bulb.corners[:, 1], axis=1))
+    back = Nearest(bulb).samples(few, edge / 2, Work())
+    assert back.max() <= done.back_mm <= 0.1
+    assert Nearest(bulb).samples(few, 0.05, Work()).max() < 0.15, "between samples: near it, not promised"
 
 
 def test_the_bound_is_no_less_than_the_truth_and_refuses_what_is_too_far():
     cube, ball = shapes.cube(2, (-1, -1, -1)), shapes.sphere(1, level=4)
     corner = np.sqrt(3) - 1
-    bounds = distance_bounds(cube, ball, 0.75, Work())
+    bounds, _ = Nearest(ball).bounds(cube, 0.75, Work())
     assert corner - 1e-9 <= bounds.max() <= 0.75
-    assert np.isinf(distance_bounds(cube, ball, 0.73, Work())).any()
-    assert sampled_distances(cube, ball, 0.1, Work()).max() == pytest.approx(corner, abs=0.01)
+    assert np.isinf(Nearest(ball).bounds(cube, 0.73, Work())[0]).any()
+    assert Nearest(ball).samples(cube, 0.1, Work()).max() == pytest.approx(corner, abs=0.01)
 
 
 def test_the_bound_sees_what_lies_between_the_vertices():
@@ -91,7 +97,68 @@ def test_the_bound_sees_what_lies_between_the_vertices():
         np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 0.2]], float),
         np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32),
     )
-    assert np.isinf(distance_bounds(flat, bent, 0.05, Work())).all(), "its corners are all on the other"
+    bounds, _ = Nearest(bent).bounds(flat, 0.05, Work())
+    assert np.isinf(bounds).all(), "its corners are all on the other"
+    hints = np.zeros((1, 3), np.int32)
+    assert np.isinf(Nearest(bent).bounds(flat, 0.05, Work(), hints)[0]).all(), "nor does a hint deceive it"
+
+
+def naive_distance(p, a, b, c):
+    """Of a point from a triangle: from its plane if it is above it, else from its edges."""
+    sides = [(a, b), (b, c), (c, a)]
+    normal = np.cross(b - a, c - a)
+    if all(np.dot(np.cross(normal, end - begin), p - begin) >= 0 for begin, end in sides):
+        return abs(np.dot(p - a, normal)) / np.linalg.norm(normal)
+    shares = [np.clip(np.dot(p - q, r - q) / np.dot(r - q, r - q), 0, 1) for q, r in sides]
+    return min(np.linalg.norm(p - q - t * (r - q)) for t, (q, r) in zip(shares, sides, strict=True))
+
+
+def test_samples_are_as_far_as_each_triangle_says():
+    rng = np.random.default_rng(1)
+    other = shapes.torus().selected(np.arange(len(shapes.torus().triangles)) % 20 == 0)
+    places = rng.uniform(-14, 14, (60, 3))
+    specks = Mesh(
+        np.repeat(places, 3, axis=0) + 1e-9 * rng.uniform(size=(180, 3)),
+        np.arange(180, dtype=np.int32).reshape(-1, 3),
+    )
+    found = Nearest(other).samples(specks, 1.0, Work())
+    naive = [min(naive_distance(p, *corners) for corners in other.corners) for p in places]
+    assert found == pytest.approx(naive, abs=1e-8)
+    assert Nearest(shapes.torus(), closed=True).samples(specks, 1.0, Work()) == pytest.approx(
+        Nearest(shapes.torus()).samples(specks, 1.0, Work()), abs=1e-12
+    )
+
+
+def test_what_is_taken_out_can_be_put_back_in_any_order():
+    ball = shapes.torus()
+    collapse = Collapse(ball, 0.5)
+    rng = np.random.default_rng(2)
+    found = collapse.run(Work())
+    assert found.gone.mean() > 0.5
+    for _ in range(1000):
+        faulty = found.changed & (rng.uniform(size=len(found.gone)) < 0.1)
+        collapse.undo(faulty, for_good=True)
+        found = collapse.run(Work())
+        left = found.triangles[~found.gone]
+        counts = links(left, len(ball.vertices))
+        assert (counts[1:], len(np.unique(left)) - len(left) // 2) == ((0, 0, 0, 0), 0), "a torus"
+        if not found.changed.any():
+            break
+    assert np.array_equal(found.triangles, ball.triangles)
+    distances = [naive_distance(v, *ball.corners[t]) for v, t in zip(ball.vertices, found.owner, strict=True)]
+    assert max(distances) < 1e-12, "each vertex is near one of its own triangles again"
+
+
+def test_crossings_can_be_asked_for_among_some():
+    cubes = [shapes.cube(10, (x, 0, 0)) for x in (0, 5, 30, 35)]
+    vertices = np.concatenate([cube.vertices for cube in cubes])
+    mesh = Mesh(
+        vertices, np.concatenate([cube.triangles + 8 * i for i, cube in enumerate(cubes)]).astype(np.int32)
+    )
+    of = np.arange(len(mesh.triangles)) // 12
+    whole = crossing_triangles(mesh)
+    assert np.array_equal(crossing_triangles(mesh, among=of == 0), whole & (of < 2))
+    assert not crossing_triangles(mesh, among=of < 0).any()
 
 
 def test_the_result_is_the_same_for_any_number_of_threads():

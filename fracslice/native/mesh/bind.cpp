@@ -1,9 +1,9 @@
-// Functions of fracslice._native on triangle meshes: what comes in is looked through once, for no index may leave its array.
-#include <stdexcept>
+// Functions of fracslice._native on triangle meshes.
+#include <nanobind/stl/optional.h>
 
-#include "../numpy.h"
 #include "../unlocked.h"
 #include "crossings.h"
+#include "input.h"
 #include "links.h"
 #include "nesting.h"
 #include "predicates.h"
@@ -12,38 +12,6 @@
 
 namespace fracslice {
 namespace {
-
-template <class T>
-using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-template <class T>
-using Rows = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-
-template <class T>
-void require_below(const T* values, size_t count, size_t end, const char* what, T least = 0) {
-    for (size_t i = 0; i < count; ++i) {
-        if (values[i] < least || (values[i] >= 0 && size_t(values[i]) >= end)) throw std::invalid_argument(what);
-    }
-}
-
-Triangles triangles_of(const Rows<int32_t>& triangles, size_t vertices) {
-    require_below(triangles.data(), triangles.size(), vertices, "a triangle names a vertex that does not exist");
-    return {triangles.data(), triangles.shape(0), vertices};
-}
-
-MeshView mesh_of(const Rows<double>& vertices, const Rows<int32_t>& triangles) {
-    return {triangles_of(triangles, vertices.shape(0)), vertices.data()};
-}
-
-TreeView tree_of(const MeshView& mesh, const Vector<int64_t>& order, const Rows<double>& low, const Rows<double>& high) {
-    TreeView tree{order.data(), low.data(), high.data(), order.size(), low.shape(0) / 2};
-    size_t leaves = 1;
-    while (leaves * kLeaf < mesh.count) leaves *= 2;
-    if (order.size() != mesh.count || low.shape(0) != 2 * leaves || high.shape(0) != 2 * leaves) {
-        throw std::invalid_argument("the tree is not of this mesh");
-    }
-    require_below(tree.order, tree.count, mesh.count, "the tree names a triangle that does not exist");
-    return tree;
-}
 
 void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t parts) {
     if (labels.size() != mesh.count) throw std::invalid_argument("triangles and labels differ in length");
@@ -91,10 +59,12 @@ nb::tuple bind_tree(const Rows<double>& vertices, const Rows<int32_t>& triangles
 }
 
 nb::object bind_crossings(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order,
-                          const Rows<double>& low, const Rows<double>& high, int threads) {
+                          const Rows<double>& low, const Rows<double>& high, int threads,
+                          const std::optional<Vector<bool>>& among) {
     Array<bool> marks = unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
-        return crossing_triangles(mesh, tree_of(mesh, order, low, high));
+        if (among && among->size() != mesh.count) throw std::invalid_argument("triangles and among differ in length");
+        return crossing_triangles(mesh, tree_of(mesh, order, low, high), among ? among->data() : nullptr);
     });
     return to_numpy(std::move(marks), {triangles.shape(0)});
 }
@@ -130,9 +100,10 @@ void bind_mesh(nb::module_& module) {
     module.def("weld", &bind_weld, "points"_a);
     module.def("tree", &bind_tree, "vertices"_a, "triangles"_a);
     module.def("crossing_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,
-               "threads"_a = 0);
+               "threads"_a = 0, "among"_a = nb::none());
     module.def("nesting", &bind_nesting, "vertices"_a, "triangles"_a, "labels"_a, "sizes"_a, "first"_a, "order"_a,
                "low"_a, "high"_a);
+    bind_reduction(module);
     module.def("side_of_line", &side_of_line, "ax"_a, "ay"_a, "bx"_a, "by"_a, "cx"_a, "cy"_a);
     module.def("side_of_plane", &bind_side_of_plane, "a"_a, "b"_a, "c"_a, "d"_a);
 }

@@ -19,8 +19,11 @@ constexpr size_t kTask = 256;
 
 class Pairs {
   public:
-    Pairs(const MeshView& mesh, const TreeView& tree) : mesh_(mesh), tree_(tree), aspects_(mesh.count), marks_(mesh.count) {
+    Pairs(const MeshView& mesh, const TreeView& tree, const bool* among)
+        : mesh_(mesh), tree_(tree), among_(among), holds_(2 * tree.leaves, !among), aspects_(mesh.count), marks_(mesh.count) {
         tbb::parallel_for(size_t(0), mesh.count, [&](size_t t) { aspects_[t] = aspect_of(mesh, t); });
+        for (size_t i = 0; among && i < tree.count; ++i) holds_[tree.leaves + i / kLeaf] |= among[tree.order[i]];
+        for (size_t node = tree.leaves; among && --node > 0;) holds_[node] = holds_[2 * node] | holds_[2 * node + 1];
     }
 
     Array<bool> run();
@@ -31,16 +34,19 @@ class Pairs {
 
     bool meet(size_t a, size_t b) const {
         const double *low = tree_.low, *high = tree_.high;
-        bool apart = false;
+        bool apart = !holds_[a] && !holds_[b];
         for (int k = 0; k < 3; ++k) apart |= (low[3 * a + k] > high[3 * b + k]) | (high[3 * a + k] < low[3 * b + k]);
         return !apart;
     }
 
+    bool asked(size_t s, size_t t) const { return !among_ || among_[s] || among_[t]; }
     bool marked(size_t t) const { return marks_[t].load(std::memory_order_relaxed); }
     void mark(size_t t) { marks_[t].store(true, std::memory_order_relaxed); }
 
     const MeshView& mesh_;
     const TreeView& tree_;
+    const bool* among_;
+    std::vector<uint8_t> holds_;  // for each node whether some of its triangles are asked about
     std::vector<Aspect> aspects_;
     std::vector<std::atomic<bool>> marks_;
 };
@@ -123,7 +129,7 @@ class Pairs::Search {
     void mark_pair(const Leaf& one, size_t i, const Leaf& other, size_t j) {
         size_t s = size_t(tree_.order[tree_.first(one.number) + i]);
         size_t t = size_t(tree_.order[tree_.first(other.number) + j]);
-        if ((pairs_.marked(s) && pairs_.marked(t)) || !overlap(mesh_, one.facets[i], other.facets[j])) return;
+        if (!pairs_.asked(s, t) || (pairs_.marked(s) && pairs_.marked(t)) || !overlap(mesh_, one.facets[i], other.facets[j])) return;
         pairs_.mark(s);
         pairs_.mark(t);
     }
@@ -147,6 +153,8 @@ Array<bool> Pairs::run() {
 
 }  // namespace
 
-Array<bool> crossing_triangles(const MeshView& mesh, const TreeView& tree) { return Pairs(mesh, tree).run(); }
+Array<bool> crossing_triangles(const MeshView& mesh, const TreeView& tree, const bool* among) {
+    return Pairs(mesh, tree, among).run();
+}
 
 }  // namespace fracslice

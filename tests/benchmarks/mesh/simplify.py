@@ -15,7 +15,7 @@ from fracslice.formulas import julia, mandelbulb, menger, sphere
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check
 from fracslice.mesh.extract import contour
-from fracslice.mesh.nearest import sampled_distances
+from fracslice.mesh.nearest import Nearest
 from fracslice.mesh.rounding import rounded
 from fracslice.mesh.simplify import simplify
 from fracslice.mesh.solid import to_manifold
@@ -64,7 +64,7 @@ def main() -> None:
             start = time.process_time()
             few = way(mesh, tolerance, count)
             spent, count = time.process_time() - start, count or len(few.triangles)
-            off = sampled_distances(mesh, few, 10 * planned.voxel, Work()).max() / tolerance
+            off = Nearest(few).samples(mesh, 10 * planned.voxel, Work()).max() / tolerance
             share = len(few.triangles) / len(mesh.triangles)
             defects = ", ".join(check(few).problems) or "none"
             numbers = f"{len(few.triangles):10}{share:8.1%}{off:8.2f}{spent:8.1f}"

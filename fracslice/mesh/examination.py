@@ -1,0 +1,111 @@
+"""What a simplification is held to: distances, crossings, shells; looked at again where something changes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fracslice.mesh.collapse import Collapsed
+from fracslice.mesh.crossings import crossing_triangles
+from fracslice.mesh.links import parts, shell_volumes
+from fracslice.mesh.model import Mesh
+from fracslice.mesh.nearest import Nearest
+from fracslice.mesh.tree import build
+from fracslice.work import Work
+
+
+class Examination:
+    """What is proved and found of each triangle, by the numbers of the original. It stands as long as nothing
+    changes that it depends on.
+
+    bound: how far one of the original is from what is left, proved; strayed: whether that depends on more
+    than the triangles near its corners. back: how far samples of what is left are from the original.
+    crossing: whether it crosses another that is left.
+    """
+
+    def __init__(self, mesh: Mesh, tolerance: float, work: Work) -> None:
+        self.mesh, self.tolerance, self.work = mesh, tolerance, work
+        self.original, self.spacing, self.shells = Nearest(mesh, closed=True), _edge(mesh) / 2, _Shells(mesh)
+        self.bound, self.back = np.zeros(len(mesh.triangles)), np.zeros(len(mesh.triangles))
+        self.strayed, self.crossing = np.zeros((2, len(mesh.triangles)), dtype=bool)
+
+    def faults(self, found: Collapsed) -> NDArray[np.bool_]:
+        """Triangles at which something has to be put back, bool [m]. Raises `Cancelled`."""
+        left = _Left(self.mesh, found)
+        fresh = found.fresh[found.owner][self.mesh.triangles].any(axis=1) | found.fresh
+        faulty = self._far(left, found, found.changed & fresh) | self._beyond(found)
+        self.crossing = left.crossing(found.fresh | self.crossing, self.work)
+        faulty |= (self.crossing | left.all(self.shells.turned(left.mesh))) & found.changed
+        if not faulty.any():
+            faulty = self._far(left, found, found.changed & self.strayed & ~fresh)
+        return faulty
+
+    def distances(self, found: Collapsed) -> tuple[float, float]:
+        """The greatest distances of the original and back."""
+        there, back = self.bound[found.changed], self.back[found.changed & ~found.gone]
+        return float(there.max(initial=0.0)), float(back.max(initial=0.0))
+
+    def _far(self, left: _Left, found: Collapsed, lost: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Where originals are too far off, `lost` (bool [m]) proved anew: what changed last near them."""
+        these = Mesh(self.mesh.vertices, self.mesh.triangles[lost])
+        hints = left.number[found.owner[these.triangles]]
+        self.bound[lost], self.strayed[lost] = left.nearest.bounds(these, self.tolerance, self.work, hints)
+        far = np.flatnonzero(np.isinf(self.bound) & found.changed)
+        suspects = np.column_stack([found.owner[self.mesh.triangles[far]], far])
+        latest = found.step[suspects].argmax(axis=1)
+        faulty = np.zeros(len(lost), dtype=bool)
+        faulty[suspects[np.arange(len(suspects)), latest]] = True
+        return faulty
+
+    def _beyond(self, found: Collapsed) -> NDArray[np.bool_]:
+        """Which new triangles have samples too far from the original."""
+        new = found.changed & ~found.gone
+        fresh = new & found.fresh
+        these = Mesh(self.mesh.vertices, found.triangles[fresh])
+        self.back[fresh] = self.original.samples(these, self.spacing, self.work, self.tolerance)
+        return new & (self.back > self.tolerance)
+
+
+class _Left:
+    """The triangles that are left, as a mesh. number: int32 [m], theirs in it."""
+
+    def __init__(self, mesh: Mesh, found: Collapsed) -> None:
+        self.old = np.flatnonzero(~found.gone)
+        self.number = np.cumsum(~found.gone, dtype=np.int32) - np.int32(1)
+        self.mesh = Mesh(mesh.vertices, found.triangles[self.old])
+        self.tree = build(self.mesh)
+        self.nearest = Nearest(self.mesh, self.tree)
+
+    def crossing(self, among: NDArray[np.bool_], work: Work) -> NDArray[np.bool_]:
+        """Those that cross, of which one at least is among these of the original."""
+        return self.all(crossing_triangles(self.mesh, self.tree, work.threads, among[self.old]))
+
+    def all(self, marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """The same marks by the numbers of the original."""
+        found = np.zeros(len(self.number), dtype=bool)
+        found[self.old] = marks
+        return found
+
+
+class _Shells:
+    """The shells of a mesh, for one that has the same."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        labels, self.count = parts(mesh.triangles, len(mesh.vertices))
+        self.of = np.zeros(len(mesh.vertices), labels.dtype)
+        self.of[mesh.triangles] = labels[:, None]
+        self.outside = self._volumes(mesh) >= 0
+
+    def turned(self, mesh: Mesh) -> NDArray[np.bool_]:
+        """The triangles of shells that are inside out: a crumb that fewer triangles cannot hold open."""
+        found: NDArray[np.bool_] = (self.outside != (self._volumes(mesh) >= 0))[self.of[mesh.triangles[:, 0]]]
+        return found
+
+    def _volumes(self, mesh: Mesh) -> NDArray[np.float64]:
+        return shell_volumes(mesh.vertices, mesh.triangles, self.of[mesh.triangles[:, 0]], self.count)
+
+
+def _edge(mesh: Mesh) -> float:
+    """The median length of an edge."""
+    a, b = mesh.vertices[mesh.triangles[:, 0]], mesh.vertices[mesh.triangles[:, 1]]
+    return float(np.median(np.linalg.norm(a - b, axis=1)))

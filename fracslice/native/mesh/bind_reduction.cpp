@@ -1,0 +1,99 @@
+// Fewer triangles, and how far they are: classes of fracslice._native that keep the arrays they look into.
+#include "../unlocked.h"
+#include "input.h"
+#include "nearest.h"
+#include "reduction.h"
+
+namespace fracslice {
+namespace {
+
+class BoundReduction {
+  public:
+    BoundReduction(const Rows<double>& vertices, const Rows<int32_t>& triangles, double tolerance)
+        : vertices_(vertices), triangles_(triangles),
+          reduction_(unlocked(0, [&] { return Reduction(mesh_of(vertices, triangles), tolerance); })) {}
+
+    void renew() { reduction_.renew(); }
+
+    size_t sweep(size_t first, size_t last, double share) {
+        if (last > vertices_.shape(0)) throw nb::value_error("no such vertices");
+        return unlocked(0, [&] { return reduction_.sweep(first, last, share); });
+    }
+
+    void undo(const Vector<bool>& faulty, bool for_good) {
+        if (faulty.size() != triangles_.shape(0)) throw nb::value_error("triangles and faults differ in length");
+        unlocked(0, [&] { reduction_.undo(faulty.data(), for_good); });
+    }
+
+    nb::tuple state() {
+        auto state = unlocked(0, [&] { return reduction_.state(); });
+        size_t count = triangles_.shape(0);
+        return nb::make_tuple(to_numpy(std::move(state.triangles), {count, 3}), to_numpy(std::move(state.gone), {count}),
+                              to_numpy(std::move(state.step), {count}), to_numpy(std::move(state.fresh), {count}),
+                              to_numpy(std::move(state.owner), {vertices_.shape(0)}));
+    }
+
+  private:
+    Rows<double> vertices_;
+    Rows<int32_t> triangles_;
+    Reduction reduction_;
+};
+
+class BoundNearest {
+  public:
+    BoundNearest(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order,
+                 const Rows<double>& low, const Rows<double>& high, bool closed)
+        : vertices_(vertices), low_(low), high_(high), triangles_(triangles), order_(order), nearest_(unlocked(0, [&] {
+              MeshView mesh = mesh_of(vertices, triangles);
+              if (!mesh.count) throw std::invalid_argument("nothing is near an empty mesh");
+              return Nearest(mesh, tree_of(mesh, order, low, high), closed);
+          })) {}
+
+    nb::tuple bounds(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<int32_t>& hints, double tolerance,
+                     int threads) const {
+        size_t count = triangles.shape(0);
+        Array<double> found(count, 1);
+        Array<bool> strayed(count, 1);
+        unlocked(threads, [&] {
+            MeshView mesh = mesh_of(vertices, triangles);
+            bool hinted = hints.shape(0) > 0;
+            if (hinted && hints.shape(0) != mesh.count) throw std::invalid_argument("triangles and hints differ in length");
+            require_below(hints.data(), hints.size(), triangles_.shape(0), "a hint names a triangle that does not exist");
+            nearest_.bounds(mesh, hinted ? hints.data() : nullptr, tolerance, found.data.get(), strayed.data.get());
+        });
+        return nb::make_tuple(to_numpy(std::move(found), {count}), to_numpy(std::move(strayed), {count}));
+    }
+
+    nb::object samples(const Rows<double>& vertices, const Rows<int32_t>& triangles, double spacing, double enough,
+                       int threads) const {
+        Array<double> found(triangles.shape(0), 1);
+        unlocked(threads, [&] { nearest_.samples(mesh_of(vertices, triangles), spacing, enough, found.data.get()); });
+        return to_numpy(std::move(found), {triangles.shape(0)});
+    }
+
+  private:
+    Rows<double> vertices_, low_, high_;
+    Rows<int32_t> triangles_;
+    Vector<int64_t> order_;
+    Nearest nearest_;
+};
+
+}  // namespace
+
+void bind_reduction(nb::module_& module) {
+    using namespace nanobind::literals;
+    nb::class_<BoundReduction>(module, "Reduction")
+        .def(nb::init<const Rows<double>&, const Rows<int32_t>&, double>(), "vertices"_a, "triangles"_a, "tolerance"_a)
+        .def("renew", &BoundReduction::renew)
+        .def("sweep", &BoundReduction::sweep, "first"_a, "last"_a, "share"_a)
+        .def("undo", &BoundReduction::undo, "faulty"_a, "for_good"_a)
+        .def("state", &BoundReduction::state);
+    nb::class_<BoundNearest>(module, "Nearest")
+        .def(nb::init<const Rows<double>&, const Rows<int32_t>&, const Vector<int64_t>&, const Rows<double>&, const Rows<double>&,
+                      bool>(),
+             "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a, "closed"_a = false)
+        .def("bounds", &BoundNearest::bounds, "vertices"_a, "triangles"_a, "hints"_a, "tolerance"_a, "threads"_a = 0)
+        .def("samples", &BoundNearest::samples, "vertices"_a, "triangles"_a, "spacing"_a, "enough"_a, "threads"_a = 0);
+}
+
+}  // namespace fracslice

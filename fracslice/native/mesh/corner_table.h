@@ -1,0 +1,79 @@
+// A closed surface whose vertices can be taken out and put back: a corner table (Rossignac, "3D compression made simple:
+// Edgebreaker on a corner-table", 2001) with a history. Corner k of triangle t is 3 t + k.
+#pragma once
+#include <vector>
+
+#include "triangles.h"
+
+namespace fracslice {
+
+// Of each corner of a closed, oriented 2-manifold the one opposite, on the other side of the edge that it faces. Throws
+// std::invalid_argument if one has none.
+std::vector<int32_t> opposite_corners(const Triangles& triangles);
+
+// Triangles around a vertex, at most.
+constexpr int kDegree = 48;
+
+// The triangles around a vertex in order: their corners there, and in each the vertex that follows.
+struct Star {
+    int count = 0;
+    int32_t corner[kDegree], ring[kDegree];
+
+    int32_t triangle(int i) const { return corner[i] / 3; }
+    // Makes it begin at another triangle.
+    void turn(int begin);
+};
+
+class CornerTable {
+  public:
+    // A closed, oriented 2-manifold.
+    explicit CornerTable(const Triangles& triangles);
+
+    const int32_t* triangles() const { return triangles_.data(); }
+    // Of each triangle whether it is out, having been between a vertex and the one that it moved to.
+    const std::vector<uint8_t>& gone() const { return gone_; }
+    // The step, counted from 1, that changed a triangle last; 0 if it is as it was.
+    int32_t changed_by(size_t t) const;
+    // One corner of a vertex, -1 if it is out.
+    int32_t corner(size_t v) const { return corner_[v]; }
+    // The vertex that a step took out.
+    int32_t vertex(int32_t step) const { return steps_[size_t(step) - 1].vertex; }
+    bool stands(int32_t step) const { return steps_[size_t(step) - 1].stands; }
+
+    // False if there are more than kDegree triangles.
+    bool star(size_t v, Star& found) const;
+    // Whether the vertex of a star may move to ring[i] and leave a manifold of the same topology: the two have two common
+    // neighbours and no common triangle (the link condition; Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge
+    // contraction", 1999).
+    bool linked(const Star& star, int i) const;
+    // Moves the vertex of a star to ring[0]; the first and the last of its triangles are out.
+    void collapse(const Star& star);
+    // A step that has to be undone before this one, because it changed something there later; itself if there is none.
+    int32_t above(int32_t step) const;
+    // Puts back the vertex of a step that none is above; returns its star as it was.
+    Star undo(int32_t step);
+
+  private:
+    struct Step {
+        int32_t vertex;
+        int count;
+        bool stands;
+        size_t begin;  // in touched_ and before_, count + 2 of them
+    };
+    int32_t& at(int32_t c) { return triangles_[size_t(c)]; }
+    int32_t at(int32_t c) const { return triangles_[size_t(c)]; }
+    int32_t& across(int32_t c) { return across_[size_t(c)]; }
+    int32_t across(int32_t c) const { return across_[size_t(c)]; }
+    void touch(int32_t c);
+    // Of what a step touched.
+    auto touched(const Step& s) const { return touched_.begin() + std::ptrdiff_t(s.begin); }
+
+    std::vector<int32_t> triangles_, across_, corner_;
+    std::vector<int32_t> last_;  // of each triangle the step that touched it last
+    std::vector<uint8_t> gone_;
+    std::vector<Step> steps_;
+    // The corners of a star and two opposite ones: the triangles that a step touched. And which step had done so before.
+    std::vector<int32_t> touched_, before_;
+};
+
+}  // namespace fracslice

@@ -1,0 +1,61 @@
+// How far points are from a triangle (Ericson, "Real-Time Collision Detection", 2005).
+#pragma once
+#include <algorithm>
+
+#include "triangles.h"
+
+namespace fracslice {
+
+// What many points ask of one triangle is worked out once.
+class TriangleDistance {
+  public:
+    TriangleDistance() = default;
+    TriangleDistance(const double* a, const double* b, const double* c) {
+        for (int k = 0; k < 3; ++k) a_[k] = a[k], u_[k] = b[k] - a[k], v_[k] = c[k] - a[k];
+        uu_ = dot(u_, u_), uv_ = dot(u_, v_), vv_ = dot(v_, v_);
+    }
+    TriangleDistance(const MeshView& mesh, size_t t) : TriangleDistance(mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)) {}
+
+    // The square of the distance of the nearest point; where a needle of a triangle leaves no digits to find it, of another of
+    // its points, never of one outside.
+    double square(const double* p) const {
+        double x[3] = {p[0] - a_[0], p[1] - a_[1], p[2] - a_[2]};
+        double d1 = dot(u_, x), d2 = dot(v_, x);
+        if (d1 <= 0 && d2 <= 0) return dot(x, x);
+        double d3 = d1 - uu_, d4 = d2 - uv_, d5 = d1 - uv_, d6 = d2 - vv_, s = 0, t = 0;
+        if (d3 >= 0 && d4 <= d3) {
+            s = 1;
+        } else if (d6 >= 0 && d5 <= d6) {
+            t = 1;
+        } else if (d1 * d4 - d3 * d2 <= 0 && d1 >= 0 && d3 <= 0) {
+            s = d1 / (d1 - d3);
+        } else if (d5 * d2 - d1 * d6 <= 0 && d2 >= 0 && d6 <= 0) {
+            t = d2 / (d2 - d6);
+        } else if (d3 * d6 - d5 * d4 <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+            t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+            s = 1 - t;
+        } else if (double area = square_area(); area > 0) {
+            s = std::clamp((vv_ * d1 - uv_ * d2) / area, 0.0, 1.0);
+            t = std::clamp((uu_ * d2 - uv_ * d1) / area, 0.0, 1 - s);
+        }
+        for (int k = 0; k < 3; ++k) x[k] -= s * u_[k] + t * v_[k];
+        return dot(x, x);
+    }
+
+    // The normal, as long as twice the area; the square of its length, and the sum of the squares of the sides.
+    void normal(double* n) const {
+        for (int k = 0; k < 3; ++k) {
+            int i = (k + 1) % 3, j = (k + 2) % 3;
+            n[k] = u_[i] * v_[j] - u_[j] * v_[i];
+        }
+    }
+    double square_area() const { return uu_ * vv_ - uv_ * uv_; }
+    double square_sides() const { return 2 * (uu_ + vv_ - uv_); }
+
+  private:
+    static double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+    double a_[3], u_[3], v_[3], uu_, uv_, vv_;
+};
+
+}  // namespace fracslice

@@ -1,0 +1,44 @@
+// Meshes that come in from Python: looked through once, for no index may leave its array.
+#pragma once
+#include <stdexcept>
+
+#include "../numpy.h"
+#include "triangles.h"
+
+namespace fracslice {
+
+template <class T>
+using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+template <class T>
+using Rows = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+template <class T>
+void require_below(const T* values, size_t count, size_t end, const char* what, T least = 0) {
+    for (size_t i = 0; i < count; ++i) {
+        if (values[i] < least || (values[i] >= 0 && size_t(values[i]) >= end)) throw std::invalid_argument(what);
+    }
+}
+
+inline Triangles triangles_of(const Rows<int32_t>& triangles, size_t vertices) {
+    require_below(triangles.data(), triangles.size(), vertices, "a triangle names a vertex that does not exist");
+    return {triangles.data(), triangles.shape(0), vertices};
+}
+
+inline MeshView mesh_of(const Rows<double>& vertices, const Rows<int32_t>& triangles) {
+    return {triangles_of(triangles, vertices.shape(0)), vertices.data()};
+}
+
+inline TreeView tree_of(const MeshView& mesh, const Vector<int64_t>& order, const Rows<double>& low, const Rows<double>& high) {
+    TreeView tree{order.data(), low.data(), high.data(), order.size(), low.shape(0) / 2};
+    size_t leaves = 1;
+    while (leaves * kLeaf < mesh.count) leaves *= 2;
+    if (order.size() != mesh.count || low.shape(0) != 2 * leaves || high.shape(0) != 2 * leaves) {
+        throw std::invalid_argument("the tree is not of this mesh");
+    }
+    require_below(tree.order, tree.count, mesh.count, "the tree names a triangle that does not exist");
+    return tree;
+}
+
+void bind_reduction(nb::module_& module);
+
+}  // namespace fracslice

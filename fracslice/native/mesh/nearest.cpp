@@ -1,0 +1,119 @@
+#include "nearest.h"
+
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+
+#include "corner_table.h"
+
+namespace fracslice {
+namespace {
+
+// Triangles that one thread looks at in turn, each beginning where the one before was: always the same ones.
+constexpr size_t kTurn = 256;
+// The longest way over neighbouring triangles.
+constexpr int kSteps = 32;
+
+template <class Do>
+void in_turns(size_t count, const Do& act) {
+    tbb::parallel_for(size_t(0), (count + kTurn - 1) / kTurn,
+                      [&](size_t turn) { act(turn * kTurn, std::min(count, (turn + 1) * kTurn)); });
+}
+
+}  // namespace
+
+Nearest::Nearest(const MeshView& mesh, const TreeView& tree, bool closed) : mesh_(mesh), tree_(tree) {
+    if (closed) across_ = opposite_corners(mesh);
+}
+
+double Nearest::to_box(const double* p, size_t node) const {
+    double total = 0;
+    for (size_t k = 0; k < 3; ++k) {
+        double d = std::max({tree_.low[3 * node + k] - p[k], 0.0, p[k] - tree_.high[3 * node + k]});
+        total += d * d;
+    }
+    return total;
+}
+
+Found Nearest::operator()(const double* p, size_t guess) const {
+    struct Open {
+        size_t node;
+        double square;
+    } open[128];
+    Found best{guess, distance(guess).square(p)};
+    open[0] = {1, 0};
+    for (int height = 1; height > 0;) {
+        auto [node, square] = open[--height];
+        if (square >= best.square) continue;
+        if (node >= tree_.leaves) {
+            size_t leaf = node - tree_.leaves;
+            for (size_t i = tree_.first(leaf); i < tree_.last(leaf); ++i) {
+                size_t t = size_t(tree_.order[i]);
+                if (double d = distance(t).square(p); d < best.square) best = {t, d};
+            }
+            continue;
+        }
+        Open one{2 * node, to_box(p, 2 * node)}, two{2 * node + 1, to_box(p, 2 * node + 1)};
+        if (one.square < two.square) std::swap(one, two);
+        open[height++] = one, open[height++] = two;
+    }
+    return best;
+}
+
+// From neighbour to neighbour as long as that comes nearer: mostly all the way.
+Found Nearest::within(double limit, const double* p, size_t guess) const {
+    Found best{guess, distance(guess).square(p)};
+    bool nearer = !across_.empty();
+    for (int step = 0; nearer && step < kSteps; ++step) {
+        nearer = false;
+        for (size_t c = 3 * best.triangle, end = c + 3; c < end; ++c) {
+            size_t t = size_t(across_[c]) / 3;
+            if (double d = distance(t).square(p); d < best.square) best = {t, d}, nearer = true;
+        }
+    }
+    return best.square <= limit ? best : (*this)(p, best.triangle);
+}
+
+void Nearest::bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* found, bool* strayed) const {
+    in_turns(triangles.count, [&](size_t first, size_t last) {
+        Bound<Nearest> bound(*this, tolerance);
+        size_t near[3] = {0, 0, 0};
+        for (size_t t = first; t < last; ++t) {
+            if (hints) std::copy_n(hints + 3 * t, 3, near);
+            found[t] = std::sqrt(bound({triangles.corner(t, 0), triangles.corner(t, 1), triangles.corner(t, 2)}, near));
+            strayed[t] = bound.strayed();
+        }
+    });
+}
+
+void Nearest::samples(const MeshView& triangles, double spacing, double enough, double* found) const {
+    in_turns(triangles.count, [&](size_t first, size_t last) {
+        size_t guess = 0;
+        for (size_t t = first; t < last; ++t) found[t] = sampled(triangles, t, spacing, enough * enough, guess);
+    });
+}
+
+double Nearest::sampled(const MeshView& triangles, size_t t, double spacing, double limit, size_t& guess) const {
+    const double *a = triangles.corner(t, 0), *b = triangles.corner(t, 1), *c = triangles.corner(t, 2);
+    double longest = 0, most = 0;
+    for (int x = 0; x < 3; ++x) {
+        double d = std::max({std::abs(a[x] - b[x]), std::abs(b[x] - c[x]), std::abs(c[x] - a[x])});
+        longest += d * d;
+    }
+    int n = std::max(1, int(std::ceil(std::sqrt(longest) / spacing)));
+    for (int i = 0; i <= n; ++i) {
+        size_t begin = guess;
+        for (int j = 0; j <= n - i; ++j) {
+            double p[3];
+            for (int x = 0; x < 3; ++x) p[x] = a[x] + (b[x] - a[x]) * i / n + (c[x] - a[x]) * j / n;
+            Found found = within(limit, p, guess);
+            guess = found.triangle;
+            if (j == 0) begin = guess;
+            most = std::max(most, found.square);
+        }
+        guess = begin;
+    }
+    return std::sqrt(most);
+}
+
+}  // namespace fracslice

@@ -1,0 +1,37 @@
+// How far other meshes are from one: proved, or sampled.
+#pragma once
+#include <vector>
+
+#include "bound.h"
+
+namespace fracslice {
+
+class Nearest {
+  public:
+    // Of a mesh and its tree, which outlive this. closed: whether it is a closed, oriented 2-manifold, in which ways are shorter.
+    Nearest(const MeshView& mesh, const TreeView& tree, bool closed);
+
+    TriangleDistance distance(size_t t) const { return {mesh_, t}; }
+    // What is nearest to a point; the search begins with a guess.
+    Found operator()(const double* p, size_t guess) const;
+    // The same, or something whose distance has a square within a limit.
+    Found within(double limit, const double* p, size_t guess) const;
+
+    // For each triangle a bound on how far its points are; infinite where one is farther than the tolerance, or that could not be
+    // excluded. hints: of each corner a triangle here that may be near it, [count, 3], or none. strayed: whether others were
+    // looked for.
+    void bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* found, bool* strayed) const;
+    // For each triangle how far its samples are at most: exactly, but for distances below `enough`. Samples are at most `spacing`
+    // apart along its edges.
+    void samples(const MeshView& triangles, double spacing, double enough, double* found) const;
+
+  private:
+    double to_box(const double* p, size_t node) const;
+    double sampled(const MeshView& triangles, size_t t, double spacing, double limit, size_t& guess) const;
+
+    MeshView mesh_;
+    TreeView tree_;
+    std::vector<int32_t> across_;
+};
+
+}  // namespace fracslice
