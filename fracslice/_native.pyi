@@ -133,6 +133,20 @@ def parts(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int32], int
 def shell_volumes(
     vertices: NDArray[float64], triangles: NDArray[int32], labels: NDArray[int32], count: int
 ) -> NDArray[float64]: ...
+def measures(
+    vertices: NDArray[float64], triangles: NDArray[int32], point: Point
+) -> tuple[float, float, int]:
+    """The triangles' area, the signed volume between them and a point, and how many have no area."""
+
+def turned(
+    vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64]
+) -> NDArray[int64]:
+    """The triangles, ascending, that are flat or turn by a right angle or more when the vertices move to
+    `points`."""
+
+def bounds(points: NDArray[float64]) -> tuple[Point, Point]:
+    """Low and high corner of the box around points, float64 [n, 3]. Raises ValueError if there are none."""
+
 def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]: ...
 def tree(
     vertices: NDArray[float64], triangles: NDArray[int32]
@@ -160,7 +174,7 @@ class Reduction:
         """Takes out such of the vertices first to last - 1 as can go with an error of a share of the tolerance,
         and returns how many; a sweep begins with first = 0."""
 
-    def undo(self, faulty: NDArray[bool_], for_good: bool) -> None: ...
+    def undo(self, faulty: NDArray[bool_]) -> None: ...
     def state(
         self,
     ) -> tuple[NDArray[int32], NDArray[bool_], NDArray[int32], NDArray[bool_], NDArray[int32]]:

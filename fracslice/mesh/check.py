@@ -95,7 +95,7 @@ def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
     closed = not (link.open_edges or link.misoriented_edges)
     misplaced = _misplaced(whole, labels, volumes, tree) if closed else 0
     crossing = crossing_triangles(whole, tree, threads)
-    normals = np.linalg.norm(mesh.normals, axis=1)
+    area, _, flat = mesh.measures
     cavities = int((volumes < 0).sum()) if closed else 0
     return MeshReport(
         triangles=len(mesh.triangles),
@@ -104,7 +104,7 @@ def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
         manifold=not (link.open_edges or link.crowded_edges or link.extra_fans),
         oriented=not (link.misoriented_edges or misplaced),
         self_intersections=int(crossing.sum()),
-        degenerate_triangles=int((normals == 0).sum()),
+        degenerate_triangles=flat,
         duplicate_triangles=duplicates(whole.triangles[crossing]),
         open_edges=link.open_edges,
         nonmanifold_edges=link.crowded_edges,
@@ -117,7 +117,7 @@ def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
         if closed and not (link.crowded_edges or link.extra_fans)
         else None,
         volume_mm3=float(volumes.sum()),
-        area_mm2=float(normals.sum() / 2),
+        area_mm2=area,
         bbox_mm=_box(mesh),
     )
 

@@ -29,9 +29,10 @@ def mended(mesh: Mesh, low: float = -np.inf, high: float = np.inf) -> Mesh:
 
     Only those whose largest x is in [low, high): elsewhere the surface may be cut open.
     """
+    from fracslice._native import turned
+
     points = float32_points(mesh).astype(np.float64)
-    agreement = np.einsum("ij,ij->i", Mesh(points, mesh.triangles).normals, mesh.normals)
-    suspects = np.flatnonzero(agreement <= 0)
+    suspects = turned(mesh.vertices, mesh.triangles, points)
     top = mesh.vertices[mesh.triangles[suspects], 0].max(axis=1)
     bad = set(suspects[(low <= top) & (top < high)].tolist())
     if not bad:

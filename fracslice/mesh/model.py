@@ -29,7 +29,9 @@ class Mesh:
         """Low and high corner of the box around all vertices, float64 [2, 3]; zeros for an empty mesh."""
         if not len(self.vertices):
             return np.zeros((2, 3))
-        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+        from fracslice._native import bounds
+
+        return np.array(bounds(self.vertices))
 
     @property
     def size(self) -> NDArray[np.float64]:
@@ -47,19 +49,26 @@ class Mesh:
     @property
     def area(self) -> float:
         """Sum of the triangles' areas."""
-        return float(np.linalg.norm(self.normals, axis=1).sum() / 2)
-
-    @property
-    def cones(self) -> NDArray[np.float64]:
-        """Signed volume between each triangle and the origin, float64 [m]; their sum is a closed mesh's."""
-        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
-        volumes: NDArray[np.float64] = np.einsum("ij,ij->i", _cross(a, b), c) / 6
-        return volumes
+        return self.measures[0]
 
     @property
     def volume(self) -> float:
         """Signed volume: positive when the triangles look outwards (divergence theorem)."""
-        return float(self.translated(-self.bounds.mean(axis=0)).cones.sum())
+        return self.measures[1]
+
+    @property
+    def measures(self) -> tuple[float, float, int]:
+        """`area`, `volume`, and how many triangles have no area."""
+        x, y, z = self.bounds.mean(axis=0).tolist()
+        return self.measures_from((x, y, z))
+
+    def measures_from(self, point: tuple[float, float, float]) -> tuple[float, float, int]:
+        """`measures`, with the signed volume between the triangles and a point: of an open mesh, a part of
+        the whole one's.
+        """
+        from fracslice._native import measures
+
+        return measures(self.vertices, self.triangles, point)
 
     def translated(self, offset: tuple[float, float, float] | NDArray[np.float64]) -> Mesh:
         """A copy moved by `offset`."""

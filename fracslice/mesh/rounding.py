@@ -20,7 +20,9 @@ def rounded(mesh: Mesh) -> Mesh:
     points = float32_points(mesh)
     first, labels = weld(points)
     welded = Mesh(points[first].astype(np.float64), labels[mesh.triangles])
-    return welded.selected(np.ones(len(welded.triangles), dtype=bool))
+    used = np.zeros(len(first), dtype=bool)
+    used[welded.triangles] = True
+    return welded if used.all() else welded.selected(np.ones(len(welded.triangles), dtype=bool))
 
 
 def float32_points(mesh: Mesh) -> NDArray[np.float32]:

@@ -77,8 +77,8 @@ class Window:
         distinct = (a != b) & (b != c) & (c != a)
         ends = edge_ends(mesh.triangles[distinct], counted)
         crossing = crossing_triangles(mesh, threads=self.threads) & done
-        normals = np.linalg.norm(mesh.normals[done], axis=1)
         tally, passed = self.tally, mesh.selected(done)
+        area, volume, flat = passed.measures_from((0.0, 0.0, 0.0))
         tally.triangles += int(done.sum())
         tally.vertices += int(counted.sum())
         tally.open_edges += ends.open_edges
@@ -86,10 +86,10 @@ class Window:
         tally.misoriented_edges += ends.misoriented_edges
         tally.nonmanifold_vertices += ends.extra_fans
         tally.self_intersections += int(crossing.sum())
-        tally.degenerate_triangles += int((normals == 0).sum())
+        tally.degenerate_triangles += flat
         tally.duplicate_triangles += duplicates(mesh.triangles[crossing])
-        tally.volume += float(passed.cones.sum())
-        tally.area += float(normals.sum() / 2)
+        tally.volume += volume
+        tally.area += area
         if len(passed.vertices):
             low, high = passed.bounds
             self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)

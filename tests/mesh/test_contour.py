@@ -213,7 +213,7 @@ def test_open_samples_are_refused() -> None:
 
 
 def test_a_straight_edge_takes_no_vertex_in_its_cells() -> None:
-    """Of a box whose faces lie beside the grid's planes: vertices on grid edges, on its edges in cells' faces,
+    """Of a box whose faces lie beside the grid's planes: on grid edges, on the box's edges in cells' faces,
     and 8 in cells."""
     mesh = made(box(size=(1, 1.2, 0.8)), 40.3)
     planned = plan(box(size=(1, 1.2, 0.8)), 40.3)

@@ -5,6 +5,7 @@
 #include "crossings.h"
 #include "input.h"
 #include "links.h"
+#include "measures.h"
 #include "nesting.h"
 #include "predicates.h"
 #include "tree.h"
@@ -12,6 +13,8 @@
 
 namespace fracslice {
 namespace {
+
+using Point = std::array<double, 3>;
 
 void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t parts) {
     if (labels.size() != mesh.count) throw std::invalid_argument("triangles and labels differ in length");
@@ -42,6 +45,25 @@ nb::object bind_volumes(const Rows<double>& vertices, const Rows<int32_t>& trian
         return shell_volumes(mesh, labels.data(), count);
     });
     return to_numpy(std::move(volumes), {count});
+}
+
+nb::tuple bind_measures(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Point& point) {
+    Measures found = unlocked(0, [&] { return measures(mesh_of(vertices, triangles), point); });
+    return nb::make_tuple(found.area, found.volume, found.flat);
+}
+
+nb::object bind_turned(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<double>& points) {
+    if (points.shape(0) != vertices.shape(0)) throw nb::value_error("vertices and points differ in length");
+    std::vector<int64_t> found = unlocked(0, [&] { return turned(mesh_of(vertices, triangles), points.data()); });
+    Array<int64_t> rows(found.size(), 1);
+    std::copy(found.begin(), found.end(), rows.data.get());
+    return to_numpy(std::move(rows), {found.size()});
+}
+
+nb::tuple bind_bounds(const Rows<double>& points) {
+    if (!points.shape(0)) throw nb::value_error("no points");
+    Bounds found = unlocked(0, [&] { return bounds(points.data(), points.shape(0)); });
+    return nb::make_tuple(found.low, found.high);
 }
 
 nb::tuple bind_weld(const Rows<float>& points) {
@@ -83,8 +105,6 @@ nb::tuple bind_nesting(const Rows<double>& vertices, const Rows<int32_t>& triang
     return nb::make_tuple(to_numpy(std::move(found.winding), {shells}), to_numpy(std::move(found.parent), {shells}));
 }
 
-using Point = std::array<double, 3>;
-
 int bind_side_of_plane(const Point& a, const Point& b, const Point& c, const Point& d) {
     return side_of_plane(a.data(), b.data(), c.data(), d.data());
 }
@@ -97,6 +117,9 @@ void bind_mesh(nb::module_& module) {
     module.def("corners_by_vertex", &bind_corners, "triangles"_a, "vertices"_a);
     module.def("parts", &bind_parts, "triangles"_a, "vertices"_a);
     module.def("shell_volumes", &bind_volumes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a);
+    module.def("measures", &bind_measures, "vertices"_a, "triangles"_a, "point"_a);
+    module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "points"_a);
+    module.def("bounds", &bind_bounds, "points"_a);
     module.def("weld", &bind_weld, "points"_a);
     module.def("tree", &bind_tree, "vertices"_a, "triangles"_a);
     module.def("crossing_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,

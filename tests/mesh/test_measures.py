@@ -1,0 +1,43 @@
+"""Area, volume, bounds and what rounding turns over, against NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracslice._native import bounds, measures, turned
+from fracslice.mesh import Mesh
+
+RNG = np.random.default_rng(5)
+SOUP = Mesh(RNG.normal(size=(9000, 3)), RNG.integers(0, 9000, (40000, 3)).astype(np.int32))
+"""More than two blocks of triangles, some of them without area."""
+
+
+def normals(vertices: np.ndarray) -> np.ndarray:
+    a, b, c = (vertices[SOUP.triangles[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def test_measures() -> None:
+    point = np.array([0.3, -2, 1])
+    n, tips = normals(SOUP.vertices), SOUP.vertices[SOUP.triangles[:, 0]]
+    area, volume, flat = measures(SOUP.vertices, SOUP.triangles, tuple(point))
+    assert area == pytest.approx(np.linalg.norm(n, axis=1).sum() / 2, rel=1e-12)
+    assert volume == pytest.approx(((tips - point) * n).sum() / 6, rel=1e-9)
+    assert flat == (np.linalg.norm(n, axis=1) == 0).sum() > 0
+
+
+def test_bounds() -> None:
+    low, high = bounds(SOUP.vertices)
+    assert (np.array([low, high]) == [SOUP.vertices.min(0), SOUP.vertices.max(0)]).all()
+    with pytest.raises(ValueError, match="no points"):
+        bounds(np.empty((0, 3)))
+
+
+def test_turned() -> None:
+    points = SOUP.vertices + RNG.normal(0, 0.5, SOUP.vertices.shape)
+    expected = np.flatnonzero((normals(SOUP.vertices) * normals(points)).sum(1) <= 0)
+    assert 1000 < len(expected) < 39000
+    assert turned(SOUP.vertices, SOUP.triangles, points).tolist() == expected.tolist()
+    with pytest.raises(ValueError, match="length"):
+        turned(SOUP.vertices, SOUP.triangles, points[1:])
