@@ -133,14 +133,10 @@ def parts(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int32], int
 def shell_volumes(
     vertices: NDArray[float64], triangles: NDArray[int32], labels: NDArray[int32], count: int
 ) -> NDArray[float64]: ...
-def measures(
-    vertices: NDArray[float64], triangles: NDArray[int32], point: Point
-) -> tuple[float, float, int]:
+def measures(vertices: NDArray[float64], triangles: NDArray[int32], point: Point) -> tuple[float, float, int]:
     """The triangles' area, the signed volume between them and a point, and how many have no area."""
 
-def turned(
-    vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64]
-) -> NDArray[int64]:
+def turned(vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64]) -> NDArray[int64]:
     """The triangles, ascending, that are flat or turn by a right angle or more when the vertices move to
     `points`."""
 

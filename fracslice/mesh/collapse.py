@@ -54,7 +54,7 @@ class Collapse:
         self._mesh, self._native = mesh, Reduction(mesh.vertices, mesh.triangles, tolerance)
         self._stages: tuple[float, ...] = STAGES
 
-    def run(self, work: Work) -> Collapsed:
+    def run(self, work: Work) -> None:
         """Takes out what can go: at first, and after `undo`. Raises `Cancelled`."""
         for share in self._stages:
             if len(self._stages) > 1:
@@ -62,6 +62,9 @@ class Collapse:
             while self._sweep(share, work):
                 pass
         self._stages = STAGES[-1:]
+
+    def found(self) -> Collapsed:
+        """What it has come to."""
         return Collapsed(*self._native.state())
 
     def _sweep(self, share: float, work: Work) -> int:
@@ -71,9 +74,7 @@ class Collapse:
             done += self._native.sweep(part.start, part.stop, share)
         return done
 
-    def undo(self, faulty: NDArray[np.bool_], for_good: bool) -> None:
-        """Puts back what was done last at the triangles that are at fault, bool [m].
-
-        It is done again only with a quarter of the tolerance; the next time, or if this is for good, never.
-        """
-        self._native.undo(faulty, for_good)
+    def undo(self, faulty: NDArray[np.bool_]) -> None:
+        """Puts back what was done last at the triangles that are at fault, bool [m]; `run` does it again only
+        with a quarter of the tolerance, and the next time never."""
+        self._native.undo(faulty)

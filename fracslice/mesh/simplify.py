@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from fracslice.errors import MeshError
 from fracslice.mesh.model import Mesh
 from fracslice.work import Work
 
-ROUNDS, PATIENT = 60, 4
-"""How often what is at fault is put back, and how often of these only that, and something else may be tried
-there; then what is around it too, for good."""
+ROUNDS, PATIENT = 200, 40
+"""How often what is at fault is put back, and how often of these something else may be tried there."""
 
 AIM = 0.95
 """The share of the tolerance that vertices may spend; triangles between them need the rest."""
@@ -50,14 +47,14 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
     if any(defects) or not len(mesh.triangles):
         raise MeshError("only a closed, oriented manifold can be simplified")
     collapse, examination = Collapse(mesh, AIM * tolerance), Examination(mesh, tolerance, work)
-    for patience in range(PATIENT, PATIENT - ROUNDS, -1):
-        work.progress("simplifying", 1 - 0.8 ** (PATIENT - patience))
-        found = collapse.run(work)
+    for number in range(ROUNDS):
+        work.progress("simplifying", 1 - 0.8**number)
+        if number < PATIENT:
+            collapse.run(work)
+        found = collapse.found()
         faulty = examination.faults(found)
         if not faulty.any():
             done = Simplified(tolerance, len(mesh.triangles), *examination.distances(found))
             return Mesh(mesh.vertices, found.triangles).selected(~found.gone), done
-        around = np.zeros(len(mesh.vertices), dtype=bool)
-        around[found.triangles[faulty]] = patience <= 0
-        collapse.undo(faulty | around[found.triangles].any(axis=1), for_good=patience <= 0)
+        collapse.undo(faulty)
     raise MeshError(f"the mesh cannot be simplified within {tolerance:g} mm without crossing itself")

@@ -20,9 +20,9 @@ class BoundReduction {
         return unlocked(0, [&] { return reduction_.sweep(first, last, share); });
     }
 
-    void undo(const Vector<bool>& faulty, bool for_good) {
+    void undo(const Vector<bool>& faulty) {
         if (faulty.size() != triangles_.shape(0)) throw nb::value_error("triangles and faults differ in length");
-        unlocked(0, [&] { reduction_.undo(faulty.data(), for_good); });
+        unlocked(0, [&] { reduction_.undo(faulty.data()); });
     }
 
     nb::tuple state() {
@@ -86,7 +86,7 @@ void bind_reduction(nb::module_& module) {
         .def(nb::init<const Rows<double>&, const Rows<int32_t>&, double>(), "vertices"_a, "triangles"_a, "tolerance"_a)
         .def("renew", &BoundReduction::renew)
         .def("sweep", &BoundReduction::sweep, "first"_a, "last"_a, "share"_a)
-        .def("undo", &BoundReduction::undo, "faulty"_a, "for_good"_a)
+        .def("undo", &BoundReduction::undo, "faulty"_a)
         .def("state", &BoundReduction::state);
     nb::class_<BoundNearest>(module, "Nearest")
         .def(nb::init<const Rows<double>&, const Rows<int32_t>&, const Vector<int64_t>&, const Rows<double>&, const Rows<double>&,

@@ -124,7 +124,7 @@ void Reduction::changed(const Star& star) {
 
 void Reduction::look_again(int32_t v) { due_[size_t(v)] = true, least_[size_t(v)] = 0; }
 
-void Reduction::undo(const bool* faulty, bool for_good) {
+void Reduction::undo(const bool* faulty) {
     std::vector<int32_t> steps;
     for (size_t t = 0; t < mesh_.count; ++t) {
         if (int32_t step = faulty[t] ? table_.changed_by(t) : 0) steps.push_back(step);
@@ -142,7 +142,6 @@ void Reduction::undo(const bool* faulty, bool for_good) {
             for (Near& p : points_) p.before = fan.nearest(mesh_.point(p.vertex));
             place(star, &Near::before);
             look_again(u);
-            if (for_good) trust_[size_t(u)] = 0;
             changed(star);
         }
     }

@@ -21,8 +21,8 @@ class Reduction {
     // changed since they could not go. Returns how many went.
     size_t sweep(size_t first, size_t last, double share);
     // Puts back what was taken out last at each triangle at fault: [count]. These vertices are taken out again only at a quarter
-    // of the tolerance, and if they come back once more, never; nor is anything that comes back if this is for good.
-    void undo(const bool* faulty, bool for_good);
+    // of the tolerance, and if they come back once more, never.
+    void undo(const bool* faulty);
 
     // What the triangles have become; whether they are out; the step that changed each last, 0 for those that are as they were;
     // what has changed since the state before. Of each vertex a triangle near it, -1 if it never was part of one.
