@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ..errors import VolumeError
-from ..formulas import Box, Node
-from ..formulas.registry import Facts
+from ..formulas import Node
 from ..kernel import Compilable, Kernel, compile_scene
-from ..volume import Bricks, Lattice, sample
+from ..volume import Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
 from .samples import Samples
@@ -56,79 +56,169 @@ class Slender:
         return sampled.chosen(sampled.width >= self.replaces) + mine.chosen(mine.width < limit)
 
 
-def slender(root: Node | Compilable, seen: Samples, work: Work, *, gaps: bool = False) -> Slender:
-    """The thin walls or gaps of an object, also those that its samples miss.
+def slender(root: Node | Compilable, seen: Samples, work: Work) -> tuple[Slender, Slender]:
+    """The thin walls and gaps of an object, also those that its samples miss.
 
     root: all depths known. seen: the distances that were sampled of it. The values of escape-time fractals
     are far from distances: there the samples are better, and only what they miss is looked for. A gap between
-    walls that are themselves thinner than a voxel or two is not found: there is nothing to look from.
+    walls that are themselves thin is found behind them.
     """
-    b, kernel, towards = seen.bricks, compile_scene(root), -1.0 if gaps else 1.0
-    bound, reach = root.facts.lipschitz, NEAR * b.voxel * root.facts.lipschitz
-    moved = Raised(kernel, towards * reach)
-    raised = Samples(_raised(moved, root.facts, root.facts.box | seen.box, b.voxel, work))
-    start, axis = crossed(raised)
-    normals = normals_at(raised, start)
-    ways = -towards * normals
-    area = b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
-    field = _along(kernel, start, ways, work)
-    least = STEP * b.voxel
-    far = 2 * reach + 2 * b.voxel
-    enter = _first(field, np.arange(len(start)), np.zeros(len(start)), far, towards, bound, least)
-    unknown = np.abs(seen.points(*(start + enter[:, None] * ways).T)) > AWAY * b.voxel
-    rays = np.flatnonzero((enter < far) & (unknown | (not root.facts.weak)))
-    leave = _first(field, rays, enter[rays], enter[rays] + THIN * b.voxel, -towards, bound, least)
-    thin = leave < enter[rays] + THIN * b.voxel
-    rays, leave = rays[thin], leave[thin]
-    ends = [start[rays] + s[:, None] * ways[rays] for s in (enter[rays], leave)]
-    facing = (_slopes(kernel, ends[0], least, work) * _slopes(kernel, ends[1], least, work)).sum(1)
-    found = Walls(ends[0], ends[1], leave - enter[rays], area[rays])
-    return Slender(found.chosen(facing < OPPOSITE), 0.0 if root.facts.weak else THIN * b.voxel)
+    look = _Look(root, seen, work)
+    replaces = 0.0 if root.facts.weak else THIN * seen.bricks.voxel
+    return Slender(look.walls(), replaces), Slender(look.gaps(), replaces)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """From beside a surface through it. start, ways: float64 [n, 3]; area: [n], of the surface that each
+    stands for; enter, leave: [n], how far along the thin wall or gap begins and ends.
+    """
+
+    start: np.ndarray
+    ways: np.ndarray
+    area: np.ndarray
+    enter: np.ndarray
+    leave: np.ndarray
+
+    def chosen(self, which: np.ndarray) -> _Rays:
+        """Some of them, bool [n]."""
+        return _Rays(*(values[which] for values in vars(self).values()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What is looked at, and what its samples tell."""
+
+    root: Node | Compilable
+    seen: Samples
+    work: Work
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        return compile_scene(self.root)
+
+    @property
+    def voxel(self) -> float:
+        return self.seen.bricks.voxel
+
+    @cached_property
+    def inwards(self) -> _Rays:
+        """Through all thin walls."""
+        return self.rays(1.0)
+
+    def walls(self) -> Walls:
+        """Thin walls."""
+        return self.facing(self.inwards)
+
+    def gaps(self) -> Walls:
+        """Thin gaps: what is seen of them from within thick walls; and behind thin ones, also behind those
+        that follow, where they are so near each other that no ray starts between them.
+        """
+        found, rays = self.from_within(), self.inwards
+        while len(rays.start):
+            gap = self.stretch(rays, rays.leave, 1.0)
+            gap = gap.chosen(self.missed(gap, gap.enter) & self.missed(gap, gap.leave))
+            found = found + self.facing(gap)
+            near = gap.chosen(gap.leave - gap.enter < 2 * NEAR * self.voxel)
+            rays = self.stretch(near, near.leave, -1.0)
+        return found
+
+    def from_within(self) -> Walls:
+        """Thin gaps seen from thick walls."""
+        try:
+            rays = self.rays(-1.0)
+        except VolumeError:  # all walls are thin
+            return Walls.none()
+        limit = np.full(len(rays.start), THIN * self.voxel)
+        back = self.first(replace(rays, ways=-rays.ways), 0 * limit, limit, -1.0)
+        return self.facing(rays.chosen(rays.enter + back > limit))
+
+    def stretch(self, rays: _Rays, begin: np.ndarray, sign: float) -> _Rays:
+        """The rays on which the field times `sign`, which is positive from `begin` on, is negative within
+        `THIN` voxels; entered at the one, left at the other.
+        """
+        end = begin + THIN * self.voxel
+        leave = self.first(rays, begin, end, sign)
+        return replace(rays, enter=begin, leave=leave).chosen(leave < end)
+
+    def rays(self, sign: float) -> _Rays:
+        """Through all thin walls (sign 1), or from within all others through thin gaps (-1)."""
+        reach = NEAR * self.voxel * self.root.facts.lipschitz
+        raised = self.raised(sign * reach)
+        start, axis = crossed(raised)
+        normals = normals_at(raised, start)
+        area = self.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
+        far, none = np.full(len(start), 2 * reach + 2 * self.voxel), np.zeros(len(start))
+        rays = _Rays(start, -sign * normals, area, none, none)
+        enter = self.first(rays, none, far, sign)
+        rays = replace(rays, enter=enter).chosen((enter < far) & self.missed(rays, enter))
+        return self.stretch(rays, rays.enter, -sign)
+
+    def missed(self, rays: _Rays, s: np.ndarray) -> np.ndarray:
+        """Whether what is so far along each ray is to be looked at: of a fractal, what its samples miss."""
+        known = np.abs(self.seen.points(*(rays.start + s[:, None] * rays.ways).T)) <= AWAY * self.voxel
+        return np.asarray(~known | (not self.root.facts.weak))
+
+    def raised(self, by: float) -> Samples:
+        """Samples of the field less `by`: the flatter it is, the farther its inside reaches from the box."""
+        for times in (2, 8, 32):
+            try:
+                box = (self.root.facts.box | self.seen.box).grown(times * abs(by))
+                facts = replace(self.root.facts, box=box)
+                return Samples(
+                    sample(Raised(self.kernel, by), facts, Lattice.around(box, self.voxel), self.work)
+                )
+            except VolumeError as error:
+                failure = error
+        raise failure
+
+    def first(self, rays: _Rays, begin: np.ndarray, end: np.ndarray, sign: float) -> np.ndarray:
+        """How far along each ray the field times `sign` is first below zero from `begin` on; beyond `end`
+        where it never is.
+        """
+
+        def field(which: np.ndarray, s: np.ndarray) -> np.ndarray:
+            points = rays.start[which] + s[:, None] * rays.ways[which]
+            return sign * values_at(self.kernel, points.T, self.work)
+
+        return _first(field, begin, end, self.root.facts.lipschitz, STEP * self.voxel)
+
+    def facing(self, rays: _Rays) -> Walls:
+        """Those whose two faces are turned away from each other."""
+        ends = [rays.start + s[:, None] * rays.ways for s in (rays.enter, rays.leave)]
+        facing = (self.normals(ends[0]) * self.normals(ends[1])).sum(1)
+        return Walls(ends[0], ends[1], rays.leave - rays.enter, rays.area).chosen(facing < OPPOSITE)
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Unit normals of the field itself, [n, 3]."""
+        shifts = STEP * self.voxel * np.eye(3)
+        values = [[values_at(self.kernel, (points + w).T, self.work) for w in (s, -s)] for s in shifts]
+        slope = np.stack([ahead - back for ahead, back in values], 1)
+        unit: np.ndarray = slope / np.maximum(np.linalg.norm(slope, axis=1), 1e-30)[:, None]
+        return unit
 
 
 def all_walls(
     root: Node | Compilable, seen: Samples, limit: float, work: Work, *, gaps: bool = False
 ) -> Walls:
     """The walls or gaps up to `limit` scene units, whether the samples tell of them or the field alone."""
-    return slender(root, seen, work, gaps=gaps).beside(walls(seen, limit, work, gaps=gaps), limit)
-
-
-def _raised(kernel: Raised, facts: Facts, box: Box, voxel: float, work: Work) -> Bricks:
-    """Samples of a raised field: the flatter it is, the farther its inside reaches beyond the box."""
-    for times in (2, 8, 32):
-        try:
-            wide = replace(facts, box=box.grown(times * abs(kernel.by)))
-            return sample(kernel, wide, Lattice.around(wide.box, voxel), work)
-        except VolumeError as error:
-            failure = error
-    raise failure
-
-
-Along = Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-
-def _along(kernel: Kernel, start: np.ndarray, ways: np.ndarray, work: Work) -> Along:
-    """The field on rays by their numbers and how far along."""
-    return lambda rays, s: values_at(kernel, (start[rays] + s[:, None] * ways[rays]).T, work)
+    look = slender(root, seen, work)[int(gaps)]
+    return look.beside(walls(seen, limit, work, gaps=gaps), limit)
 
 
 def _first(
-    field: Along,
-    rays: np.ndarray,
+    field: Callable[[np.ndarray, np.ndarray], np.ndarray],
     begin: np.ndarray,
-    end: np.ndarray | float,
-    sign: float,
+    end: np.ndarray,
     bound: float,
     least: float,
 ) -> np.ndarray:
-    """How far along each ray the field times `sign` is first below zero from `begin` on; beyond `end` where
-    it never is. In steps of the distance (sphere tracing, Hart 1996), then by bisection.
+    """Where a field on rays, of their numbers and of how far along, is first below zero: in steps of the
+    distance (sphere tracing, Hart 1996), then by bisection.
     """
-    s, before = begin.copy(), begin.copy()
-    end = np.broadcast_to(end, s.shape)
-    todo = np.arange(len(s))
+    s, before, todo = begin.copy(), begin.copy(), np.arange(len(begin))
     for _ in range(ROUNDS):
-        f = sign * field(rays[todo], s[todo])
+        f = field(todo, s[todo])
         todo, f = todo[f >= 0], f[f >= 0]
         before[todo] = s[todo]
         s[todo] += np.maximum(f / bound, least)
@@ -138,19 +228,9 @@ def _first(
     found = np.flatnonzero((s < end) & (s > begin))
     for _ in range(HALVINGS):
         middle = (before[found] + s[found]) / 2
-        low = sign * field(rays[found], middle) < 0
+        low = field(found, middle) < 0
         s[found], before[found] = np.where(low, middle, s[found]), np.where(low, before[found], middle)
     return s
-
-
-def _slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> np.ndarray:
-    """Unit normals of the field itself, [n, 3]."""
-    shifts = step * np.eye(3)
-    slope = np.stack(
-        [values_at(kernel, (points + s).T, work) - values_at(kernel, (points - s).T, work) for s in shifts], 1
-    )
-    unit: np.ndarray = slope / np.maximum(np.linalg.norm(slope, axis=1), 1e-30)[:, None]
-    return unit
 
 
 class Raised:

@@ -41,6 +41,11 @@ class Walls:
         """Halfway between the faces, float64 [n, 3]."""
         return np.asarray((self.start + self.end) / 2)
 
+    @classmethod
+    def none(cls) -> Walls:
+        """No walls at all."""
+        return cls(*np.empty((2, 0, 3)), *np.empty((2, 0)))
+
     def chosen(self, which: np.ndarray) -> Walls:
         """Some of them, bool [n]."""
         return Walls(*(values[which] for values in vars(self).values()))
