@@ -31,7 +31,7 @@ COARSEST, FINEST = 8, 16384
 """Voxels along the longest side."""
 
 ALWAYS_FITS = 256
-BYTES_A_BRICK = 80_000
+BYTES_A_BRICK = 60_000
 """Peak memory for each brick of samples, its triangles in all their stages included; measured."""
 
 DUST = 1e-5

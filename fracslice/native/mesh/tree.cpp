@@ -4,70 +4,65 @@
 
 #include <array>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "measures.h"
 
 namespace fracslice {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Puts two empty bits between the 21 bits of x.
+// Bits of a place along an axis, and of a triangle's number: a key holds three and one of these.
+constexpr int kPlaceBits = 11, kNumberBits = 31;
+
+// Puts two empty bits between the bits of x.
 uint64_t spread(uint64_t x) {
-    x &= 0x1FFFFF;
-    x = (x | x << 32) & 0x1F00000000FFFF;
-    x = (x | x << 16) & 0x1F0000FF0000FF;
-    x = (x | x << 8) & 0x100F00F00F00F00F;
-    x = (x | x << 4) & 0x10C30C30C30C30C3;
-    return (x | x << 2) & 0x1249249249249249;
+    x = (x | x << 16) & 0xFF0000FF;
+    x = (x | x << 8) & 0xF00F00F00F;
+    x = (x | x << 4) & 0xC30C30C30C3;
+    return (x | x << 2) & 0x249249249249;
 }
 
-// The place of each triangle's middle on Morton's curve, in a grid of 2^21 cells along the longest side.
-Array<uint64_t> morton_codes(const MeshView& mesh) {
-    std::array<double, 3> low = {kInfinity, kInfinity, kInfinity}, high = {-kInfinity, -kInfinity, -kInfinity};
-    for (size_t i = 0; i < 3 * mesh.vertices; ++i) {
-        low[i % 3] = std::min(low[i % 3], mesh.positions[i]);
-        high[i % 3] = std::max(high[i % 3], mesh.positions[i]);
-    }
-    double size = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-    double scale = size > 0 ? 0x1FFFFF / size : 0;
-    Array<uint64_t> codes(mesh.count, 1);
+// The place of each triangle's middle on Morton's curve, in a grid of 2^11 cells along the longest side, before its number.
+Array<uint64_t> keys(const MeshView& mesh) {
+    constexpr double most = (1 << kPlaceBits) - 1;
+    Bounds box = bounds(mesh.positions, mesh.vertices);
+    double size = 0;
+    for (int k = 0; k < 3; ++k) size = std::max(size, box.high[k] - box.low[k]);
+    double scale = size > 0 ? most / size : 0;
+    Array<uint64_t> keys(mesh.count, 1);
     tbb::parallel_for(size_t(0), mesh.count, [&](size_t t) {
         uint64_t code = 0;
         for (int k = 0; k < 3; ++k) {
             double middle = (mesh.corner(t, 0)[k] + mesh.corner(t, 1)[k] + mesh.corner(t, 2)[k]) / 3;
-            code |= spread(uint64_t(std::max(0.0, (middle - low[k]) * scale))) << k;
+            code |= spread(uint64_t(std::clamp((middle - box.low[k]) * scale, 0.0, most))) << k;
         }
-        codes.data[t] = code;
+        keys.data[t] = code << kNumberBits | t;
     });
-    return codes;
+    return keys;
 }
 
-// The indices of the codes from the lowest on, equal ones in their order: sorted by digits, the last first.
-Array<uint32_t> sorted(Array<uint64_t> codes) {
-    constexpr int bits = 11, digits = 6;
+// The keys in the order of their places, then of their numbers: sorted by digits, the last first.
+Array<uint64_t> sorted(Array<uint64_t> keys) {
+    constexpr int bits = 11, digits = 3 * kPlaceBits / bits;
     constexpr size_t values = size_t(1) << bits;
-    size_t n = codes.rows;
+    size_t n = keys.rows;
     std::vector<std::array<size_t, values>> before(digits);
-    auto digit = [](uint64_t code, int d) { return code >> (bits * d) & (values - 1); };
+    auto digit = [](uint64_t key, int d) { return key >> (kNumberBits + bits * d) & (values - 1); };
     for (size_t i = 0; i < n; ++i) {
-        for (int d = 0; d < digits; ++d) ++before[d][digit(codes.data[i], d)];
+        for (int d = 0; d < digits; ++d) ++before[d][digit(keys.data[i], d)];
     }
-    Array<uint64_t> next_codes(n, 1);
-    Array<uint32_t> order(n, 1), next_order(n, 1);
-    for (size_t i = 0; i < n; ++i) order.data[i] = uint32_t(i);
+    Array<uint64_t> next(n, 1);
     for (int d = 0; d < digits; ++d) {
         size_t total = 0;
         for (size_t& count : before[d]) total += std::exchange(count, total);
-        for (size_t i = 0; i < n; ++i) {
-            size_t place = before[d][digit(codes.data[i], d)]++;
-            next_codes.data[place] = codes.data[i];
-            next_order.data[place] = order.data[i];
-        }
-        std::swap(codes, next_codes);
-        std::swap(order, next_order);
+        for (size_t i = 0; i < n; ++i) next.data[before[d][digit(keys.data[i], d)]++] = keys.data[i];
+        std::swap(keys, next);
     }
-    return order;
+    return keys;
 }
 
 void set_leaf(const MeshView& mesh, const int64_t* first, const int64_t* last, double* low, double* high) {
@@ -85,9 +80,10 @@ void set_leaf(const MeshView& mesh, const int64_t* first, const int64_t* last, d
 
 Tree build_tree(const MeshView& mesh) {
     Tree tree;
-    Array<uint32_t> order = sorted(morton_codes(mesh));
+    if (mesh.count >> kNumberBits) throw std::invalid_argument("more than 2^31 triangles");
+    Array<uint64_t> order = sorted(keys(mesh));
     tree.order = {mesh.count, 1};
-    std::copy_n(order.data.get(), mesh.count, tree.order.data.get());
+    for (size_t i = 0; i < mesh.count; ++i) tree.order.data[i] = int64_t(order.data[i] & ((uint64_t(1) << kNumberBits) - 1));
     size_t leaves = 1;
     while (leaves * kLeaf < mesh.count) leaves *= 2;
     tree.low = {2 * leaves, 3}, tree.high = {2 * leaves, 3};
