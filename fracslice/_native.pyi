@@ -195,7 +195,7 @@ class Nearest:
         hints: NDArray[int32],
         tolerance: float,
         threads: int = 0,
-    ) -> tuple[NDArray[float64], NDArray[bool_]]: ...
+    ) -> tuple[NDArray[float64], NDArray[int32]]: ...
     def samples(
         self,
         vertices: NDArray[float64],

@@ -18,8 +18,8 @@ class Examination:
     """What is proved and found of each triangle, by the numbers of the original. It stands as long as nothing
     changes that it depends on.
 
-    bound: how far one of the original is from what is left, proved; strayed: whether that depends on more
-    than the triangles near its corners. back: how far samples of what is left are from the original.
+    bound: how far one of the original is from what is left, proved; beyond: what that depends on besides the
+    triangles near its corners, int32 [k, 2]. back: how far samples of what is left are from the original.
     crossing: whether it crosses another that is left.
     """
 
@@ -27,17 +27,14 @@ class Examination:
         self.mesh, self.tolerance, self.work = mesh, tolerance, work
         self.original, self.spacing, self.shells = Nearest(mesh, closed=True), _edge(mesh) / 2, _Shells(mesh)
         self.bound, self.back = np.zeros(len(mesh.triangles)), np.zeros(len(mesh.triangles))
-        self.strayed, self.crossing = np.zeros((2, len(mesh.triangles)), dtype=bool)
+        self.crossing, self.beyond = np.zeros(len(mesh.triangles), dtype=bool), np.empty((0, 2), np.int32)
 
     def faults(self, found: Collapsed) -> NDArray[np.bool_]:
         """Triangles at which something has to be put back, bool [m]. Raises `Cancelled`."""
         left = _Left(self.mesh, found)
-        fresh = found.fresh[found.owner][self.mesh.triangles].any(axis=1) | found.fresh
-        faulty = self._far(left, found, found.changed & fresh) | self._beyond(found)
+        faulty = self._there(left, found) | self._back(found)
         self.crossing = left.crossing(found.fresh | self.crossing, self.work)
         faulty |= (self.crossing | left.all(self.shells.turned(left.mesh))) & found.changed
-        if not faulty.any():
-            faulty = self._far(left, found, found.changed & self.strayed & ~fresh)
         return faulty
 
     def distances(self, found: Collapsed) -> tuple[float, float]:
@@ -45,11 +42,16 @@ class Examination:
         there, back = self.bound[found.changed], self.back[found.changed & ~found.gone]
         return float(there.max(initial=0.0)), float(back.max(initial=0.0))
 
-    def _far(self, left: _Left, found: Collapsed, lost: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Where originals are too far off, `lost` (bool [m]) proved anew: what changed last near them."""
-        these = Mesh(self.mesh.vertices, self.mesh.triangles[lost])
+    def _there(self, left: _Left, found: Collapsed) -> NDArray[np.bool_]:
+        """Where originals are too far off: of the triangles near one, that which changed last."""
+        lost = found.fresh | found.fresh[found.owner][self.mesh.triangles].any(axis=1)
+        lost[self.beyond[found.fresh[self.beyond[:, 1]], 0]] = True
+        which = np.flatnonzero(lost & found.changed)
+        these = Mesh(self.mesh.vertices, self.mesh.triangles[which])
         hints = left.number[found.owner[these.triangles]]
-        self.bound[lost], self.strayed[lost] = left.nearest.bounds(these, self.tolerance, self.work, hints)
+        self.bound[which], pairs = left.nearest.bounds(these, self.tolerance, self.work, hints)
+        beyond = np.column_stack([which[pairs[:, 0]], left.old[pairs[:, 1]]]).astype(np.int32)
+        self.beyond = np.concatenate([self.beyond[~lost[self.beyond[:, 0]]], beyond])
         far = np.flatnonzero(np.isinf(self.bound) & found.changed)
         suspects = np.column_stack([found.owner[self.mesh.triangles[far]], far])
         latest = found.step[suspects].argmax(axis=1)
@@ -57,7 +59,7 @@ class Examination:
         faulty[suspects[np.arange(len(suspects)), latest]] = True
         return faulty
 
-    def _beyond(self, found: Collapsed) -> NDArray[np.bool_]:
+    def _back(self, found: Collapsed) -> NDArray[np.bool_]:
         """Which new triangles have samples too far from the original."""
         new = found.changed & ~found.gone
         fresh = new & found.fresh

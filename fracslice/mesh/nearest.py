@@ -28,23 +28,24 @@ class Nearest:
 
     def bounds(
         self, mesh: Mesh, tolerance: float, work: Work, hints: NDArray[np.int32] = UNKNOWN
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """For each triangle of `mesh` a proved bound on how far its points are, float64 [m], and whether more
-        than the hints was looked at for it, bool [m].
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """For each triangle of `mesh` a proved bound on how far its points are, float64 [m].
 
         Infinite where a point is farther than `tolerance`, or that could not be excluded. hints: int32
-        [m, 3], for each corner a triangle here that may be near it. The distance to one triangle is a convex
+        [m, 3], for each corner a triangle here that may be near it. What a bound depends on besides comes
+        second: int32 [k, 2], a triangle of `mesh` and one here. The distance to one triangle is a convex
         function: a piece whose corners all are within a distance of the same triangle is so as a whole; other
         pieces are cut (the idea of Tang, Lee and Kim, "Interactive Hausdorff distance computation for general
         polygonal models", 2009). Raises `Cancelled`.
         """
-        found, strayed = np.empty(len(mesh.triangles)), np.empty(len(mesh.triangles), dtype=np.bool_)
+        found, beyond = np.empty(len(mesh.triangles)), [UNKNOWN[:, :2]]
         for part in chunks(len(found), CHUNK):
             work.check()
-            found[part], strayed[part] = self._native.bounds(
+            found[part], pairs = self._native.bounds(
                 mesh.vertices, mesh.triangles[part], hints[part], tolerance, work.threads
             )
-        return found, strayed
+            beyond.append(pairs + np.array([part.start, 0], np.int32))
+        return found, np.concatenate(beyond)
 
     def samples(self, mesh: Mesh, spacing: float, work: Work, enough: float = 0.0) -> NDArray[np.float64]:
         """For each triangle of `mesh` the greatest distance of its samples, float64 [m].

@@ -53,15 +53,14 @@ class BoundNearest {
                      int threads) const {
         size_t count = triangles.shape(0);
         Array<double> found(count, 1);
-        Array<bool> strayed(count, 1);
-        unlocked(threads, [&] {
+        auto beyond = unlocked(threads, [&] {
             MeshView mesh = mesh_of(vertices, triangles);
             bool hinted = hints.shape(0) > 0;
             if (hinted && hints.shape(0) != mesh.count) throw std::invalid_argument("triangles and hints differ in length");
             require_below(hints.data(), hints.size(), triangles_.shape(0), "a hint names a triangle that does not exist");
-            nearest_.bounds(mesh, hinted ? hints.data() : nullptr, tolerance, found.data.get(), strayed.data.get());
+            return nearest_.bounds(mesh, hinted ? hints.data() : nullptr, tolerance, found.data.get());
         });
-        return nb::make_tuple(to_numpy(std::move(found), {count}), to_numpy(std::move(strayed), {count}));
+        return nb::make_tuple(to_numpy(std::move(found), {count}), to_numpy<int32_t>(beyond));
     }
 
     nb::object samples(const Rows<double>& vertices, const Rows<int32_t>& triangles, double spacing, double enough,

@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <limits>
+#include <vector>
 
 #include "distance.h"
 
@@ -28,7 +29,9 @@ class Bound {
     double operator()(const std::array<const double*, 3>& corners, size_t* near) {
         Piece& whole = pieces_[0];
         double most = 0;
-        whole.depth = 0, strayed_ = false;
+        whole.depth = 0;
+        hints_ = {near[0], near[1], near[2]};
+        beyond_.clear();
         for (size_t k = 0; k < 3; ++k) {
             std::copy_n(corners[k], 3, whole.corner[k].data());
             Found found = {near[k], others_.distance(near[k]).square(corners[k])};
@@ -51,8 +54,8 @@ class Bound {
         return most;
     }
 
-    // Whether for the last one it was looked beyond those that may be near its corners.
-    bool strayed() const { return strayed_; }
+    // Of what the last bound depends on besides those that might be near its corners.
+    const std::vector<size_t>& beyond() const { return beyond_; }
 
   private:
     using Point = std::array<double, 3>;
@@ -65,8 +68,10 @@ class Bound {
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
     Found search(const double* p, size_t guess) {
-        strayed_ = true;
-        return others_(p, guess);
+        Found found = others_(p, guess);
+        auto known = [&](const auto& these) { return std::find(these.begin(), these.end(), found.triangle) != these.end(); };
+        if (!known(hints_) && !known(beyond_)) beyond_.push_back(found.triangle);
+        return found;
     }
 
     // The distance to one triangle is a convex function: where all corners are near the same one, so is the whole piece.
@@ -119,7 +124,8 @@ class Bound {
 
     const Others& others_;
     double limit_;
-    bool strayed_ = false;
+    std::array<size_t, 3> hints_{};
+    std::vector<size_t> beyond_;
     Piece pieces_[kDepth + 2];
 };
 

@@ -74,16 +74,20 @@ Found Nearest::within(double limit, const double* p, size_t guess) const {
     return best.square <= limit ? best : (*this)(p, best.triangle);
 }
 
-void Nearest::bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* found, bool* strayed) const {
+std::vector<Nearest::Pair> Nearest::bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* found) const {
+    std::vector<std::vector<Pair>> beyond((triangles.count + kTurn - 1) / kTurn);
     in_turns(triangles.count, [&](size_t first, size_t last) {
         Bound<Nearest> bound(*this, tolerance);
         size_t near[3] = {0, 0, 0};
         for (size_t t = first; t < last; ++t) {
             if (hints) std::copy_n(hints + 3 * t, 3, near);
             found[t] = std::sqrt(bound({triangles.corner(t, 0), triangles.corner(t, 1), triangles.corner(t, 2)}, near));
-            strayed[t] = bound.strayed();
+            for (size_t other : bound.beyond()) beyond[first / kTurn].push_back({int32_t(t), int32_t(other)});
         }
     });
+    std::vector<Pair> pairs;
+    for (const auto& turn : beyond) pairs.insert(pairs.end(), turn.begin(), turn.end());
+    return pairs;
 }
 
 void Nearest::samples(const MeshView& triangles, double spacing, double enough, double* found) const {

@@ -18,9 +18,10 @@ class Nearest {
     Found within(double limit, const double* p, size_t guess) const;
 
     // For each triangle a bound on how far its points are; infinite where one is farther than the tolerance, or that could not be
-    // excluded. hints: of each corner a triangle here that may be near it, [count, 3], or none. strayed: whether others were
-    // looked for.
-    void bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* found, bool* strayed) const;
+    // excluded. hints: of each corner a triangle here that may be near it, [count, 3], or none. Returns what bounds depend on
+    // besides: a triangle, and one here.
+    using Pair = std::array<int32_t, 2>;
+    std::vector<Pair> bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* found) const;
     // For each triangle how far its samples are at most: exactly, but for distances below `enough`. Samples are at most `spacing`
     // apart along its edges.
     void samples(const MeshView& triangles, double spacing, double enough, double* found) const;
