@@ -12,7 +12,7 @@ from ..kernel import Compilable, compile_scene
 from ..work import Work, chunks
 from .roots import Roots
 
-NEAR, FOUND = 1e-6, 1e-7
+NEAR, FOUND = 1e-9, 1e-8
 """A point with |f| below this share of a voxel is where it should be, for a corner has no gradient to follow;
 one that is brought there shall have |f| below the other."""
 
