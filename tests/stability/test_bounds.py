@@ -24,6 +24,7 @@ from tests.examples import EXAMPLES
 
 from .bounds import verdict
 from .draws import drawn
+from .seams import SEAMS
 
 HARD: dict[str, Node] = {
     "Julia set in pieces": julia(iterations=12, c=(0.3, 0.5, 0.4, 0)),
@@ -64,6 +65,12 @@ def test_the_bound_holds(name: str) -> None:
 def test_the_bound_holds_with_other_numbers(name: str) -> None:
     root = drawn(EXAMPLES[name], np.random.default_rng(2), 0.5)
     assert verdict(root, 50_000).violations == 0
+
+
+@pytest.mark.parametrize("name", SEAMS)
+def test_seams_cuts_walls_and_folds_of_fractals(name: str) -> None:
+    found = verdict(SEAMS[name], 100_000)
+    assert found.violations == 0 and found.points > 50_000
 
 
 @pytest.mark.parametrize("name", HARD)

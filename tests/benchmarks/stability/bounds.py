@@ -1,8 +1,9 @@
 """The Lipschitz bound of every formula, tried at 10^7 points.
 
-`python -m tests.benchmarks.stability.bounds [POINTS [NAME]] [--write]`: the example of every formula, and
-nine versions with other numbers in all its elements, a tenth of the points each. Points anywhere, and on and
-next to axes, poles, cell borders and fold planes; partners along the gradient and anywhere.
+`python -m tests.benchmarks.stability.bounds [POINTS [NAME]] [--write]`: the example of every formula, seams
+of fractals, and nine versions of each with other numbers in all its elements, a tenth of the points each.
+Points anywhere, and on and next to axes, poles, cell borders and fold planes; partners along the gradient and
+anywhere.
 """
 
 from __future__ import annotations
@@ -20,13 +21,15 @@ from tests.benchmarks.tables import publish, table
 from tests.examples import EXAMPLES
 from tests.stability.bounds import Verdict, verdict
 from tests.stability.draws import drawn, torn
+from tests.stability.seams import SEAMS
 
+SCENES = {**EXAMPLES, **SEAMS}
 VERSIONS = 10
 
 
 def versions(name: str) -> list[Node]:
     """The example and its drawn versions, always the same ones; powers are whole where the example's is."""
-    root, rng = EXAMPLES[name], np.random.default_rng(crc32(name.encode()))
+    root, rng = SCENES[name], np.random.default_rng(crc32(name.encode()))
     others = (drawn(root, rng, 0.5) for _ in count())
     return [root, *islice((other for other in others if torn(other) == torn(root)), VERSIONS - 1)]
 
@@ -36,7 +39,7 @@ def tried(name: str, tries: int) -> Verdict:
 
 
 def rows(tries: int, wanted: str) -> Iterator[list[str]]:
-    for name, root in EXAMPLES.items():
+    for name, root in SCENES.items():
         if wanted in name:
             found = tried(name, tries)
             kind = "free ball" if root.facts.weak else "slope"
