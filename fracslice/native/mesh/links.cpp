@@ -26,6 +26,10 @@ class Fans {
     explicit Fans(const Triangles& triangles) : triangles_(triangles) {}
 
     void add(const int64_t* corners, size_t degree) {
+        if (ring(corners, degree)) {
+            counts.edges += int64_t(degree);
+            return;
+        }
         set_spokes(corners, degree);
         int64_t fans = int64_t(degree);
         for (size_t i = 0, j; i < spokes_.size(); i = j) {  // one neighbour after the other
@@ -45,6 +49,25 @@ class Fans {
     Links counts;
 
   private:
+    // Whether all arrows form one ring, as nearly everywhere: then nothing needs to be sorted.
+    bool ring(const int64_t* corners, size_t degree) {
+        arrows_.resize(degree);
+        for (size_t i = 0; i < degree; ++i) {
+            const int32_t* t = triangles_[size_t(corners[i] / 3)];
+            int k = int(corners[i] % 3);
+            arrows_[i] = {t[(k + 1) % 3], t[(k + 2) % 3]};
+        }
+        int32_t first = arrows_[0].from, at = arrows_[0].to;
+        size_t length = 1;
+        for (; at != first && length < degree; ++length) {
+            size_t next = 1;
+            while (next < degree && arrows_[next].from != at) ++next;
+            if (next == degree) return false;
+            at = arrows_[next].to;
+        }
+        return at == first && length == degree;
+    }
+
     // The two edges of each corner that meet at the vertex, by neighbour: neighbour, corner, whether inward, as one number.
     void set_spokes(const int64_t* corners, size_t degree) {
         spokes_.resize(2 * degree);
@@ -61,7 +84,12 @@ class Fans {
 
     static int32_t corner(uint64_t spoke) { return int32_t(uint32_t(spoke) >> 1); }
 
+    struct Arrow {
+        int32_t from, to;
+    };
+
     const Triangles& triangles_;
+    std::vector<Arrow> arrows_;
     std::vector<uint64_t> spokes_;
     std::vector<int32_t> fan_;
 };
