@@ -86,7 +86,10 @@ def _(node: Node) -> Box:
 @offset.slope
 def _(node: Node) -> float:
     inner = node.children[0].facts
-    return max(1.0, inner.lipschitz * (1 + (inner.steepening / 4 if node["distance"] > 0 else 0.0)))
+    n = inner.steepening
+    # By how steeply the stretch along circles of latitude ends: within 1/n, in narrow rings within 3/n^2.
+    steeper = 2 + n / 4 + n * n / 128 if inner.weak and node["distance"] > 0 else 1.0
+    return max(1.0, inner.lipschitz * steeper)
 
 
 @offset.identity

@@ -42,8 +42,8 @@ class Facts:
     weak: True if there is an escape-time fractal in it. Its inside values are much smaller than the distance
     to the surface, and bound nothing: the inside cannot be recognised from afar.
     steepening: of a weak field, the highest power n in it. Along circles of latitude the derivative changes
-    n times within 2/n of the poles; so level sets other than the surface are steeper, up to 1 + n/4 times
-    (measured: `docs/accuracy.md`).
+    n times within 2/n of the poles; so level sets other than the surface are steeper: how much is measured
+    (`docs/accuracy.md`).
     """
 
     box: Box
