@@ -20,6 +20,9 @@ from fracslice.work import Work, chunks
 STAGES = (1e-3, 0.25, 0.5, 0.75, 1.0)
 """Shares of the tolerance, in the order in which they are spent: cheap collapses first."""
 
+FIRST = 0.3
+"""About how much of all the work the first run is."""
+
 CHUNK = 1 << 16
 """Vertices between two looks at whether to stop."""
 
@@ -56,8 +59,9 @@ class Collapse:
 
     def run(self, work: Work) -> None:
         """Takes out what can go: at first, and after `undo`. Raises `Cancelled`."""
-        for share in self._stages:
+        for i, share in enumerate(self._stages):
             if len(self._stages) > 1:
+                work.progress("simplifying", FIRST * i / len(self._stages))
                 self._native.renew()
             while self._sweep(share, work):
                 pass

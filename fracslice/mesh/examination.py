@@ -25,7 +25,11 @@ class Examination:
 
     def __init__(self, mesh: Mesh, tolerance: float, work: Work) -> None:
         self.mesh, self.tolerance, self.work = mesh, tolerance, work
-        self.original, self.spacing, self.shells = Nearest(mesh, closed=True), _edge(mesh) / 2, _Shells(mesh)
+        self.spacing, self.shells = _edge(mesh) / 2, _Shells(mesh)
+        work.check()
+        tree = build(mesh)
+        work.check()
+        self.original = Nearest(mesh, tree, closed=True)
         self.bound, self.back = np.zeros(len(mesh.triangles)), np.zeros(len(mesh.triangles))
         self.crossing, self.beyond = np.zeros(len(mesh.triangles), dtype=bool), np.empty((0, 2), np.int32)
 
@@ -33,6 +37,7 @@ class Examination:
         """Triangles at which something has to be put back, bool [m]. Raises `Cancelled`."""
         left = _Left(self.mesh, found)
         faulty = self._there(left, found) | self._back(found)
+        self.work.check()
         self.crossing = left.crossing(found.fresh | self.crossing, self.work)
         faulty |= (self.crossing | left.all(self.shells.turned(left.mesh))) & found.changed
         return faulty

@@ -36,7 +36,7 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
     apart, crossings, and that no shell is inside out. What fails is put back. Raises `MeshError` for a mesh
     that is not a closed manifold, or if that comes to no end, and `Cancelled`.
     """
-    from fracslice.mesh.collapse import Collapse
+    from fracslice.mesh.collapse import FIRST, Collapse
     from fracslice.mesh.examination import Examination
     from fracslice.mesh.links import links
 
@@ -48,9 +48,9 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
         raise MeshError("only a closed, oriented manifold can be simplified")
     collapse, examination = Collapse(mesh, AIM * tolerance), Examination(mesh, tolerance, work)
     for number in range(ROUNDS):
-        work.progress("simplifying", 1 - 0.8**number)
         if number < PATIENT:
             collapse.run(work)
+        work.progress("simplifying", 1 - (1 - FIRST) * 0.6**number)
         found = collapse.found()
         faulty = examination.faults(found)
         if not faulty.any():

@@ -164,6 +164,16 @@ def test_the_result_is_the_same_for_any_number_of_threads():
     assert np.array_equal(one.vertices, two.vertices) and np.array_equal(one.triangles, two.triangles)
 
 
+def test_the_result_is_the_same_at_every_scale_and_progress_goes_on():
+    said = []
+    bulb = fine(mandelbulb(iterations=4), 24)
+    few, done = simplify(bulb, 0.2, Work(progress=lambda stage, share: said.append(share)))
+    assert said == sorted(said) and 0 <= said[0] < said[-1] <= 1
+    tiny, told = simplify(bulb.scaled(2.0**-20), 0.2 * 2.0**-20)
+    assert np.array_equal(few.triangles, tiny.triangles)
+    assert (told.bound_mm, told.back_mm) == (done.bound_mm * 2.0**-20, done.back_mm * 2.0**-20)
+
+
 @pytest.mark.parametrize("tolerance", [0, -1, float("nan"), float("inf")])
 def test_a_tolerance_that_cannot_be(tolerance):
     with pytest.raises(MeshError, match="expected a finite number above zero"):
