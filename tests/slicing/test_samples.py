@@ -1,4 +1,4 @@
-"""Lists of samples on machines with and without wide vectors: the same layers."""
+"""Samples and pictures on machines with and without wide vectors: the same layers."""
 
 from __future__ import annotations
 
@@ -10,10 +10,15 @@ SCRIPT = """
 import zlib
 from fracslice.formulas import box, difference, mandelbulb, sphere
 from fracslice.slicing import SliceJob, Slicer, plan_stack
+from fracslice.slicing.printers import printer
+from fracslice.slicing.raster import Screen
 for root in (mandelbulb(), difference(box(), sphere(radius=0.6))):
     stack = plan_stack(root, SliceJob(size=20, layer=1.5, pixel=(0.1, 0.1)))
-    for coverage, spent in Slicer(stack).map(lambda layer: (layer.coverage.tobytes(), layer.evaluations)):
-        print(zlib.crc32(coverage), spent)
+    screen = Screen(stack, printer("sl1"), gamma=1.5)
+    def made(layer):
+        return zlib.crc32(layer.coverage.tobytes()), zlib.crc32(screen.deflated(layer)), layer.evaluations
+    for numbers in Slicer(stack).map(made):
+        print(*numbers)
 """
 
 

@@ -1,92 +1,240 @@
 #include "coverage.h"
 
-#include <algorithm>
+#include <cstring>
+
+#include "wide.h"
+
+#if defined(FRACSLICE_WIDE)
+#include <immintrin.h>
+#endif
 
 namespace fracslice {
 namespace {
 
-constexpr int kLanes = 16;  // cells that are rounded at a time
+constexpr int kEnds = kTile + 1;  // samples along a row of cells
+constexpr float kLeast = 1e-15f, kMost = 1e15f;  // values, so that products of them are numbers
 
-// As `Shape` has it; `more`: what inside values are to be taken times.
-void measure(int n, float more, const float* __restrict from_u, const float* __restrict to_u, const float* __restrict from_v,
-             const float* __restrict to_v, const float* __restrict product, float* __restrict area) {
-    const float less = 1 / more;
-    for (int i = 0; i < n; ++i) {
-        const float scale = product[i] < 0 ? less : more, p = scale * from_u[i], q = scale * from_v[i];
-        const float u = p / (p - to_u[i]), v = q / (q - to_v[i]);
-        const float size = std::abs(product[i]);
-        area[i] = (size - product[i]) + product[i] * u * v + (0.5f - size) * (u + v);
+// Four samples or cells side by side.
+using Four = float __attribute__((vector_size(16)));
+using Word = int32_t __attribute__((vector_size(16)));
+
+Four load(const float* from) {
+    Four four;
+    std::memcpy(&four, from, sizeof four);
+    return four;
+}
+void store(const Four& four, float* to) { std::memcpy(to, &four, sizeof four); }
+
+// The inside parts of all sides of the cells of a tile.
+struct Parts {
+    float across[kEnds][kTile], up[kTile][kEnds];
+};
+
+// All ones where the bits from `first` on are set.
+Word mask(uint64_t word, int first) {
+    const Word columns = {1, 2, 4, 8};
+    return (columns & int32_t(word >> first & 15)) != 0;
+}
+// The first column as a row (Warren 2012, "Hacker's Delight", 7-3).
+uint64_t first_column(uint64_t word) { return (word & kFirstColumn) * 0x0102040810204080 >> 56; }
+
+// What samples weigh in the sides between them: all, and those inside; unknown ones are between none that are crossed.
+struct Weights {
+    float all[kEnds][kEnds], inside[kEnds][kEnds];
+
+    void set(int row, int column, Four values, Word known, Word within, float scale) {
+        const Four size = Four(Word(values) & 0x7FFFFFFF), none = {}, one = none + 1, least = none + kLeast, most = none + kMost;
+        const Four some = size > least ? size : least;
+        Four weight = known ? (some < most ? some : most) : one;
+        weight = within ? scale * weight : weight;
+        store(weight, &all[row][column]), store(within ? weight : none, &inside[row][column]);
+    }
+    // Of one row, with those to the right.
+    void set(int row, const float* values, uint64_t known, uint64_t within, float scale) {
+        for (int i = 0; i < kTile; i += 4) set(row, i, load(values + i), mask(known, i), mask(within, i), scale);
+    }
+};
+
+// Where the samples' values say that sides are crossed.
+void by_values(const Slab& slab, const Quad& tiles, float scale, Parts& parts) {
+    const float *own = slab.values[tiles.own].data(), *right = slab.values[tiles.right].data();
+    const uint64_t known = slab.known[tiles.own], within = slab.inside[tiles.own];
+    Weights sample, beside;  // the latter: the column to the right, as two rows that are one after the other
+    for (int r = 0; r < kTile; ++r) sample.set(r, own + kTile * r, known >> kTile * r, within >> kTile * r, scale);
+    sample.set(kTile, slab.values[tiles.upper].data(), slab.known[tiles.upper], slab.inside[tiles.upper], scale);
+    float column[kTile];
+    for (int r = 0; r < kTile; ++r) column[r] = right[kTile * r];
+    beside.set(0, column, first_column(slab.known[tiles.right]), first_column(slab.inside[tiles.right]), scale);
+    column[0] = slab.values[tiles.beyond][0];
+    beside.set(1, column, slab.known[tiles.beyond] & 1, slab.inside[tiles.beyond] & 1, scale);
+    beside.all[0][kTile] = beside.all[1][0], beside.inside[0][kTile] = beside.inside[1][0];
+    for (int r = 0; r < kEnds; ++r) sample.all[r][kTile] = beside.all[0][r], sample.inside[r][kTile] = beside.inside[0][r];
+
+    for (int i = 0; i < kTile; i += 4) {
+        for (int r = 0; r < kTile; ++r) {
+            const float *all = &sample.all[r][i], *inside = &sample.inside[r][i];
+            const Four u = load(all) + load(all + 1), v = load(all) + load(all + kEnds);
+            const Four over = 1 / (u * v);  // one division for both
+            store((load(inside) + load(inside + 1)) * v * over, &parts.across[r][i]);
+            store((load(inside) + load(inside + kEnds)) * u * over, &parts.up[r][i]);
+        }
+        const float *all = &sample.all[kTile][i], *inside = &sample.inside[kTile][i];
+        store((load(inside) + load(inside + 1)) / (load(all) + load(all + 1)), &parts.across[kTile][i]);
+        all = &beside.all[0][i], inside = &beside.inside[0][i];
+        store((load(inside) + load(inside + 1)) / (load(all) + load(all + 1)), column + i);
+    }
+    for (int r = 0; r < kTile; ++r) parts.up[r][kTile] = column[r];
+}
+
+// Where they were found to be crossed.
+void by_crossings(const Slab& slab, const Quad& tiles, const Corners& corners, Parts& parts) {
+    const uint16_t *own = slab.cross[tiles.own].data(), *right = slab.cross[tiles.right].data();
+    auto part = [](float share, bool first, bool second) {
+        const float whole = first, inside = first ? share : kWhole - share;
+        return first == second ? whole : inside * (1 / kWhole);
+    };
+    auto is = [](uint64_t word, int bit) { return bool(word >> bit & 1); };
+    for (int bit = 0; bit < 64; ++bit) {
+        const bool here = is(corners.word[0], bit);
+        parts.across[bit >> 3][bit & 7] = part(own[bit], here, is(corners.word[1], bit));
+        parts.up[bit >> 3][bit & 7] = part(own[64 + bit], here, is(corners.word[3], bit));
+    }
+    const uint16_t* upper = slab.cross[tiles.upper].data();
+    for (int i = 0; i < kTile; ++i) {
+        const int top = 56 + i, last = kTile * i + 7;
+        parts.across[kTile][i] = part(upper[i], is(corners.word[3], top), is(corners.word[2], top));
+        parts.up[i][kTile] = part(right[64 + kTile * i], is(corners.word[1], last), is(corners.word[2], last));
     }
 }
 
-// Parts of pixels as shares of 255, and their sum; n rounded up to whole lanes.
-double round(int n, const float* __restrict area, uint8_t* __restrict level) {
+// The sum of two rows.
+double total(const float* even, const float* odd) {
     double sum = 0;
-    for (int i = 0; i < n; i += kLanes) {
-        float lanes = 0;
-        for (int lane = 0; lane < kLanes; ++lane) level[i + lane] = uint8_t(int(255 * area[i + lane] + 0.5f));
-        for (int lane = 0; lane < kLanes; ++lane) lanes += area[i + lane];
-        sum += lanes;
-    }
+    for (int i = 0; i < kTile; ++i) sum += even[i] + odd[i];
     return sum;
 }
 
+// With b, r, a, l the inside parts of the lower, right, upper and left side of a cell that is cut once, of its area
+// (l + r) (a + b) / 2 - l r a b is inside: of a corner l and b alone are not 0, of all but a corner two are 1, and of a half
+// one is 0 and the opposite one 1. So it is of one wholly in or out.
+double measure(const Parts& parts, Levels& levels, float* area) {
+    float sum[2][kTile] = {};
+    for (int i = 0; i < 64; i += 4) {
+        const int row = i / kTile, column = i % kTile;
+        const Four b = load(&parts.across[row][column]), a = load(&parts.across[row + 1][column]);
+        const Four l = load(&parts.up[row][column]), r = load(&parts.up[row][column + 1]);
+        const Four within = (l + r) * (a + b) * 0.5f - l * r * (a * b);
+        store(within, area + i);
+        store(load(&sum[row & 1][column]) + within, &sum[row & 1][column]);
+        const Word level = __builtin_convertvector(255 * within + 0.5f, Word);
+        for (int n = 0; n < 4; ++n) levels[i + n] = uint8_t(level[n]);
+    }
+    return total(sum[0], sum[1]);
+}
+
+double cover(const Slab& slab, float scale, const Quad& tiles, const Corners& corners, Levels& levels, float* area) {
+    Parts parts;
+    if (scale == 0)
+        by_crossings(slab, tiles, corners, parts);
+    else
+        by_values(slab, tiles, scale, parts);
+    return measure(parts, levels, area);
+}
+
+#if defined(FRACSLICE_WIDE)
+// The same by values, two rows at a time.
+struct Wide {
+    __m512 all, inside;
+
+    FRACSLICE_WIDE void set(__m512 values, uint64_t known, uint64_t within, __m512 scale) {
+        const __mmask16 is_within = __mmask16(within);
+        const __m512 size = _mm512_maskz_andnot_ps(0xFFFF, _mm512_set1_ps(-0.f), values);
+        all = _mm512_maskz_max_ps(0xFFFF, size, _mm512_set1_ps(kLeast));
+        all = _mm512_maskz_min_ps(0xFFFF, all, _mm512_set1_ps(kMost));
+        all = _mm512_mask_blend_ps(__mmask16(known), _mm512_set1_ps(1), all);
+        all = _mm512_mask_mul_ps(all, is_within, all, scale);
+        inside = _mm512_maskz_mov_ps(is_within, all);
+    }
+};
+
+FRACSLICE_WIDE Wide sum_of(const Wide& first, __m512 second_all, __m512 second_inside) {
+    return {_mm512_add_ps(first.all, second_all), _mm512_add_ps(first.inside, second_inside)};
+}
+// The second row of one and the first of another.
+FRACSLICE_WIDE __m512 between(__m512 lower, __m512 upper) {
+    return _mm512_maskz_shuffle_f32x4(0xFFFF, lower, upper, _MM_SHUFFLE(1, 0, 3, 2));
+}
+
+FRACSLICE_WIDE double cover_wide(const Slab& slab, float scale, const Quad& tiles, Levels& levels, float* area) {
+    const float *own = slab.values[tiles.own].data(), *right = slab.values[tiles.right].data();
+    const uint64_t known = slab.known[tiles.own], within = slab.inside[tiles.own];
+    const __m512 more = _mm512_set1_ps(scale);
+    Wide rows[4], rim, corner;
+    for (int i = 0; i < 4; ++i) rows[i].set(_mm512_loadu_ps(own + 16 * i), known >> 16 * i, within >> 16 * i, more);
+    // The row above, then the column to the right.
+    const __m256 column = _mm256_setr_ps(right[0], right[8], right[16], right[24], right[32], right[40], right[48], right[56]);
+    const __m512 upper = _mm512_maskz_loadu_ps(0xFF, slab.values[tiles.upper].data());
+    auto both = [&](const std::vector<uint64_t>& words) __attribute__((always_inline)) {
+        return (words[tiles.upper] & kFirstRow) | first_column(words[tiles.right]) << 8;
+    };
+    rim.set(_mm512_maskz_insertf32x8(0xFFFF, upper, column, 1), both(slab.known), both(slab.inside), more);
+    corner.set(_mm512_set1_ps(slab.values[tiles.beyond][0]), slab.known[tiles.beyond] & 1 ? 0xFFFF : 0,
+               slab.inside[tiles.beyond] & 1 ? 0xFFFF : 0, more);
+
+    const __m512i over = _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 16, 9, 10, 11, 12, 13, 14, 15, 16);
+    const Wide rims = sum_of(rim, _mm512_permutex2var_ps(rim.all, over, corner.all),
+                             _mm512_permutex2var_ps(rim.inside, over, corner.inside));
+    const __m512 rim_parts = _mm512_div_ps(rims.inside, rims.all);
+    __m512i beside[4];
+    __m512 across[5], up[4], sum = _mm512_setzero_ps();
+    across[4] = rim_parts;
+    for (int i = 0; i < 4; ++i) {
+        beside[i] = _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 24 + 2 * i, 9, 10, 11, 12, 13, 14, 15, 25 + 2 * i);
+        const Wide& next = i < 3 ? rows[i + 1] : rim;
+        const Wide u = sum_of(rows[i], _mm512_permutex2var_ps(rows[i].all, beside[i], rim.all),
+                              _mm512_permutex2var_ps(rows[i].inside, beside[i], rim.inside));
+        const Wide v = sum_of(rows[i], between(rows[i].all, next.all), between(rows[i].inside, next.inside));
+        const __m512 one_over = _mm512_div_ps(_mm512_set1_ps(1), _mm512_mul_ps(u.all, v.all));  // one division for both
+        across[i] = _mm512_mul_ps(_mm512_mul_ps(u.inside, v.all), one_over);
+        up[i] = _mm512_mul_ps(_mm512_mul_ps(v.inside, u.all), one_over);
+    }
+    for (int i = 0; i < 4; ++i) {
+        const __m512 b = across[i], a = between(b, across[i + 1]), l = up[i];
+        const __m512 r = _mm512_permutex2var_ps(l, beside[i], rim_parts);
+        const __m512 half = _mm512_mul_ps(_mm512_mul_ps(_mm512_add_ps(l, r), _mm512_add_ps(a, b)), _mm512_set1_ps(0.5f));
+        const __m512 inside = _mm512_sub_ps(half, _mm512_mul_ps(_mm512_mul_ps(l, r), _mm512_mul_ps(a, b)));
+        sum = _mm512_add_ps(sum, inside);
+        _mm512_storeu_ps(area + 16 * i, inside);
+        const __m512 level = _mm512_add_ps(_mm512_mul_ps(inside, _mm512_set1_ps(255)), _mm512_set1_ps(0.5f));
+        const __m128i bytes = _mm512_maskz_cvtepi32_epi8(0xFFFF, _mm512_maskz_cvttps_epi32(0xFFFF, level));
+        _mm_storeu_si128(reinterpret_cast<__m128i*>(&levels[16 * i]), bytes);
+    }
+    alignas(64) float sums[2][kTile];
+    _mm512_store_ps(sums, sum);
+    return total(sums[0], sums[1]);
+}
+const bool kWide = has_wide();
+#endif
+
 }  // namespace
 
-void Coverage::grow() {
-    room_ = 2 * room_ + 1024;
-    for (Rows<float>* column : {&from_u_, &to_u_, &from_v_, &to_v_, &product_, &area_}) column->resize(room_);
-    spot_.resize(room_), level_.resize(room_);
-}
-
-void Coverage::push(const Quad& tiles, const Corners& given, uint64_t word, ptrdiff_t first) {
-    if (count_ + 64 + kLanes > room_) grow();
-    const Cells cells(slab_, scale_, tiles);
-    const Corners corners = given;
-    const int32_t* spots = spots_.data();
-    float *__restrict from_u = &from_u_[count_], *__restrict to_u = &to_u_[count_], *__restrict from_v = &from_v_[count_],
-          *__restrict to_v = &to_v_[count_], *__restrict product = &product_[count_];
-    ptrdiff_t* __restrict spot = &spot_[count_];
-    int n = 0;
-    if (scale_ == 0) {
-        each(word, [&](int bit) {
-            const Sides s = cells.sides(bit);
-            const Shape& shape = kShapes[corners.signs(bit)];
-            const float u = shape.u.share(s), v = shape.v.share(s);
-            from_u[n] = u, to_u[n] = u - 1, from_v[n] = v, to_v[n] = v - 1, product[n] = shape.product;
-            spot[n++] = first + spots[bit];
-        });
-    } else {
-        const float* samples = cells.samples();
-        each(word, [&](int bit) {
-            const Shape& shape = kShapes[corners.signs(bit)];
-            const float* f = samples + Cells::place(bit);
-            from_u[n] = f[shape.u.from], to_u[n] = f[shape.u.to];
-            from_v[n] = f[shape.v.from], to_v[n] = f[shape.v.to], product[n] = shape.product;
-            spot[n++] = first + spots[bit];
-        });
-    }
-    const uint64_t sharp = slab_.sharp[tiles.own], rare = (corners.alternating() | sharp) & word;
-    each(rare, [&](int bit) {
-        const int at = count_ + __builtin_popcountll(word & ((uint64_t(1) << bit) - 1));
-        rare_.push_back({at, slab_.sharpened(tiles.own, bit, cells.area(bit, corners.signs(bit)))});
+double Coverage::operator()(const Quad& tiles, const Corners& corners, Levels& levels) const {
+    alignas(64) float area[64];
+    double sum = 0;
+#if defined(FRACSLICE_WIDE)
+    if (kWide && scale_ != 0)
+        sum = cover_wide(slab_, scale_, tiles, levels, area);
+    else
+#endif
+        sum = cover(slab_, scale_, tiles, corners, levels, area);
+    const uint64_t alternating = corners.alternating(), sharp = slab_.sharp[tiles.own];
+    each(alternating | sharp, [&](int bit) {
+        const bool both = alternating >> bit & 1;
+        const float within = both ? Cells(slab_, scale_, tiles).area(bit, corners.signs(bit)) : area[bit];
+        const float now = slab_.sharpened(tiles.own, bit, within);
+        sum += now - area[bit];
+        levels[bit] = uint8_t(int(255 * now + 0.5f));
     });
-    count_ += n;
-}
-
-double Coverage::show(const uint8_t* levels, uint8_t* picture) {
-    const int n = count_;
-    count_ = 0;
-    if (!n) return 0;
-    measure(n, scale_ == 0 ? 1 : scale_, from_u_.data(), to_u_.data(), from_v_.data(), to_v_.data(), product_.data(),
-            area_.data());
-    for (const Rare& r : rare_) area_[r.at] = r.area;
-    rare_.clear();
-    std::fill_n(&area_[n], kLanes, 0.f);
-    const double sum = round(n, area_.data(), level_.data());
-    const ptrdiff_t* spot = spot_.data();
-    const uint8_t* level = level_.data();
-    for (int i = 0; i < n; ++i) picture[spot[i]] = levels[level[i]];
     return sum;
 }
 

@@ -6,32 +6,56 @@
 
 #include "coverage.h"
 #include "deflate.h"
+#include "in_rows.h"
+#include "wide.h"
+
+#if defined(FRACSLICE_WIDE)
+#include <immintrin.h>
+#endif
 
 namespace fracslice {
 namespace {
 
-// A word of signs as a screen shows it: its rows are rows of the picture, from above.
+// The bytes that `from` names.
+void permute_each(const Levels& levels, const Levels& from, Levels& to) {
+    for (size_t at = 0; at < to.size(); ++at) to[at] = levels[from[at]];
+}
+#if defined(FRACSLICE_WIDE)
+FRACSLICE_WIDE void permute_wide(const Levels& levels, const Levels& from, Levels& to) {
+    const __m512i order = _mm512_loadu_si512(from.data()), bytes = _mm512_loadu_si512(levels.data());
+    _mm512_storeu_si512(to.data(), _mm512_maskz_permutexvar_epi8(kAll, order, bytes));
+}
+const auto permute = has_wide() ? permute_wide : permute_each;
+#else
+constexpr auto permute = permute_each;
+#endif
+
+// A tile as a screen shows it: its rows are rows of the picture, from above.
 class Turn {
  public:
-    explicit Turn(const View& view) : transposed_(view.transposed), reversed_(view.backwards) {}
+    explicit Turn(const View& view) : transposed_(view.transposed), reversed_(view.backwards), shown_(view.levels) {
+        for (int at = 0; at < 64; ++at) {
+            int row = kTile - 1 - (at >> 3), column = reversed_ ? kTile - 1 - (at & 7) : at & 7;
+            if (transposed_) std::swap(row, column);
+            from_[at] = uint8_t(kTile * row + column);
+        }
+        for (int level = 0; level < 256; ++level) plain_ &= shown_[level] == level;
+    }
     uint64_t operator()(uint64_t word) const {
         if (transposed_) word = transposed(word);
         word = __builtin_bswap64(word);
         return reversed_ ? mirrored(word) : word;
     }
-    // Where samples come to, rows `down` apart.
-    Coverage::Spots spots(int down) const {
-        Coverage::Spots spots;
-        for (int bit = 0; bit < 64; ++bit) {
-            int row = bit >> 3, column = bit & 7;
-            if (transposed_) std::swap(row, column);
-            spots[bit] = down * (kTile - 1 - row) + (reversed_ ? kTile - 1 - column : column);
-        }
-        return spots;
+    void operator()(const Levels& levels, Levels& to) const {
+        permute(levels, from_, to);
+        if (!plain_)
+            for (uint8_t& level : to) level = shown_[level];
     }
 
  private:
-    bool transposed_, reversed_;
+    bool transposed_, reversed_, plain_ = true;
+    std::array<uint8_t, 256> shown_;
+    Levels from_;
 };
 
 // The layer's pixels along a side of the picture, in its order, counted from the first tile's: those from `first` to before
@@ -57,20 +81,25 @@ class Band {
         : first_(first), last_(last), room_(tiles / 8 * 8 + 16), column_(room_), whole_(room_), cut_(kTile * room_),
           levels_(kTile * stride() + Runs::kAtOnce), ends_(kTile * room_ + 2) {}
 
-    // From row to row of the levels.
-    int stride() const { return kTile * room_; }
-    uint8_t* levels() { return levels_.data(); }
     void clear() { n_ = 0; }
-    // The tile as the next one, if it is on the picture. Returns where its levels go.
-    ptrdiff_t put(int tile, uint64_t whole, uint64_t cut) {
+    // The tile as the next one, if it is on the picture.
+    void put(int tile, uint64_t whole, uint64_t cut, const Levels& levels) {
         const int column = kTile * tile;
-        if (column <= first_ - kTile || column >= last_) return kTile * (room_ - 1);
+        if (column <= first_ - kTile || column >= last_) return;
         if (column < first_) cut &= kAll / 255 * (0xFF & 0xFF << (first_ - column));
         if (column > last_ - kTile) cut &= kAll / 255 * (0xFF >> (column + kTile - last_));
-        column_[n_] = column, whole_[n_] = whole;
-        uint8_t* rows = &cut_[n_];
-        for (int row = 0; row < kTile; ++row) rows[row * room_] = uint8_t(cut >> kTile * row);
-        return kTile * n_++;
+        uint8_t *rows = &cut_[n_], *to = &levels_[kTile * n_];
+        for (int row = 0; row < kTile; ++row) {
+            rows[row * room_] = uint8_t(cut >> kTile * row);
+            std::memcpy(to + row * stride(), &levels[kTile * row], kTile);
+        }
+        column_[n_] = column, whole_[n_++] = whole;
+    }
+    // One that is not cut.
+    void put(int tile, bool inside) {
+        if (kTile * tile <= first_ - kTile || kTile * tile >= last_) return;
+        for (int row = 0; row < kTile; ++row) cut_[n_ + row * room_] = 0;
+        column_[n_] = kTile * tile, whole_[n_++] = inside ? kAll : 0;
     }
     void close() {
         column_[n_] = last_;
@@ -110,6 +139,8 @@ class Band {
     }
 
  private:
+    // From row to row of the levels.
+    int stride() const { return kTile * room_; }
     // Where in a row pixels begin to be cut, and where they end to be, by turns; returns the end.
     const int* turns(int row) {
         const uint8_t* cut = &cut_[row * room_];
@@ -141,8 +172,8 @@ class Shown {
         : slab_(slab), layer_(layer), view_(view), turn_(view),
           down_(side(view.transposed), view.shape[view.transposed], view.at[view.transposed], view.rows, true),
           across_(side(!view.transposed), view.shape[!view.transposed], view.at[!view.transposed], view.columns, view.backwards),
-          band_(across_.tiles, across_.first, across_.last), coverage_(slab, layer, turn_.spots(band_.stride())),
-          open_(across_.tiles + 1) {}
+          band_(across_.tiles, across_.first, across_.last), coverage_(slab, layer),
+          rows_(slab, layer, view, down_.tiles, across_.tiles) {}
 
     Picture picture() {
         const uint64_t row = uint64_t(view_.columns) + 1;
@@ -164,34 +195,29 @@ class Shown {
 
     // Reads the tiles of eight rows; false if they are empty.
     bool read(int tile) {
+        using Spot = InRows::Spot;
+        const auto [begin, end] = rows_[tile];
+        if (begin == end) return false;
         const int n = across_.tiles, along = down_.tiles - tile, beside = view_.backwards ? n : 1;
         const int32_t* first = view_.transposed ? slab_.spot(layer_, beside, along) : slab_.spot(layer_, along, beside);
         const ptrdiff_t step = (view_.transposed ? slab_.columns() : 1) * (view_.backwards ? -1 : 1);
-        int full = 0, empty = 0, count = 0;
-        int* const open = open_.data();
-        for (int i = 0; i < n; ++i) {
-            const int32_t t = first[step * i];
-            full += t == kFull, empty += t == kEmpty;
-            open[count] = i, count += t >= kTiles;
-        }
-        painted_.area += kTile * kTile * full;
-        if (empty == n) return false;
-
         band_.clear();
+        // All between two tiles is as the one after the first is; the same is before the first tile and after the last.
         int next = across_.first / kTile;  // tile that the band may lack
         auto put = [&](int i) {
-            if (i == next && i < n) band_.put(i, turn_(slab_.inside[first[step * i]]), 0), ++next;
+            if (i == next && i < n) band_.put(i, slab_.inside[first[step * i]] & 1), ++next;
         };
-        if (next < n && first[step * next] < kTiles) put(next);
-        for (int k = 0; k < count; ++k) {
-            fetch(first[step * open[std::min(k + kAhead, count - 1)]]);
-            const int i = open[k];
+        if (next < n && next < begin->across) put(next);
+        for (const Spot* spot = begin; spot != end; ++spot) {
+            fetch(spot[std::min<ptrdiff_t>(kAhead, end - 1 - spot)].tile);
+            const int i = spot->across, after = spot + 1 == end ? n : spot[1].across;
             if (read(Quad(first + step * i, slab_.columns()), i)) next = std::max(next, i + 1);
-            put(i), put(k + 1 < count && open[k + 1] == i + 1 ? -1 : i + 1);
+            put(i);
+            if (i + 1 == after) continue;
+            put(i + 1);
+            if (first[step * (i + 1)] == kFull) painted_.area += kTile * kTile * double(after - i - 1);
         }
         band_.close();
-        painted_.area += whole_ + coverage_.show(view_.levels.data(), band_.levels());
-        whole_ = 0;
         return true;
     }
 
@@ -205,10 +231,14 @@ class Shown {
     bool read(const Quad& tiles, int i) {
         const Corners corners(slab_, tiles);
         const uint64_t sharp = slab_.sharp[tiles.own], whole = corners.whole() & ~sharp, cut = corners.mixed() | sharp;
-        whole_ += __builtin_popcountll(whole);
-        if (!cut) return false;
-        coverage_.push(tiles, corners, cut, band_.put(i, turn_(whole), turn_(cut)));
+        if (!cut) {
+            painted_.area += __builtin_popcountll(whole);
+            return false;
+        }
+        painted_.area += coverage_(tiles, corners, levels_);
         painted_.partly += __builtin_popcountll(cut);
+        turn_(levels_, turned_);
+        band_.put(i, turn_(whole), turn_(cut), turned_);
         return true;
     }
 
@@ -219,8 +249,8 @@ class Shown {
     Axis down_, across_;
     Band band_;
     Coverage coverage_;
-    std::vector<int> open_;  // tiles of eight rows that may be cut
-    int whole_ = 0;
+    Levels levels_, turned_;
+    InRows rows_;
     Runs runs_;
     Painted painted_{0, 0};
 };

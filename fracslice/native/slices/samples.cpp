@@ -3,10 +3,10 @@
 #include <cstdlib>
 
 #include "bits.h"
+#include "wide.h"
 
-#if defined(__x86_64__)
+#if defined(FRACSLICE_WIDE)
 #include <immintrin.h>
-#define FRACSLICE_WIDE __attribute__((target("avx512f,avx512bw,avx512vl,avx512vbmi2,bmi2,popcnt")))
 #endif
 
 namespace fracslice {
@@ -88,15 +88,20 @@ FRACSLICE_WIDE void scatter_wide(const Ask* asks, size_t n, const float* f, cons
     }
 }
 
-// Unless the environment says otherwise, so that tests see both ways.
-bool has_wide() {
-    return !std::getenv("FRACSLICE_PORTABLE") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl") &&
-           __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("bmi2");
-}
 const bool kWide = has_wide();
 #endif
 
 }  // namespace
+
+bool has_wide() {
+#if defined(FRACSLICE_WIDE)
+    return !std::getenv("FRACSLICE_PORTABLE") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vbmi") &&
+           __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("bmi2");
+#else
+    return false;
+#endif
+}
 
 void gather(const Ask* asks, size_t n, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y) {
 #if defined(FRACSLICE_WIDE)

@@ -19,6 +19,11 @@ constexpr int kMiddle = kTile * kTile / 2 + kTile / 2;
 // The middles of the blocks of 4 and of 2 samples of a tile; every other sample.
 constexpr uint64_t kFours = 0x0044000000440000, kTwos = 0xAA00AA00AA00AA00, kEven = 0xAA55AA55AA55AA55;
 
+// Places that are full: few, so that a call of `memset` would take longer.
+__attribute__((optimize("no-tree-loop-distribute-patterns"))) void fill(int32_t* place, int n) {
+    for (int i = 0; i < n; ++i) place[i] = kFull;
+}
+
 double square(double x) { return x * x; }
 double length(double x, double y) { return std::sqrt(x * x + y * y); }
 
@@ -142,11 +147,9 @@ std::vector<Slab::Block> Slab::coarse() {
 }
 
 void Slab::fill(const Block& block) {
+    const int last = std::min(block.y + block.size, ty_ - 1), n = std::min(block.size, tx_ - 1 - block.x);
     for (int k = block.first; k <= block.last; ++k)
-        for (int y = block.y; y < std::min(block.y + block.size, ty_ - 1); ++y) {
-            int32_t* row = &where[(size_t(k) * ty_ + y) * tx_];
-            std::fill(row + block.x, row + std::min(block.x + block.size, tx_ - 1), kFull);
-        }
+        for (int y = block.y; y < last; ++y) fracslice::fill(&where[(size_t(k) * ty_ + y) * tx_ + block.x], n);
 }
 
 // The places whose middle, halfway between two layers, leaves open what is around it in them and between.
@@ -165,11 +168,12 @@ std::vector<Slab::Column> Slab::columns(int first, int last) {
     std::vector<Column> open;
     for (const Block& b : blocks_) {
         const float* f = middle(b);
+        if (*f < 0 && -*f > bounds_.inside * reach) {
+            for (int k = first; k <= last; ++k) this->where[(size_t(k) * ty_ + b.y) * tx_ + b.x] = kFull;
+            continue;
+        }
         const float outside = bounds_.even ? likely(f) : float(bounds_.outside);
-        if (std::fabs(*f) <= (*f < 0 ? bounds_.inside : double(outside)) * reach)
-            open.push_back({b.y, b.x, *f, factor(outside, frame_)});
-        else if (*f < 0)
-            fill({b.y, b.x, 1, first, last});
+        if (*f <= double(outside) * reach) open.push_back({b.y, b.x, *f, factor(outside, frame_)});
     }
     for (const Block& b : blocks_) *middle(b) = NAN;
     return open;

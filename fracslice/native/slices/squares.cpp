@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
-#include <numeric>
 
 #include "coverage.h"
 
@@ -17,14 +16,6 @@ void fill(const Canvas& canvas, int y, int x, int n) {
         std::memset(canvas.across > 0 ? first : first - (n - 1), 255, size_t(n));
     else
         for (int i = 0; i < n; ++i) first[i * canvas.across] = 255;
-}
-
-// Sets the pixels of a word of signs.
-void fill(const Canvas& canvas, int y0, int x0, uint64_t whole) {
-    for (int r = 0; r < std::min(kTile, canvas.rows - y0); ++r)
-        for (uint32_t line = uint32_t(whole >> kTile * r & 0xFF); line; line &= line - 1)
-            if (int x = x0 + lowest(line); x < canvas.columns)
-                canvas.data[(y0 + r) * canvas.down + x * canvas.across] = 255;
 }
 
 // The pixels of a tile that are on it.
@@ -49,11 +40,8 @@ void link(const Sides& sides, int signs, const int32_t* e, std::vector<Crossing>
 
 Painted paint(const Slab& slab, int k, const Canvas& canvas) {
     Painted painted{0, 0};
-    Coverage::Spots spots;
-    for (int bit = 0; bit < 64; ++bit) spots[bit] = int32_t((bit >> 3) * canvas.down + (bit & 7) * canvas.across);
-    Coverage coverage(slab, k, spots);
-    std::array<uint8_t, 256> levels;
-    std::iota(levels.begin(), levels.end(), uint8_t(0));
+    const Coverage coverage(slab, k);
+    Levels levels;
     for (int y = 1; y < slab.rows() - 1; ++y) {
         int y0 = kTile * (y - 1), full = 0;  // tiles before this one that are full
         if (y0 >= canvas.rows) break;
@@ -63,9 +51,8 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
             bool empty = t == kEmpty || x0 >= canvas.columns;
             const Quad tiles(slab, {k, y, empty ? 0 : x});
             const Corners corners(slab, tiles);
-            uint64_t whole = empty ? 0 : corners.whole();
             uint64_t sharp = slab.sharp[t];
-            if (whole == kAll && !sharp) {
+            if (!empty && corners.whole() == kAll && !sharp) {
                 ++full;
                 continue;
             }
@@ -75,15 +62,14 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
                 painted.area += kTile * kTile * double(full);
                 full = 0;
             }
-            if (empty) continue;
-            painted.area += __builtin_popcountll(whole & ~sharp);
-            fill(canvas, y0, x0, whole & ~sharp);
-            if (t < kTiles) continue;
-            const uint64_t cut = (corners.mixed() | sharp) & on(canvas, y0, x0);
-            coverage.push(tiles, corners, cut, y0 * canvas.down + x0 * canvas.across);
+            const uint64_t cut = empty || t < kTiles ? 0 : corners.mixed() | sharp;
+            if (!cut) continue;
+            painted.area += coverage(tiles, corners, levels);
             painted.partly += __builtin_popcountll(cut);
+            each((cut | corners.whole()) & on(canvas, y0, x0), [&](int bit) {
+                canvas.data[(y0 + (bit >> 3)) * canvas.down + (x0 + (bit & 7)) * canvas.across] = levels[bit];
+            });
         }
-        painted.area += coverage.show(levels.data(), canvas.data);
     }
     return painted;
 }
