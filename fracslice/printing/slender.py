@@ -64,8 +64,7 @@ def slender(root: Node | Compilable, seen: Samples, work: Work) -> tuple[Slender
     walls that are themselves thin is found behind them.
     """
     look = _Look(root, seen, work)
-    replaces = 0.0 if root.facts.weak else THIN * seen.bricks.voxel
-    return Slender(look.walls(), replaces), Slender(look.gaps(), replaces)
+    return look.told(look.walls()), look.told(look.gaps())
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +99,10 @@ class _Look:
     @property
     def voxel(self) -> float:
         return self.seen.bricks.voxel
+
+    def told(self, found: Walls) -> Slender:
+        """Walls or gaps that were found, and what they are better than."""
+        return Slender(found, 0.0 if self.root.facts.weak else THIN * self.voxel)
 
     @cached_property
     def inwards(self) -> _Rays:
@@ -202,8 +205,9 @@ def all_walls(
     root: Node | Compilable, seen: Samples, limit: float, work: Work, *, gaps: bool = False
 ) -> Walls:
     """The walls or gaps up to `limit` scene units, whether the samples tell of them or the field alone."""
-    look = slender(root, seen, work)[int(gaps)]
-    return look.beside(walls(seen, limit, work, gaps=gaps), limit)
+    look = _Look(root, seen, work)
+    found = look.told(look.gaps() if gaps else look.walls())
+    return found.beside(walls(seen, limit, work, gaps=gaps), limit)
 
 
 def _first(
