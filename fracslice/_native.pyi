@@ -70,9 +70,9 @@ class Contouring:
         ValueError is raised."""
 
     def finish(self) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8]]:
-        """Vertices and triangles as `marching_cubes`, how many vertices are crossings (the first: those of the
-        layers `first` to `last`), and for each of the others, in faces and cells, the case of its cell, of
-        the upper one at a face: bit dx + 2 dy + 4 dz set for an inside grid point. Raises ValueError while
+        """Vertices and triangles as `marching_cubes`, how many vertices are crossings (the first: those of
+        the layers `first` to `last`), and for each of the others, in faces and cells, the case of its cell,
+        of the upper one at a face: bit dx + 2 dy + 4 dz set for an inside grid point. Raises ValueError while
         layers are left."""
 
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:
@@ -167,8 +167,8 @@ class Reduction:
         """All vertices are looked at by the next sweeps."""
 
     def sweep(self, first: int, last: int, share: float) -> int:
-        """Takes out such of the vertices first to last - 1 as can go with an error of a share of the tolerance,
-        and returns how many; a sweep begins with first = 0."""
+        """Takes out such of the vertices first to last - 1 as can go with an error of a share of the
+        tolerance, and returns how many; a sweep begins with first = 0."""
 
     def undo(self, faulty: NDArray[bool_]) -> None: ...
     def state(
