@@ -36,9 +36,8 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
     """
     from .._native import marching_cubes
 
-    placement = tuple(float(v) for v in bricks.origin), float(bricks.voxel), clamp(bricks)
     vertices, triangles = _called(
-        marching_cubes, bricks.ijk, bricks.values, bricks.index, *placement, threads
+        marching_cubes, bricks.ijk, bricks.values, bricks.index, *_placement(bricks), threads
     )
     return Mesh(vertices, triangles)
 
@@ -86,11 +85,10 @@ def contour_pieces(
     work = work or Work()
     signs = bricks.signs if isinstance(bricks, Bricks) else bricks
     cells = _called(Cells, signs.ijk, signs.signs, signs.index, work.threads)
-    x, y, z = signs.origin
-    placement = (float(x), float(y), float(z)), float(signs.voxel), clamp(signs)
-    known, refiner = NONE, Refiner(root, cells, signs.origin, signs.voxel, work)
+    origin, voxel, margin = _placement(signs)
+    known, refiner = NONE, Refiner(root, cells, origin, voxel, work)
     for first, last in _layers(signs, most):
-        surface = Contouring(cells, first, last, *placement)
+        surface = Contouring(cells, first, last, origin, voxel, margin)
         for begin, end in _batches(cells, first - 1, last + 1, work.threads << 16):
             known = known.since(cells.crossings_before(min(begin, last - 1)))
             known = refiner.extended(known, cells.crossings_before(end + 1))
@@ -169,6 +167,12 @@ def _nearest_corners() -> np.ndarray:
     allowed = lower[:, None, None, None] & right[None, :, None]
     found: np.ndarray = np.where(allowed, away[:, None], 4).argmin(-1).astype(np.uint8)
     return found
+
+
+def _placement(bricks: Bricks | SignBricks) -> tuple[tuple[float, float, float], float, float]:
+    """origin, voxel and clamp, as plain numbers."""
+    x, y, z = bricks.origin
+    return (float(x), float(y), float(z)), float(bricks.voxel), clamp(bricks)
 
 
 def clamp(bricks: Bricks | SignBricks) -> float:

@@ -19,7 +19,7 @@ size_t find_crossings(const std::array<Corners, kSide + 1>& corners, Crossings& 
     for (int axis = 0; axis < 3; ++axis) {
         for (int x = 0; x < kSide; ++x) {
             found.rank[axis][x] = uint16_t(total);
-            total += size_t(__builtin_popcountll(found.bits[axis][x]));
+            total += size_t(popcount(found.bits[axis][x]));
         }
     }
     return total;
@@ -43,9 +43,6 @@ std::vector<Place> ghosts(const Layout& layout, const std::vector<Signs>& signs)
     found.erase(std::unique(found.begin(), found.end()), found.end());
     return found;
 }
-
-// Rounds towards minus infinity.
-int brick_of(int x) { return x >= 0 ? x / kSide : -((kSide - 1 - x) / kSide); }
 
 }  // namespace
 
@@ -105,12 +102,11 @@ size_t CellGrid::crossings_before(int layer) const {
     return row < sampled() ? crossings_[row].base : vertices_;
 }
 
-int64_t CellGrid::find(const Place& place, int x, int y, int z) const {
-    Place wanted = {place[0] + brick_of(x), place[1] + brick_of(y), place[2] + brick_of(z)};
-    int32_t row = layout_.at(wanted[0], wanted[1], wanted[2]);
+int64_t CellGrid::find(const Place& place) const {
+    int32_t row = layout_.at(place[0], place[1], place[2]);
     if (row >= 0) return row;
-    auto first = places_.begin() + int64_t(sampled()), found = std::lower_bound(first, places_.end(), wanted);
-    return found != places_.end() && *found == wanted ? found - places_.begin() : -1;
+    auto first = places_.begin() + int64_t(sampled()), found = std::lower_bound(first, places_.end(), place);
+    return found != places_.end() && *found == place ? found - places_.begin() : -1;
 }
 
 }  // namespace fracslice

@@ -11,9 +11,9 @@ namespace fracslice {
 
 using Place = std::array<int, 3>;  // of a brick, in bricks
 
-inline int popcount(Slab bits) { return __builtin_popcountll(bits); }
-
 constexpr size_t kMostElements = size_t(std::numeric_limits<int32_t>::max());
+
+inline int popcount(Slab bits) { return __builtin_popcountll(bits); }
 
 struct Edge {
     uint8_t axis, dx, dy, dz;
@@ -132,11 +132,10 @@ class CellGrid {
     const Layout& layout() const { return layout_; }
     const std::vector<Signs>& signs() const { return signs_; }
     const Place& place(size_t i) const { return places_[i]; }
-    const Crossings& crossings(size_t i) const { return crossings_[i]; }
     Octant octant(size_t i) const { return {layout_, places_[i][0], places_[i][1], places_[i][2]}; }
 
-    // Number of the brick with the cell at x, y, z relative to a place, -1 if the surface passes no cell of it.
-    int64_t find(const Place& place, int x, int y, int z) const;
+    // Number of the brick at a place, -1 if the surface passes no cell of it.
+    int64_t find(const Place& place) const;
 
     // Calls visit(place in Numbers, vertex) for a brick's own crossings, in order, then for those on its neighbours' near
     // sides that its cells have.
@@ -155,7 +154,7 @@ class CellGrid {
                     for (Slab bits = all & seen; bits; bits &= bits - 1) {
                         int bit = __builtin_ctzll(bits);
                         Slab before = (Slab(1) << bit) - 1;
-                        visit(place + size_t(bit / 8 * kReach + bit % 8), first + uint32_t(__builtin_popcountll(all & before)));
+                        visit(place + size_t(bit / 8 * kReach + bit % 8), first + uint32_t(popcount(all & before)));
                     }
                 }
             }
@@ -169,14 +168,6 @@ class CellGrid {
 
     // The numbers of these crossings; the rest is not written.
     void collect(const Octant& near, Numbers& numbers) const;
-
-    // The crossing on edge e of the cell x, y, z of the brick at `place`.
-    static CellEdge edge(const Numbers& numbers, const Place& place, int x, int y, int z, int e) {
-        const Edge& edge = kEdges[e];
-        int ex = x + edge.dx, ey = y + edge.dy, ez = z + edge.dz;
-        return {numbers[number_at(edge.axis, ex, ey, ez)], edge.axis,
-                {place[0] * kSide + ex, place[1] * kSide + ey, place[2] * kSide + ez}};
-    }
 
     Span span(Layers layers) const;
 

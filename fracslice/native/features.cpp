@@ -2,9 +2,6 @@
 // then which of these are corners, for both cells must have features; then which cells have two that are enough.
 #include "features.h"
 
-#include <tbb/enumerable_thread_specific.h>
-
-#include <algorithm>
 #include <utility>
 
 #include "faces.h"
@@ -17,21 +14,6 @@ struct Datum {
     double t;
     Normal normal;
 };
-
-// The loop of crossings of a case: where Numbers holds them for the cell at 0, 0, 0, the first one again in what is left.
-constexpr size_t kLongest = sizeof(Case::loop), kUsual = 6;
-struct Loop {
-    std::array<uint16_t, kLongest> places{};
-};
-
-constexpr std::array<Loop, 256> make_loops() {
-    std::array<Loop, 256> loops{};
-    for (int c = 0; c < 256; ++c) {
-        for (size_t k = 0; k < kLongest; ++k) loops[c].places[k] = kPlaces[kCases[c].loop[k < kCases[c].loop_length ? k : 0]];
-    }
-    return loops;
-}
-constexpr std::array<Loop, 256> kLoops = make_loops();
 
 // An edge of the unit cell.
 struct Way {
@@ -81,18 +63,19 @@ class Finder {
     }
 
   private:
-    const Datum& datum(const Cell& cell, size_t k) const { return data_[cell.numbers[kLoops[cell.number].places[k]]]; }
+    // What is known of a crossing of a cell's loop.
+    const Datum& datum(const Cell& cell, int k) const { return data_[cell.at(kCases[cell.number].loop[k])]; }
 
     // Whether two normals of a cell's loop of crossings make a feature.
     bool bent(const Cell& cell) const {
         const Normal& first = datum(cell, 0).normal;
-        size_t length = kCases[cell.number].loop_length;
+        int length = kCases[cell.number].loop_length;
         float least = 1;
-        for (size_t k = 1; k < length; ++k) least = std::min(least, dot(first, datum(cell, k).normal));
+        for (int k = 1; k < length; ++k) least = std::min(least, dot(first, datum(cell, k).normal));
         if (least > kHalfSharp) return false;
         bool found = least < kSharp;
-        for (size_t a = 2; a < length && !found; ++a) {
-            for (size_t b = 1; b < a; ++b) found |= dot(datum(cell, a).normal, datum(cell, b).normal) < kSharp;
+        for (int a = 2; a < length && !found; ++a) {
+            for (int b = 1; b < a; ++b) found |= dot(datum(cell, a).normal, datum(cell, b).normal) < kSharp;
         }
         return found;
     }
@@ -101,7 +84,7 @@ class Finder {
     bool meet(const Cell& cell, Vec3& tip) {
         const Case& type = kCases[cell.number];
         for (int k = 0; k < type.loop_length; ++k) {
-            const Datum& from = datum(cell, size_t(k));
+            const Datum& from = datum(cell, k);
             const Way& way = kWays[type.loop[k]];
             loop_[k].point = way.start + from.t * way.along;
             for (int j = 0; j < 3; ++j) loop_[k].normal[j] = from.normal[j];
@@ -121,7 +104,7 @@ class Finder {
     Near near_;
     double margin_;
     std::array<Datum, std::tuple_size<Numbers>::value> data_;
-    std::array<Crossing, kLongest> loop_;
+    std::array<Crossing, sizeof(Case::loop)> loop_;
 };
 
 // The slab read one step against y or z; `before` is the slab of the neighbour on that side.
@@ -254,7 +237,7 @@ Around::Around(const FeatureGrid& grid, size_t i) : own_(&grid.of(i)) {
 const Features* FeatureGrid::beside(size_t i, int axis, int step) const {
     Place to = cells_.place(i);
     to[axis] += step;
-    int64_t at = cells_.find(to, 0, 0, 0);
+    int64_t at = cells_.find(to);
     return at >= 0 ? &of(size_t(at)) : nullptr;
 }
 

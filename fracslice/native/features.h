@@ -73,7 +73,7 @@ class FeatureGrid {
     // next one.
     void find(int layer, const Hermite& data);
 
-    // Finds out which corners of a layer are in two cells that both have a feature, and numbers them. Its features and those
+    // Finds out which corners of a layer are in two cells that both have a feature, and counts them. Its features and those
     // of the layer before it are known.
     void choose(int layer);
 
@@ -95,7 +95,7 @@ class FeatureGrid {
     std::array<Stores, 3> stores_;
 };
 
-// The corners in all faces (axis*2 + upper) of a brick's cells that have a feature. Null neighbours have none.
+// The corners in all faces (axis*2 + upper) of a brick's cells that have a feature. A neighbour that is not there has none.
 class Around {
   public:
     Around(const FeatureGrid& grid, size_t i);

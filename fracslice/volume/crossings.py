@@ -60,8 +60,7 @@ class Refiner:
         work: Work | None = None,
     ) -> None:
         self._fast, self._exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-        x, y, z = origin
-        self._placement = (float(x), float(y), float(z)), float(voxel), self._fast.width
+        self._placement = origin, voxel, self._fast.width
         self._cells, self._work = cells, work or Work()
 
     def extended(self, known: Crossings, end: int) -> Crossings:

@@ -7,22 +7,14 @@
 namespace fracslice {
 namespace {
 
-using Vec = std::array<double, 3>;
-
 constexpr size_t kBlock = size_t(1) << 14;
 
-Vec difference(const double* a, const double* b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
-Vec cross(const Vec& a, const Vec& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-double dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3 at(const double* p) { return {p[0], p[1], p[2]}; }
 
 // Twice a triangle's area long.
-Vec normal(const MeshView& mesh, size_t t) {
-    const double* a = mesh.corner(t, 0);
-    return cross(difference(mesh.corner(t, 1), a), difference(mesh.corner(t, 2), a));
+Vec3 normal(const MeshView& mesh, size_t t) {
+    Vec3 a = at(mesh.corner(t, 0));
+    return cross(at(mesh.corner(t, 1)) - a, at(mesh.corner(t, 2)) - a);
 }
 
 // What act(first, last) returns for each block of `count` things.
@@ -37,15 +29,15 @@ std::vector<Part> in_blocks(size_t count, const Do& act) {
 
 }  // namespace
 
-Measures measures(const MeshView& mesh, const Vec& point) {
+Measures measures(const MeshView& mesh, const Vec3& point) {
     Measures all;
     for (const Measures& part : in_blocks<Measures>(mesh.count, [&](size_t first, size_t last) {
              Measures sum;
              for (size_t t = first; t < last; ++t) {
-                 Vec n = normal(mesh, t);
+                 Vec3 n = normal(mesh, t);
                  double length = std::sqrt(dot(n, n));
                  sum.area += length / 2;
-                 sum.volume += dot(n, difference(mesh.corner(t, 0), point.data())) / 6;
+                 sum.volume += dot(n, at(mesh.corner(t, 0)) - point) / 6;
                  sum.flat += length == 0;
              }
              return sum;
@@ -73,14 +65,13 @@ std::vector<int64_t> turned(const MeshView& mesh, const double* points) {
 }
 
 Bounds bounds(const double* points, size_t count) {
-    auto spread = [](Bounds& to, const Vec& low, const Vec& high) {
+    auto spread = [](Bounds& to, const Vec3& low, const Vec3& high) {
         for (int k = 0; k < 3; ++k) to.low[k] = std::min(to.low[k], low[k]), to.high[k] = std::max(to.high[k], high[k]);
     };
-    auto at = [&](size_t i) { return Vec{points[3 * i], points[3 * i + 1], points[3 * i + 2]}; };
-    Bounds all{at(0), at(0)};
+    Bounds all;
     for (const Bounds& part : in_blocks<Bounds>(count, [&](size_t first, size_t last) {
-             Bounds found{at(first), at(first)};
-             for (size_t i = first; i < last; ++i) spread(found, at(i), at(i));
+             Bounds found;
+             for (size_t i = first; i < last; ++i) spread(found, at(points + 3 * i), at(points + 3 * i));
              return found;
          })) {
         spread(all, part.low, part.high);

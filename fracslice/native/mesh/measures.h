@@ -1,8 +1,9 @@
 // How large a mesh is, and what of it rounding turns over.
 #pragma once
-#include <array>
+#include <limits>
 #include <vector>
 
+#include "../vec3.h"
 #include "triangles.h"
 
 namespace fracslice {
@@ -14,16 +15,17 @@ struct Measures {
 };
 
 // Sums are over blocks of equal size, and so the same for any number of threads.
-Measures measures(const MeshView& mesh, const std::array<double, 3>& point);
+Measures measures(const MeshView& mesh, const Vec3& point);
 
 // The triangles, in order, that are flat or turn by a right angle or more when the vertices move to `points`.
 std::vector<int64_t> turned(const MeshView& mesh, const double* points);
 
+// The box around some points; low above high if there are none.
 struct Bounds {
-    std::array<double, 3> low, high;
+    static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    Vec3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
 };
 
-// Of at least one point.
 Bounds bounds(const double* points, size_t count);
 
 }  // namespace fracslice
