@@ -9,7 +9,7 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb-dev libimath-dev libboost-dev \
 	libgl1 libegl1 libgl1-mesa-dri libopenvdb-tools
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
-NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/*)
+NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
 
 .PHONY: demo test lint wheel setup packages clean
 
@@ -24,6 +24,7 @@ test: lint
 
 lint: setup
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 

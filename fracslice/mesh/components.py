@@ -103,6 +103,6 @@ def choose(
         bodies=int(lost.sum()),
         bodies_mm3=float(found.solid_volumes[lost].sum()),
         cavities=int((hollow & ~open_cavities).sum()),
-        filled_mm3=float(-found.volumes[filled].sum()),
+        filled_mm3=float(np.abs(found.volumes[filled]).sum()),
     )
     return stays | open_cavities, removed
