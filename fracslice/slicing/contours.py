@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .._slices import Slab
 from ..kernel import Kernel
+from .bends import bends
 from .corners import corners
+from .section import Section, Vertices
 from .slab import is_fractal
 from .stack import Stack
 
@@ -20,7 +22,7 @@ PRECISE = 1e-3
 @dataclass(frozen=True, eq=False)
 class Contours:
     """Closed polygons, outer ones counter-clockwise, holes clockwise; no two meet. Their points are the
-    crossings of the pixel lattice, and between those the sharp corners.
+    crossings of the pixel lattice, and between those sharp corners, or points where the outline bends.
 
     points: float64 [n, 2], mm from the middle of the object's box, x to the right and y to the back.
     starts: int32 [m + 1]: polygon i has the points ``starts[i]:starts[i + 1]``, the first not repeated.
@@ -59,16 +61,25 @@ def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Conto
     exact: the float64 kernel that the crossings are refined with.
     """
     edges, ends = slab.crossings(k)
-    order, starts = _cycles(edges[:, 3])
-    along = refined(exact, edges, ends, z, stack.frame)
+    following, section = edges[:, 3], Section(exact, z, stack.frame)
+    order, starts = _cycles(following)
+    along = refined(section, edges, ends)
     # Never quite at an end: there several contours, or the parts of one, would meet.
     along = np.clip(along, PRECISE, 1 - PRECISE)
     points = edges[:, :2] + along[:, None] * np.eye(2)[edges[:, 2]]
-    sharp = np.full_like(points, np.nan)
+    vertices = Vertices(points, np.arange(len(points)), np.zeros(len(points)))
     if len(points) and not is_fractal(stack.root):
-        sharp = corners(points, edges, exact, z, stack.frame)
-    places = (np.stack([points, sharp], 1) - np.array(stack.shape[::-1]) / 2) * stack.pixel
-    return _nested(places, order, starts, edges, ends[:, 0] < 0)
+        vertices += _turns(points, edges, section)
+    places = (vertices.points - np.array(stack.shape[::-1]) / 2) * stack.pixel
+    return _nested(replace(vertices, points=places), order, starts, edges, ends[:, 0] < 0)
+
+
+def _turns(points: np.ndarray, edges: np.ndarray, section: Section) -> Vertices:
+    """Corners and bends between crossings."""
+    following, middles = edges[:, 3], edges[:, :2] + 0.5 * np.eye(2)[edges[:, 2]]
+    pixels = np.floor((middles + middles[following]) / 2).astype(int)
+    sharp = corners(points, following, pixels, section)
+    return sharp + bends(points, following, pixels, sharp, section)
 
 
 def _cycles(following: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -85,12 +96,11 @@ def _cycles(following: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(order, np.int32), np.array(starts, np.int32)
 
 
-def refined(kernel: Kernel, edges: np.ndarray, ends: np.ndarray, z: float, frame: np.ndarray) -> np.ndarray:
+def refined(section: Section, edges: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Where on its edge each crossing lies, 0 to 1, to `PRECISE`: false position with the Illinois rule
     (Dowell and Jarratt 1971), all edges at once; those that are done are left out.
     """
-    base = frame[:2, None] + frame[2:, None] * edges[:, :2].T
-    step = frame[2:, None] * np.eye(2)[edges[:, 2]].T
+    base, step = edges[:, :2].astype(float), np.eye(2)[edges[:, 2]]
     lo, hi = np.zeros(len(edges)), np.ones(len(edges))
     f_lo, f_hi = ends[:, 0].copy(), ends[:, 1].copy()
     best = f_lo / (f_lo - f_hi)
@@ -100,8 +110,7 @@ def refined(kernel: Kernel, edges: np.ndarray, ends: np.ndarray, z: float, frame
         if not len(todo):
             break
         t = best[todo]
-        x, y = base[:, todo] + t * step[:, todo]
-        f = kernel.points(x, y, np.full(len(todo), z))
+        f = section(base[todo] + t[:, None] * step[todo])
         left = (f < 0) == (f_lo[todo] < 0)
         a = np.where(left, f, np.where(moved[todo] == 2, f_lo[todo] / 2, f_lo[todo]))
         b = np.where(left, np.where(moved[todo] == 1, f_hi[todo] / 2, f_hi[todo]), f)
@@ -114,11 +123,9 @@ def refined(kernel: Kernel, edges: np.ndarray, ends: np.ndarray, z: float, frame
 
 
 def _nested(
-    points: np.ndarray, order: np.ndarray, starts: np.ndarray, edges: np.ndarray, leaves: np.ndarray
+    vertices: Vertices, order: np.ndarray, starts: np.ndarray, edges: np.ndarray, leaves: np.ndarray
 ) -> Contours:
     """Contours in the order of their lowest, leftmost crossing of a row of samples, each with its parent.
-
-    points: float64 [n, 2, 2], of each crossing and of the corner after it, NaN for none.
 
     The crossing left of that one in its row tells: it is on the parent, or on a sibling, by whether the
     solid begins or ends there (as in Suzuki and Abe 1985, "Topological structural analysis of digitized
@@ -142,8 +149,9 @@ def _nested(
         beside = new[loop[rows[at - 1]]]
         parent[i] = beside if is_hole[beside] != is_hole[i] else parent[beside]
     pieces = [order[starts[i] : starts[i + 1]] for i in loops[turn]]
-    taken = points[np.concatenate(pieces)] if pieces else points
-    real = ~np.isnan(taken[..., 0])
-    before = np.concatenate([[0], np.cumsum(real.sum(1))])
+    place = np.empty(len(order), np.int64)
+    place[np.concatenate([order[:0], *pieces])] = np.arange(len(order))
+    before = np.concatenate([[0], np.cumsum(np.bincount(place[vertices.after], minlength=len(order)))])
     ends = np.concatenate([[0], np.cumsum([len(p) for p in pieces])]).astype(int)
-    return Contours(taken[real], before[ends].astype(np.int32), parent)
+    along = np.lexsort([vertices.share, place[vertices.after]])
+    return Contours(vertices.points[along], before[ends].astype(np.int32), parent)

@@ -1,0 +1,103 @@
+"""Small circles: their layers have the area of the closed form, and contours do not meet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import Node, box, cylinder, difference, menger, repeat, sphere, transform
+from fracslice.slicing import Contours, SliceJob, Slicer, Stack, plan_stack
+
+PIXEL = 0.2
+
+
+def stack_of(root: Node, pixels: float, layer: float) -> Stack:
+    return plan_stack(root, SliceJob(size=PIXEL * pixels, layer=layer, pixel=(PIXEL, PIXEL)))
+
+
+def rods(radius: float, pitch: float, side: int) -> Node:
+    """Upright rods beside each other, in pixels: `side` by `side`."""
+    return repeat(cylinder(radius=radius, height=2), period=(pitch, pitch, 9), count=(side, side, 1))
+
+
+def middle(stack: Stack) -> Contours:
+    return next(Slicer(stack).map(lambda layer: layer.contours, [len(stack.z) // 2]))
+
+
+def following(contours: Contours) -> np.ndarray:
+    """The point after each."""
+    after = np.arange(1, len(contours.points) + 1)
+    after[contours.starts[1:] - 1] = contours.starts[:-1]
+    return after
+
+
+@pytest.mark.parametrize("radius", [3.1, 4, 5, 6.7, 9, 13, 19.6])
+def test_small_circles(radius: float) -> None:
+    """Of some pixels, anywhere on the lattice: areas within 0.05 %, points within 0.001 pixels of the circle
+    and all between them within 0.003.
+    """
+    root = rods(radius, 44.1373, 6)
+    contours = middle(stack_of(root, max(root.facts.box.size), 0.1))
+    assert len(contours) == 36
+    np.testing.assert_allclose(contours.areas, np.pi * (radius * PIXEL) ** 2, rtol=5e-4)
+    for i in range(36):
+        corner = contours[i].min(0) / 2 + contours[i].max(0) / 2
+        circle = (contours[i] - 44.1373 * PIXEL * (np.round(corner / 44.1373 / PIXEL + 0.5) - 0.5)) / PIXEL
+        between = (circle + np.roll(circle, -1, axis=0)) / 2
+        assert abs(np.hypot(*circle.T) - radius).max() < 1.5e-3
+        assert abs(np.hypot(*between.T) - radius).max() < 3e-3
+
+
+@pytest.mark.parametrize(("pixels", "layer"), [(24, 0.2), (100, 0.2), (256, 0.8)])
+def test_small_layers_of_a_ball(pixels: int, layer: float) -> None:
+    """Of a radius of three pixels and more."""
+    stack = stack_of(sphere(), pixels, layer)
+    areas = np.array(list(Slicer(stack).map(lambda layer: layer.contours.area)))
+    radius = np.sqrt(1 - stack.z**2) * stack.scale
+    some = radius > 3 * PIXEL
+    np.testing.assert_allclose(areas[some], np.pi * radius[some] ** 2, rtol=5e-4)
+
+
+def test_straight_sides_get_nothing_but_corners() -> None:
+    """Between crossings of rows and columns of samples: as many as corners."""
+    contours = middle(stack_of(transform(box(), rotate=(0, 0, 1, 31)), 60, 1.0))
+    lattice = contours.points / PIXEL
+    beside = np.abs(lattice - np.round(lattice)).min(1) > 1e-6
+    assert beside.sum() == 4
+
+
+@pytest.mark.parametrize("pixels", [97, 128, 150])
+def test_contours_do_not_meet(pixels: int) -> None:
+    """Rods of some pixels less others, whose rims overlap and nearly touch in all ways, and a sponge less a
+    ball.
+    """
+    web = difference(rods(2.7, 9.1, 12), transform(rods(3.3, 8.3, 12), rotate=(0, 0, 1, 11)))
+    sponge = difference(transform(menger(level=3), rotate=(0, 0, 1, 17.3)), sphere(radius=0.7))
+    assert meetings(middle(stack_of(web, pixels, 0.1))) == 0
+    assert meetings(middle(stack_of(sponge, pixels, 2.6))) == 0
+
+
+def meetings(contours: Contours) -> int:
+    """Pairs of sides that meet, those that follow each other left out."""
+    after = following(contours)
+    order = np.minimum(contours.points[:, 0], contours.points[after, 0]).argsort()
+    a, b = contours.points[order], contours.points[after[order]]
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    last = np.searchsorted(low[:, 0], high[:, 0], side="right")
+    found = 0
+    for i, end in enumerate(last.tolist()):
+        j = np.arange(i + 1, end)
+        beside = (low[j, 1] <= high[i, 1]) & (high[j, 1] >= low[i, 1])
+        j = j[beside & (after[order[j]] != order[i]) & (after[order[i]] != order[j])]
+        found += int((_parted(a[i], b[i], a[j], b[j]) & _parted(a[j], b[j], a[i], b[i])).sum())
+    return found
+
+
+def _parted(a: np.ndarray, b: np.ndarray, p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Whether p and q are on two sides of the line through a and b."""
+
+    def side(r: np.ndarray) -> np.ndarray:
+        u, v = b - a, r - a
+        return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
+
+    return side(p) * side(q) <= 0
