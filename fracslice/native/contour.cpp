@@ -64,7 +64,7 @@ void Contouring::advance(int end, const Hermite& data) {
         features_.find(next_, data);
         if (next_ < layers_.first) continue;
         features_.choose(next_);
-        number(next_, &Features::corner_base, &Features::corner_count);
+        number_corners(next_);
         for_each_brick(cells_.span({next_, next_ + 1}), [&](size_t i) { write_vertices(i, data); });
         if (next_ > layers_.first) write_layer(next_ - 1);
     }
@@ -76,23 +76,34 @@ Contour Contouring::finish() {
     return std::move(result_);
 }
 
-// Gives the corners or the tips of a layer their places, brick by brick.
-void Contouring::number(int layer, size_t Features::*base, uint32_t Features::*count) {
+// Gives features their places, brick by brick.
+void Contouring::number_corners(int layer) {
     Span span = cells_.span({layer, layer + 1});
     for (size_t k = 0; k < span.size(); ++k) {
         Features& own = features_.of(span.brick(k));
-        own.*base = result_.crossings + result_.cases.rows;
-        result_.cases.rows += own.*count;
+        for (size_t axis = 0; axis < 3; ++axis) own.corner_base[axis] = numbered(own.counts[axis]);
     }
-    if (result_.crossings + result_.cases.rows > kMostElements) {
-        throw std::length_error("the surface has more than 2^31 vertices");
+}
+
+void Contouring::number_tips(int layer) {
+    Span span = cells_.span({layer, layer + 1});
+    for (size_t k = 0; k < span.size(); ++k) {
+        Features& own = features_.of(span.brick(k));
+        own.tip_base = numbered(own.tip_count);
     }
+}
+
+size_t Contouring::numbered(size_t count) {
+    size_t first = result_.crossings + result_.cases.rows;
+    if (first + count > kMostElements) throw std::length_error("the surface has more than 2^31 vertices");
+    result_.cases.rows += count;
+    return first;
 }
 
 void Contouring::write_layer(int layer) {
     Span span = cells_.span({layer, layer + 1});
     features_.straighten(layer);
-    number(layer, &Features::tip_base, &Features::tip_count);
+    number_tips(layer);
     for (size_t k = 0; k < span.size(); ++k) {
         size_t& count = features_.of(span.brick(k)).triangles;
         count = std::exchange(result_.triangles.rows, result_.triangles.rows + count);
@@ -119,7 +130,9 @@ void Contouring::write_vertices(size_t i, const Hermite& data) {
         put(edge.vertex - first_vertex_, point);
     });
     const Features& own = features_.of(i);
-    for (size_t k = 0; k < own.corner_count; ++k) put(own.corner_base + k, own.points[k]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+        for (size_t k = 0; k < own.counts[axis]; ++k) put(own.corner_base[axis] + k, own.found[axis][k]);
+    }
 }
 
 void Contouring::write_triangles(size_t i) {
@@ -129,7 +142,7 @@ void Contouring::write_triangles(size_t i) {
     cells_.for_each_near(near.octant,
                          [&](size_t at, uint32_t vertex) { near.numbers[at] = uint32_t(vertex - first_vertex_); });
     Around around(features_, i);
-    const Feature* feature = own.points + own.corner_count;
+    const Feature* feature = own.found[3];
     size_t tip = own.tip_base;
     near.for_each([&](const Cell& cell) {
         const Case& type = kCases[cell.number];

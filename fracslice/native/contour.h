@@ -44,7 +44,9 @@ class Contouring {
     Contour finish();
 
   private:
-    void number(int layer, size_t Features::*base, uint32_t Features::*count);
+    void number_corners(int layer);
+    void number_tips(int layer);
+    size_t numbered(size_t count);
     void write_layer(int layer);
     void write_vertices(size_t i, const Hermite& data);
     void write_triangles(size_t i);

@@ -55,9 +55,6 @@ Vec3 eigenvector(const Symmetric& a, std::array<Vec3, 3> adjugate, double trace,
 // Directions whose eigenvalue is a smaller share of the trace say nothing about where the planes meet.
 constexpr double kRank = 0.01;
 
-// How little normals differ from axes that are taken for these: as float32 rounds them.
-constexpr double kAlong = 1e-7;
-
 // How far outside its cell a feature may lie to be moved to the cell's border instead of being given up.
 constexpr double kNear = 0.4;
 
@@ -100,41 +97,11 @@ bool clipped(const Vec3& start, const Vec3& direction, double margin, Vec3& poin
     return moved_inside(point, margin);
 }
 
-// What planes across the axes ask of each coordinate: sums over the crossings.
-struct Across {
-    Vec3 points{}, weights{}, moments{}, squares{};
-    double mixed = 0;  // how far the planes are from being across the axes
-
-    void add(const Crossing& c) {
-        const Vec3& n = c.normal;
-        for (int k = 0; k < 3; ++k) {
-            double weight = n[k] * n[k], moment = weight * c.point[k];
-            points[k] += c.point[k], weights[k] += weight, moments[k] += moment, squares[k] += moment * c.point[k];
-        }
-        mixed += std::abs(n[0] * n[1]) + std::abs(n[1] * n[2]) + std::abs(n[2] * n[0]);
-    }
-
-    // feature_point, where these planes say one coordinate each.
-    bool meet(int count, double margin, Vec3& point) const {
-        int known = 0;
-        double miss = 0;
-        for (int k = 0; k < 3; ++k) {
-            bool told = weights[k] > kRank * count;
-            point[k] = told ? moments[k] / weights[k] : points[k] / count;
-            miss += told ? squares[k] - moments[k] * point[k] : 0;
-            known += told;
-        }
-        return known > 1 && fits(miss, count) && inside(point, margin);
-    }
-};
-
 }  // namespace
 
 bool feature_point(const Crossing* crossings, int count, double margin, Vec3& point) {
-    Across across;
-    for (int i = 0; i < count; ++i) across.add(crossings[i]);
-    if (across.mixed < kAlong && across.meet(count, margin, point)) return true;
-    Vec3 mean = (1.0 / count) * across.points;
+    Vec3 mean{};
+    for (int i = 0; i < count; ++i) mean = mean + (1.0 / count) * crossings[i].point;
     Symmetric a;
     Vec3 b{};
     double miss = 0;

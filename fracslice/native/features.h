@@ -18,6 +18,15 @@ struct Hermite {
     const float* normals;
     double margin;  // how near the ends of its edge a crossing may come
 
+    // Whether the normals of the crossings `begin` to `end` - 1 are along that axis, as float32 rounds them.
+    bool along(int axis, size_t begin, size_t end) const {
+        constexpr float off = 1e-7f;
+        const float *u = normals + (axis == 0 ? count : 0), *v = normals + (axis == 2 ? 1 : 2) * count;
+        int others = 0;
+        for (size_t k = begin - first; k < end - first; ++k) others |= !(std::abs(u[k]) + std::abs(v[k]) <= off);
+        return !others;
+    }
+
     double root(size_t vertex) const { return std::clamp(t[vertex - first], margin, 1 - margin); }
 
     Normal normal(size_t vertex) const {
@@ -36,31 +45,51 @@ struct Feature {
 struct Features {
     Signs cells{};
     std::array<Signs, 3> corners{};
-    Signs straight{};  // cells whose two corners say all that a tip would
+    Signs lined{};     // cells that lie in two planes, so that two corners say all that a tip would
+    Signs straight{};  // cells whose two corners do say it
     std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that slab
-    Feature* points = nullptr;                          // the corners by axis, then one a cell, in order
-    uint32_t cell_count = 0, corner_count = 0, tip_count = 0;
+    std::array<Feature*, 4> found{};  // in lower faces along each axis, then one a cell, in order
+    std::array<uint32_t, 4> counts{};
+    uint32_t tip_count = 0;
     uint32_t loops = 0;  // triangles that these cells would have without corners
-    size_t corner_base = 0, tip_base = 0, triangles = 0;
+    std::array<size_t, 3> corner_base{};
+    size_t tip_base = 0, triangles = 0;
+
+    // Puts one in a cell, or in its lower face along axis 0, 1 or 2.
+    void add(size_t kind, const Feature& feature) { found[kind][counts[kind]++] = feature; }
 };
 
 // Where a thread finds features and keeps them, until it is told that nobody needs them.
 class FeatureStore {
   public:
-    // Notes a feature in a cell's lower face along axis 0, 1 or 2, or in the cell (3).
-    void add(int axis, const Feature& feature) { found_[axis][count_[axis]++] = feature; }
+    // Makes room for the features of a brick.
+    void open(Features& of) {
+        for (size_t kind = 0; kind < 4; ++kind) of.found[kind] = rows_[kind].room();
+    }
 
-    // Keeps what was found in a brick and is ready for the next one.
-    void keep(Features& of);
+    // Keeps those that were put there.
+    void keep(const Features& of) {
+        for (size_t kind = 0; kind < 4; ++kind) rows_[kind].used += of.counts[kind];
+    }
 
-    void forget() { block_ = used_ = 0; }
+    void forget() {
+        for (Row& row : rows_) row.block = row.used = 0;
+    }
 
   private:
-    static constexpr size_t kBlock = size_t(1) << 14;
-    std::array<std::array<Feature, kSamples>, 4> found_;
-    std::array<size_t, 4> count_{};
-    std::vector<Array<Feature>> blocks_;
-    size_t block_ = 0, used_ = 0;
+    struct Row {
+        std::vector<Array<Feature>> blocks;
+        size_t block = 0, used = 0;
+
+        Feature* room() {
+            constexpr size_t size = size_t(1) << 14;
+            if (used + kSamples > size) ++block, used = 0;
+            if (block == blocks.size()) blocks.emplace_back(size, 1);
+            return blocks[block].data.get() + used;
+        }
+    };
+
+    std::array<Row, 4> rows_;
 };
 
 // The features of the bricks of a layer after the other: the points of the last three layers are kept.
@@ -106,10 +135,10 @@ class Around {
     // A corner of a brick.
     struct Corner {
         const Features* owner;
-        size_t index;
+        size_t axis, index;
 
-        const Vec3& point() const { return owner->points[index].point; }
-        size_t vertex() const { return owner->corner_base + index; }
+        const Vec3& point() const { return owner->found[axis][index].point; }
+        size_t vertex() const { return owner->corner_base[axis] + index; }
     };
 
     // The one in a face of the cell at that bit of slab x, where there is one.
@@ -122,7 +151,7 @@ class Around {
             if (leaves) owner = above_[axis];
         }
         Slab before = (Slab(1) << at % 64) - 1;
-        return {owner, owner->rank[axis][at / 64] + size_t(popcount(owner->corners[axis][at / 64] & before))};
+        return {owner, size_t(axis), owner->rank[axis][at / 64] + size_t(popcount(owner->corners[axis][at / 64] & before))};
     }
 
   private:

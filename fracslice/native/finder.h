@@ -1,0 +1,10 @@
+// The features of one brick's cells.
+#pragma once
+#include "features.h"
+
+namespace fracslice {
+
+// Finds brick i's. data: the crossings that its cells have.
+void find_features(const CellGrid& cells, const Hermite& data, size_t i, Features& own, FeatureStore& store);
+
+}  // namespace fracslice
