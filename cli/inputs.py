@@ -21,13 +21,19 @@ class BadInput(click.ClickException):
     exit_code = 2
 
 
-def load_scene(source: str, settings: Iterable[str] = ()) -> Scene:
-    """The scene in a file, or the shipped scene of that name if there is no such file; --set applied."""
-    from fracslice.scene import library, read
+def scene_path(source: str) -> Path:
+    """A scene file, or that of the shipped scene of that name if there is no such file."""
+    from fracslice.scene import library
 
     bare = Path(source).name == source and not Path(source).suffix
-    path = Path(source) if Path(source).exists() or not bare else library.path(source)
-    return read(path).with_values(settings)
+    return Path(source) if Path(source).exists() or not bare else library.path(source)
+
+
+def load_scene(source: str, settings: Iterable[str] = ()) -> Scene:
+    """The scene that the command is pointed at; --set applied."""
+    from fracslice.scene import read
+
+    return read(scene_path(source)).with_values(settings)
 
 
 def is_model(source: str) -> bool:

@@ -25,6 +25,7 @@ from fracslice.errors import (
 
 from .bench import bench
 from .check import check
+from .fly import fly
 from .formulas import formulas
 from .mesh import mesh
 from .render import render
@@ -53,7 +54,7 @@ def commands(context: click.Context) -> None:
         context.exit(USAGE)
 
 
-for command in (mesh, render, slice_, check, show, formulas, scenes, bench):
+for command in (mesh, render, slice_, check, show, fly, formulas, scenes, bench):
     commands.add_command(command)
 
 

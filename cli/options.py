@@ -125,6 +125,9 @@ threads_option = click.option(
     metavar="N",
     help="All cores by default.",
 )
+device_option = click.option(
+    "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", help="What computes it."
+)
 quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress, no summary.")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .inputs import load_scene
-from .options import quiet_option, set_option, threads_option
+from .options import device_option, quiet_option, set_option, threads_option
 from .working import working
 
 if TYPE_CHECKING:
@@ -52,9 +52,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     "--samples", type=click.IntRange(1, 1_000_000), metavar="N", help="The most samples of a pixel."
 )
 @click.option("--size", callback=pixels, metavar="WxH", help="Pixels across and down, such as 1280x720.")
-@click.option(
-    "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", help="What computes it."
-)
+@device_option
 @click.option("--time", "limit", callback=duration, metavar="TIME", help="Stop after 10s, 2min or 1h.")
 @click.option("--bits", type=click.Choice(["8", "16"]), default="8", help="Of a PNG file, per colour.")
 @click.option(

@@ -7,12 +7,13 @@ from typing import Any
 import click
 
 from .inputs import is_model, load_model, load_scene
-from .options import job_of, job_options, quiet_option, set_option, threads_option
+from .options import job_of, job_options, print_options, quiet_option, set_option, threads_option
 from .working import working
 
 
 @click.command()
 @click.argument("source", metavar="MODEL|SCENE")
+@print_options
 @job_options
 @set_option
 @threads_option
@@ -28,5 +29,5 @@ def show(source: str, settings: tuple[str, ...], threads: int, quiet: bool, **op
 
     scene = load_scene(source, settings)
     with working(threads, quiet) as work:
-        mesh = make_mesh(scene, job_of(**options), work).mesh
+        mesh = make_mesh(scene, job_of(scene, **options), work).mesh
     viewer.show(mesh)

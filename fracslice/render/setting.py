@@ -48,7 +48,7 @@ def settle(root: Node, view: View, size: tuple[int, int]) -> Setting:
     if sum(light.kind == "sky" for light in lights) > 1:
         raise lights[-1].fail("kind: expected at most one sky")
     pixel = 2 * math.tan(math.radians(camera.fov) / 2) / size[1]
-    near = _clearance(resolve_depths(root, pixel * math.dist(camera.eye, camera.target)), camera)
+    near = clearance(resolve_depths(root, pixel * math.dist(camera.eye, camera.target)), camera)
     scale = max(map(abs, camera.eye))
     precision = "float32" if pixel * near > 4 * ROUNDING["float32"] * scale else "float64"
     roots = tuple(resolve_depths(root, detail * pixel * near) for detail in DETAIL)
@@ -62,8 +62,11 @@ def _whole(root: Node) -> Camera:
     return Camera.around(root.facts.box)
 
 
-def _clearance(root: Node, camera: Camera) -> float:
-    """How far the surface is from the eye, at least."""
+def clearance(root: Node, camera: Camera) -> float:
+    """How far the surface is from the eye, at least, in scene units. root: with its depths.
+
+    Raises `SceneError` from inside the solid.
+    """
     f = float(compile_scene(root, "float64").points(*(np.array([c]) for c in camera.eye))[0])
     if not f > 0:
         raise camera.fail("eye: expected a place outside the solid")

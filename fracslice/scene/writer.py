@@ -10,11 +10,19 @@ from ..formulas import Node
 from .layout import SCENE, SECTIONS, SOLID, VERSION, Element
 from .model import Scene
 from .printing import Print
+from .view import Part
 
 
 def to_xml(scene: Scene) -> str:
     """The canonical scene file: only what differs from the defaults, two spaces a level. Reads back equal."""
     return "\n".join(_lines(scene)) + "\n"
+
+
+def part_to_xml(part: Part | Print) -> str:
+    """A camera, a light, what makes the object printable, ... as an element of a scene file."""
+    section = SECTIONS[part.element]
+    values = {name: getattr(part, name) for name in section.parameters}
+    return f"<{section.name}{_attributes(section, values)}/>"
 
 
 def _lines(scene: Scene) -> Iterator[str]:
@@ -24,9 +32,7 @@ def _lines(scene: Scene) -> Iterator[str]:
     yield f"  </{SOLID.name}>"
     printing = () if scene.printing == Print() else (scene.printing,)
     for part in (*printing, *scene.view.parts):
-        section = SECTIONS[part.element]
-        values = {name: getattr(part, name) for name in section.parameters}
-        yield f"  <{section.name}{_attributes(section, values)}/>"
+        yield "  " + part_to_xml(part)
     yield f"</{SCENE.name}>"
 
 

@@ -1,6 +1,7 @@
-"""Meshes on the screen and in pictures; the only importer of pyvista."""
+"""Windows and pictures of meshes and scenes; the only importer of pyvista."""
 
+from fracslice.viewer.cockpit import fly
 from fracslice.viewer.picture import picture
 from fracslice.viewer.window import show
 
-__all__ = ["picture", "show"]
+__all__ = ["fly", "picture", "show"]

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
-import ctypes.util
-import sys
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from fracslice.errors import RenderError
 from fracslice.mesh.model import Mesh
 from fracslice.mesh.reading import read_mesh
+from fracslice.viewer.screen import need_screen
 from fracslice.viewer.stage import body, set_stage
 
 INK = "#303438"
@@ -27,26 +23,8 @@ def show(mesh: Mesh | str | Path) -> None:
     """
     name = "" if isinstance(mesh, Mesh) else f"{Path(mesh).name}: "
     model = mesh if isinstance(mesh, Mesh) else read_mesh(mesh)
-    if find_spec("pyvista") is None:
-        raise RenderError("the window needs pyvista: pip install 'fracslice[view]'")
-    if not _has_screen():
-        raise RenderError("there is no screen to open a window on; a picture can be made without one")
+    need_screen()
     Window(model, name).plotter.show()
-
-
-def _has_screen() -> bool:
-    """On Linux, whether an X server answers: VTK ends the process where none does. Elsewhere always."""
-    if not sys.platform.startswith("linux"):
-        return True
-    library = ctypes.util.find_library("X11")
-    if library is None:
-        return False
-    x11 = ctypes.CDLL(library)
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    display = x11.XOpenDisplay(None)
-    if display:
-        x11.XCloseDisplay(ctypes.c_void_p(display))
-    return bool(display)
 
 
 def caption(mesh: Mesh) -> str:
