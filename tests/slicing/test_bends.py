@@ -20,8 +20,9 @@ def rods(radius: float, pitch: float, side: int) -> Node:
     return repeat(cylinder(radius=radius, height=2), period=(pitch, pitch, 9), count=(side, side, 1))
 
 
-def middle(stack: Stack) -> Contours:
-    return next(Slicer(stack).map(lambda layer: layer.contours, [len(stack.z) // 2]))
+def middle(stack: Stack) -> tuple[Contours, float]:
+    """The contours of the layer in the middle, and the area of its pixels."""
+    return next(Slicer(stack).map(lambda layer: (layer.contours, layer.area), [len(stack.z) // 2]))
 
 
 def following(contours: Contours) -> np.ndarray:
@@ -33,13 +34,14 @@ def following(contours: Contours) -> np.ndarray:
 
 @pytest.mark.parametrize("radius", [3.1, 4, 5, 6.7, 9, 13, 19.6])
 def test_small_circles(radius: float) -> None:
-    """Of some pixels, anywhere on the lattice: areas within 0.05 %, points within 0.001 pixels of the circle
-    and all between them within 0.003.
+    """Of some pixels, anywhere on the lattice: areas within 0.05 %, those of pixels in sum, points within
+    0.001 pixels of the circle and all between them within 0.003.
     """
     root = rods(radius, 44.1373, 6)
-    contours = middle(stack_of(root, max(root.facts.box.size), 0.1))
+    contours, covered = middle(stack_of(root, max(root.facts.box.size), 0.1))
     assert len(contours) == 36
     np.testing.assert_allclose(contours.areas, np.pi * (radius * PIXEL) ** 2, rtol=5e-4)
+    assert covered == pytest.approx(36 * np.pi * (radius * PIXEL) ** 2, rel=2e-4)
     for i in range(36):
         corner = contours[i].min(0) / 2 + contours[i].max(0) / 2
         circle = (contours[i] - 44.1373 * PIXEL * (np.round(corner / 44.1373 / PIXEL + 0.5) - 0.5)) / PIXEL
@@ -52,15 +54,15 @@ def test_small_circles(radius: float) -> None:
 def test_small_layers_of_a_ball(pixels: int, layer: float) -> None:
     """Of a radius of three pixels and more."""
     stack = stack_of(sphere(), pixels, layer)
-    areas = np.array(list(Slicer(stack).map(lambda layer: layer.contours.area)))
+    areas = np.array(list(Slicer(stack).map(lambda layer: (layer.contours.area, layer.area))))
     radius = np.sqrt(1 - stack.z**2) * stack.scale
     some = radius > 3 * PIXEL
-    np.testing.assert_allclose(areas[some], np.pi * radius[some] ** 2, rtol=5e-4)
+    np.testing.assert_allclose(areas[some], np.pi * radius[some, None] ** 2 * [1, 1], rtol=5e-4)
 
 
 def test_straight_sides_get_nothing_but_corners() -> None:
     """Between crossings of rows and columns of samples: as many as corners."""
-    contours = middle(stack_of(transform(box(), rotate=(0, 0, 1, 31)), 60, 1.0))
+    contours, _ = middle(stack_of(transform(box(), rotate=(0, 0, 1, 31)), 60, 1.0))
     lattice = contours.points / PIXEL
     beside = np.abs(lattice - np.round(lattice)).min(1) > 1e-6
     assert beside.sum() == 4
@@ -73,8 +75,8 @@ def test_contours_do_not_meet(pixels: int) -> None:
     """
     web = difference(rods(2.7, 9.1, 12), transform(rods(3.3, 8.3, 12), rotate=(0, 0, 1, 11)))
     sponge = difference(transform(menger(level=3), rotate=(0, 0, 1, 17.3)), sphere(radius=0.7))
-    assert meetings(middle(stack_of(web, pixels, 0.1))) == 0
-    assert meetings(middle(stack_of(sponge, pixels, 2.6))) == 0
+    assert meetings(middle(stack_of(web, pixels, 0.1))[0]) == 0
+    assert meetings(middle(stack_of(sponge, pixels, 2.6))[0]) == 0
 
 
 def meetings(contours: Contours) -> int:

@@ -1,4 +1,4 @@
-// Where the outlines of a layer are, exactly: crossings settled on the field, and corners within pixels.
+// Where the outlines of a layer are, exactly: crossings settled on the field, and corners and bends within pixels.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -13,8 +13,10 @@ constexpr float kPrecise = 2e-3f;  // pixels that a last step may take a crossin
 constexpr int kRounds = 16;
 constexpr double kShort = 0.1;  // pixels: a shorter side tells no direction
 constexpr double kSine = 0.17;  // of the angle between two sides, at least: 10 degrees
+constexpr double kStraight = 0.005;  // of the angle beside an arc that is worth its while, at least
 constexpr double kNear = 0.02;  // pixels between a corner and the zero set, at most
-constexpr double kLeast = 1e-3;  // of a pixel's area that a corner changes; less is only beside one
+constexpr double kExact = 2e-3;  // that corners are known to
+constexpr double kLeast = 1e-3;  // of a pixel's area that a corner or a bend changes; less is only beside a corner
 
 struct Vector {
     double x, y;
@@ -26,6 +28,8 @@ double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y; }
 double det(Vector a, Vector b) { return a.x * b.y - a.y * b.x; }
 Vector unit(Vector a) { return 1 / std::sqrt(dot(a, a)) * a; }
 bool is_short(Vector a) { return dot(a, a) < kShort * kShort; }
+// Of the circle through three points, the ways between them given.
+double curvature(Vector u, Vector v) { return 2 * det(u, v) / std::sqrt(dot(u, u) * dot(v, v) * dot(u + v, u + v)); }
 
 // The crossings of a layer in order: their places, and those before them.
 struct Outline {
@@ -58,12 +62,13 @@ struct Outline {
     }
 };
 
-// Where the sides before a crossing and after the next one meet.
-struct Corner {
-    int32_t edge;
-    Vector tip;
-    double gain;  // pixels that it adds to the inside
-};
+// The area between a side and an arc, as curved as the less curved of its ends: beside a corner the other one tells of
+// something else.
+double bulge(Vector before, Vector side, Vector after) {
+    const double square = dot(side, side), first = curvature(before, side), last = curvature(side, after);
+    if (!(first * last > 0)) return 0;
+    return (std::fabs(first) < std::fabs(last) ? first : last) * square * std::sqrt(square) / 12;
+}
 
 // How much of the triangle between a, b and the tip lies in the pixel of the tip, if that is beside the one of a and b.
 double share_beyond(Vector a, Vector b, Vector tip, const Place& own, const Place& beside) {
@@ -71,6 +76,31 @@ double share_beyond(Vector a, Vector b, Vector tip, const Place& own, const Plac
     double height = along(tip);
     return height == 0 ? 0 : height / (height - along(a)) * (height / (height - along(b)));
 }
+
+// How the outline turns after a crossing: what an arc there adds to the inside, pixels; and, where the sides before that
+// crossing and after the next one meet, what a corner adds that may be there, 0 for none.
+struct Turn {
+    int32_t edge;
+    double arc, corner;
+    Vector tip{0, 0}, away{0, 0};  // where they meet, and as far from there as the field must change its sign
+
+    Turn(const Outline& outline, int32_t i) : edge(i), arc(0), corner(0) {
+        const auto [before, after] = outline.sides(i);
+        const double turn = det(before, after), most = dot(before, before) * dot(after, after);
+        if (!(turn * turn > kStraight * kStraight * most)) return;
+        const Vector a = outline.places[i], b = outline.places[outline.edges[i].following];
+        arc = bulge(before, b - a, after);
+        if (!(turn * turn > kSine * kSine * most)) return;
+        const Place own = outline.pixel(i);
+        tip = a + det(b - a, after) / turn * before, away = unit(unit(before) - unit(after));
+        if (std::abs(int(std::floor(tip.y)) - own.y) + std::abs(int(std::floor(tip.x)) - own.x) > 1) return;
+        corner = det(tip - a, b - a) / 2;
+        if (std::fabs(corner) < kLeast) corner = 0;
+        // An arc is half as far from its chord as its tangents' corner is.
+        away = std::clamp(std::fabs(corner) / std::sqrt(dot(b - a, b - a)) / 2, kExact, kNear) * away;
+    }
+    bool matters() const { return corner != 0 || std::fabs(arc) >= kLeast; }
+};
 
 }  // namespace
 
@@ -119,56 +149,43 @@ void Slab::settle(int layer, const std::vector<Edge>& edges) {
 }
 
 // Corners within pixels: where the sides before and after meet, if the field changes its sign there. In the pixel that both
-// crossings belong to, or in one beside it.
+// crossings belong to, or in one beside it. Other sides are arcs.
 void Slab::sharpen(int layer) {
     const Outline outline(*this, layer);
-    std::vector<Corner> corners;
+    std::vector<Turn> turns;
     std::vector<Spot> spots;
     for (int32_t i = 0; i < int32_t(outline.edges.size()); ++i) {
-        auto [before, after] = outline.sides(i);
-        double turn = det(before, after);
-        if (!(turn * turn > kSine * kSine * dot(before, before) * dot(after, after))) continue;
-        Vector a = outline.places[i], b = outline.places[outline.edges[i].following];
-        Vector tip = a + det(b - a, after) / turn * before, away = unit(before) - unit(after);
-        Place own = outline.pixel(i);
-        if (std::abs(int(std::floor(tip.y)) - own.y) + std::abs(int(std::floor(tip.x)) - own.x) > 1) continue;
-        double gain = det(tip - a, b - a) / 2;
-        if (std::fabs(gain) < kLeast) continue;
-        corners.push_back({i, tip, gain});
-        for (double side : {kNear, -kNear}) {
-            Vector spot = tip + side * unit(away);
-            spots.push_back({spot.x, spot.y});
+        const Turn turn(outline, i);
+        if (turn.matters()) turns.push_back(turn);
+        if (turn.corner == 0) continue;
+        for (const Vector& spot : {turn.tip + turn.away, turn.tip - turn.away}) spots.push_back({spot.x, spot.y});
+    }
+    const std::vector<float> f = values_at(layer, spots);
+    tips.resize(count());
+    size_t n = 0;
+    for (const Turn& turn : turns) {
+        const Place own = outline.pixel(turn.edge), beside{0, int(std::floor(turn.tip.y)), int(std::floor(turn.tip.x))};
+        const bool maybe = turn.corner != 0, is_corner = maybe && (f[n] < 0) != (f[n + 1] < 0);
+        if (maybe) n += 2;
+        if (!is_corner) {
+            if (std::fabs(turn.arc) >= kLeast) put_tip(layer, own.y, own.x, float(turn.arc));
+            continue;
         }
+        const Vector a = outline.places[turn.edge], b = outline.places[outline.edges[turn.edge].following];
+        const double beyond = own.x == beside.x && own.y == beside.y ? 0 : share_beyond(a, b, turn.tip, own, beside);
+        put_tip(layer, own.y, own.x, float(turn.corner * (1 - beyond)));
+        if (beyond > 0) put_tip(layer, beside.y, beside.x, float(turn.corner * beyond));
     }
-    std::vector<float> f = values_at(layer, spots);
-    size_t first = tips_.size();
-    for (size_t n = 0; n < corners.size(); ++n) {
-        if ((f[2 * n] < 0) == (f[2 * n + 1] < 0)) continue;
-        auto [i, tip, gain] = corners[n];
-        Vector a = outline.places[i], b = outline.places[outline.edges[i].following];
-        Place own = outline.pixel(i), beside{0, int(std::floor(tip.y)), int(std::floor(tip.x))};
-        double beyond = own.x == beside.x && own.y == beside.y ? 0 : share_beyond(a, b, tip, own, beside);
-        put_tip(layer, own.y, own.x, float(gain * (1 - beyond)));
-        if (beyond > 0) put_tip(layer, beside.y, beside.x, float(gain * beyond));
-    }
-    std::sort(tips_.begin() + std::ptrdiff_t(first), tips_.end(), [](const Tip& a, const Tip& b) { return a.cell < b.cell; });
 }
 
 void Slab::put_tip(int layer, int row, int column, float area) {
     if (row < 0 || column < 0 || row >= kTile * (ty_ - 2) || column >= kTile * (tx_ - 2)) return;
-    int y = row / kTile + 1, x = column / kTile + 1, bit = kTile * (row % kTile) + column % kTile;
+    const int y = row / kTile + 1, x = column / kTile + 1, bit = kTile * (row % kTile) + column % kTile;
     int32_t t = at(layer, y, x);
-    if (t < kTiles) t = add(layer, y, x), cross.resize(count());
-    sharp[t] |= uint64_t(1) << bit;
-    tips_.push_back({64 * int64_t(t) + bit, area});
-}
-
-float Slab::tip(int32_t tile, int bit) const {
-    Tip cell{64 * int64_t(tile) + bit, 0};
-    auto range = std::equal_range(tips_.begin(), tips_.end(), cell, [](const Tip& a, const Tip& b) { return a.cell < b.cell; });
-    float area = 0;
-    for (auto t = range.first; t != range.second; ++t) area += t->area;
-    return area;
+    if (t < kTiles) t = add(layer, y, x), cross.resize(count()), tips.resize(count());
+    const uint64_t cell = uint64_t(1) << bit;
+    tips[t][bit] = (sharp[t] & cell ? tips[t][bit] : 0) + area;
+    sharp[t] |= cell;
 }
 
 }  // namespace fracslice

@@ -87,9 +87,9 @@ class Slab : public Tiles {
     std::vector<std::array<int32_t, 2>> span;
     // How many times smaller inside values are than outside ones in each layer; 0 where `cross` says where edges are crossed.
     std::vector<float> scale;
-    // The inside area of a cell with the corner that it has.
+    // The inside area of a cell with the corner or bend that it has.
     float sharpened(int32_t tile, int bit, float area) const {
-        return sharp[tile] >> bit & 1 ? std::clamp(area + tip(tile, bit), 0.f, 1.f) : area;
+        return sharp[tile] >> bit & 1 ? std::clamp(area + tips[tile][bit], 0.f, 1.f) : area;
     }
     int64_t evaluations = 0;
 
@@ -115,11 +115,6 @@ class Slab : public Tiles {
     struct Edge {
         int32_t tile, number;
         float first, second;
-    };
-    // What a corner adds to the inside of a cell, in pixels; `cell` is 64 * tile + bit.
-    struct Tip {
-        int64_t cell;
-        float area;
     };
 
     template <class Where, class Take>
@@ -147,7 +142,6 @@ class Slab : public Tiles {
     float inside_scale(int layer);
     void settle(int layer, const std::vector<Edge>& edges);
     void sharpen(int layer);
-    float tip(int32_t tile, int bit) const;
     void put_tip(int layer, int row, int column, float area);
 
     std::shared_ptr<Memory> memory_;
@@ -165,7 +159,6 @@ class Slab : public Tiles {
     int group_ = -1;
     std::vector<float> middles_;   // values in the middles of places, NaN between uses
     std::vector<Ask> asks_;  // for use within a step
-    std::vector<Tip> tips_;  // ascending
     int32_t first_ = kTiles;  // tile of the layer that is sampled
     int ty_, tx_;
 };

@@ -24,6 +24,7 @@ void Tiles::grow(size_t n) {
 void Tiles::clear(size_t places) {
     where.assign(places, kEmpty);
     place.clear(), inside.clear(), known.clear(), decided.clear(), sharp.clear(), reach.clear(), values.clear(), cross.clear();
+    tips.clear();
     push({0, 0, 0}, kAll);
     push({0, 0, 0}, 0);
     values[kFull].fill(0), values[kEmpty].fill(0);

@@ -48,8 +48,9 @@ struct Tiles {
     // The share of the edge before its crossing, of `kWhole`: of the edge from each sample to its right, then of the one
     // upwards.
     Rows<std::array<uint16_t, 128>> cross;
-    // The cells of each tile that a corner changes.
+    // The cells of each tile that corners and bends change, and the area that they add to the inside, pixels.
     std::vector<uint64_t> sharp;
+    Rows<std::array<float, 64>> tips;
 
     size_t count() const { return place.size(); }
     void push(const Place& at, uint64_t signs);
