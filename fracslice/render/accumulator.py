@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 from zipfile import BadZipFile
@@ -52,6 +53,9 @@ class Accumulator(Protocol):
 
     def receive(self, add: Callable[[Any], None]) -> None:
         """Lets a pass be added to the sums. If it raises anything, the picture stays as it was."""
+
+    def anew(self, coarse: int) -> Accumulator:
+        """A picture of the same size without a sample; this one is gone."""
 
     def statistics(self) -> tuple[float, float]:
         """Samples of a pixel, on average, and the root mean square of the pixels' standard errors, as shown;
@@ -126,15 +130,11 @@ class HostAccumulator:
         return np.asarray(squares.reshape(self.height, self.width))
 
     def wanted(self, most: int, tolerance: float) -> tuple[np.ndarray, int]:
-        if self.passes == 0:
-            mask = np.zeros((self.height, self.width), bool)
-            mask[:: self.coarse, :: self.coarse] = True
-        elif self.passes == 1:
-            mask = self.counts == 0
+        if self.passes == 0 or self.passes == 1 < self.coarse:
+            pixels = first_two(self.width, self.height, self.coarse)[self.passes]
         else:
-            mask = self._pressing(most, tolerance)
-        order = ordered(self.width, self.height)
-        pixels = order[mask[order >> 16, order & 65535]]
+            order, mask = ordered(self.width, self.height), self._pressing(most, tolerance)
+            pixels = order[mask[order >> 16, order & 65535]]
         return pixels, len(pixels)
 
     def _pressing(self, most: int, tolerance: float) -> np.ndarray:
@@ -152,6 +152,9 @@ class HostAccumulator:
         add(sums)
         self.sums = sums
         self.passes += 1
+
+    def anew(self, coarse: int) -> HostAccumulator:
+        return self.empty(self.width, self.height, self.sums.dtype, coarse)
 
     def save(self, file: BinaryIO, key: str) -> None:
         """Writes it as an .npz file, from which rendering goes on as if it had not stopped. key: of what it
@@ -173,6 +176,14 @@ class HostAccumulator:
         if found != key or sums.shape != (width * height, CHANNELS):
             raise RenderError(f"{path}: is of another scene, view, size or version")
         return cls(width, height, sums, passes, coarse)
+
+
+@lru_cache(maxsize=4)
+def first_two(width: int, height: int, coarse: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pixels of the first pass and those of the second, as `ordered` has them."""
+    order = ordered(width, height)
+    first = ((order >> 16) % coarse == 0) & ((order & 65535) % coarse == 0)
+    return order[first], order[~first]
 
 
 def around(values: np.ndarray) -> np.ndarray:

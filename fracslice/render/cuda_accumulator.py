@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from copy import copy
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,15 +15,25 @@ from ..kernel.cpu import Precision
 from ..kernel.cuda import launched, load_loops, require
 from ..kernel.linker import Linked
 from ..scene.view import Film
-from .accumulator import FEW, NEARLY, TRUSTED, HostAccumulator
+from .accumulator import FEW, NEARLY, TRUSTED, HostAccumulator, first_two
 from .cpu import ordered
 
 PARTS = 8192
 """Threads that sum over a picture, each over every 8192nd pixel, so that sums come out the same every
 time."""
+GONE = -1
+"""As many passes as no picture has: the memory is another's."""
 TONES = {"none": 0, "filmic": 1, "reinhard": 2}
 
 LOOPS = """
+@kernel
+def clear(A):
+    k = cuda.grid(1)
+    if k < A.shape[0]:
+        for c in range(A.shape[1]):
+            A[k, c] = real(0)
+
+
 @kernel
 def measure(A, E, T):
     b = cuda.grid(1)
@@ -130,9 +142,9 @@ def encoded(c):
 def level(c):
     return whole(minimum(maximum(c, real(0)), real(1)) * real(255) + real(0.5))
 """
-"""measure: the squared error of each pixel. judge: what a sample more in each is worth, 1e30 if it must be,
--1 if it need not. choose: the pixels that are worth as much. show: as `film.develop` does, but for
-bloom."""
+"""clear: no sample in any pixel. measure: the squared error of each pixel. judge: what a sample more in each
+is worth, 1e30 if it must be, -1 if it need not. choose: the pixels that are worth as much. show: as
+`film.develop` does, but for bloom."""
 
 
 class CudaAccumulator:
@@ -146,6 +158,7 @@ class CudaAccumulator:
         precision: Precision = "float32" if self.dtype == np.float32 else "float64"
         self._loops = load_loops(Linked("", np.zeros(1)), precision, LOOPS)
         self.sums = cuda.to_device(start.sums)
+        self._first_two = lru_cache(maxsize=4)(self._sent)
         self._order = cuda.to_device(ordered(self.width, self.height))
         self._pixels = cuda.device_array(pixels, np.int32)
         self._squares, self._gains = (cuda.device_array(pixels, self.dtype) for _ in range(2))
@@ -156,8 +169,17 @@ class CudaAccumulator:
     def of(cls, other: HostAccumulator) -> CudaAccumulator:
         return cls(other)
 
+    def anew(self, coarse: int) -> CudaAccumulator:
+        fresh = copy(self)
+        fresh.passes, fresh.coarse, self.passes = 0, coarse, GONE
+        launched(self._loops.clear, len(self.sums), self.sums)
+        return fresh
+
     def host(self) -> HostAccumulator:
         return HostAccumulator(self.width, self.height, self.sums.copy_to_host(), self.passes, self.coarse)
+
+    def _sent(self, coarse: int) -> list[Any]:
+        return [self._cuda.to_device(pixels) for pixels in first_two(self.width, self.height, coarse)]
 
     def _summed(self, loop: Any, *arguments: Any) -> np.ndarray:
         """Runs a loop over PARTS; returns the sums, float64 [3]."""
@@ -170,9 +192,9 @@ class CudaAccumulator:
         return samples / (self.width * self.height), math.sqrt(total / known) if known else math.inf
 
     def wanted(self, most: int, tolerance: float) -> tuple[Any, int]:
-        if self.passes < 2:
-            pixels, count = HostAccumulator.wanted(self.host(), most, tolerance)
-            return self._cuda.to_device(pixels), count
+        if self.passes == 0 or self.passes == 1 < self.coarse:
+            pixels = self._first_two(self.coarse)[self.passes]
+            return pixels, pixels.size
         self.statistics()
         real = self.dtype.type
         judged = (self.sums, self._squares, self._gains, self._parts, self.width)

@@ -25,7 +25,7 @@ from .setting import Setting, settle
 
 STEPS, GROWTH, GROWN = 160, 10, 16
 """Steps of a ray in the first pass; how often as many after GROWN passes, in equal steps between."""
-PREVIEWS = (2, 4, 8)
+PREVIEWS = (1, 2, 4, 8)
 """How coarse the first pass from a moved camera may be."""
 TOLERANCE = 0.002
 """A pixel has converged when its brightness, as shown, is known to half a level of 256."""
@@ -101,12 +101,9 @@ class Renderer:
         self.dtype = np.dtype(self.setting.precision)
         tracer, self._kept = _machinery(self.device)
         self.tracer = tracer(self._frame(0), self.dtype, self.width, self.height)
-        self.accumulator = self._empty(COARSE)
+        self.accumulator = self._kept(HostAccumulator.empty(self.width, self.height, self.dtype))
         self._aimed: tuple[Node, bool] | None = None
         self._rate = 0.0
-
-    def _empty(self, coarse: int) -> Accumulator:
-        return self._kept(HostAccumulator.empty(self.width, self.height, self.dtype, coarse))
 
     @property
     def key(self) -> str:
@@ -127,7 +124,7 @@ class Renderer:
         seen = optics(camera, (self.width, self.height), what.roots[-1], what.optics.least)
         self.setting = replace(what, camera=camera, optics=seen)
         self._aimed = None
-        self.accumulator = self._empty(COARSE if within is None else self._affordable(within))
+        self.accumulator = self.accumulator.anew(COARSE if within is None else self._affordable(within))
 
     def _affordable(self, within: float) -> int:
         """How coarse the first pass has to be."""

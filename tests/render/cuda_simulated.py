@@ -64,6 +64,11 @@ def accumulators() -> None:
         assert abs(gpu.shown(film, mode).astype(int) - host.shown(film, mode)).max() <= 1
     host.passes = gpu.passes = 1
     assert abs(gpu.shown(Film(), "light").astype(int) - host.shown(Film(), "light")).max() <= 1
+    again, fresh = gpu.anew(2), host.anew(2)
+    assert not again.host().sums.any() and gpu.passes != again.passes == 0
+    for number in (0, 1):
+        again.passes = fresh.passes = number
+        assert (again.wanted(9, 0.1)[0].copy_to_host() == fresh.wanted(9, 0.1)[0]).all()
 
 
 if __name__ == "__main__":
