@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import Cancelled, FracsliceError
+from ..errors import Cancelled, FracsliceError, SceneError
 from ..scene.model import Scene
 from ..scene.reader import read
 from ..scene.view import Camera
@@ -175,7 +175,7 @@ class Live:
             return False
         try:
             self._look(aim)
-        except FracsliceError:  # there is no looking from inside the solid
+        except SceneError:  # there is no looking from inside the solid
             with self._lock:
                 self._aim = self.camera
             return False

@@ -70,7 +70,8 @@ def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
     within(lambda: 0 < live.shown.room < 0.1)
     live.steer(Stick())
     assert np.linalg.norm(np.cross(live.camera.forward, before.forward)) < 1e-9, "straight ahead"
-    near = sharp(live, live.camera)
+    within(lambda: live.shown.done.samples == 4)  # it has come to rest
+    near = live.shown.pixels
     assert abs(near.astype(int) - first).mean() > 5
     aside = live.camera.turned(90, 10)
     live.turn(90, 10)
