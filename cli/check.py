@@ -10,7 +10,7 @@ import click
 
 from .inputs import is_model, load_model, load_scene
 from .options import job_of, job_options, length, print_options, quiet_option, set_option, threads_option
-from .slice import check_print, heights, limits_of
+from .slice import check_print, heights, limits_of, printer_option
 from .summary import found, summary
 from .working import working
 
@@ -20,7 +20,7 @@ from .working import working
 @click.option("--json", "as_json", is_flag=True, help="All numbers, as JSON.")
 @click.option("--layer", callback=heights, metavar="LENGTH[..LENGTH]", help="Check layers, so high.")
 @click.option("--pixel", callback=length, metavar="LENGTH", help="With --layer; the printer's, or 0.05mm.")
-@click.option("--printer", "machine", metavar="NAME", help="With --layer: whose bed it has to fit.")
+@printer_option('With --layer: whose bed it has to fit; "list" shows them.')
 @click.option("--picture", metavar="FILE.png", help="With --layer: draw the worst layers.")
 @click.option("--wall", callback=length, default="0.1mm", metavar="LENGTH", help="The thinnest wall; 0.1mm.")
 @click.option(
@@ -71,7 +71,8 @@ def check(
 
 def refuse_scene_options(context: click.Context) -> None:
     """Options that would say something about a scene say nothing about a model."""
-    for name in context.params:
+    for option in context.command.params:
+        name = str(option.name)
         given = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
         if given and name not in ("source", "as_json", "threads", "quiet"):
-            raise click.UsageError(f"--{name.removesuffix('tings')}: only for scenes, and a model was given")
+            raise click.UsageError(f"{option.opts[0]}: only for scenes, and a model was given")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +46,23 @@ def heights(
     return least, length(context, option, high) if ".." in text else None
 
 
+def printer(context: click.Context, _: click.Parameter, name: str | None) -> Printer | None:
+    """The printer of that name; "list" shows all of them and ends the command."""
+    from fracslice.slicing import printers
+
+    if name != "list":
+        return None if name is None else printers.printer(name)
+    for p in printers.PRINTERS.values():
+        room = " x ".join(f"{r:g}" for r in p.room)
+        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {room} mm")
+    context.exit()
+
+
+def printer_option(text: str) -> Callable[..., Any]:
+    """--printer, looked at before anything that is missing. text: its help."""
+    return click.option("--printer", "machine", callback=printer, is_eager=True, metavar="NAME", help=text)
+
+
 @click.command("slice")
 @click.argument("source", metavar="SCENE")
 @click.option(
@@ -60,9 +78,7 @@ def heights(
     help="Layer height, 0.05mm by default; or a range, 0.05mm..0.2mm: thick where the surface is steep.",
 )
 @click.option("--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's, or 0.05mm.")
-@click.option(
-    "--printer", "machine", metavar="NAME", help='Whose screen the layers are for; "list" shows them.'
-)
+@printer_option('Whose screen the layers are for; "list" shows them.')
 @click.option(
     "--up", nargs=3, type=float, metavar="X Y Z", help="The scene's direction that is up; 0 0 1 by default."
 )
@@ -105,8 +121,6 @@ def slice_(
     from fracslice.export.slices import slice_format, write_slices
     from fracslice.slicing.raster import Screen
 
-    if options["machine"] == "list":
-        return list_printers()
     slice_format(output, form)
     preview = options["preview"]
     if preview:
@@ -114,10 +128,10 @@ def slice_(
             raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
         check_target(preview)
     scene = load_scene(source, settings)
-    machine = chosen_printer(options["machine"])
     with working(threads, quiet) as work:
-        stack = stack_of(scene, machine, options, work)
-        screen = Screen(stack, machine, options["compensation"], options["gamma"], options["mirror"])
+        stack = stack_of(scene, options, work)
+        how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
+        screen = Screen(stack, *how)
         about = {"Title": scene.name, "scene_hash": scene.hash}
         write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about), output, form)
         if preview:
@@ -131,26 +145,11 @@ def slice_(
     return 0
 
 
-def list_printers() -> int:
-    from fracslice.slicing.printers import PRINTERS
-
-    for p in PRINTERS.values():
-        room = " x ".join(f"{r:g}" for r in p.room)
-        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {room} mm")
-    return 0
-
-
-def chosen_printer(name: str | None) -> Printer | None:
-    from fracslice.slicing.printers import printer
-
-    return None if name is None else printer(name)
-
-
-def job(scene: Scene, machine: Printer | None, options: dict[str, Any]) -> SliceJob:
+def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
     """What the options ask for."""
     from fracslice.slicing import SliceJob
 
-    pixel = options.get("pixel")
+    pixel, machine = options["pixel"], options["machine"]
     if pixel is not None and machine is not None:
         raise click.UsageError("--pixel and --printer: expected one of them")
     given = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
@@ -159,11 +158,11 @@ def job(scene: Scene, machine: Printer | None, options: dict[str, Any]) -> Slice
     return SliceJob(size, options["layer"][0], given, up, printing_of(scene, options))
 
 
-def stack_of(scene: Scene, machine: Printer | None, options: dict[str, Any], work: Work) -> Stack:
+def stack_of(scene: Scene, options: dict[str, Any], work: Work) -> Stack:
     """The layers that are wanted, of the object made printable."""
     from fracslice.slicing import adapted, plan_stack
 
-    stack = plan_stack(scene.root, job(scene, machine, options), work)
+    stack = plan_stack(scene.root, job(scene, options), work)
     most = options["layer"][1]
     return stack if most is None else adapted(stack, most, work)
 
@@ -187,10 +186,9 @@ def check_print(
     if options["picture"]:
         check_target(options["picture"])
     scene = load_scene(source, settings)
-    machine = chosen_printer(options["machine"])
     with working(threads, quiet) as work:
-        stack = stack_of(scene, machine, options, work)
-        report = check_layers(stack, limits_of(options), machine, work)
+        stack = stack_of(scene, options, work)
+        report = check_layers(stack, limits_of(options), options["machine"], work)
         if options["picture"]:
             with replacing(options["picture"]) as file:
                 worst_layers(stack, report.worst, file, work)

@@ -31,6 +31,14 @@ def test_layers_of_a_range_of_heights(ball: Path, tmp_path: Path) -> None:
     assert layers[-1]["top"] == 20
 
 
+@pytest.mark.parametrize("command", ["slice", "check"])
+def test_printers_are_listed_without_a_scene(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([command, "--printer", "list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) >= 6
+    assert any(line.startswith("sl1s ") and "2560 x 1620, 128 x 81 x 150 mm" in line for line in lines)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
