@@ -5,10 +5,15 @@ Arrays are C-contiguous and as `fracslice.volume.bricks.Bricks` describes them. 
 run.
 """
 
+from collections.abc import Callable
+
 from numpy import bool_, float32, float64, int32, int64, uint8, uint32
 from numpy.typing import NDArray
 
 Point = tuple[float, float, float]
+Loop = tuple[int, int, int] | Callable[..., None]
+"""The addresses of a loop, of its parameters and of its frame, which must outlive its use; or a function of
+the rows that it reads, [6, n], those that it writes, and where it takes steps their number."""
 
 def marching_cubes(
     ijk: NDArray[int32],
@@ -36,6 +41,22 @@ def marching_cubes(
 def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
     """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) set where < 0."""
 
+class RootLoops:
+    """The loops of `fracslice.volume.root_loops` that find crossings: FIND in float32 and in float64, and
+    POLISH. lanes: segments come in multiples of it. steps: that all segments are given, and those that then are left. sure: a root is exact where it
+    moved less. batch: how many segments are worth a call."""
+
+    def __init__(
+        self,
+        lanes: int,
+        batch: int,
+        guess: Loop,
+        find: Loop,
+        polish: Loop,
+        steps: tuple[int, int],
+        sure: float,
+    ) -> None: ...
+
 class Cells:
     """The grid cells that a surface passes, numbered once, to be meshed as a whole or in pieces.
 
@@ -50,10 +71,24 @@ class Cells:
     def crossings_before(self, layer: int) -> int:
         """How many crossings the bricks before a layer number."""
 
-    def segments(self, begin: int, end: int, origin: Point, voxel: float, lanes: int = 1) -> NDArray[float64]:
+    def segments(self, begin: int, end: int, origin: Point, voxel: float) -> NDArray[float64]:
         """The grid edges that the surface crosses, numbers `begin` to `end` - 1 in the order of the vertices
-        of `marching_cubes`: float64 [6, n], where each starts and from there to its end, scene units; the
-        last one repeated up to a multiple of `lanes`. Raises ValueError where there are no such crossings."""
+        of `marching_cubes`: float64 [6, n], where each starts and from there to its end, scene units. Raises
+        ValueError where there are no such crossings."""
+
+    def find_crossings(
+        self,
+        begin: int,
+        end: int,
+        origin: Point,
+        voxel: float,
+        loops: RootLoops,
+        t: NDArray[float64],
+        normals: NDArray[float32],
+    ) -> None:
+        """Writes where on these edges the surface is, as shares of them, to t, [n]; and its unit normals
+        there to normals, [3, n], each row contiguous. Raises ValueError as `segments`, or for arrays of
+        another length, and whatever Python functions raise."""
 
 class Contouring:
     """The surface of `marching_cubes` in some layers of cells, through exact crossings, its edges and corners

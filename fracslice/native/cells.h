@@ -91,22 +91,51 @@ inline Slab cases_of_row(const Corners& a, const Corners& b, int y) {
     return m ^ t ^ t << 28;
 }
 
-// Calls visit(x, y, z, case) for every cell of a brick that the surface passes, in that order.
+// Cells that the surface passes, between two slabs of corners: by the one axis along which it crosses edges of theirs, all four
+// in one direction, up where the lower end is outside; and the rest.
+struct Passed {
+    std::array<std::array<Slab, 2>, 3> flat;  // by axis and whether up
+    Slab rest;
+
+    Passed(const Corners& a, const Corners& b) {
+        Slab axes[3] = {(a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2]) | (a[3] ^ b[3]),
+                        (a[0] ^ a[1]) | (a[2] ^ a[3]) | (b[0] ^ b[1]) | (b[2] ^ b[3]),
+                        (a[0] ^ a[2]) | (a[1] ^ a[3]) | (b[0] ^ b[2]) | (b[1] ^ b[3])};
+        for (int axis = 0; axis < 3; ++axis) {
+            Slab only = axes[axis] & ~(axes[(axis + 1) % 3] | axes[(axis + 2) % 3]);
+            flat[axis] = {only & a[0], only & ~a[0]};
+        }
+        rest = (axes[0] & axes[1]) | (axes[1] & axes[2]) | (axes[2] & axes[0]);
+    }
+
+    int flat_count() const {
+        Slab all = 0;
+        for (const auto& both : flat) all |= both[0] | both[1];
+        return popcount(all);
+    }
+};
+
+// The cases of flat cells.
+constexpr uint8_t kFlat[3][2] = {{0x55, 0xaa}, {0x33, 0xcc}, {0x0f, 0xf0}};
+
+// Calls visit(x, y, z, case) for some cells between two slabs of corners, in order.
+template <class Visit>
+inline void for_each_cell(const Corners& a, const Corners& b, int x, Slab cells, const Visit& visit) {
+    while (cells) {
+        int y = __builtin_ctzll(cells) / 8;
+        Slab cases = cases_of_row(a, b, y);
+        for (unsigned row = cells >> 8 * y & 0xff; row; row &= row - 1) {
+            int z = __builtin_ctz(row);
+            visit(x, y, z, uint8_t(cases >> 8 * z));
+        }
+        cells &= y == 7 ? 0 : ~Slab(0) << 8 * (y + 1);
+    }
+}
+
+// The same for every cell of a brick that the surface passes.
 template <class Visit>
 inline void for_each_cell(const std::array<Corners, kSide + 1>& corners, const Visit& visit) {
-    for (int x = 0; x < kSide; ++x) {
-        const Corners &a = corners[x], &b = corners[x + 1];
-        Slab cells = mixed(a, b);
-        while (cells) {
-            int y = __builtin_ctzll(cells) / 8;
-            Slab cases = cases_of_row(a, b, y);
-            for (unsigned row = cells >> 8 * y & 0xff; row; row &= row - 1) {
-                int z = __builtin_ctz(row);
-                visit(x, y, z, uint8_t(cases >> 8 * z));
-            }
-            cells &= y == 7 ? 0 : ~Slab(0) << 8 * (y + 1);
-        }
-    }
+    for (int x = 0; x < kSide; ++x) for_each_cell(corners[x], corners[x + 1], x, mixed(corners[x], corners[x + 1]), visit);
 }
 
 // Replaces each count by the sum of those before it; returns the whole sum.

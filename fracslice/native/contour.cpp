@@ -34,6 +34,18 @@ int32_t* write_fan(const Around& around, const Cell& cell, int64_t tip, int32_t*
     return out;
 }
 
+// The two triangles of each of some flat cells of slab x.
+int32_t* write_flat(const Near& near, int x, Slab cells, uint8_t number, int32_t* out) {
+    std::array<uint16_t, 6> places;
+    for (int k = 0; k < 6; ++k) places[k] = kPlaces[kCases[number].corners[k]];
+    for (; cells; cells &= cells - 1) {
+        int bit = __builtin_ctzll(cells);
+        const uint32_t* numbers = &near.numbers[number_at(0, x, bit / 8, bit % 8)];
+        for (int k = 0; k < 6; ++k) *out++ = int32_t(numbers[places[k]]);
+    }
+    return out;
+}
+
 // How many crossings some layers number.
 size_t crossings_of(const CellGrid& cells, Layers layers) {
     return cells.crossings_before(layers.last) - cells.crossings_before(layers.first);
@@ -144,7 +156,7 @@ void Contouring::write_triangles(size_t i) {
     Around around(features_, i);
     const Feature* feature = own.found[3];
     size_t tip = own.tip_base;
-    near.for_each([&](const Cell& cell) {
+    auto write = [&](const Cell& cell) {
         const Case& type = kCases[cell.number];
         if (!(own.cells[cell.x] & cell.bit())) {
             for (int k = 0; k < 3 * type.triangles; ++k) *out++ = int32_t(cell.at(type.corners[k]));
@@ -155,7 +167,17 @@ void Contouring::write_triangles(size_t i) {
             put(tip, *feature++);
             out = write_fan(around, cell, int64_t(tip++), out);
         }
-    });
+    };
+    for (int x = 0; x < kSide; ++x) {
+        Passed cells(near.corners[x], near.corners[x + 1]);
+        Slab left = cells.rest;
+        for (int k = 0; k < 6; ++k) {
+            Slab bent = cells.flat[k / 2][k % 2] & own.cells[x];
+            left |= bent;
+            out = write_flat(near, x, cells.flat[k / 2][k % 2] & ~bent, kFlat[k / 2][k % 2], out);
+        }
+        near.for_each(x, left, write);
+    }
 }
 
 }  // namespace fracslice

@@ -164,7 +164,7 @@ constexpr double kSame = 1e-9;
 // The same where every plane is across its crossing's edge: each says one coordinate, and which is a matter of the case.
 bool find_across(const Seen& seen, Features& own) {
     bool exact = true;
-    seen.near.for_each([&](const Cell& cell) {
+    auto find = [&](const Cell& cell) {
         const Planes& planes = kPlanes[cell.number];
         own.loops += kCases[cell.number].triangles;
         if (planes.known < 2) return;
@@ -191,7 +191,12 @@ bool find_across(const Seen& seen, Features& own) {
             own.corners[axis][cell.x] |= cell.bit();
             own.add(axis, {corner, cell.number});
         }
-    });
+    };
+    for (int x = 0; x < kSide; ++x) {
+        Passed cells(seen.near.corners[x], seen.near.corners[x + 1]);
+        own.loops += 2 * uint32_t(cells.flat_count());
+        seen.near.for_each(x, cells.rest, find);
+    }
     return exact;
 }
 

@@ -1,6 +1,7 @@
 // The extension module fracslice._native. Its Python face and its documentation are in ../_native.pyi.
 #include <algorithm>
 
+#include "bind_roots.h"
 #include "contour.h"
 #include "numpy.h"
 #include "signs.h"
@@ -24,19 +25,25 @@ class Cells {
         : ijk_(ijk), index_(index), threads_(threads),
           grid_(unlocked(threads, [&] { return CellGrid(layout(ijk, index), words(ijk, signs)); })) {}
 
-    nb::object segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, size_t lanes) const {
-        if (begin > end || end > grid_.vertices() || !lanes) throw nb::value_error("no such crossings");
-        size_t count = end - begin, whole = (count + lanes - 1) / lanes * lanes;
-        Array<double> rows(6, whole);
+    nb::object segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel) const {
+        if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
+        Array<double> rows(6, end - begin);
         {
             nb::gil_scoped_release released;
-            double* data = rows.data.get();
-            grid_.segments(begin, end, origin, voxel, whole, data);
-            for (size_t k = 0; count && k < 6; ++k) {
-                std::fill(data + k * whole + count, data + (k + 1) * whole, data[k * whole + count - 1]);
-            }
+            grid_.segments(begin, end, origin, voxel, end - begin, rows.data.get());
         }
-        return to_numpy(std::move(rows), {6, whole});
+        return to_numpy(std::move(rows), {6, end - begin});
+    }
+
+    void find_crossings(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, const RootLoops& loops,
+                        const RootsOut& t, const NormalsOut& normals) const {
+        if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
+        if (t.shape(0) != end - begin || normals.shape(1) != end - begin) throw nb::value_error("as many rows as crossings");
+        unlocked(threads_, [&] {
+            fracslice::find_crossings(grid_, loops, begin, end, origin, voxel, t.data(), normals.data(),
+                                      size_t(normals.stride(0)));
+            return 0;
+        });
     }
 
     size_t crossings_before(int layer) const { return grid_.crossings_before(layer); }
@@ -107,11 +114,16 @@ NB_MODULE(_native, module) {
                "clamp"_a, "threads"_a = 0);
     module.def("signs", &fracslice::bind_signs, "values"_a, "threads"_a = 0);
     module.def("open_edges", &fracslice::bind_open_edges, "ijk"_a, "values"_a, "index"_a);
+    using fracslice::RootLoops;
+    nanobind::class_<RootLoops>(module, "RootLoops")
+        .def(nanobind::new_(&fracslice::root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "steps"_a,
+             "sure"_a);
     using fracslice::Cells;
     nanobind::class_<Cells>(module, "Cells")
         .def(nanobind::init<const fracslice::IjkArray&, const fracslice::SignsArray&, const fracslice::IndexArray&, int>(),
              "ijk"_a, "signs"_a, "index"_a, "threads"_a = 0)
-        .def("segments", &Cells::segments, "begin"_a, "end"_a, "origin"_a, "voxel"_a, "lanes"_a = 1)
+        .def("segments", &Cells::segments, "begin"_a, "end"_a, "origin"_a, "voxel"_a)
+        .def("find_crossings", &Cells::find_crossings, "begin"_a, "end"_a, "origin"_a, "voxel"_a, "loops"_a, "t"_a, "normals"_a)
         .def("crossings_before", &Cells::crossings_before, "layer"_a);
     using fracslice::Surfacing;
     nanobind::class_<Surfacing>(module, "Contouring")

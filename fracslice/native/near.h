@@ -36,12 +36,23 @@ struct Near {
         for (int& k : first) k *= kSide;
     }
 
+    // Calls visit(cell) for the cells that the surface passes.
     template <class Visit>
     void for_each(const Visit& visit) const {
-        for_each_cell(corners, [&](int x, int y, int z, uint8_t number) {
-            Vec3 lower = {double(first[0] + x), double(first[1] + y), double(first[2] + z)};
-            visit(Cell{x, y, z, lower, number, &numbers[number_at(0, x, y, z)]});
-        });
+        for_each_cell(corners, [&](int x, int y, int z, uint8_t number) { visit(cell(x, y, z, number)); });
+    }
+
+    // The same for some of slab x.
+    template <class Visit>
+    void for_each(int x, Slab cells, const Visit& visit) const {
+        for_each_cell(corners[x], corners[x + 1], x, cells,
+                      [&](int, int y, int z, uint8_t number) { visit(cell(x, y, z, number)); });
+    }
+
+  private:
+    Cell cell(int x, int y, int z, uint8_t number) const {
+        Vec3 lower = {double(first[0] + x), double(first[1] + y), double(first[2] + z)};
+        return {x, y, z, lower, number, &numbers[number_at(0, x, y, z)]};
     }
 };
 

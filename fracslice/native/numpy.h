@@ -18,6 +18,8 @@ using ValuesArray = nb::ndarray<const float, nb::shape<-1, kSamples>, nb::c_cont
 using SignsArray = nb::ndarray<const uint8_t, nb::shape<-1, kSide, kSide>, nb::c_contig, nb::device::cpu>;
 using RootsArray = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using NormalsArray = nb::ndarray<const float, nb::shape<3, -1>, nb::c_contig, nb::device::cpu>;
+using RootsOut = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using NormalsOut = nb::ndarray<float, nb::shape<3, -1>, nb::device::cpu>;
 using IndexArray = nb::ndarray<const int32_t, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 inline Layout layout(const IjkArray& ijk, const IndexArray& index) {

@@ -10,18 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._native import Cells
+from .._native import Cells, RootLoops
 from ..formulas.registry import Node
 from ..kernel import Compilable
-from ..work import Work, chunks
-from .roots import Roots
+from ..work import Work
+from .roots import MOST, QUICK, Roots
 
 SURE = 1e-4
 """A root is exact where Newton's last step was shorter, as a share of a voxel: the error is of the order of
 its square."""
 
 
-CHUNK = 1 << 14
+BATCHES = 1 << 10, 1 << 14
+"""Crossings that are looked for together by a compiled field: they stay in the fastest memory; and by
+another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,37 +61,19 @@ class Refiner:
         voxel: float,
         work: Work | None = None,
     ) -> None:
-        self._fast, self._exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-        self._placement = origin, voxel, self._fast.width
+        fast, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
+        loops = fast.native("find"), exact.native("find"), exact.native("polish"), (QUICK, MOST), SURE
+        self._loops = RootLoops(fast.width, BATCHES[not isinstance(root, Node)], *loops)
+        self._roots = fast, exact  # whose loops these are
+        self._placement = origin, voxel
         self._cells, self._work = cells, work or Work()
 
     def extended(self, known: Crossings, end: int) -> Crossings:
         """Crossings that are known, and those after them up to the number `end` - 1. Raises `Cancelled`."""
+        self._work.check()
         size, old = end - known.first, len(known.t)
         t, normals = np.empty(size), np.empty((3, size), np.float32)
         t[:old], normals[:, :old] = known.t, known.normals
-        left: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-
-        def quick(part: slice) -> None:
-            first, last = old + part.start, old + part.stop
-            edges = self._cells.segments(known.first + first, known.first + last, *self._placement)
-            found, facing, miss = self._exact.polished(edges, self._fast.found(edges.astype(np.float32)))
-            count = last - first
-            t[first:last], normals[:, first:last] = found[:count], facing[:, :count]
-            unsure = np.flatnonzero(~(miss[:count] <= SURE))
-            left[first] = first + unsure, edges.take(unsure, 1)
-
-        def slow(part: slice) -> None:
-            edges = segments.take(self._exact.padded(np.arange(len(which))[part]), 1)
-            roots = self._exact.found(edges)
-            moved, facing, miss = self._exact.polished(edges, roots)
-            count = part.stop - part.start
-            t[which[part]] = np.where(miss <= SURE, moved, roots)[:count]
-            normals[:, which[part]] = facing[:, :count]
-
-        self._work.map(quick, chunks(size - old, CHUNK))
-        if left:
-            numbers, rows = zip(*(left[first] for first in sorted(left)), strict=True)
-            which, segments = np.concatenate(numbers), np.concatenate(rows, axis=1)
-            self._work.map(slow, chunks(len(which), CHUNK))
+        new = t[old:], normals[:, old:]
+        self._cells.find_crossings(known.first + old, end, *self._placement, self._loops, *new)
         return Crossings(known.first, t, normals)

@@ -6,9 +6,11 @@ for itself: what it finds does not depend on its neighbours, nor on how the segm
 
 from __future__ import annotations
 
+import ctypes
 import sys
 from collections.abc import Callable, Iterable
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -67,13 +69,12 @@ class Roots:
         found: np.ndarray = roots[0]
         return found
 
-    def polished(self, segments: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Roots after one of Newton's steps, [n], the field's unit normals where they were, [3, n], and how
-        far they moved, [n]."""
-        out = np.empty((5, len(roots)), self.dtype)
-        out[0] = roots
-        self._functions["polish"](self._frame, segments, out)
-        return out[0], out[1:4], out[4]
+    def native(self, name: str) -> Native:
+        """One of the loops for native code."""
+        run = self._functions[name]
+        if isinstance(run, CompiledLoop):
+            return run.code, run.parameters.ctypes.data, self._frame.ctypes.data
+        return partial(run, self._frame)
 
     def aimed(self, segments: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Roots brought nearer, [n], and |f| in voxels, [n]."""
@@ -93,6 +94,29 @@ class Roots:
 Run = Callable[..., None]
 """A loop on its frame, the rows that it reads, those that it writes, both C-contiguous, and its numbers."""
 
+Native = tuple[int, int, int] | Callable[..., None]
+"""The addresses of a loop, of its parameters and of its frame; or a function of the rows that it reads, those
+that it writes and its numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledLoop:
+    """A `Run` in machine code."""
+
+    function: Callable[..., None]
+    parameters: np.ndarray
+
+    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
+        places = (*_places(rows), *_places(out))
+        self.function(self.parameters.ctypes.data, frame.ctypes.data, *places, *numbers, rows.shape[1])
+
+    @property
+    def code(self) -> int:
+        """Its address."""
+        address = ctypes.cast(self.function, ctypes.c_void_p).value  # type: ignore[arg-type]
+        assert address
+        return address
+
 
 def _places(rows: np.ndarray) -> Iterable[int]:
     """The addresses of the rows of an array."""
@@ -106,16 +130,9 @@ def _compiled(source: str, numbers: bytes, precision: Precision) -> tuple[int, d
     parameters = np.frombuffer(numbers).astype(precision)
     bits = parameters.dtype.itemsize * 8
 
-    def runs(function: Callable[..., None]) -> Run:
-        def run(frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
-            places = (*_places(rows), *_places(out))
-            function(parameters.ctypes.data, frame.ctypes.data, *places, *numbers, rows.shape[1])
-
-        return run
-
     width = lane_count(bits)
     functions = load_functions(Linked(source, parameters), bits, width, LOOPS[precision])
-    return width, {name: runs(function) for name, function in functions.items()}
+    return width, {name: CompiledLoop(function, parameters) for name, function in functions.items()}
 
 
 def _on_arrays(root: Compilable, precision: Precision) -> tuple[int, dict[str, Run]]:

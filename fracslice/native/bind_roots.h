@@ -1,0 +1,67 @@
+// Loops over a field, compiled or in Python, as native code calls them.
+#pragma once
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/pair.h>
+
+#include "roots.h"
+
+namespace fracslice {
+
+namespace nb = nanobind;
+
+// Machine code: the addresses of a loop, of its parameters and of its frame.
+using Code = std::array<uintptr_t, 3>;
+
+template <class Real>
+auto compiled_find(const Code& code) {
+    using R = const Real*;
+    auto run = reinterpret_cast<void (*)(R, R, R, R, R, R, R, R, Real*, ptrdiff_t, ptrdiff_t)>(code[0]);
+    auto p = reinterpret_cast<R>(code[1]), frame = reinterpret_cast<R>(code[2]);
+    return [=](R s, Real* roots, size_t steps, size_t n) {
+        run(p, frame, s, s + n, s + 2 * n, s + 3 * n, s + 4 * n, s + 5 * n, roots, ptrdiff_t(steps), ptrdiff_t(n));
+    };
+}
+
+inline auto compiled_polish(const Code& code) {
+    using R = const double*;
+    using W = double*;
+    auto run = reinterpret_cast<void (*)(R, R, R, R, R, R, R, R, W, W, W, W, W, ptrdiff_t)>(code[0]);
+    auto p = reinterpret_cast<R>(code[1]), frame = reinterpret_cast<R>(code[2]);
+    return [=](R s, W out, size_t n) {
+        run(p, frame, s, s + n, s + 2 * n, s + 3 * n, s + 4 * n, s + 5 * n, out, out + n, out + 2 * n, out + 3 * n, out + 4 * n,
+            ptrdiff_t(n));
+    };
+}
+
+// A Python function of the rows of n segments, those that it writes, and perhaps a number of steps.
+template <class Real, class... Steps>
+void call(const nb::object& function, const Real* segments, Real* out, size_t rows, size_t n, Steps... steps) {
+    nb::gil_scoped_acquire locked;
+    auto view = [n](auto* p, size_t count) {
+        return nb::cast(nb::ndarray<nb::numpy, Real, nb::ndim<2>>(const_cast<Real*>(p), {count, n}, nb::handle()),
+                        nb::rv_policy::reference);
+    };
+    function(view(segments, 6), view(out, rows), steps...);
+}
+
+// Of a loop that is either.
+template <class Real>
+std::function<void(const Real*, Real*, size_t, size_t)> find_loop(nb::object loop) {
+    if (nb::isinstance<nb::tuple>(loop)) return compiled_find<Real>(nb::cast<Code>(loop));
+    return [=](const Real* s, Real* roots, size_t steps, size_t n) { call(loop, s, roots, 1, n, steps); };
+}
+
+inline std::function<void(const double*, double*, size_t)> polish_loop(nb::object loop) {
+    if (nb::isinstance<nb::tuple>(loop)) return compiled_polish(nb::cast<Code>(loop));
+    return [=](const double* s, double* out, size_t n) { call(loop, s, out, 5, n); };
+}
+
+// Machine code must outlive what is made of it.
+inline RootLoops root_loops(size_t lanes, size_t batch, nb::object guess, nb::object find, nb::object polish,
+                            std::pair<size_t, size_t> steps, double sure) {
+    return {lanes, batch, find_loop<float>(guess), find_loop<double>(find), polish_loop(polish), steps.first, steps.second, sure};
+}
+
+}  // namespace fracslice
