@@ -6,16 +6,22 @@ import numpy as np
 
 from ..volume import Bricks
 from .parts import Parts
+from .samples import positions
 
 NONE = -1
+
+ACROSS = 192
+"""Cells along the longest side, at most; where samples are finer, bodies are in cells of several."""
+
+CHUNK = 2048
 
 
 def struts(solid: Bricks, parts: Parts, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The ends of struts, float64 [n - 1, 3] each, scene units, that join n bodies, together as short as can
     be.
 
-    Every sample of the space between belongs to its nearest body (exact Euclidean distances: Maurer, Qi and
-    Raghavan 2003); where two such cells meet, their bodies may be joined. The minimum spanning tree of the
+    Every cell of the space between belongs to its nearest body (exact Euclidean distances: Maurer, Qi and
+    Raghavan 2003); where two such regions meet, their bodies may be joined. The minimum spanning tree of the
     bodies is among these pairs, as the one of points is in their Delaunay triangulation.
     """
     from scipy.ndimage import distance_transform_edt
@@ -24,10 +30,14 @@ def struts(solid: Bricks, parts: Parts, bodies: np.ndarray) -> tuple[np.ndarray,
 
     if len(bodies) < 2:
         return np.empty((0, 3)), np.empty((0, 3))
-    body = _dense(solid, parts, bodies)
-    nearest = distance_transform_edt(body == NONE, return_distances=False, return_indices=True)
-    pairs, ends = _meetings(body, nearest)
-    pairs, ends, length = _nearest(pairs, ends)
+    times = -(-8 * max(solid.index.shape) // ACROSS)
+    cell, body, place = _cells(solid, parts, bodies, times)
+    shape = tuple(-(-8 * n // times) for n in solid.index.shape)
+    of = np.full(shape, NONE)
+    of.flat[cell] = np.arange(len(cell))
+    nearest = distance_transform_edt(of == NONE, return_distances=False, return_indices=True)
+    meeting = np.concatenate([_sharing(cell), _meetings(of[tuple(nearest)], body)])
+    pairs, ends, length = _nearest(body[meeting], place[meeting], times)
     tree = minimum_spanning_tree(coo_array((length, pairs.T), (len(bodies),) * 2)).tocoo()
     chosen = {(int(i), int(j)) for i, j in zip(*tree.coords, strict=True)}
     kept = [n for n, (i, j) in enumerate(pairs.tolist()) if (i, j) in chosen]
@@ -35,15 +45,18 @@ def struts(solid: Bricks, parts: Parts, bodies: np.ndarray) -> tuple[np.ndarray,
     return points[:, 0], points[:, 1]
 
 
-def _nearest(pairs: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _nearest(pairs: np.ndarray, ends: np.ndarray, slack: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Each pair once, with the ends that are nearest to each other, and their distance. Where faces lie side
-    by side many are, but for a sample: then the ones nearest to the middle of them.
+    by side many are, but for some samples: then the ones nearest to the middle of them.
     """
+    swapped = pairs[:, 0] > pairs[:, 1]
+    pairs, ends = pairs.copy(), ends.copy()
+    pairs[swapped], ends[swapped] = pairs[swapped][:, ::-1], ends[swapped][:, ::-1]
     kinds, of = np.unique(pairs, axis=0, return_inverse=True)
     length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
     least = np.full(len(kinds), np.inf)
     np.minimum.at(least, of, length)
-    near = length < least[of] + 1
+    near = length < least[of] + slack
     ends, of, length = ends[near], of[near], length[near]
     middle, count = np.zeros((len(kinds), 3)), np.bincount(of)
     np.add.at(middle, of, ends.mean(1))
@@ -53,30 +66,40 @@ def _nearest(pairs: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return kinds, ends[first], length[first]
 
 
-def _dense(solid: Bricks, parts: Parts, bodies: np.ndarray) -> np.ndarray:
-    """Which of the bodies each grid point is in, int32 [x, y, z], or `NONE`."""
-    number = np.full(len(parts.inside) + 1, NONE, np.int32)
-    number[bodies] = np.arange(len(bodies))
-    nx, ny, nz = solid.index.shape
-    cells = np.where(solid.index >= 0, NONE, number[parts.tiles])[..., None] + np.zeros(512, np.int32)
-    cells[tuple(solid.ijk.T // 8)] = number[parts.labels]
-    return cells.reshape(nx, ny, nz, 8, 8, 8).transpose(0, 3, 1, 4, 2, 5).reshape(8 * nx, 8 * ny, 8 * nz)
-
-
-def _meetings(body: np.ndarray, nearest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of bodies [n, 2] whose cells meet somewhere, the lower number first, and the nearest points
-    there, [n, 2, 3].
+def _cells(
+    solid: Bricks, parts: Parts, bodies: np.ndarray, times: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The cells of `times` samples along each side that bodies are in, one after the other: flat index,
+    number of the body, and a sample of it there, int64 [n], [n] and [n, 3]. A cell comes once for each body
+    in it.
     """
-    owner = body[tuple(nearest)]
-    pairs, ends = [np.empty((0, 2), np.int64)], [np.empty((0, 2, 3), np.int64)]
+    number = np.full(len(parts.inside), NONE)
+    number[bodies] = np.arange(len(bodies))
+    shape = [-(-8 * n // times) for n in solid.index.shape]
+    keys, places = [np.empty(0, np.int64)], [np.empty((0, 3), np.int64)]
+    for begin in range(0, len(solid), CHUNK):
+        body = number[parts.labels[begin : begin + CHUNK]]
+        rows, offsets = np.nonzero(body != NONE)
+        place = positions(solid, begin + rows, offsets)
+        cell = np.ravel_multi_index(tuple(place.T // times), shape)
+        found, first = np.unique(cell * len(bodies) + body[rows, offsets], return_index=True)
+        keys.append(found)
+        places.append(place[first])
+    found, first = np.unique(np.concatenate(keys), return_index=True)
+    return *np.divmod(found, len(bodies)), np.concatenate(places)[first]
+
+
+def _sharing(cell: np.ndarray) -> np.ndarray:
+    """Those that follow each other in one cell, int64 [n, 2]."""
+    first = np.flatnonzero(cell[:-1] == cell[1:])
+    return np.column_stack([first, first + 1])
+
+
+def _meetings(owner: np.ndarray, body: np.ndarray) -> np.ndarray:
+    """The nearest ones of either side, int64 [n, 2], where regions of different bodies meet."""
+    pairs = [np.empty((0, 2), np.int64)]
     for axis in range(3):
-        own, near = np.moveaxis(owner, axis, 0), np.moveaxis(nearest, 1 + axis, 1)
-        here = np.nonzero(own[:-1] != own[1:])
-        there = (here[0] + 1, *here[1:])
-        two = np.stack([own[here], own[there]], 1)
-        at = np.stack([np.stack([n[end] for n in near], 1) for end in (here, there)], 1)
-        swapped = two[:, 0] > two[:, 1]
-        two[swapped], at[swapped] = two[swapped][:, ::-1], at[swapped][:, ::-1]
-        pairs.append(two)
-        ends.append(at)
-    return np.concatenate(pairs), np.concatenate(ends)
+        own = np.moveaxis(owner, axis, 0)
+        differ = body[own[:-1]] != body[own[1:]]
+        pairs.append(np.column_stack([own[:-1][differ], own[1:][differ]]))
+    return np.concatenate(pairs)

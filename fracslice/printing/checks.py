@@ -7,30 +7,23 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import VolumeError
 from ..formulas import Box, Node
-from ..kernel import Compilable, compile_scene
-from ..volume import Bricks, Lattice, sample
+from ..kernel import Compilable
+from ..volume import Bricks
 from ..volume.grid import from_grid, to_grid
-from ..volume.lattice import BRICK
 from ..work import Work
+from .apart import resolved, shown
 from .parts import parts_of
 from .samples import Samples
 from .slender import slender
 from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
 
-COARSE, FINE, FINEST = 96, 192, 768
-"""Samples along the longest side, at least and at most; and where these show nothing at all."""
+COARSE, FINE = 96, 192
+"""Samples along the longest side, at least and at most."""
 
 SPECK = 27
 """Samples: less is not told from noise."""
-
-MOST = 150_000
-"""Bricks of samples to tell what is connected, about."""
-
-AGAIN = 3.0
-"""How many times finer fractals are looked at that seem to be in pieces."""
 
 ACROSS = 4
 """Samples across the thinnest wall that may be, if `FINE` allows."""
@@ -91,16 +84,7 @@ def check_object(
     longest = max(outer.size)
     wanted = ACROSS * longest * scale / max(min(limits.wall, limits.floor), 1e-6)
     samples = min(max(wanted, COARSE), FINE)
-    while True:
-        try:
-            lattice = Lattice.around(outer, longest / samples)
-            bricks = sample(compile_scene(root), root.facts, lattice, work)
-            break
-        except VolumeError:
-            # A plate may lie between all samples.
-            samples *= 2
-            if samples > FINEST:
-                raise
+    bricks = shown(root, outer, longest, samples, work)
     return check_solid(root, bricks, scale, limits, work)
 
 
@@ -128,8 +112,12 @@ def check_solid(
     bare = _under(floors, limits.floor, scale)
     narrow = _under(thick, limits.wall, scale)
     speck = max(limits.speck, SPECK * (bricks.voxel * scale) ** 3) / scale**3
-    apart = _Apart(root, bricks, thin.walls + tight.walls, limits.thin / scale**2, speck)
-    bodies, cavities = ([v * scale**3 for v in found] for found in apart.volumes(work))
+    found = _volumes(bricks, speck)
+    missed = thin.walls + tight.walls
+    fine = resolved(root, bricks, limits.thin / scale**2, len(found[0]) > 1, work, missed)
+    if fine is not bricks:
+        found = _volumes(fine, speck)
+    bodies, cavities = ([v * scale**3 for v in volumes] for volumes in found)
     problems = []
     if len(bodies) > 1:
         problems.append(f"{len(bodies)} loose bodies")
@@ -145,54 +133,12 @@ def check_solid(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Apart:
-    """What tells whether an object is in one piece. thin: walls and gaps that its samples may miss; they
-    count from an area of `least` on. speck: the least volume of a part. Scene units.
-    """
-
-    root: Node | Compilable
-    bricks: Bricks
-    thin: Walls
-    least: float
-    speck: float
-
-    def volumes(self, work: Work) -> tuple[list[float], list[float]]:
-        """Of all bodies, and of all cavities, the largest first."""
-        found = self.of(self.bricks)
-        times = self.closer(len(found[0]))
-        if times <= 1:
-            return found
-        around, voxel = Samples(self.bricks).box, self.bricks.voxel / times
-        return self.of(sample(compile_scene(self.root), self.root.facts, Lattice.around(around, voxel), work))
-
-    def of(self, bricks: Bricks) -> tuple[list[float], list[float]]:
-        """The volumes that these samples tell."""
-        parts = parts_of(bricks)
-        sizes = [bricks.voxel**3 * parts.count[numbers] for numbers in (parts.bodies, parts.cavities)]
-        bodies, cavities = ([v for v in size.tolist() if v >= self.speck] for size in sizes)
-        return bodies, cavities
-
-    def closer(self, bodies: int) -> float:
-        """How many times finer to look, so that there are two samples across the thinnest wall or gap: a
-        plate thicker than sqrt 3 samples is not pierced, whatever its tilt (Andres, Acharya and Sibata 1997,
-        "Discrete analytical hyperplanes"). A fractal has them at every scale; only if it seems to be in
-        pieces is it looked at again.
-        """
-        thin, voxel = self.thin, self.bricks.voxel
-        if self.root.facts.weak:
-            return AGAIN if bodies > 1 else 1.0
-        if thin.chosen(thin.width < 2 * voxel).area.sum() < self.least:
-            return 1.0
-        bricks = max(len(self.bricks), float(thin.area.sum()) / (BRICK * voxel) ** 2)
-        return float(min(2 * voxel / _thinnest(thin), (MOST / bricks) ** 0.5))
-
-
-def _thinnest(found: Walls) -> float:
-    """The width that a hundredth of the surface is under."""
-    order = np.argsort(found.width)
-    upto = np.cumsum(found.area[order])
-    return float(found.width[order][np.searchsorted(upto, 0.01 * upto[-1])])
+def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
+    """Of all bodies, and of all cavities, of at least `speck`, the largest first."""
+    parts = parts_of(bricks)
+    sizes = [bricks.voxel**3 * parts.count[numbers] for numbers in (parts.bodies, parts.cavities)]
+    bodies, cavities = ([v for v in size.tolist() if v >= speck] for size in sizes)
+    return bodies, cavities
 
 
 def _under(found: Walls, limit: float, scale: float) -> float:

@@ -17,7 +17,7 @@ from ..formulas import Box, Node, box, cylinder, plane, transform
 from ..formulas.box import Triple
 from ..kernel import Compilable, compile_scene
 from ..scene import Print
-from ..volume import Bricks, Lattice, Plan, extent, sample
+from ..volume import Bricks, Plan, extent
 from ..volume.grid import from_grid, to_grid
 from ..work import Work
 from .altered import altered
@@ -25,7 +25,6 @@ from .altered import altered
 # What measures needs Numba and SciPy, which take as long to load as a small mesh: only where it is used.
 if TYPE_CHECKING:
     from .parts import Parts
-    from .samples import Samples
 
 COARSE, FINE = 128, 640
 """Samples along the longest side that distances are measured on, at least and at most."""
@@ -35,6 +34,9 @@ SHARP = 6
 
 DUST = 1e-5
 """The share of the whole below which a body is dust that no strut is built to."""
+
+THIN = 1.0
+"""mm2 of walls or gaps that samples may miss, from which finer ones are taken."""
 
 
 Measure = Callable[[Plan], Box]
@@ -124,8 +126,20 @@ class _Run:
         if length < 2 * self.size / samples:
             least = 2 * self.size / samples
             raise VolumeError(f"{length:g} mm in {self.size:g} mm: expected at least {least:.3g} mm, or 0")
-        lattice = Lattice.around(self.planned.outer, max(self.planned.box.size) / samples)
-        return sample(compile_scene(self.thing), self.thing.facts, lattice, self.work)
+        from .apart import shown
+
+        return shown(self.thing, self.planned.outer, max(self.planned.box.size), samples, self.work)
+
+    def parts(self) -> tuple[Bricks, Parts]:
+        """Samples that tell what is connected, and what is."""
+        from .apart import resolved
+        from .parts import parts_of
+
+        coarse = self.sampled()
+        found = parts_of(coarse)
+        unit = max(self.planned.box.size) / self.size
+        bricks = resolved(self.thing, coarse, THIN * unit**2, len(_large(found)) > 1, self.work)
+        return (coarse, found) if bricks is coarse else (bricks, parts_of(bricks))
 
     def distances(self, length: float) -> Grid:
         """The same as distances."""
@@ -133,33 +147,29 @@ class _Run:
 
     def filled(self) -> Node | Compilable:
         """The space that nothing reaches becomes solid."""
-        from .parts import parts_of
+        from .border import nearer
 
-        solid = self.sampled()
-        parts = parts_of(solid)
+        solid, parts = self.parts()
         if not len(parts.cavities):
             return self.thing
-        return altered(self.thing, "add", _nearer(solid, parts, parts.cavities, np.array([0])))
+        return altered(self.thing, "add", nearer(solid, parts, parts.cavities, np.array([0])))
 
     def largest(self) -> Node | Compilable:
         """Only the largest body stays."""
-        from .parts import parts_of
+        from .border import nearer
 
-        solid = self.sampled()
-        parts = parts_of(solid)
+        solid, parts = self.parts()
         if len(parts.bodies) == 1:
             return self.thing
-        return altered(self.thing, "keep", _nearer(solid, parts, parts.bodies[:1], parts.bodies[1:]))
+        return altered(self.thing, "keep", nearer(solid, parts, parts.bodies[:1], parts.bodies[1:]))
 
     def bridged(self) -> Node | Compilable:
         """Struts between bodies, as few and as short as can be."""
         from .bridges import struts
-        from .parts import parts_of
 
-        solid = self.sampled()
-        parts = parts_of(solid)
-        bodies = parts.bodies[parts.count[parts.bodies] > DUST * parts.count[parts.inside].sum()]
-        return self.added(*struts(solid, parts, bodies), self.how.bridge / self.scale / 2, solid)
+        solid, parts = self.parts()
+        ends = struts(solid, parts, _large(parts))
+        return self.added(*ends, self.how.bridge / self.scale / 2, self.sampled())
 
     def closed(self) -> Node | Compilable:
         """Gaps are filled from face to face."""
@@ -229,20 +239,10 @@ def _apart(points: np.ndarray, voxel: float) -> np.ndarray:
     return np.asarray(first)
 
 
-def _nearer(solid: Bricks, parts: Parts, these: np.ndarray, others: np.ndarray) -> Samples:
-    """Negative where it is nearer to these parts than to the others: half the difference of the distances. So
-    the border lies midway between them, and the surfaces of both stay as they are.
-    """
-    from .samples import Samples, positions, with_signs
-
-    near, far = (
-        Samples(from_grid(to_grid(with_signs(solid, *parts.masks(p))).redistance())) for p in (these, others)
-    )
-    rows, offsets = np.divmod(np.arange(solid.values.size), 512)
-    at = (np.array(solid.origin) + solid.voxel * positions(solid, rows, offsets)).T
-    share = np.clip((near.points(*at) - far.points(*at)) / 2, -8 * solid.voxel, 8 * solid.voxel)
-    signed = with_signs(solid, *parts.masks(these))
-    return Samples(replace(signed, values=share.astype(np.float32).reshape(solid.values.shape)))
+def _large(parts: Parts) -> np.ndarray:
+    """The numbers of the bodies that are no dust."""
+    bodies = parts.bodies
+    return np.asarray(bodies[parts.count[bodies] > DUST * parts.count[parts.inside].sum()])
 
 
 def _around(middle: Triple, box: Box) -> Box:

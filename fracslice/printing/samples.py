@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import njit
 
 from ..formulas.box import Box
 from ..volume import Bricks
-from ..volume.bricks import INSIDE, OUTSIDE
+from ..volume.bricks import INSIDE
 from ..volume.lattice import BRICK
 
 NEAR = 1.5
@@ -104,12 +102,3 @@ def positions(bricks: Bricks, rows: np.ndarray, offsets: np.ndarray) -> np.ndarr
     inner = np.stack([offsets >> 6, offsets >> 3 & 7, offsets & 7], -1)
     place: np.ndarray = bricks.ijk[rows].astype(np.int64) + inner
     return place
-
-
-def with_signs(bricks: Bricks, inside: np.ndarray, tiles: np.ndarray) -> Bricks:
-    """The same distances with other signs. inside: bool [n, 512]; tiles: bool, of bricks without samples."""
-    from dataclasses import replace
-
-    size = np.abs(bricks.values)
-    index: Any = np.where(bricks.index >= 0, bricks.index, np.where(tiles, INSIDE, OUTSIDE))
-    return replace(bricks, values=np.where(inside, -size, size), index=index.astype(np.int32))

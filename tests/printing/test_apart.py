@@ -1,0 +1,101 @@
+"""Walls and gaps thinner than the samples, kept, bridged and filled: what is in one piece stays so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import Node, box, mandelbulb, shell, sphere, transform, union
+from fracslice.kernel import compile_scene
+from fracslice.printing import printable
+from fracslice.printing.altered import Altered
+from fracslice.printing.apart import resolved
+from fracslice.printing.make import COARSE
+from fracslice.printing.parts import Parts, parts_of
+from fracslice.scene import Print
+from fracslice.volume import Lattice, Plan, plan, sample
+from fracslice.work import Work
+
+SIZE = 20.0
+VOXEL = 2 / COARSE
+"""Of objects two units large, about, in their units."""
+
+
+def made(root: Node, **printing: float | str) -> Plan:
+    return printable(plan(root, COARSE), SIZE, Print(**printing))[0]  # type: ignore[arg-type]
+
+
+def at(node: Node, x: float, y: float, z: float) -> Node:
+    return transform(node, translate=(x, y, z))
+
+
+def inside(made: Plan, points: np.ndarray) -> np.ndarray:
+    return compile_scene(made.root, "float64").points(*points.T) < 0
+
+
+def on_sphere(radius: float) -> np.ndarray:
+    ways = np.random.default_rng(0).normal(size=(5000, 3))
+    return np.asarray(radius * ways / np.linalg.norm(ways, axis=1)[:, None])
+
+
+def parts(made: Plan, voxels: float) -> tuple[Parts, float]:
+    """On samples that are finer."""
+    voxel = max(made.box.size) / COARSE * voxels
+    lattice = Lattice.around(made.outer, voxel)
+    return parts_of(sample(compile_scene(made.root), made.root.facts, lattice)), voxel
+
+
+def plates(thick: float, gap: float) -> Node:
+    """Two, the lower one smaller, in voxels."""
+    z = (thick + gap) / 2
+    pair = union(*(at(box(size=(s, s, thick * VOXEL)), 0, 0, h * VOXEL) for s, h in ((2, z), (1.8, -z))))
+    return transform(pair, rotate=(1, 0.3, 0.2, 31))
+
+
+BALL = at(sphere(radius=0.1), 1.3, 0, 0)
+
+
+@pytest.mark.parametrize("voxels", [0.4, 1.0])
+def test_the_inside_of_a_thin_sealed_shell_is_filled(voxels: float) -> None:
+    filled = made(shell(sphere(), thickness=voxels * VOXEL), cavities="fill")
+    for radius in (0.1, 0.9, 1 - 0.5 * voxels * VOXEL):
+        assert inside(filled, on_sphere(radius)).all()
+    assert not inside(filled, on_sphere(1.001)).any()
+
+
+@pytest.mark.parametrize("voxels", [0.4, 1.0])
+def test_a_thin_shell_is_kept_whole(voxels: float) -> None:
+    kept = made(union(shell(sphere(), thickness=voxels * VOXEL), BALL), keep="largest")
+    assert inside(kept, on_sphere(1 - 0.5 * voxels * VOXEL)).all()
+    assert not inside(kept, on_sphere(0.9)).any()
+    assert not inside(kept, np.array([[1.3, 0, 0], [1.39, 0, 0]])).any()
+
+
+def test_a_thin_shell_is_not_bridged_to_itself() -> None:
+    thin = shell(sphere(), thickness=0.4 * VOXEL)
+    assert not isinstance(made(thin, bridge=1).root, Altered)
+    joined = made(union(thin, BALL), bridge=1)
+    assert inside(joined, np.array([[1.1, 0, 0]])).all()
+    assert not inside(joined, on_sphere(0.8)).any()
+    assert not inside(joined, np.array([[-1.1, 0, 0], [0, 0, 1.1], [0, 0, -1.1]])).any()
+
+
+@pytest.mark.parametrize(("thick", "gap"), [(0.5, 0.4), (0.5, 2.5), (2, 0.4)])
+def test_plates_however_near_stay_two(thick: float, gap: float) -> None:
+    """Only the larger one is kept, whole; and both are joined by a strut."""
+    root = plates(thick, gap)
+    both, voxel = parts(plan(root, COARSE), 0.2)
+    assert len(both.bodies) == 2
+    volumes = both.count[both.bodies] * voxel**3
+    one, voxel = parts(made(root, keep="largest"), 0.2)
+    assert one.count[one.bodies] * voxel**3 == pytest.approx(volumes[:1], rel=0.01)
+    assert len(parts(made(root, bridge=1), 0.2)[0].bodies) == 1
+
+
+def test_what_is_thick_is_not_looked_at_again() -> None:
+    for root, loose in ((box(), True), (mandelbulb(iterations=4), False)):
+        planned = plan(root, 48)
+        bricks = sample(
+            compile_scene(planned.root), planned.root.facts, Lattice.around(planned.outer, planned.voxel)
+        )
+        assert resolved(planned.root, bricks, 1e-3, loose, Work()) is bricks
