@@ -7,6 +7,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -34,6 +35,7 @@ from fracslice.printing.checks import Limits, SolidReport, check_object
 from fracslice.printing.parts import parts_of
 from fracslice.printing.samples import Samples
 from fracslice.printing.walls import walls
+from fracslice.printing.widths import Widths
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layers import Slicer
@@ -173,28 +175,31 @@ def test_seeded_defects_are_found_and_clean_solids_not_blamed(root: Node, proble
     assert found == [] if problem is None else any(problem in p for p in found)
 
 
-@pytest.mark.parametrize("tilt", [0.0, 17.0])
-@pytest.mark.parametrize("voxels", [0.3, 0.6, 1.0, 2.0, 2.9])
-def test_walls_thinner_than_the_samples_are_found(voxels: float, tilt: float) -> None:
-    """A fin on a plate, its width in voxels of the check; and the fin's area, both faces."""
-    width = voxels * 2.1 / 96
-    fin = at(box(size=(1.4, width, 1.5)), 0, 0.003, 0.75)
-    report, scale = tilted(union(box(size=(2, 2, 0.5)), fin), tilt)
-    assert report.walls
-    assert report.walls.median == pytest.approx(width * scale, rel=0.02)
-    assert report.thin_walls == pytest.approx(2 * 1.4 * 1.25 * scale**2, rel=0.15)
+def fin(width: float) -> tuple[Node, float]:
+    """A fin on a plate, and the area of both faces."""
+    upright = at(box(size=(1.4, width, 1.5)), 0, 0.003, 0.75)
+    return union(box(size=(2, 2, 0.5)), upright), 2 * 1.4 * 1.25
+
+
+def slot(width: float) -> tuple[Node, float]:
+    """A slot into a block, and the area of both faces."""
+    return difference(box(size=(2, 2, 1.5)), at(box(size=(3, width, 2)), 0, 0.003, 1)), 2 * 2 * 0.75
 
 
 @pytest.mark.parametrize("tilt", [0.0, 17.0])
 @pytest.mark.parametrize("voxels", [0.3, 0.6, 1.0, 2.0, 2.9])
-def test_gaps_thinner_than_the_samples_are_found(voxels: float, tilt: float) -> None:
-    """A slot through a block, its width in voxels of the check; and the slot's area, both faces."""
+@pytest.mark.parametrize(("made", "told"), [(fin, "walls"), (slot, "gaps")], ids=["wall", "gap"])
+def test_what_is_thinner_than_the_samples_is_found(
+    made: Callable[[float], tuple[Node, float]], told: str, voxels: float, tilt: float
+) -> None:
+    """Its width, in voxels of the check, and its area."""
     width = voxels * 2.1 / 96
-    slot = at(box(size=(3, width, 2)), 0, 0.003, 1)
-    report, scale = tilted(difference(box(size=(2, 2, 1.5)), slot), tilt)
-    assert report.gaps
-    assert report.gaps.median == pytest.approx(width * scale, rel=0.02)
-    assert sum(report.gaps.counts) == pytest.approx(2 * 2 * 0.75 * scale**2, rel=0.15)
+    root, area = made(width)
+    report, scale = tilted(root, tilt)
+    found: Widths = getattr(report, told)
+    assert found.median == pytest.approx(width * scale, rel=0.02)
+    assert sum(found.counts) == pytest.approx(area * scale**2, rel=0.15)
+    assert told == "gaps" or report.thin_walls == pytest.approx(area * scale**2, rel=0.15)
 
 
 def tilted(root: Node, degrees: float) -> tuple[SolidReport, float]:
