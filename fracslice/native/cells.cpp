@@ -69,14 +69,28 @@ void CellGrid::segments(size_t begin, size_t end, const std::array<double, 3>& o
     auto after = [](size_t number, const Crossings& brick) { return number < brick.base; };
     size_t row = size_t(std::upper_bound(crossings_.begin(), crossings_.end(), begin, after) - crossings_.begin());
     for (row = row ? row - 1 : 0; row < sampled() && crossings_[row].base < end; ++row) {
-        for_each_own_edge(row, [&](const CellEdge& edge) {
-            if (edge.vertex < begin || edge.vertex >= end) return;
-            double* to = rows + (edge.vertex - begin);
+        const int32_t* p = layout_.ijk + 3 * row;
+        auto starts = ranges(row);
+        for (int axis = 0; axis < 3; ++axis) {
+            size_t first = std::max(starts[axis], begin), last = std::min(starts[axis + 1], end);
+            if (first >= last) continue;
             for (int k = 0; k < 3; ++k) {
-                to[size_t(k) * stride] = origin[k] + voxel * edge.lower[k];
-                to[size_t(k + 3) * stride] = edge.axis == k ? voxel : 0;
+                double* to = rows + size_t(k + 3) * stride - begin;
+                std::fill(to + first, to + last, k == axis ? voxel : 0);
             }
-        });
+            size_t number = starts[axis];
+            for (int x = 0; x < kSide; ++x) {
+                double px = origin[0] + voxel * (p[0] + x);
+                for (Slab bits = crossings_[row].bits[axis][x]; bits; bits &= bits - 1, ++number) {
+                    if (number < first || number >= last) continue;
+                    int bit = __builtin_ctzll(bits);
+                    double* to = rows + (number - begin);
+                    to[0] = px;
+                    to[stride] = origin[1] + voxel * (p[1] + bit / 8);
+                    to[2 * stride] = origin[2] + voxel * (p[2] + bit % 8);
+                }
+            }
+        }
     }
 }
 

@@ -5,7 +5,7 @@ given.
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -25,7 +25,9 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.kernel import reference
+from fracslice.formulas.registry import Facts
+from fracslice.kernel import Kernel, compile_scene, reference
+from fracslice.kernel.cpu import Precision
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check
 from fracslice.mesh.extract import Piece, contour, contour_pieces, extract
@@ -85,6 +87,65 @@ def test_known_volumes_and_areas(root: Node, volume: float, area: float) -> None
     assert mesh.volume == pytest.approx(volume, rel=1e-3)
     assert mesh.area == pytest.approx(area, rel=1e-3)
     assert_solid(mesh)
+
+
+@pytest.mark.parametrize("step", [0.2, 0.5])
+def test_two_parallel_planes_in_one_cell(step: float) -> None:
+    """Faces across the axes are exact where each cell tells one of each; where one sees both sides of a step
+    lower than a voxel, it is still a solid, and no farther off than marching cubes."""
+    voxel = 2 / 32
+    raised = transform(box(size=(0.9, 3, 2 * step * voxel)), translate=(0.41, 0, 1))
+    planned = plan(union(box(size=(2, 2, 2)), raised), 32)
+    bricks = sample_scene(planned)
+    truth = 8 + 0.9 * 3 * step * voxel + 0.9 * 1 * step * voxel
+    exact, plain = contour(planned.root, bricks), extract(bricks)
+    assert_solid(exact)
+    assert abs(exact.volume - truth) < abs(plain.volume - truth)
+
+
+class Called:
+    """A kernel that is no machine code."""
+
+    def __init__(self, kernel: Kernel, fails: bool) -> None:
+        self.kernel, self.fails = kernel, fails
+        self.dtype, self.batch, self.bricks = kernel.dtype, kernel.batch, kernel.bricks
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        if self.fails:
+            raise MeshError("no field")
+        return self.kernel.points(x, y, z)
+
+
+@dataclass
+class InPython:
+    """A scene whose field is called in Python."""
+
+    root: Node
+    fails: bool = False
+
+    @property
+    def facts(self) -> Facts:
+        return self.root.facts
+
+    def guard(self) -> InPython:
+        return self
+
+    def compiled(self, precision: Precision) -> Called:
+        return Called(compile_scene(self.root, precision), self.fails)
+
+
+def test_a_field_in_python_gives_the_same_surface() -> None:
+    planned = plan(difference(box(), sphere(radius=0.6)), 40)
+    bricks = sample_scene(planned)
+    mesh, same = contour(planned.root, bricks), contour(InPython(planned.root), bricks)
+    assert np.abs(mesh.vertices - same.vertices).max() < 1e-6 * bricks.voxel
+    assert (mesh.triangles == same.triangles).all()
+
+
+def test_what_a_field_raises_is_passed_on() -> None:
+    planned = plan(box(), 40)
+    with pytest.raises(MeshError, match="no field"):
+        contour(InPython(planned.root, fails=True), sample_scene(planned), Work(threads=2))
 
 
 def test_much_nearer_than_marching_cubes() -> None:
