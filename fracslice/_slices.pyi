@@ -55,10 +55,10 @@ class Memory:
     """Of slabs that are gone, for those to come."""
 
 class Slab:
-    """The samples of layers on a lattice of ny x nx points at (x0 + dx i, y0 + dy j).
+    """The samples of one layer after the other, on a lattice of ny x nx points at (x0 + dx i, y0 + dy j).
 
     memory: shared by slabs of one job. frame: (x0, y0, dx, dy). z: heights of neighbouring layers. All in
-    scene units.
+    scene units. What is read of a layer is read before the next one is sampled; a ValueError else.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Slab:
     ) -> None: ...
     def sample(self, layer: int) -> None:
         """Finds the samples around the contours of a layer, closed: every edge that a contour crosses has two
-        evaluated ends. Once; they do not depend on which layers were sampled before. Raises BorderError.
+        evaluated ends. They do not depend on which layers were sampled before. Raises BorderError.
         """
 
     @property
@@ -111,8 +111,8 @@ class Slab:
         """
 
     def signs(self) -> tuple[NDArray[uint8], NDArray[uint8]]:
-        """Which samples are inside, and which were evaluated: 0 or 1, uint8 [layers, rows, columns], rows and
-        columns rounded up to whole tiles of 8.
+        """Which samples are inside, and which were evaluated: 0 or 1, uint8 [rows, columns], both rounded up
+        to whole tiles of 8.
         """
 
 def deflated(image: NDArray[uint8]) -> bytes:

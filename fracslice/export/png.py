@@ -26,10 +26,11 @@ def encode_layer(screen: Screen, layer: Layer) -> bytes:
 
 def _file(shape: tuple[int, int], rows: bytes) -> bytes:
     head = struct.pack(">IIBBBBB", shape[1], shape[0], 8, 0, 0, 0, 0)
-    return SIGNATURE + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(data, zlib.crc32(kind)))
-        for kind, data in ((b"IHDR", head), (b"IDAT", rows), (b"IEND", b""))
-    )
+    return b"".join((SIGNATURE, *_chunk(b"IHDR", head), *_chunk(b"IDAT", rows), *_chunk(b"IEND", b"")))
+
+
+def _chunk(kind: bytes, data: bytes) -> tuple[bytes, bytes, bytes, bytes]:
+    return struct.pack(">I", len(data)), kind, data, struct.pack(">I", zlib.crc32(data, zlib.crc32(kind)))
 
 
 def is_whole(data: bytes) -> bool:

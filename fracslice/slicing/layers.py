@@ -44,7 +44,10 @@ class View:
 
 @dataclass(eq=False)
 class Layer:
-    """One layer of a stack, before it is given a form. evaluations: of the field for this layer, about."""
+    """One layer of a stack, before it is given a form: to be read before the next one is sampled.
+
+    evaluations: of the field for this layer, about.
+    """
 
     stack: Stack
     index: int
@@ -114,8 +117,9 @@ class Slicer:
     def map(self, make: Callable[[Layer], T], layers: Sequence[int] | None = None) -> Iterator[T]:
         """``make(layer)`` of every layer, or of the chosen ones, which ascend.
 
-        `make` runs in worker threads; results do not depend on their number. At most a few slabs are held
-        at a time. Raises `SliceError`, `Cancelled`, or what `make` raises.
+        `make` runs in worker threads, and reads a layer while it is there; results do not depend on their
+        number. At most a few slabs are held at a time. Raises `SliceError`, `Cancelled`, or what `make`
+        raises.
         """
         root, shape = self.stack.root, self.stack.shape
         exact = compile_scene(root, "float64")

@@ -1,9 +1,9 @@
 """A few neighbouring layers, from the field to the samples around their contours.
 
 The work is `fracslice._slices`; here is what it must know of a field. Top down, blocks of 64, 32 and 16
-pixels over all layers of the slab and of 8 over a few of them are dropped where ``|f| > bound * reach``
-at their middle says that no sample in them has the other sign. In the tiles of each layer that are left,
-samples in the middles of blocks of 4 and 2 pixels and single ones are evaluated, as long as no value
+pixels over all layers of the slab, of 8 over a few of them and of 4 over one or two are dropped where
+``|f| > bound * reach`` at their middle says that no sample in them has the other sign. In what is left of
+each layer one sample of each block of 2 pixels and then the others are evaluated, as long as no value
 reaches them. Then follows closure: where two neighbours differ in sign and one of them is only implied by
 another, it is evaluated. Nothing within a layer is evaluated twice.
 

@@ -51,11 +51,12 @@ def sampler_of(stack: Stack, facts: Facts | None = None) -> Sampler:
 
 def signs(sampler: Sampler, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Inside and known, bool [layers, y, x], of all samples."""
-    slab = sampler.slab(z)
+    slab, found = sampler.slab(z), []
     for layer in range(len(z)):
         sampler.sample(slab, layer)
-    inside, known = slab.signs()
-    return inside > 0, known > 0
+        found.append(slab.signs())
+    inside, known = (np.stack(signs) > 0 for signs in zip(*found, strict=True))
+    return inside, known
 
 
 def dense(stack: Stack, z: np.ndarray, like: np.ndarray) -> np.ndarray:
@@ -208,13 +209,14 @@ def test_pixels_just_below_a_horizontal_face() -> None:
 def test_each_pixel_of_a_corner(root: Node) -> None:
     """Coverage against 64 x 64 signs in each pixel: within 2 %, corners of both kinds included."""
     stack = stack_of(root, 40)
-    layer = all_of(stack, lambda layer: layer)[len(stack.z) // 2]
+    middle = len(stack.z) // 2
+    coverage = next(Slicer(stack).map(lambda layer: layer.coverage, [middle]))
     x0, y0, dx, dy = stack.frame
     y, x = ((np.arange(64 * n) + 0.5) / 64 for n in stack.shape)
     at = np.meshgrid(x0 + dx * x, y0 + dy * y)
-    inside = compile_scene(stack.root).points(*at, np.full(at[0].shape, stack.z[layer.index])) < 0
+    inside = compile_scene(stack.root).points(*at, np.full(at[0].shape, stack.z[middle])) < 0
     truth = inside.reshape(stack.shape[0], 64, stack.shape[1], 64).mean((1, 3))
-    assert abs(layer.coverage / 255 - truth).max() < 0.02
+    assert abs(coverage / 255 - truth).max() < 0.02
 
 
 def test_vertices_lie_on_the_surface() -> None:
@@ -225,13 +227,12 @@ def test_vertices_lie_on_the_surface() -> None:
         assert abs(np.hypot(*contours.points.T) - radius).max() < 0.01 * 0.2
     stack = stack_of(mandelbulb(iterations=4), 200)
     exact = compile_scene(stack.root, "float64")
-    for layer in all_of(stack, lambda layer: layer)[10:80:10]:
+    of = range(10, len(stack.z), 10)
+    for index, points in zip(of, Slicer(stack).map(lambda layer: layer.contours.points, of), strict=True):
         x, y = (
-            layer.contours.points / stack.scale
-            + np.array(stack.corner)
-            + stack.frame[2:] * np.array(stack.shape[::-1]) / 2
+            points / stack.scale + np.array(stack.corner) + stack.frame[2:] * np.array(stack.shape[::-1]) / 2
         ).T
-        z = np.full(len(x), stack.z[layer.index])
+        z = np.full(len(x), stack.z[index])
         step = 0.01 * stack.frame[2]
         lattice = [(x - step, y), (x + step, y), (x, y - step), (x, y + step)]
         signs = np.array([exact.points(*at, z) < 0 for at in lattice])
@@ -250,12 +251,13 @@ def test_coverage_is_the_area_of_the_contours() -> None:
 def test_each_pixel_of_a_disc() -> None:
     """Coverage against the disc sampled 64 x 64 times a pixel: within 2 %."""
     stack = stack_of(sphere(), 64)
-    layer = all_of(stack, lambda layer: layer)[len(stack.z) // 2]
+    middle = len(stack.z) // 2
+    coverage = next(Slicer(stack).map(lambda layer: layer.coverage, [middle]))
     ny, nx = stack.shape
-    radius = math.sqrt(1 - stack.z[layer.index] ** 2) * stack.scale / 0.2
+    radius = math.sqrt(1 - stack.z[middle] ** 2) * stack.scale / 0.2
     y, x = ((np.arange(n * 64) + 0.5) / 64 - n / 2 for n in (ny, nx))
     truth = (np.hypot(*np.meshgrid(x, y)) < radius).reshape(ny, 64, nx, 64).mean((1, 3))
-    assert abs(layer.coverage / 255 - truth).max() < 0.02
+    assert abs(coverage / 255 - truth).max() < 0.02
 
 
 def test_contours_are_nested_and_oriented() -> None:

@@ -13,7 +13,7 @@ import pytest
 from fracslice._slices import deflated
 from fracslice.errors import SliceError
 from fracslice.formulas import Node, box, mandelbulb, menger, sphere, transform, union
-from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
+from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.printers import PRINTERS, Printer, printer
 from fracslice.slicing.raster import Screen, compensated
 
@@ -98,13 +98,13 @@ def test_deflated_pictures_are_the_pictures(
     for size in (6.1, 9.9):
         screen = Screen(stack_of(root, size), machine, **options)
         rows, columns = screen.shape
-        layers = list(Slicer(screen.stack).map(lambda layer: layer))[::5]
-        for layer in layers:
-            rows_read = np.frombuffer(zlib.decompress(screen.deflated(layer)), np.uint8).reshape(
-                rows, columns + 1
-            )
+        def made(layer: Layer, screen: Screen = screen) -> tuple[bytes, np.ndarray]:
+            return screen.deflated(layer), screen.picture(layer)
+
+        for data, picture in Slicer(screen.stack).map(made, range(0, len(screen.stack.z), 5)):
+            rows_read = np.frombuffer(zlib.decompress(data), np.uint8).reshape(rows, columns + 1)
             assert not rows_read[:, 0].any()
-            assert (rows_read[:, 1:] == screen.picture(layer)).all()
+            assert (rows_read[:, 1:] == picture).all()
 
 
 def test_deflated_pictures_are_small() -> None:

@@ -57,33 +57,40 @@ nb::object owned(std::vector<Row>&& rows, std::initializer_list<size_t> shape) {
 
 using Bytes = nb::ndarray<uint8_t, nb::ndim<2>, nb::device::cpu>;
 
+// Layers are read one at a time.
+void held(const Slab& slab, int layer) {
+    if (layer != slab.layer()) throw nb::value_error("another layer of the slab was sampled since");
+}
+
 nb::tuple bind_paint(const Slab& slab, int layer, const Bytes& image) {
+    held(slab, layer);
     Canvas canvas{image.data(), int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)};
     Painted painted;
     {
         nb::gil_scoped_release released;
-        painted = paint(slab, layer, canvas);
+        painted = paint(slab, canvas);
     }
     return nb::make_tuple(painted.area, painted.partly);
 }
 
-nb::bytes bytes(const std::vector<uint8_t>& data) { return nb::bytes(data.data(), data.size()); }
+nb::bytes bytes(const Rows<uint8_t>& data) { return nb::bytes(data.data(), data.size()); }
 
 nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_columns, bool transposed, bool backwards,
                        std::array<int, 2> at, std::array<int, 2> shape, const nb::bytes& levels) {
+    held(slab, layer);
     View view{rows_columns[0], rows_columns[1], transposed, backwards, at, shape, {}};
     if (levels.size() != view.levels.size()) throw nb::value_error("256 levels were expected");
     std::copy_n(reinterpret_cast<const uint8_t*>(levels.c_str()), view.levels.size(), view.levels.begin());
     Picture shown;
     {
         nb::gil_scoped_release released;
-        shown = picture(slab, layer, view);
+        shown = picture(slab, view);
     }
     return nb::make_tuple(bytes(shown.data), shown.painted.area, shown.painted.partly);
 }
 
 nb::bytes bind_deflated(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device::cpu>& image) {
-    std::vector<uint8_t> data;
+    Rows<uint8_t> data;
     {
         nb::gil_scoped_release released;
         auto* first = const_cast<uint8_t*>(image.data());
@@ -93,28 +100,26 @@ nb::bytes bind_deflated(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device
 }
 
 nb::tuple bind_crossings(const Slab& slab, int layer) {
+    held(slab, layer);
     Crossings found;
     {
         nb::gil_scoped_release released;
-        found = crossings(slab, layer);
+        found = crossings(slab);
     }
     size_t n = found.edges.size();
     return nb::make_tuple(owned<int32_t>(std::move(found.edges), {n, 4}), owned<double>(std::move(found.ends), {n, 2}));
 }
 
 nb::tuple bind_signs(const Slab& slab) {
-    size_t shape[3] = {size_t(slab.layers()), size_t(slab.rows() - 2) * kTile, size_t(slab.columns() - 2) * kTile};
-    std::vector<uint8_t> inside(shape[0] * shape[1] * shape[2]), known(inside.size());
-    for (size_t k = 0; k < shape[0]; ++k)
-        for (size_t r = 0; r < shape[1]; ++r)
-            for (size_t c = 0; c < shape[2]; ++c) {
-                int y = int(r / kTile) + 1, x = int(c / kTile) + 1, bit = int(kTile * (r % kTile) + c % kTile);
-                int32_t t = slab.at(int(k), y, x);
-                inside[(k * shape[1] + r) * shape[2] + c] = slab.word(int(k), y, x) >> bit & 1;
-                known[(k * shape[1] + r) * shape[2] + c] = slab.known[t] >> bit & 1;
-            }
-    auto wide = {shape[0], shape[1], shape[2]};
-    return nb::make_tuple(owned<uint8_t>(std::move(inside), wide), owned<uint8_t>(std::move(known), wide));
+    const size_t rows = size_t(slab.rows() - 2) * kTile, columns = size_t(slab.columns() - 2) * kTile;
+    std::vector<uint8_t> inside(rows * columns), known(inside.size());
+    for (size_t r = 0; r < rows; ++r)
+        for (size_t c = 0; c < columns; ++c) {
+            const int y = int(r / kTile) + 1, x = int(c / kTile) + 1, bit = int(kTile * (r % kTile) + c % kTile);
+            inside[r * columns + c] = slab.word(y, x) >> bit & 1;
+            known[r * columns + c] = slab.known[slab.at(y, x)] >> bit & 1;
+        }
+    return nb::make_tuple(owned<uint8_t>(std::move(inside), {rows, columns}), owned<uint8_t>(std::move(known), {rows, columns}));
 }
 
 }  // namespace

@@ -6,22 +6,22 @@
 
 namespace fracslice {
 
-int32_t Slab::add(int layer, int y, int x) {
-    int32_t& here = where[(size_t(layer) * ty_ + y) * tx_ + x];
-    push({layer, y, x}, inside[here]);
+int32_t Slab::add(int y, int x) {
+    int32_t& here = where[size_t(y) * tx_ + x];
+    push({y, x, here}, inside[here]);
     return here = int32_t(count() - 1);
 }
 
 // Tiles said to be full beside ones said to be empty, where a bound is wrong; the same in all layers of a group.
-void Slab::mend(int layer) {
-    if (!torn_) torn_ = torn(layer);
-    for (const Place& p : *torn_) add(layer, p.y, p.x);
+void Slab::mend() {
+    if (!torn_) torn_ = torn();
+    for (const Place& p : *torn_) add(p.y, p.x);
 }
 
-std::vector<Place> Slab::torn(int layer) const {
+std::vector<Place> Slab::torn() const {
     std::vector<Place> found;
     for (int y = 1; y < ty_ - 1; ++y) {
-        const int32_t *row = spot(layer, y, 0), *below = row - tx_, *above = row + tx_;
+        const int32_t *row = spot(y, 0), *below = row - tx_, *above = row + tx_;
         auto torn = [&](int x) {
             bool beside = (row[x - 1] == kEmpty) | (row[x + 1] == kEmpty) | (below[x] == kEmpty) | (above[x] == kEmpty);
             return (row[x] == kFull) & beside;
@@ -29,84 +29,112 @@ std::vector<Place> Slab::torn(int layer) const {
         int32_t any = 0;
         for (int x = 1; x < tx_ - 1; ++x) any |= -int32_t(torn(x));
         for (int x = 1; any && x < tx_ - 1; ++x)
-            if (torn(x)) found.push_back({layer, y, x});
+            if (torn(x)) found.push_back({y, x, kFull});
     }
     return found;
 }
 
-void Slab::close(int layer) {
-    std::vector<int32_t> active(count() - first_), again;
-    std::iota(active.begin(), active.end(), first_);
-    std::vector<uint8_t> marked;  // tiles that are in `again`, from the layer's first on
+// Whether anything is to be done for a tile is hard to foretell: everywhere here lists are written without asking, and what
+// does not belong to them is written over.
+void Slab::close() {
+    std::vector<int32_t> active(count() - kTiles), again;
+    std::iota(active.begin(), active.end(), kTiles);
+    std::vector<uint8_t> marked;  // tiles that are in `again`, and the two that never are
+    std::vector<Ask> turned;
     while (!active.empty()) {
         asks_.clear(), again.clear();
         ask(active, again);
-        marked.assign(count() - first_, 0);
-        auto mark = [&](int32_t t) {
-            if (t < kTiles || marked[t - first_]) return;
-            marked[t - first_] = 1;
-            again.push_back(t);
-        };
-        for (int32_t t : again) marked[t - first_] = 1;
-        const Rim none{0, reach.data(), INFINITY};
-        evaluate(layer, asks_, none, [&](const Ask& ask, const Found& found) {
-            const int32_t t = ask.tile;
-            const uint64_t turned = (inside[t] ^ found.negative) & ask.samples;
-            known[t] |= ask.samples;
-            if (!turned) return;
-            inside[t] ^= turned;
-            const int32_t* here = spot(layer, place[t].y, place[t].x);
-            mark(t);
-            if (turned & kLastColumn) mark(here[1]);
-            if (turned & kFirstColumn) mark(here[-1]);
-            if (turned & kLastRow) mark(here[tx_]);
-            if (turned & kFirstRow) mark(here[-tx_]);
+        turned.resize(asks_.size());
+        size_t turns = 0;
+        evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) {
+            const uint64_t other = (inside[ask.tile] ^ found.negative) & ask.samples;
+            known[ask.tile] |= ask.samples, inside[ask.tile] ^= other;
+            turned[turns] = {ask.tile, other};
+            turns += other != 0;
         });
+        marked.assign(count(), 0);
+        marked[kFull] = marked[kEmpty] = 1;
+        for (int32_t t : again) marked[t] = 1;
+        size_t marks = again.size();
+        again.resize(marks + 5 * turns);
+        auto mark = [&](bool is, int32_t t) {
+            t = is ? t : kFull;
+            again[marks] = t, marks += !marked[t], marked[t] = 1;
+        };
+        for (size_t i = 0; i < turns; ++i) {
+            const auto [t, samples] = turned[i];
+            const int32_t* here = spot(place[t].y, place[t].x);
+            mark(true, t);
+            mark(samples & kLastColumn, here[1]), mark(samples & kFirstColumn, here[-1]);
+            mark(samples & kLastRow, here[tx_]), mark(samples & kFirstRow, here[-tx_]);
+        }
+        again.resize(marks);
         std::swap(active, again);
     }
 }
 
+// The samples of a tile that differ from those to their right, left, above and below; and the tiles there.
+struct Slab::Differing {
+    int32_t beside[4];
+    uint64_t words[4];
+
+    Differing(const Slab& slab, int32_t t) {
+        const int32_t* here = slab.spot(slab.place[t].y, slab.place[t].x);
+        const uint64_t *inside = slab.inside.data(), s = inside[t];
+        beside[0] = here[1], beside[1] = here[-1], beside[2] = here[slab.tx_], beside[3] = here[-slab.tx_];
+        words[0] = s ^ rights(s, inside[beside[0]]), words[1] = s ^ lefts(s, inside[beside[1]]);
+        words[2] = s ^ uppers(s, inside[beside[2]]), words[3] = s ^ lowers(s, inside[beside[3]]);
+    }
+    // Those that differ from what has no tile.
+    uint64_t open(int side) const {
+        constexpr uint64_t faces[] = {kLastColumn, kFirstColumn, kLastRow, kFirstRow};
+        return words[side] & faces[side] & -uint64_t(beside[side] < kTiles);
+    }
+};
+
 // One wave of the closure: the implied samples that differ from a neighbour. Tiles made on the way become active; tiles at
 // the rim that reach it are to be looked at again.
 void Slab::ask(std::vector<int32_t>& active, std::vector<int32_t>& again) {
-    constexpr uint64_t faces[] = {kLastColumn, kFirstColumn, kLastRow, kFirstRow};
-    constexpr int dy[] = {0, 0, 1, -1}, dx[] = {1, -1, 0, 0};
-    size_t asked = 0;
-    for (size_t a = 0; a < active.size(); ++a) {
-        const int32_t t = active[a];
-        const Place p = place[t];
-        const int32_t* here = spot(p.layer, p.y, p.x);
-        const int32_t beside[] = {here[1], here[-1], here[tx_], here[-tx_]};
-        const uint64_t s = inside[t], kept = known[t];
-        const uint64_t differing[] = {s ^ rights(s, inside[beside[0]]), s ^ lefts(s, inside[beside[1]]),
-                                      s ^ uppers(s, inside[beside[2]]), s ^ lowers(s, inside[beside[3]])};
-        // Whether a tile has any is hard to foretell: all are written, and those without written over.
-        if (asked == asks_.size()) asks_.resize(asked + active.size());
-        asks_[asked] = {t, (differing[0] | differing[1] | differing[2] | differing[3]) & ~kept};
-        asked += asks_[asked].samples != 0;
-        uint64_t open = 0;
-        for (int side = 0; side < 4; ++side) open |= beside[side] < kTiles ? differing[side] & faces[side] : 0;
-        for (int side = 0; open && side < 4; ++side) {
-            uint64_t face = differing[side] & faces[side];
-            if (!face || beside[side] >= kTiles) continue;
-            int y = p.y + dy[side], x = p.x + dx[side];
-            if (y > 0 && x > 0 && y < ty_ - 1 && x < tx_ - 1)
-                active.push_back(add(p.layer, y, x));
-            else if (face & kept)
-                throw std::domain_error("the solid reaches the border of the layers");
-            else
-                again.push_back(t);
+    std::vector<int32_t> open;
+    for (size_t begin = 0, end; begin < active.size(); begin = end) {
+        end = active.size();
+        size_t asked = asks_.size(), opened = 0;
+        asks_.resize(asked + end - begin), open.resize(end - begin);
+        for (size_t a = begin; a < end; ++a) {
+            const int32_t t = active[a];
+            const Differing d(*this, t);
+            asks_[asked] = {t, (d.words[0] | d.words[1] | d.words[2] | d.words[3]) & ~known[t]};
+            asked += asks_[asked].samples != 0;
+            open[opened] = t, opened += (d.open(0) | d.open(1) | d.open(2) | d.open(3)) != 0;
         }
+        asks_.resize(asked);
+        for (size_t i = 0; i < opened; ++i) enlarge(open[i], active, again);
     }
-    asks_.resize(asked);
+}
+
+// Makes the tiles beside one that samples in it ask for.
+void Slab::enlarge(int32_t t, std::vector<int32_t>& active, std::vector<int32_t>& again) {
+    constexpr int dy[] = {0, 0, 1, -1}, dx[] = {1, -1, 0, 0};
+    const Differing d(*this, t);
+    for (int side = 0; side < 4; ++side) {
+        const uint64_t face = d.open(side);
+        if (!face) continue;
+        const int y = place[t].y + dy[side], x = place[t].x + dx[side];
+        if (y > 0 && x > 0 && y < ty_ - 1 && x < tx_ - 1)
+            active.push_back(add(y, x));
+        else if (face & known[t])
+            throw std::domain_error("the solid reaches the border of the layers");
+        else
+            again.push_back(t);
+    }
 }
 
 // Tiles of which the contour cuts nothing but the last cell, at the corner.
 void Slab::corners() {
-    for (int32_t t = first_, n = int32_t(count()); t < n; ++t) {
+    for (int32_t t = kTiles, n = int32_t(count()); t < n; ++t) {
         Place p = place[t];
-        int32_t there = at(p.layer, p.y - 1, p.x - 1);
-        if (there < kTiles && (there == kFull) != bool(inside[t] & 1)) add(p.layer, p.y - 1, p.x - 1);
+        int32_t there = at(p.y - 1, p.x - 1);
+        if (there < kTiles && (there == kFull) != bool(inside[t] & 1)) add(p.y - 1, p.x - 1);
     }
 }
 

@@ -11,7 +11,7 @@ using Levels = std::array<uint8_t, 64>;
 
 class Coverage {
  public:
-    Coverage(const Slab& slab, int layer) : slab_(slab), scale_(slab.scale[layer]) {}
+    explicit Coverage(const Slab& slab) : slab_(slab), scale_(slab.scale) {}
 
     // Sets the levels of a tile. Returns the area inside in pixels, before it is rounded.
     double operator()(const Quad& tiles, const Corners& corners, Levels& levels) const;

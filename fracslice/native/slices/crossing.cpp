@@ -14,7 +14,7 @@ constexpr int32_t kOften = 8, kSeldom = 16, kEnough = 96;  // every so many tile
 // Crossed edges of the layer.
 std::vector<Slab::Edge> Slab::edges() const {
     std::vector<Edge> found;
-    for (int32_t t = first_; t < int32_t(count()); ++t)
+    for (int32_t t = kTiles; t < int32_t(count()); ++t)
         crossed(t, kAll, [&](int number, float first, float second) { found.push_back({t, number, first, second}); });
     return found;
 }
@@ -22,9 +22,9 @@ std::vector<Slab::Edge> Slab::edges() const {
 // Those of one tile in `step`.
 Slab::Middles Slab::middles(int32_t step) const {
     Middles found;
-    for (auto* list : {&found.x, &found.y, &found.quotients}) list->reserve(count() - first_);
+    for (auto* list : {&found.x, &found.y, &found.quotients}) list->reserve(count() - kTiles);
     const float half[2] = {float(frame_.dx / 2), float(frame_.dy / 2)};
-    for (int32_t t = first_; t < int32_t(count()); t += step) {
+    for (int32_t t = kTiles; t < int32_t(count()); t += step) {
         const float *x = &x_[kTile * (place[t].x - 1)], *y = &y_[kTile * (place[t].y - 1)];
         crossed(t, kAll, [&](int number, float first, float second) {
             const bool up = number >> 6;
@@ -37,12 +37,13 @@ Slab::Middles Slab::middles(int32_t step) const {
 
 // How many times smaller inside values are than outside ones: the factor with which as many crossings lie before the middle
 // of their edge as do in truth. An eighth of the edges is enough to know it, and a sixteenth of many.
-float Slab::inside_scale(int layer) {
-    const int32_t tiles = int32_t(count()) - first_;
-    Middles some = middles(std::clamp(tiles / kEnough, kOften, kSeldom));
-    if (some.x.size() < kFew) some = middles(1);
+float Slab::inside_scale() {
+    const int32_t tiles = int32_t(count()) - kTiles;
+    int32_t step = std::clamp(tiles / kEnough, kOften, kSeldom);
+    Middles some = middles(step);
+    while (some.x.size() < kFew && step > 1) some = middles(step /= 2);
     if (some.x.empty()) return 1;
-    const float height = float(z_[layer]);
+    const float height = float(z_[layer_]);
     ptrdiff_t before = 0;
     auto where = [&](size_t i, float& x, float& y, float& z) { x = some.x[i], y = some.y[i], z = height; };
     evaluate(some.x.size(), where, [&](size_t, float f) { before += f < 0; });

@@ -8,7 +8,8 @@ namespace fracslice {
 namespace {
 
 constexpr int kEnd = 256, kCodes = 286, kMostBits = 15;
-constexpr uint32_t kModulus = 65521;
+constexpr size_t kMany = 1 << 14;  // symbols: where there are more, `kTold` of each `kOf` say how often they come
+constexpr ptrdiff_t kTold = 256, kOf = 8 * kTold;
 
 // Symbols of `Runs` that are not bytes: so many bytes more, as a match of that length; that of two and three longest ones;
 // and none.
@@ -151,33 +152,8 @@ void put_head(Bits& out, const Sizes& sizes) {
 
 }  // namespace
 
-inline void Runs::Adler::run(uint64_t value, uint64_t length) {
-    const uint64_t all = value * length;
-    sum += all;
-    weighted += all * at + value * (length * (length - 1) / 2);
-    at += length;
-}
-
-// The first n of eight bytes: sums of words of four 16 bit numbers, by multiplication.
-inline void Runs::Adler::word(uint64_t bytes, uint64_t n) {
-    constexpr uint64_t low = 0x00FF00FF00FF00FF, ones = 0x0001000100010001, places = 0x0000000100020003;
-    bytes &= n < 8 ? ~(kAll << 8 * n) : kAll;
-    const uint64_t odd = bytes >> 8 & low, both = (bytes & low) + odd, all = both * ones >> 48;
-    sum += all;
-    weighted += at * all + 2 * (both * places >> 48) + (odd * ones >> 48);
-    at += n;
-}
-
-void Runs::Adler::reduce() { sum %= kModulus, weighted %= kModulus, at %= kModulus; }
-
-uint32_t Runs::Adler::value() {
-    reduce();
-    return uint32_t((at + at * sum + kModulus - weighted) % kModulus << 16 | (1 + sum) % kModulus);
-}
-
 // For so many symbols more.
 void Runs::reserve(size_t symbols) {
-    sum_.reduce();
     symbols += count_ + kAtOnce;
     if (symbols > symbols_.size()) symbols_.resize(2 * symbols);
 }
@@ -186,7 +162,6 @@ void Runs::close() {
     reserve(length_ / kLongest + 4);
     uint16_t* end = &symbols_[count_];
     count_ += size_t(put(value_, length_, end) - end);
-    sum_.run(value_, length_);
     length_ = 0;
 }
 
@@ -198,27 +173,20 @@ void Runs::add(const Span* spans, size_t count, const uint8_t* bytes) {
     for (size_t i = 0; i < count; ++i) room += spans[i].length / kLongest + 4 + spans[i].n;
     reserve(room);
     uint16_t* __restrict end = &symbols_[count_];
-    Adler sum = sum_;
     for (size_t i = 0; i < count; ++i) {
         const Span span = spans[i];
         const uint8_t* __restrict from = bytes + span.at;
-        if (i) {
-            end = put(span.value, span.length, end);
-            sum.run(span.value, span.length);
-        }
+        if (i) end = put(span.value, span.length, end);
         if (span.n <= kAtOnce) {
-            uint64_t word;
-            std::memcpy(&word, from, 8);
             widen(from, end);
             end += span.n;
-            sum.word(word, span.n);
         } else {
-            count_ = size_t(end - symbols_.data()), sum_ = sum;
+            count_ = size_t(end - symbols_.data());
             compare(from, span.n);
-            end = &symbols_[count_], sum = sum_;
+            end = &symbols_[count_];
         }
     }
-    count_ = size_t(end - symbols_.data()), sum_ = sum;
+    count_ = size_t(end - symbols_.data());
 }
 
 // Bytes among which there may be runs.
@@ -230,18 +198,21 @@ void Runs::compare(const uint8_t* bytes, uint32_t n) {
     close();
 }
 
-std::vector<uint8_t> Runs::zlib() {
+Rows<uint8_t> Runs::zlib(uint32_t checksum) {
     close();
     while (count_ % 4) symbols_[count_++] = kNothing;
     const uint16_t *symbols = symbols_.data(), *end = symbols + count_;
     // Two counts, for the same symbol may come twice in a row.
     uint32_t uses[2][kSymbols] = {};
-    for (const uint16_t* s = symbols; s != end; s += 2) ++uses[0][s[0]], ++uses[1][s[1]];
-    for (int s = 0; s < kSymbols; ++s) uses[0][s] += uses[1][s];
+    const ptrdiff_t step = count_ > kMany ? kOf : kTold;
+    for (const uint16_t* from = symbols; from < end; from += step)
+        for (const uint16_t *s = from, *to = from + std::min(kTold, end - from); s != to; s += 2) ++uses[0][s[0]], ++uses[1][s[1]];
 
-    Counts counts{};
+    Counts counts;
+    counts.fill(step > kTold);
     counts[kEnd] = 1;
-    std::copy_n(uses[0], 256, counts.begin());
+    for (int s = 0; s < kSymbols; ++s) uses[0][s] += uses[1][s];
+    for (int value = 0; value < 256; ++value) counts[value] += uses[0][value];
     for (int length = kShortest; length <= kLongest; ++length) counts[kLengths[length].symbol] += uses[0][kMatches + length];
     counts[kCodes - 1] += 2 * uses[0][kTwice] + 3 * uses[0][kThrice];
     const Sizes sizes = sizes_of(counts);
@@ -257,9 +228,7 @@ std::vector<uint8_t> Runs::zlib() {
     says[kTwice] = longest.then(longest), says[kThrice] = says[kTwice].then(longest);
     says[kNothing] = {0, 0};
 
-    uint64_t bits = 8 * 256;
-    for (int s = 0; s < kCodes; ++s) bits += uint64_t(counts[s]) * (sizes[s] + 6);
-    std::vector<uint8_t> data(bits / 8);
+    Rows<uint8_t> data(1024 + 8 * count_);
     Bits out(data.data());
     put_head(out, sizes);
     for (const uint16_t* s = symbols; s != end; s += 4) {
@@ -272,7 +241,7 @@ std::vector<uint8_t> Runs::zlib() {
     }
     out.put(codes[kEnd]);
     uint8_t* last = out.end();
-    for (int shift = 24; shift >= 0; shift -= 8) *last++ = uint8_t(sum_.value() >> shift);
+    for (int shift = 24; shift >= 0; shift -= 8) *last++ = uint8_t(checksum >> shift);
     data.resize(size_t(last - data.data()));
     return data;
 }

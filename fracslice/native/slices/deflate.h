@@ -32,19 +32,10 @@ class Runs {
     }
     // The first run may be more of the last one, the others differ from what is before them.
     void add(const Span* spans, size_t n, const uint8_t* bytes);
-    std::vector<uint8_t> zlib();
+    // checksum: of all bytes.
+    Rows<uint8_t> zlib(uint32_t checksum);
 
  private:
-    // With d_i the n bytes: 1 + sum d_i, and n + sum (n - i) d_i, modulo 65521 (RFC 1950).
-    struct Adler {
-        uint64_t at = 0, sum = 0, weighted = 0;  // modulo 65521, now and then
-
-        void run(uint64_t value, uint64_t length);
-        void word(uint64_t bytes, uint64_t n);
-        void reduce();
-        uint32_t value();
-    };
-
     void reserve(size_t symbols);
     void close();
     void compare(const uint8_t* bytes, uint32_t n);
@@ -52,7 +43,6 @@ class Runs {
     // Symbols: bytes; and how many times the byte before them comes again, two or three times the most among them.
     Rows<uint16_t> symbols_;
     size_t count_ = 0;
-    Adler sum_;
     uint64_t length_ = 0;
     uint8_t value_ = 0;
 };

@@ -37,10 +37,10 @@ void Slab::evaluate(size_t n, const Where& where, const Take& take) {
 
 // Of samples; keeps the values. take(ask, found) for each tile.
 template <class Take>
-void Slab::evaluate(int layer, const std::vector<Ask>& asks, const Rim& rim, const Take& take) {
+void Slab::evaluate(const std::vector<Ask>& asks, const Rim* rim, const Take& take) {
     Batch batch;
     std::array<Found, kBatch> found;
-    std::fill(batch.z, batch.z + kBatch, float(z_[layer]));
+    std::fill(batch.z, batch.z + kBatch, float(z_[layer_]));
     for (size_t begin = 0, end = 0; begin < asks.size(); begin = end) {
         size_t n = 0;
         for (; end < asks.size() && n + kTile * kTile <= kBatch; ++end) n += size_t(__builtin_popcountll(asks[end].samples));

@@ -16,8 +16,8 @@ class InRows {
         int32_t across, tile;
     };
 
-    InRows(const Slab& slab, int layer, const View& view, int down, int across) {
-        const auto [first, last] = slab.span[layer];
+    InRows(const Slab& slab, const View& view, int down, int across) {
+        const auto first = kTiles, last = int32_t(slab.count());
         spots_.resize(size_t(last - first));
         Rows<int32_t> by_column(spots_.size());
         auto row = [&](int32_t t) { return down - (view.transposed ? slab.place[t].x : slab.place[t].y); };

@@ -4,8 +4,7 @@
 #include <cstring>
 #include <utility>
 
-#include "coverage.h"
-#include "deflate.h"
+#include "band.h"
 #include "in_rows.h"
 #include "wide.h"
 
@@ -73,121 +72,33 @@ struct Axis {
     int count() const { return last - first; }
 };
 
-// Eight rows of a picture, from its column `first` to before `last`: of the tiles the first, those that are cut, and the one
-// after each of these. All else is as its left neighbour.
-class Band {
- public:
-    Band(int tiles, int first, int last)
-        : first_(first), last_(last), room_(tiles / 8 * 8 + 16), column_(room_), whole_(room_), cut_(kTile * room_),
-          levels_(kTile * stride() + Runs::kAtOnce), ends_(kTile * room_ + 2) {}
-
-    void clear() { n_ = 0; }
-    // The tile as the next one, if it is on the picture.
-    void put(int tile, uint64_t whole, uint64_t cut, const Levels& levels) {
-        const int column = kTile * tile;
-        if (column <= first_ - kTile || column >= last_) return;
-        if (column < first_) cut &= kAll / 255 * (0xFF & 0xFF << (first_ - column));
-        if (column > last_ - kTile) cut &= kAll / 255 * (0xFF >> (column + kTile - last_));
-        uint8_t *rows = &cut_[n_], *to = &levels_[kTile * n_];
-        for (int row = 0; row < kTile; ++row) {
-            rows[row * room_] = uint8_t(cut >> kTile * row);
-            std::memcpy(to + row * stride(), &levels[kTile * row], kTile);
-        }
-        column_[n_] = column, whole_[n_++] = whole;
-    }
-    // One that is not cut.
-    void put(int tile, bool inside) {
-        if (kTile * tile <= first_ - kTile || kTile * tile >= last_) return;
-        for (int row = 0; row < kTile; ++row) cut_[n_ + row * room_] = 0;
-        column_[n_] = kTile * tile, whole_[n_++] = inside ? kAll : 0;
-    }
-    void close() {
-        column_[n_] = last_;
-        for (int row = 0; row < kTile; ++row) std::memset(&cut_[row * room_ + n_], 0, kTile);
-    }
-
-    // Some of the rows, each after `before` zeros and before `after` ones.
-    void write(int row, int end, uint32_t before, uint32_t after, Runs& runs) {
-        spans_.resize(size_t(end - row) * (ends_.size() / 2 + 2));
-        Span* span = spans_.data();
-        uint8_t value = 0;
-        uint32_t length = 0;  // of the run of this value, so far
-        auto is = [&](uint8_t next) {
-            if (value != next) *span++ = {value, length, 0, 0}, value = next, length = 0;
-        };
-        const int* column = column_.data();
-        const uint64_t* whole = whole_.data();
-        for (; row < end; ++row) {
-            auto filled = [&](int at) { return uint8_t(-(whole[at >> 3] >> (kTile * row + (at & 7)) & 1)); };
-            is(0);
-            length += before;
-            is(filled(first_ & 7));
-            int begin = first_ - int(length);
-            const int* ends = ends_.data();
-            for (const int* stop = turns(row); ends != stop; ends += 2) {
-                const int from = ends[0], to = ends[1];
-                const int at = column[from >> 3] + (from & 7);
-                *span++ = {value, uint32_t(at - begin), uint32_t(row * stride() + from), uint32_t(to - from)};
-                begin = column[to >> 3] + (to & 7), value = filled(to);
-            }
-            length = uint32_t(last_ - begin);
-            is(0);
-            length += after;
-        }
-        runs.add(spans_.data(), size_t(span - spans_.data()), levels_.data());
-        runs.add(0, length);
-    }
-
- private:
-    // From row to row of the levels.
-    int stride() const { return kTile * room_; }
-    // Where in a row pixels begin to be cut, and where they end to be, by turns; returns the end.
-    const int* turns(int row) {
-        const uint8_t* cut = &cut_[row * room_];
-        int* end = ends_.data();
-        uint64_t before = 0;
-        for (int i = 0; i <= n_; i += 8) {
-            uint64_t word;
-            std::memcpy(&word, cut + i, 8);
-            each(word ^ (word << 1 | before), [&](int bit) { *end++ = kTile * i + bit; });
-            before = word >> 63;
-        }
-        return end;
-    }
-
-    int first_, last_, room_, n_ = 0;
-    std::vector<int> column_;
-    std::vector<uint64_t> whole_;
-    std::vector<uint8_t> cut_, levels_;
-    std::vector<int> ends_;
-    Rows<Span> spans_;
-};
-
 constexpr int kAhead = 3;  // tiles
 
 // A layer on its way to a picture.
 class Shown {
  public:
-    Shown(const Slab& slab, int layer, const View& view)
-        : slab_(slab), layer_(layer), view_(view), turn_(view),
+    Shown(const Slab& slab, const View& view)
+        : slab_(slab), view_(view), turn_(view),
           down_(side(view.transposed), view.shape[view.transposed], view.at[view.transposed], view.rows, true),
           across_(side(!view.transposed), view.shape[!view.transposed], view.at[!view.transposed], view.columns, view.backwards),
-          band_(across_.tiles, across_.first, across_.last), coverage_(slab, layer),
-          rows_(slab, layer, view, down_.tiles, across_.tiles) {}
+          band_(across_.tiles, across_.first, across_.last), coverage_(slab),
+          rows_(slab, view, down_.tiles, across_.tiles) {}
 
     Picture picture() {
         const uint64_t row = uint64_t(view_.columns) + 1;
+        int64_t at = int64_t(row) * down_.at + 1 + across_.at;  // place of a row's first pixel among all bytes
         runs_.add(0, row * down_.at);
         for (int tile = down_.first / kTile; tile * kTile < down_.last; ++tile) {
             int from = std::max(down_.first - tile * kTile, 0), to = std::min(down_.last - tile * kTile, kTile);
-            if (!read(tile)) {
+            band_.clear(from, to, at, row);
+            at += int64_t(row) * (to - from);
+            if (read(tile))
+                band_.write(uint32_t(across_.at) + 1, uint32_t(view_.columns - across_.at - across_.count()), runs_);
+            else
                 runs_.add(0, row * (to - from));
-                continue;
-            }
-            band_.write(from, to, uint32_t(across_.at) + 1, uint32_t(view_.columns - across_.at - across_.count()), runs_);
         }
         runs_.add(0, row * (view_.rows - down_.at - down_.count()));
-        return {runs_.zlib(), painted_};
+        return {runs_.zlib(band_.checksum(row * uint64_t(view_.rows))), painted_};
     }
 
  private:
@@ -199,9 +110,8 @@ class Shown {
         const auto [begin, end] = rows_[tile];
         if (begin == end) return false;
         const int n = across_.tiles, along = down_.tiles - tile, beside = view_.backwards ? n : 1;
-        const int32_t* first = view_.transposed ? slab_.spot(layer_, beside, along) : slab_.spot(layer_, along, beside);
+        const int32_t* first = view_.transposed ? slab_.spot(beside, along) : slab_.spot(along, beside);
         const ptrdiff_t step = (view_.transposed ? slab_.columns() : 1) * (view_.backwards ? -1 : 1);
-        band_.clear();
         // All between two tiles is as the one after the first is; the same is before the first tile and after the last.
         int next = across_.first / kTile;  // tile that the band may lack
         auto put = [&](int i) {
@@ -243,7 +153,6 @@ class Shown {
     }
 
     const Slab& slab_;
-    int layer_;
     const View& view_;
     Turn turn_;
     Axis down_, across_;
@@ -257,10 +166,12 @@ class Shown {
 
 }  // namespace
 
-Picture picture(const Slab& slab, int layer, const View& view) { return Shown(slab, layer, view).picture(); }
+Picture picture(const Slab& slab, const View& view) { return Shown(slab, view).picture(); }
 
-std::vector<uint8_t> deflated(const Canvas& image) {
+Rows<uint8_t> deflated(const Canvas& image) {
     Runs runs;
+    Adler sum;
+    const int64_t stride = image.columns + 1;
     for (int y = 0; y < image.rows; ++y) {
         runs.add(0, 1);
         const uint8_t* row = image.data + y * image.down;
@@ -268,9 +179,10 @@ std::vector<uint8_t> deflated(const Canvas& image) {
             const uint8_t value = row[x * image.across];
             while (++x < image.columns && row[x * image.across] == value) {}
             runs.add(value, uint64_t(x - begin));
+            sum.add(value, y * stride + 1 + begin, 1, uint64_t(x - begin), 0);
         }
     }
-    return runs.zlib();
+    return runs.zlib(sum.value(uint64_t(stride) * uint64_t(image.rows)));
 }
 
 }  // namespace fracslice

@@ -19,11 +19,11 @@ struct View {
 };
 
 struct Picture {
-    std::vector<uint8_t> data;
+    Rows<uint8_t> data;
     Painted painted;
 };
 
-Picture picture(const Slab& slab, int layer, const View& view);
-std::vector<uint8_t> deflated(const Canvas& image);
+Picture picture(const Slab& slab, const View& view);
+Rows<uint8_t> deflated(const Canvas& image);
 
 }  // namespace fracslice

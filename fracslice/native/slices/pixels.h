@@ -10,7 +10,7 @@ struct Quad {
 
     Quad(const int32_t* spot, ptrdiff_t columns)
         : own(spot[0]), right(spot[1]), upper(spot[columns]), beyond(spot[columns + 1]) {}
-    Quad(const Slab& slab, const Place& p) : Quad(slab.spot(p.layer, p.y, p.x), slab.columns()) {}
+    Quad(const Slab& slab, const Place& p) : Quad(slab.spot(p.y, p.x), slab.columns()) {}
 };
 
 // The signs of the corners 0 to 3 of each cell of a tile; a cell has the bit of its corner 0.

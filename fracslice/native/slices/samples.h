@@ -1,5 +1,6 @@
 // Samples of tiles as a list, and what was found there back in the tiles.
 #pragma once
+#include <array>
 #include <cstddef>
 
 #include "tiles.h"
@@ -12,16 +13,17 @@ struct Ask {
     uint64_t samples;
 };
 
-// Those whose values are negative, and those whose values are beyond a rim.
+// Those whose values are negative, and those whose values are beyond rims.
 struct Found {
-    uint64_t negative, beyond;
+    uint64_t negative;
+    std::array<uint64_t, 2> beyond;
 };
 
 // What squared values are compared with: `least`, once they are scaled by a factor for inside, or of their tile for outside.
 struct Rim {
     float inside;
     const float* outside;
-    float least;
+    std::array<float, 2> least;
 };
 
 constexpr size_t kSlack = 64;  // numbers that `gather` may write and `scatter` may read behind the last one
@@ -29,7 +31,7 @@ constexpr size_t kSlack = 64;  // numbers that `gather` may write and `scatter` 
 // Where samples lie: x by columns and y by rows of the lattice, in the order of tiles and bits.
 void gather(const Ask* asks, size_t n, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y);
 
-// The values `f` of the same samples, into the tiles.
-void scatter(const Ask* asks, size_t n, const float* f, const Rim& rim, Tiles& tiles, Found* found);
+// The values `f` of the same samples, into the tiles. rim: null if none is beyond.
+void scatter(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& tiles, Found* found);
 
 }  // namespace fracslice

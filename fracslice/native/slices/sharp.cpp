@@ -1,7 +1,6 @@
 // Where the outlines of a layer are, exactly: crossings settled on the field, and corners and bends within pixels.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "evaluate.h"
 #include "squares.h"
@@ -10,6 +9,7 @@ namespace fracslice {
 namespace {
 
 constexpr float kPrecise = 2e-3f;  // pixels that a last step may take a crossing
+constexpr double kTight = 1e-3;   // pixels within which a crossing is known
 constexpr int kRounds = 16;
 constexpr double kShort = 0.1;  // pixels: a shorter side tells no direction
 constexpr double kSine = 0.17;  // of the angle between two sides, at least: 10 degrees
@@ -37,12 +37,12 @@ struct Outline {
     std::vector<Vector> places;
     std::vector<int32_t> before;
 
-    Outline(const Slab& slab, int layer) : edges(crossings(slab, layer).edges), before(edges.size()) {
+    explicit Outline(const Slab& slab) : edges(crossings(slab).edges), before(edges.size()) {
         for (size_t i = 0; i < edges.size(); ++i) {
             const Crossing& e = edges[i];
-            const Place p{layer, e.row / kTile + 1, e.column / kTile + 1};
+            const int y = e.row / kTile + 1, x = e.column / kTile + 1;
             int number = 64 * e.up + kTile * (e.row % kTile) + e.column % kTile;
-            double share = slab.cross[slab.at(p.layer, p.y, p.x)][number] / kWhole;
+            double share = slab.cross[slab.at(y, x)][number] / kWhole;
             places.push_back({e.column + (e.up ? 0 : share), e.row + (e.up ? share : 0)});
             before[e.following] = int32_t(i);
         }
@@ -51,7 +51,7 @@ struct Outline {
     Place pixel(int32_t i) const {
         const Crossing &a = edges[i], &b = edges[edges[i].following];
         // Halfway between the middles of both edges, times four.
-        return {0, (2 * (a.row + b.row) + a.up + b.up) / 4, (2 * (a.column + b.column) + 2 - a.up - b.up) / 4};
+        return {(2 * (a.row + b.row) + a.up + b.up) / 4, (2 * (a.column + b.column) + 2 - a.up - b.up) / 4, kEmpty};
     }
     // The sides before crossing i and after the next one.
     std::array<Vector, 2> sides(int32_t i) const {
@@ -107,7 +107,7 @@ struct Turn {
 // Crossings on the zero set: false position with the Illinois rule (Dowell and Jarratt 1971), all edges at once. Straight
 // lines between the values at both ends would miss it by up to half a pixel where other faces are nearer, as just below a
 // horizontal one.
-void Slab::settle(int layer, const std::vector<Edge>& edges) {
+void Slab::settle(const std::vector<Edge>& edges) {
     cross.resize(count());
     struct Root {
         float low, high, below, above, share;
@@ -122,8 +122,17 @@ void Slab::settle(int layer, const std::vector<Edge>& edges) {
     };
     std::vector<Root> roots;
     for (const Edge& e : edges) roots.push_back({0, 1, e.first, e.second, e.first / (e.first - e.second), 0});
-    std::vector<int32_t> todo(edges.size());
-    std::iota(todo.begin(), todo.end(), 0);
+    std::vector<int32_t> todo;
+    for (size_t i = 0; i < edges.size(); ++i) {
+        const Edge& e = edges[i];
+        // No crossing is nearer to an end than its value over the bound; nothing is left to be found where both leave no room.
+        const double reach = bounds_.proven * (e.number >> 6 ? frame_.dy : frame_.dx);
+        const double low = std::fabs(e.first) / reach, high = 1 - std::fabs(e.second) / reach;
+        if (high - low > kTight)
+            todo.push_back(int32_t(i));
+        else
+            roots[i].share = float((low + high) / 2);
+    }
     std::vector<Spot> spots;
     for (int round = 0; round < kRounds && !todo.empty(); ++round) {
         spots.clear();
@@ -134,7 +143,7 @@ void Slab::settle(int layer, const std::vector<Edge>& edges) {
             spots.push_back({kTile * (place[e.tile].x - 1) + (e.number & 7) + (up ? 0 : share),
                              kTile * (place[e.tile].y - 1) + (e.number >> 3 & 7) + (up ? share : 0)});
         }
-        std::vector<float> f = values_at(layer, spots);
+        std::vector<float> f = values_at(spots);
         size_t left = 0;
         for (size_t n = 0; n < todo.size(); ++n) {
             Root& root = roots[todo[n]];
@@ -150,8 +159,8 @@ void Slab::settle(int layer, const std::vector<Edge>& edges) {
 
 // Corners within pixels: where the sides before and after meet, if the field changes its sign there. In the pixel that both
 // crossings belong to, or in one beside it. Other sides are arcs.
-void Slab::sharpen(int layer) {
-    const Outline outline(*this, layer);
+void Slab::sharpen() {
+    const Outline outline(*this);
     std::vector<Turn> turns;
     std::vector<Spot> spots;
     for (int32_t i = 0; i < int32_t(outline.edges.size()); ++i) {
@@ -160,29 +169,29 @@ void Slab::sharpen(int layer) {
         if (turn.corner == 0) continue;
         for (const Vector& spot : {turn.tip + turn.away, turn.tip - turn.away}) spots.push_back({spot.x, spot.y});
     }
-    const std::vector<float> f = values_at(layer, spots);
+    const std::vector<float> f = values_at(spots);
     tips.resize(count());
     size_t n = 0;
     for (const Turn& turn : turns) {
-        const Place own = outline.pixel(turn.edge), beside{0, int(std::floor(turn.tip.y)), int(std::floor(turn.tip.x))};
+        const Place own = outline.pixel(turn.edge), beside{int(std::floor(turn.tip.y)), int(std::floor(turn.tip.x)), kEmpty};
         const bool maybe = turn.corner != 0, is_corner = maybe && (f[n] < 0) != (f[n + 1] < 0);
         if (maybe) n += 2;
         if (!is_corner) {
-            if (std::fabs(turn.arc) >= kLeast) put_tip(layer, own.y, own.x, float(turn.arc));
+            if (std::fabs(turn.arc) >= kLeast) put_tip(own.y, own.x, float(turn.arc));
             continue;
         }
         const Vector a = outline.places[turn.edge], b = outline.places[outline.edges[turn.edge].following];
         const double beyond = own.x == beside.x && own.y == beside.y ? 0 : share_beyond(a, b, turn.tip, own, beside);
-        put_tip(layer, own.y, own.x, float(turn.corner * (1 - beyond)));
-        if (beyond > 0) put_tip(layer, beside.y, beside.x, float(turn.corner * beyond));
+        put_tip(own.y, own.x, float(turn.corner * (1 - beyond)));
+        if (beyond > 0) put_tip(beside.y, beside.x, float(turn.corner * beyond));
     }
 }
 
-void Slab::put_tip(int layer, int row, int column, float area) {
+void Slab::put_tip(int row, int column, float area) {
     if (row < 0 || column < 0 || row >= kTile * (ty_ - 2) || column >= kTile * (tx_ - 2)) return;
     const int y = row / kTile + 1, x = column / kTile + 1, bit = kTile * (row % kTile) + column % kTile;
-    int32_t t = at(layer, y, x);
-    if (t < kTiles) t = add(layer, y, x), cross.resize(count()), tips.resize(count());
+    int32_t t = at(y, x);
+    if (t < kTiles) t = add(y, x), cross.resize(count()), tips.resize(count());
     const uint64_t cell = uint64_t(1) << bit;
     tips[t][bit] = (sharp[t] & cell ? tips[t][bit] : 0) + area;
     sharp[t] |= cell;

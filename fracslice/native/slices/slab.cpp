@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "evaluate.h"
 
@@ -11,13 +12,15 @@ namespace {
 constexpr int kCoarsest = 8;        // tiles along a block of the first level
 constexpr int32_t kChunk = 256;     // tiles that stay in a near cache
 constexpr double kSteep = 0.7;
-constexpr double kAside = 1.25;      // how much farther a likely bound must reach into layers aside
-constexpr double kThick = 2.2;       // pixels from the middle of a group to its last layer, at most
-constexpr double kSurely = 0.99999;  // squared distances are rounded
-constexpr int kMiddle = kTile * kTile / 2 + kTile / 2;
+// Of a group of layers and of a pair: how much farther a likely bound must reach into them, and how many pixels it is from
+// their middle to the last one, at most.
+constexpr double kAside = 1.4, kThick = 2.2, kBeside = 1.2, kThin = 0.8;
+constexpr double kMiddle = (kTile + 1) / 2.0;  // from the next tile's first sample back to a tile's middle
+constexpr double kSurely = 0.99999;            // squared distances are rounded
 
-// The middles of the blocks of 4 and of 2 samples of a tile; every other sample.
-constexpr uint64_t kFours = 0x0044000000440000, kTwos = 0xAA00AA00AA00AA00, kEven = 0xAA55AA55AA55AA55;
+// One sample of each block of 2; every other sample; the four blocks of 4.
+constexpr uint64_t kTwos = 0xAA00AA00AA00AA00, kEven = 0xAA55AA55AA55AA55;
+constexpr uint64_t kQuarters[] = {block(4), block(4) << 4, block(4) << 32, block(4) << 36};
 
 // Places that are full: few, so that a call of `memset` would take longer.
 __attribute__((optimize("no-tree-loop-distribute-patterns"))) void fill(int32_t* place, int n) {
@@ -31,7 +34,7 @@ double length(double x, double y) { return std::sqrt(x * x + y * y); }
 float factor(double bound, const Frame& frame) { return float(kSurely / square(bound * std::min(frame.dx, frame.dy))); }
 
 // Neighbouring layers of at most so little height, in halves of halves.
-void group(const std::vector<double>& z, int first, int last, double thick, std::vector<std::pair<int, int>>& groups) {
+void group(const std::vector<double>& z, int first, int last, double thick, std::vector<std::array<int, 2>>& groups) {
     int half = (first + last) / 2;
     if (first == last || ((z[last] - z[first]) / 2 <= thick && last - first < int(z.size()) / 2)) {
         groups.push_back({first, last});
@@ -61,6 +64,9 @@ class Likely {
     float across_, along_, least_, most_;
 };
 
+// What values of some samples reach.
+uint64_t around(const Found& found, uint64_t of) { return squares(found.beyond[0] & of) | crosses(found.beyond[1] & of); }
+
 }  // namespace
 
 Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const Bounds& bounds, const Frame& frame,
@@ -70,48 +76,48 @@ Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, c
       bounds_(bounds),
       frame_(frame),
       z_(std::move(z)),
-      discs_(frame.dx, frame.dy),
-      farthest_((frame.dx * frame.dx + frame.dy * frame.dy) / 4 / square(std::min(frame.dx, frame.dy))),
+      diagonal_((square(frame.dx) + square(frame.dy)) / square(std::min(frame.dx, frame.dy))),
       ty_((ny + kTile - 1) / kTile + 2),
       tx_((nx + kTile - 1) / kTile + 2) {
-    static_cast<Tiles&>(*this) = memory_->take(z_.size() * ty_ * tx_);
-    span.resize(z_.size());
-    scale.resize(z_.size());
+    static_cast<Tiles&>(*this) = memory_->take(size_t(ty_) * tx_);
     group(z_, 0, layers() - 1, kThick * std::min(frame.dx, frame.dy), groups_);
+    group(z_, 0, layers() - 1, kThin * std::min(frame.dx, frame.dy), pairs_);
+    if (!bounds_.even) discs_.emplace(frame.dx, frame.dy, 0), centres_.emplace(frame.dx, frame.dy, 0.5);
     for (int i = 0; i < kTile * (tx_ - 2); ++i) x_.push_back(float(frame.x0 + frame.dx * i));
     for (int i = 0; i < kTile * (ty_ - 2); ++i) y_.push_back(float(frame.y0 + frame.dy * i));
 }
 
 void Slab::sample(int layer) {
+    if (layer < 0 || layer >= layers()) throw std::out_of_range("a slab has no such layer");
+    drop(tx_), layer_ = layer;
     if (group_ < 0) blocks_ = coarse();
-    auto [first, last] = *std::find_if(groups_.begin(), groups_.end(), [&](const auto& g) { return layer <= g.second; });
-    if (first != group_) columns_ = columns(first, last), torn_.reset(), group_ = first;
-    first_ = int32_t(count());
-    begin(layer, z_[layer] - (z_[first] + z_[last]) / 2);
-    for (int32_t t = first_, end = int32_t(count()); t < end; t += kChunk) {
-        Chunk chunk{layer, t, std::min(t + kChunk, end)};
-        probe(chunk, 4, kFours);
+    auto of = [&](const auto& groups) { return *std::find_if(groups.begin(), groups.end(), [&](auto& g) { return layer <= g[1]; }); };
+    const auto group = of(groups_), pair = of(pairs_);
+    if (group[0] != group_) columns_ = columns(group[0], group[1]), torn_.reset(), group_ = group[0], pair_ = -1;
+    const double middle = (z_[pair[0]] + z_[pair[1]]) / 2;
+    if (pair[0] != pair_) quarter(middle), pair_ = pair[0];
+    begin(z_[layer] - middle);
+    for (int32_t t = kTiles, end = int32_t(count()); t < end; t += kChunk) {
+        Chunk chunk{t, std::min(t + kChunk, end)};
         probe(chunk, 2, kTwos);
         if (!bounds_.even) probe(chunk, 1, kEven);
         probe(chunk, 1, kAll);
     }
-    mend(layer);
-    close(layer);
+    mend();
+    close();
     corners();
-    span[layer] = {first_, int32_t(count())};
     if (bounds_.even) {
-        scale[layer] = inside_scale(layer);
+        scale = inside_scale();
     } else {
-        settle(layer, edges());
-        sharpen(layer);
-        span[layer][1] = int32_t(count());
+        settle(edges());
+        sharpen();
     }
 }
 
-std::vector<float> Slab::values_at(int layer, const std::vector<Spot>& spots) {
+std::vector<float> Slab::values_at(const std::vector<Spot>& spots) {
     std::vector<float> found(spots.size());
     auto where = [&](size_t i, float& x, float& y, float& z) {
-        x = float(frame_.x0 + frame_.dx * spots[i].column), y = float(frame_.y0 + frame_.dy * spots[i].row), z = float(z_[layer]);
+        x = float(frame_.x0 + frame_.dx * spots[i].column), y = float(frame_.y0 + frame_.dy * spots[i].row), z = float(z_[layer_]);
     };
     evaluate(spots.size(), where, [&](size_t i, float f) { found[i] = f; });
     return found;
@@ -122,7 +128,7 @@ std::vector<float> Slab::values_at(int layer, const std::vector<Spot>& spots) {
 std::vector<Slab::Block> Slab::coarse() {
     std::vector<Block> blocks, cut;
     for (int y = 1; y < ty_ - 1; y += kCoarsest)
-        for (int x = 1; x < tx_ - 1; x += kCoarsest) blocks.push_back({y, x, kCoarsest, 0, layers() - 1});
+        for (int x = 1; x < tx_ - 1; x += kCoarsest) blocks.push_back({y, x, kCoarsest});
     double width = length(frame_.dx, frame_.dy) * kTile / 2, height = (z_.back() - z_[0]) / 2;
     for (int size = kCoarsest; size > 1; size /= 2) {
         cut.clear();
@@ -138,7 +144,7 @@ std::vector<Slab::Block> Slab::coarse() {
             }
             for (int q = 0; q < 4; ++q) {
                 int y = b.y + (q >> 1) * size / 2, x = b.x + (q & 1) * size / 2;
-                if (y < ty_ - 1 && x < tx_ - 1) cut.push_back({y, x, size / 2, b.first, b.last});
+                if (y < ty_ - 1 && x < tx_ - 1) cut.push_back({y, x, size / 2});
             }
         });
         std::swap(blocks, cut);
@@ -148,76 +154,98 @@ std::vector<Slab::Block> Slab::coarse() {
 
 void Slab::fill(const Block& block) {
     const int last = std::min(block.y + block.size, ty_ - 1), n = std::min(block.size, tx_ - 1 - block.x);
-    for (int k = block.first; k <= block.last; ++k)
-        for (int y = block.y; y < last; ++y) fracslice::fill(&where[(size_t(k) * ty_ + y) * tx_ + block.x], n);
+    for (int y = block.y; y < last; ++y) fracslice::fill(&where[size_t(y) * tx_ + block.x], n);
 }
 
 // The places whose middle, halfway between two layers, leaves open what is around it in them and between.
 std::vector<Slab::Column> Slab::columns(int first, int last) {
     double height = (z_[last] - z_[first]) / 2;
     const double margin = bounds_.even ? kAside : 1;
-    double reach = margin * length(length(frame_.dx, frame_.dy) * kTile / 2, height);
+    double reach = margin * length(length(frame_.dx, frame_.dy) * (kTile - 1) / 2, height);
     middles_.resize(size_t(ty_) * tx_, NAN);
     auto middle = [&](const Block& b) { return &middles_[size_t(b.y) * tx_ + b.x]; };
     const float between = float(z_[first] + height);
     auto where = [&](size_t i, float& x, float& y, float& z) {
-        x = x_[kTile * (blocks_[i].x - 1) + kTile / 2], y = y_[kTile * (blocks_[i].y - 1) + kTile / 2], z = between;
+        x = float(frame_.x0 + frame_.dx * (kTile * blocks_[i].x - kMiddle));
+        y = float(frame_.y0 + frame_.dy * (kTile * blocks_[i].y - kMiddle)), z = between;
     };
     evaluate(blocks_.size(), where, [&](size_t i, float f) { *middle(blocks_[i]) = f; });
     const Likely likely(bounds_, frame_, tx_);
     std::vector<Column> open;
     for (const Block& b : blocks_) {
         const float* f = middle(b);
-        if (*f < 0 && -*f > bounds_.inside * reach) {
-            for (int k = first; k <= last; ++k) this->where[(size_t(k) * ty_ + b.y) * tx_ + b.x] = kFull;
-            continue;
-        }
+        const bool full = *f < 0 && -*f > bounds_.inside * reach;
+        this->where[size_t(b.y) * tx_ + b.x] = full ? kFull : kEmpty;
+        if (full) continue;
         const float outside = bounds_.even ? likely(f) : float(bounds_.outside);
-        if (*f <= double(outside) * reach) open.push_back({b.y, b.x, *f, factor(outside, frame_)});
+        if (*f <= double(outside) * reach) open.push_back({b.y, b.x, *f, factor(outside, frame_), {}});
     }
     for (const Block& b : blocks_) *middle(b) = NAN;
     return open;
 }
 
-// The tiles of a layer that is `height` above the middles of columns.
-void Slab::begin(int layer, double height) {
-    float inside_reach = factor(bounds_.inside, frame_), aside = float(square(height)) * factor(1, frame_);
-    grow(columns_.size());
-    for (size_t i = 0; i < columns_.size(); ++i) {
-        const Column& c = columns_[i];
-        const size_t t = first_ + i;
-        place[t] = {layer, c.y, c.x};
-        where[(size_t(layer) * ty_ + c.y) * tx_ + c.x] = int32_t(t);
-        reach[t] = c.reach;
-        inside[t] = c.value < 0 ? kAll : 0;
-        float d2 = c.value * c.value * (c.value < 0 ? inside_reach : reach[t]) - aside;
-        if (d2 > 0 && !bounds_.even) decided[t] = discs_(d2, kMiddle);
-        if (height == 0) {
-            known[t] = uint64_t(1) << kMiddle, decided[t] |= known[t];
-            values[t][kMiddle] = c.value;
-        }
-    }
+// The values in the middles of the columns' quarters, at a height.
+void Slab::quarter(double height) {
+    auto where = [&](size_t i, float& x, float& y, float& z) {
+        const Column& c = columns_[i / 4];
+        const size_t right = 4 * (i & 1) + 1, above = 2 * (i & 2) + 1;
+        x = x_[kTile * (c.x - 1) + right] + float(frame_.dx / 2), y = y_[kTile * (c.y - 1) + above] + float(frame_.dy / 2);
+        z = float(height);
+    };
+    evaluate(4 * columns_.size(), where, [&](size_t i, float f) { columns_[i / 4].quarters[i & 3] = f; });
 }
 
-// Evaluates those of the samples `among` that are not decided, each in the middle of a block of `size`, and decides what is
-// within their reach; in an even field all of the block or nothing.
+// The tiles of the layer that is `height` above the middles of quarters; none where all of these say that it is empty, unless
+// one beside it is said to be full.
+void Slab::begin(double height) {
+    const float aside = float(square(height)) * factor(1, frame_), least = aside + float(2.25 * diagonal_ * square(bounds_.even ? kBeside : 1));
+    // What is farther than `rims` decides its quarter.
+    const float rims[] = {bounds_.stop_outside < 4 ? least : -1, bounds_.stop_inside < 4 ? least : -1};
+    const float inside_reach = factor(bounds_.inside, frame_);
+    size_t t = kTiles;
+    grow(columns_.size());
+    for (const Column& c : columns_) {
+        uint64_t now = c.value < 0 ? kAll : 0, reached = 0;
+        for (int q = 0; q < 4; ++q) {
+            const float v = c.quarters[q], d2 = v * v * (v < 0 ? inside_reach : c.reach);
+            uint64_t near = kQuarters[q] & -uint64_t(d2 > rims[v < 0]);
+            if (!bounds_.even && d2 > aside) near |= (*centres_)(d2 - aside, 9 + 4 * (q & 1) + 16 * (q & 2));
+            now = (now & ~near) | (near & -uint64_t(v < 0));
+            reached |= near;
+        }
+        int32_t* here = &where[size_t(c.y) * tx_ + c.x];
+        const bool empty = reached == kAll && now == 0;
+        if (empty && here[1] != kFull && here[-1] != kFull && here[tx_] != kFull && here[-tx_] != kFull) continue;
+        place[t] = {c.y, c.x, kEmpty};
+        reach[t] = c.reach, inside[t] = now, decided[t] = reached;
+        *here = int32_t(t++);
+    }
+    cut(t);
+}
+
+// Evaluates those of the samples `among` that are not decided, each in a block of `size`, and decides what is within their
+// reach; in an even field of those beside them, unless they disagree.
 void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
     asks_.clear();
     for (int32_t t = chunk.first; t < chunk.last; ++t)
         if (uint64_t samples = among & ~decided[t]) asks_.push_back({t, samples});
-    const Rim rim{factor(bounds_.inside, frame_), reach.data(), float(size * size * farthest_)};
+    const float side = float(square(std::max(frame_.dx, frame_.dy) / std::min(frame_.dx, frame_.dy)));
+    const Rim rim{factor(bounds_.inside, frame_), reach.data(), {float(diagonal_), side}};
     const int back = size / 2 * (kTile + 1);
     const uint64_t own = uint64_t(1) << back, least_in = size <= bounds_.stop_inside ? block(size) : own,
                    least_out = size <= bounds_.stop_outside ? block(size) : own;
-    evaluate(chunk.layer, asks_, rim, [&](const Ask& ask, const Found& found) {
+    evaluate(asks_, bounds_.even && size > 1 ? &rim : nullptr, [&](const Ask& ask, const Found& found) {
         uint64_t reached = 0, within = 0;
         if (bounds_.even) {
-            reached = (found.beyond >> back) * block(size), within = ((found.beyond & found.negative) >> back) * block(size);
+            if (size > 1) {
+                within = around(found, found.negative);
+                reached = (within ^ around(found, ~found.negative)) & ~decided[ask.tile];
+            }
         } else {
             const float *kept = values[ask.tile].data(), outside = reach[ask.tile];
             each(ask.samples, [&](int bit) {
                 const float v = kept[bit], d2 = v * v * (v < 0 ? rim.inside : outside);
-                uint64_t near = discs_(d2, bit) | (v < 0 ? least_in : least_out) << (bit - back);
+                uint64_t near = (*discs_)(d2, bit) | (v < 0 ? least_in : least_out) << (bit - back);
                 within = v < 0 ? within | near : within & ~near;
                 reached |= near;
             });

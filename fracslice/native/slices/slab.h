@@ -1,4 +1,4 @@
-// The samples around the contours of a few neighbouring layers, from the field.
+// The samples around the contours of a few neighbouring layers, one after the other, from the field.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -44,10 +44,10 @@ struct Spot {
     double column, row;
 };
 
-// The samples of layers, tile by tile.
+// The samples of a layer, tile by tile; neighbouring layers share what is found out first.
 //
-// Top down, blocks of 64, 32 and 16 pixels over all layers and of 8 over groups of some, then samples: in the middles of
-// blocks of 4 and of 2, and single ones. A value decides all samples within its reach. Then closure: where two neighbours
+// Top down, blocks of 64, 32 and 16 pixels over all layers, of 8 over groups of some and of 4 over pairs, then samples: one
+// of each block of 2, and the others. A value decides all samples within its reach. Then closure: where two neighbours
 // differ in sign and one of them is only implied, it is evaluated, until no such pair is left. So every edge that the contour
 // crosses has two evaluated ends.
 class Slab : public Tiles {
@@ -58,23 +58,24 @@ class Slab : public Tiles {
     Slab(const Slab&) = delete;
     ~Slab() { memory_->give(std::move(*this)); }
 
-    // Finds the tiles of a layer, once; they do not depend on which others were sampled before. Throws std::domain_error where
-    // the solid reaches the rim of the lattice.
+    // Finds the tiles of a layer and lets go of those of the one before; they do not depend on which others were sampled.
+    // Throws std::domain_error where the solid reaches the rim of the lattice.
     void sample(int layer);
+    int layer() const { return layer_; }  // the one whose tiles there are; -1 of none
 
     int layers() const { return int(z_.size()); }
     int rows() const { return ty_; }  // of places, their rim included
     int columns() const { return tx_; }
     // The tile at a place; the rim is empty. Those to its right and above are 1 and `columns` further.
-    const int32_t* spot(int layer, int y, int x) const { return &where[(size_t(layer) * ty_ + y) * tx_ + x]; }
-    int32_t at(int layer, int y, int x) const { return *spot(layer, y, x); }
+    const int32_t* spot(int y, int x) const { return &where[size_t(y) * tx_ + x]; }
+    int32_t at(int y, int x) const { return *spot(y, x); }
     // The inside word at a place, implied where there is no tile.
-    uint64_t word(int layer, int y, int x) const { return inside[at(layer, y, x)]; }
+    uint64_t word(int y, int x) const { return inside[at(y, x)]; }
 
     // visit(number, first, second) for each crossed edge from the samples `of` a tile, with the values at its ends.
     template <class Visit>
     void crossed(int32_t tile, uint64_t of, const Visit& visit) const {
-        const int32_t* here = spot(place[tile].layer, place[tile].y, place[tile].x);
+        const int32_t* here = spot(place[tile].y, place[tile].x);
         const float *own = values[tile].data(), *right = values[here[1]].data(), *upper = values[here[tx_]].data();
         uint64_t s = inside[tile], across = (s ^ rights(s, inside[here[1]])) & of, up = (s ^ uppers(s, inside[here[tx_]])) & of;
         each(across & ~kLastColumn, [&](int bit) { visit(bit, own[bit], own[bit + 1]); });
@@ -83,10 +84,8 @@ class Slab : public Tiles {
         each(up & kLastRow, [&](int bit) { visit(64 + bit, own[bit], upper[bit - 56]); });
     }
 
-    // The tiles of each layer, from the first of a pair to before the second.
-    std::vector<std::array<int32_t, 2>> span;
-    // How many times smaller inside values are than outside ones in each layer; 0 where `cross` says where edges are crossed.
-    std::vector<float> scale;
+    // How many times smaller inside values are than outside ones; 0 where `cross` says where edges are crossed.
+    float scale = 0;
     // The inside area of a cell with the corner or bend that it has.
     float sharpened(int32_t tile, int bit, float area) const {
         return sharp[tile] >> bit & 1 ? std::clamp(area + tips[tile][bit], 0.f, 1.f) : area;
@@ -95,20 +94,21 @@ class Slab : public Tiles {
 
  private:
     struct Block {
-        int y, x, size, first, last;
+        int y, x, size;
     };
-    // A place whose tiles are open from layer to layer: the value in its middle, and how far outside values around it reach.
+    // A place whose tiles are open from layer to layer: the value in its middle, and how far outside values around it reach;
+    // and the values in the middles of its quarters.
     struct Column {
         int y, x;
         float value, reach;
+        std::array<float, 4> quarters;
     };
     // The middles of crossed edges, and how many times the values outside are those inside.
     struct Middles {
         std::vector<float> x, y, quotients;
     };
-    // Tiles of a layer.
+    // Tiles.
     struct Chunk {
-        int layer;
         int32_t first, last;
     };
     // A crossed edge: of which sample, to its right or (64 more) upwards, and the values at its ends.
@@ -120,46 +120,48 @@ class Slab : public Tiles {
     template <class Where, class Take>
     void evaluate(size_t n, const Where& where, const Take& take);
     template <class Take>
-    void evaluate(int layer, const std::vector<Ask>& asks, const Rim& rim, const Take& take);
-    std::vector<float> values_at(int layer, const std::vector<Spot>& spots);
+    void evaluate(const std::vector<Ask>& asks, const Rim* rim, const Take& take);
+    std::vector<float> values_at(const std::vector<Spot>& spots);
 
     std::vector<Block> coarse();
     void fill(const Block& block);
     std::vector<Column> columns(int first, int last);
-    void begin(int layer, double height);
+    void quarter(double z);
+    void begin(double height);
     void probe(const Chunk& chunk, int size, uint64_t among);
     void set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t within);
 
-    int32_t add(int layer, int y, int x);
-    void mend(int layer);
-    std::vector<Place> torn(int layer) const;
-    void close(int layer);
+    int32_t add(int y, int x);
+    void mend();
+    std::vector<Place> torn() const;
+    void close();
+    struct Differing;
     void ask(std::vector<int32_t>& active, std::vector<int32_t>& again);
+    void enlarge(int32_t t, std::vector<int32_t>& active, std::vector<int32_t>& again);
     void corners();
 
     std::vector<Edge> edges() const;
     Middles middles(int32_t step) const;
-    float inside_scale(int layer);
-    void settle(int layer, const std::vector<Edge>& edges);
-    void sharpen(int layer);
-    void put_tip(int layer, int row, int column, float area);
+    float inside_scale();
+    void settle(const std::vector<Edge>& edges);
+    void sharpen();
+    void put_tip(int row, int column, float area);
 
     std::shared_ptr<Memory> memory_;
     std::shared_ptr<const Field> field_;
     Bounds bounds_;
     Frame frame_;
     std::vector<double> z_;
-    std::vector<std::pair<int, int>> groups_;  // first and last of layers that share blocks of 8 pixels
+    std::vector<std::array<int, 2>> groups_, pairs_;  // first and last of layers that share blocks of 8 pixels, or of 4
     std::vector<float> x_, y_;               // of lattice points
-    Discs discs_;
-    double farthest_;  // from the middle of a block to its farthest sample, squared, as `reach` has it, if its size is one
+    std::optional<Discs> discs_, centres_;  // in fields that are not even
+    double diagonal_;  // of a pixel, squared, in lesser steps
     std::vector<Block> blocks_;  // of 16 pixels, that are not decided
-    std::vector<Column> columns_;  // of the group whose first layer is `group_`
+    std::vector<Column> columns_;  // of the group
     std::optional<std::vector<Place>> torn_;  // of that group, once they are known
-    int group_ = -1;
+    int group_ = -1, pair_ = -1, layer_ = -1;  // their first layers; the layer
     std::vector<float> middles_;   // values in the middles of places, NaN between uses
     std::vector<Ask> asks_;  // for use within a step
-    int32_t first_ = kTiles;  // tile of the layer that is sampled
     int ty_, tx_;
 };
 

@@ -38,18 +38,18 @@ void link(const Sides& sides, int signs, const int32_t* e, std::vector<Crossing>
 
 }  // namespace
 
-Painted paint(const Slab& slab, int k, const Canvas& canvas) {
+Painted paint(const Slab& slab, const Canvas& canvas) {
     Painted painted{0, 0};
-    const Coverage coverage(slab, k);
+    const Coverage coverage(slab);
     Levels levels;
     for (int y = 1; y < slab.rows() - 1; ++y) {
         int y0 = kTile * (y - 1), full = 0;  // tiles before this one that are full
         if (y0 >= canvas.rows) break;
         for (int x = 1; x < slab.columns(); ++x) {
-            int32_t t = slab.at(k, y, x);
+            int32_t t = slab.at(y, x);
             int x0 = kTile * (x - 1);
             bool empty = t == kEmpty || x0 >= canvas.columns;
-            const Quad tiles(slab, {k, y, empty ? 0 : x});
+            const Quad tiles(slab, {y, empty ? 0 : x, kEmpty});
             const Corners corners(slab, tiles);
             uint64_t sharp = slab.sharp[t];
             if (!empty && corners.whole() == kAll && !sharp) {
@@ -74,17 +74,17 @@ Painted paint(const Slab& slab, int k, const Canvas& canvas) {
     return painted;
 }
 
-Crossings crossings(const Slab& slab, int k) {
+Crossings crossings(const Slab& slab) {
     Crossings found;
-    auto [first, end] = slab.span[k];
+    const int32_t first = kTiles, end = int32_t(slab.count());
     std::unique_ptr<int32_t[]> ids(new int32_t[size_t(end - first) * 128]);
-    auto id = [&, first = first](int32_t t, int number) -> int32_t& { return ids[128 * size_t(t - first) + number]; };
+    auto id = [&](int32_t t, int number) -> int32_t& { return ids[128 * size_t(t - first) + number]; };
     for (int y = 1; y < slab.rows() - 1; ++y)
         for (int x = 1; x < slab.columns() - 1; ++x) {
-            int32_t t = slab.at(k, y, x);
+            int32_t t = slab.at(y, x);
             if (t < kTiles) continue;
             uint64_t of = slab.inside[t];
-            uint64_t words[2] = {of ^ rights(of, slab.word(k, y, x + 1)), of ^ uppers(of, slab.word(k, y + 1, x))};
+            uint64_t words[2] = {of ^ rights(of, slab.word(y, x + 1)), of ^ uppers(of, slab.word(y + 1, x))};
             for (uint64_t w = words[0] | words[1]; w; w &= w - 1)
                 slab.crossed(t, w & -w, [&, t = t](int number, float a, float b) {
                     id(t, number) = int32_t(found.edges.size());
@@ -95,15 +95,15 @@ Crossings crossings(const Slab& slab, int k) {
         }
     for (int y = 1; y < slab.rows() - 1; ++y)
         for (int x = 1; x < slab.columns() - 1; ++x) {
-            int32_t t = slab.at(k, y, x);
+            int32_t t = slab.at(y, x);
             if (t < kTiles) continue;
-            const Quad tiles(slab, {k, y, x});
+            const Quad tiles(slab, {y, x, kEmpty});
             const Corners corners(slab, tiles);
-            const Cells cells(slab, slab.scale[k], tiles);
+            const Cells cells(slab, slab.scale, tiles);
             for (uint64_t mixed = corners.mixed(); mixed; mixed &= mixed - 1) {
                 int bit = lowest(mixed);
-                int32_t right = (bit & 7) == 7 ? std::max(slab.at(k, y, x + 1), first) : t;
-                int32_t upper = bit >> 3 == 7 ? std::max(slab.at(k, y + 1, x), first) : t;
+                int32_t right = (bit & 7) == 7 ? std::max(slab.at(y, x + 1), first) : t;
+                int32_t upper = bit >> 3 == 7 ? std::max(slab.at(y + 1, x), first) : t;
                 const int32_t e[4] = {id(t, bit), id(right, 64 + (bit & 56) + ((bit + 1) & 7)), id(upper, (bit + 8) & 63),
                                       id(t, 64 + bit)};
                 link(cells.sides(bit), corners.signs(bit), e, found.edges);

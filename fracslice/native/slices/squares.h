@@ -20,7 +20,7 @@ struct Painted {
 };
 
 // Writes how much of each pixel of a layer is inside, 255 wholly; pixels wholly outside are left as they are.
-Painted paint(const Slab& slab, int layer, const Canvas& canvas);
+Painted paint(const Slab& slab, const Canvas& canvas);
 
 // A crossed edge of the lattice.
 struct Crossing {
@@ -33,6 +33,6 @@ struct Crossings {
     std::vector<double> ends;  // [n, 2], the values at both ends
 };
 
-Crossings crossings(const Slab& slab, int layer);
+Crossings crossings(const Slab& slab);
 
 }  // namespace fracslice

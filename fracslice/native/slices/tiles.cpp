@@ -23,11 +23,20 @@ void Tiles::grow(size_t n) {
 
 void Tiles::clear(size_t places) {
     where.assign(places, kEmpty);
-    place.clear(), inside.clear(), known.clear(), decided.clear(), sharp.clear(), reach.clear(), values.clear(), cross.clear();
-    tips.clear();
-    push({0, 0, 0}, kAll);
-    push({0, 0, 0}, 0);
+    cut(0);
+    push({0, 0, kFull}, kAll);
+    push({0, 0, kEmpty}, 0);
     values[kFull].fill(0), values[kEmpty].fill(0);
+}
+
+void Tiles::cut(size_t n) {
+    place.resize(n), inside.resize(n), known.resize(n), decided.resize(n), sharp.resize(n), reach.resize(n), values.resize(n);
+    cross.clear(), tips.clear();
+}
+
+void Tiles::drop(int columns) {
+    for (size_t t = kTiles; t < count(); ++t) where[size_t(place[t].y) * columns + place[t].x] = place[t].otherwise;
+    cut(kTiles);
 }
 
 Tiles Memory::take(size_t places) {
@@ -48,17 +57,17 @@ void Memory::give(Tiles&& tiles) {
     free_.push_back(std::move(tiles));
 }
 
-Discs::Discs(double dx, double dy) {
+Discs::Discs(double dx, double dy, double aside) {
     double unit = std::min(dx, dy);
     for (int d2 = 0; d2 <= kMost; ++d2)
         for (int bit = 0; bit < 64; ++bit) {
             uint64_t word = 0;
             for (int row = 0; row < kTile; ++row) {
-                double down = (row - (bit >> 3)) * dy / unit, left = d2 - down * down;
+                double down = (row - (bit >> 3) - aside) * dy / unit, left = d2 - down * down;
                 if (left < 0) continue;
-                int column = bit & 7, wide = int(std::sqrt(left) * unit / dx);
-                int from = std::max(column - wide, 0), to = std::min(column + wide, kTile - 1);
-                word |= ((uint64_t(2) << to) - (uint64_t(1) << from)) << kTile * row;
+                double column = (bit & 7) + aside, wide = std::sqrt(left) * unit / dx;
+                int from = std::max(int(std::ceil(column - wide)), 0), to = std::min(int(std::floor(column + wide)), kTile - 1);
+                if (from <= to) word |= ((uint64_t(2) << to) - (uint64_t(1) << from)) << kTile * row;
             }
             discs_[d2][bit] = word;
         }

@@ -32,14 +32,15 @@ struct Uninitialised : std::allocator<T> {
 template <class T>
 using Rows = std::vector<T, Uninitialised<T>>;
 
+// Where a tile is, and which of the two that stand for all others would be there without it.
 struct Place {
-    int32_t layer, y, x;
+    int32_t y, x, otherwise;
 };
 
 // Tiles of 8 x 8 samples: words of 64 bits and 64 values; bit 8 * row + column belongs to the sample at
 // (8 (x - 1) + column, 8 (y - 1) + row). The sign of a sample that is not known is implied by one near it.
 struct Tiles {
-    std::vector<int32_t> where;  // the tile at each place, layer by layer, row by row
+    std::vector<int32_t> where;  // the tile at each place, row by row
     std::vector<Place> place;
     std::vector<uint64_t> inside, known;
     std::vector<uint64_t> decided;  // implied by a value that reaches there, or known
@@ -56,6 +57,8 @@ struct Tiles {
     void push(const Place& at, uint64_t signs);
     void grow(size_t n);  // by so many tiles with no place yet, nothing known of them
     void clear(size_t places);  // all of them empty
+    void drop(int columns);     // all tiles but the two that stand for others; columns: of places
+    void cut(size_t n);         // to the first n
 };
 
 // Memory of tiles that are gone, for those to come: laying new pages would take as long as sampling. For many threads.
@@ -69,10 +72,11 @@ class Memory {
     std::vector<Tiles> free_;
 };
 
-// The samples of a tile within a distance of one of them, by its square in units of the lesser step.
+// The samples of a tile within a distance of a place in it, by its square in units of the lesser step.
 class Discs {
  public:
-    Discs(double dx, double dy);
+    // aside: how far middles are to the right and above, in steps.
+    Discs(double dx, double dy, double aside);
     // d2: not negative.
     uint64_t operator()(float d2, int bit) const { return discs_[d2 < kMost ? int(d2) : kMost][bit]; }
 
