@@ -61,7 +61,8 @@ inline std::function<void(const double*, double*, size_t)> polish_loop(nb::objec
 // Machine code must outlive what is made of it.
 inline RootLoops root_loops(size_t lanes, size_t batch, nb::object guess, nb::object find, nb::object polish,
                             std::pair<size_t, size_t> steps, double sure) {
-    return {lanes, batch, find_loop<float>(guess), find_loop<double>(find), polish_loop(polish), steps.first, steps.second, sure};
+    return {lanes,        batch,       find_loop<float>(guess), find_loop<double>(find), polish_loop(polish),
+            steps.first, steps.second, sure};
 }
 
 }  // namespace fracslice

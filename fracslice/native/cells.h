@@ -51,25 +51,6 @@ struct CellEdge {
     std::array<int32_t, 3> lower;  // its lower grid point
 };
 
-// Crossings along one axis at one x of a brick, or of its neighbour `beyond`, dx + 2 dy + 4 dz.
-struct NearWord {
-    int beyond, axis;
-    Slab bits, all;  // those that the brick's cells have, and all that are numbered there
-    size_t place;    // of the first bit in Numbers
-    uint32_t first;  // vertex
-
-    // Calls visit(place in Numbers, vertex) for those that the cells have, in order.
-    template <class Visit>
-    void for_each(const Visit& visit) const {
-        uint32_t next = first;
-        for (Slab left = bits; left; left &= left - 1) {
-            int bit = __builtin_ctzll(left);
-            uint32_t vertex = bits == all ? next++ : first + uint32_t(popcount(all & ((Slab(1) << bit) - 1)));
-            visit(place + size_t(bit / 8 * kReach + bit % 8), vertex);
-        }
-    }
-};
-
 // A bit for each cell between two slabs of corners whose corners are not all alike.
 inline Slab mixed(const Corners& a, const Corners& b) {
     Slab any = a[0] | a[1] | a[2] | a[3] | b[0] | b[1] | b[2] | b[3];
@@ -185,10 +166,10 @@ class CellGrid {
     // Number of the brick at a place, -1 if the surface passes no cell of it.
     int64_t find(const Place& place) const;
 
-    // Calls visit(word) for the crossings that a brick's cells have: its own, in order, then those on its neighbours' near
-    // sides.
+    // Calls visit(place in Numbers, vertex) for a brick's own crossings, in order, then for those on its neighbours' near
+    // sides that its cells have.
     template <class Visit>
-    void for_each_near_word(const Octant& near, const Visit& visit) const {
+    void for_each_near(const Octant& near, const Visit& visit) const {
         for (int k = 0; k < 8; ++k) {
             if (near.rows[k] < 0) continue;
             const Crossings& owner = crossings_[size_t(near.rows[k])];
@@ -196,19 +177,18 @@ class CellGrid {
             for (int axis = 0; axis < 3; ++axis) {
                 if (k >> axis & 1) continue;
                 for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) {
-                    Slab all = owner.bits[axis][x];
-                    if (!(all & seen)) continue;
                     size_t place = number_at(axis, x + (k & 1) * 8, (k & 2) * 4, (k & 4) * 2);
-                    visit(NearWord{k, axis, all & seen, all, place, uint32_t(owner.base) + owner.rank[axis][x]});
+                    uint32_t first = uint32_t(owner.base) + owner.rank[axis][x], next = first;
+                    Slab all = owner.bits[axis][x], bits = all & seen;
+                    bool whole = bits == all;
+                    for (; bits; bits &= bits - 1) {
+                        int bit = __builtin_ctzll(bits);
+                        uint32_t vertex = whole ? next++ : first + uint32_t(popcount(all & ((Slab(1) << bit) - 1)));
+                        visit(place + size_t(bit / 8 * kReach + bit % 8), vertex);
+                    }
                 }
             }
         }
-    }
-
-    // Calls visit(place in Numbers, vertex) for the same, one by one.
-    template <class Visit>
-    void for_each_near(const Octant& near, const Visit& visit) const {
-        for_each_near_word(near, [&](const NearWord& word) { word.for_each(visit); });
     }
 
     // The grid edges of the crossings `begin` to `end` - 1, as six rows of `stride` numbers: where each starts, and from there

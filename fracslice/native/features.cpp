@@ -69,13 +69,32 @@ Slab straight_cells(const Features& own, const Around& around, int x, const Feat
 }  // namespace
 
 FeatureGrid::FeatureGrid(const CellGrid& cells, Layers layers)
-    : cells_(cells), near_(cells.span({layers.first - 1, layers.last + 1})), features_(near_.size()) {}
+    : cells_(cells), near_(cells.span({layers.first - 1, layers.last + 2})), features_(near_.size()),
+      along_(near_.size()), looked_(layers.first - 1) {}
+
+void FeatureGrid::look(int layer, const Hermite& data) {
+    Span span = cells_.span({layer, layer + 1});
+    tbb::parallel_for(span.row, span.row + span.rows, [&](size_t i) {
+        auto ranges = cells_.ranges(i);
+        bool along = true;
+        for (int axis = 0; axis < 3; ++axis) along = along && data.along(axis, ranges[axis], ranges[axis + 1]);
+        along_[near_.place_of(i)] = along;
+    });
+}
+
+bool FeatureGrid::all_along(size_t i) const {
+    for (int32_t row : cells_.octant(i).rows) {
+        if (row >= 0 && !along_[near_.place_of(size_t(row))]) return false;
+    }
+    return true;
+}
 
 void FeatureGrid::find(int layer, const Hermite& data) {
     Stores& stores = stores_[size_t(layer + 3) % 3];
     for (FeatureStore& store : stores) store.forget();
+    for (; looked_ <= layer + 1; ++looked_) look(looked_, data);
     for_each_brick(cells_.span({layer, layer + 1}),
-                   [&](size_t i) { find_features(cells_, data, i, of(i), stores.local()); });
+                   [&](size_t i) { find_features(cells_, data, i, all_along(i), of(i), stores.local()); });
 }
 
 void FeatureGrid::choose(int layer) {

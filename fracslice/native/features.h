@@ -118,9 +118,17 @@ class FeatureGrid {
   private:
     using Stores = tbb::enumerable_thread_specific<FeatureStore>;
 
+    // Notes in which bricks of a layer all normals are along their edges.
+    void look(int layer, const Hermite& data);
+
+    // Whether they are for all crossings that brick i's cells have.
+    bool all_along(size_t i) const;
+
     const CellGrid& cells_;
     Span near_;
     std::vector<Features> features_;
+    std::vector<uint8_t> along_;
+    int looked_;  // the next layer to look at
     std::array<Stores, 3> stores_;
 };
 

@@ -11,20 +11,12 @@ struct Seen {
     std::array<uint32_t, std::tuple_size<Numbers>::value> vertices;
     std::array<double, std::tuple_size<Numbers>::value> roots;
     uint32_t count = 0;
-    bool along = true;  // all normals are along their edges
 
     Seen(const CellGrid& cells, const Hermite& data, size_t i) : near(cells, i) {
-        if (i < cells.sampled()) {
-            auto ranges = cells.ranges(i);
-            for (int axis = 0; axis < 3; ++axis) along = along && data.along(axis, ranges[axis], ranges[axis + 1]);
-        }
-        cells.for_each_near_word(near.octant, [&](const NearWord& word) {
-            if (word.beyond) along = along && data.along(word.axis, word.first, word.first + size_t(popcount(word.all)));
-            word.for_each([&](size_t place, uint32_t vertex) {
-                near.numbers[place] = count;
-                vertices[count] = vertex;
-                roots[count++] = data.root(vertex);
-            });
+        cells.for_each_near(near.octant, [&](size_t place, uint32_t vertex) {
+            near.numbers[place] = count;
+            vertices[count] = vertex;
+            roots[count++] = data.root(vertex);
         });
     }
 };
@@ -202,10 +194,10 @@ bool find_across(const Seen& seen, Features& own) {
 
 }  // namespace
 
-void find_features(const CellGrid& cells, const Hermite& data, size_t i, Features& own, FeatureStore& store) {
+void find_features(const CellGrid& cells, const Hermite& data, size_t i, bool along, Features& own, FeatureStore& store) {
     Seen seen(cells, data, i);
     store.open(own);
-    if (!seen.along || !find_across(seen, own)) {
+    if (!along || !find_across(seen, own)) {
         own = {};
         store.open(own);
         Finder(seen, data).find(own);

@@ -4,7 +4,7 @@
 
 namespace fracslice {
 
-// Finds brick i's. data: the crossings that its cells have.
-void find_features(const CellGrid& cells, const Hermite& data, size_t i, Features& own, FeatureStore& store);
+// Finds brick i's. data: the crossings that its cells have. along: whether their normals are all along their edges.
+void find_features(const CellGrid& cells, const Hermite& data, size_t i, bool along, Features& own, FeatureStore& store);
 
 }  // namespace fracslice
