@@ -25,9 +25,11 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
     start = resumable_folder(folder, said, "{:05d}.png".format, png.is_whole)
 
     def write(layer: Layer) -> None:
+        data = png.encode_layer(run.screen, layer)
         # Not renamed into place, nor forced to the disk one by one: a remainder is read before it is used.
         try:
-            (folder / f"{layer.index:05d}.png").write_bytes(png.encode_layer(run.screen, layer))
+            with open(f"{folder}/{layer.index:05d}.png", "wb") as file:
+                file.write(data)
         except OSError as error:
             raise ExportError(f"{folder}: {reason(error)}") from error
 

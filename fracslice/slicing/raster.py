@@ -64,13 +64,14 @@ class Screen:
         Written from the layer's tiles as runs of equal pixels, without laying out the picture, unless there
         is compensation.
         """
-        if self.compensation:
-            return deflated(self.picture(layer))
+        return deflated(self.picture(layer)) if self.compensation else layer.deflated(self._view)
+
+    @cached_property
+    def _view(self) -> View:
         mine = self._place
         at = [on.start - of.start for on, of in zip(mine.on_bed, mine.of_layer, strict=True)]
-        levels = self._levels.tobytes()
         backwards = self._mirrored != self._portrait
-        return layer.deflated(View(self.shape, self._portrait, backwards, (at[0], at[1]), levels))
+        return View(self.shape, self._portrait, backwards, (at[0], at[1]), self._levels.tobytes())
 
     @cached_property
     def _levels(self) -> np.ndarray:

@@ -98,6 +98,7 @@ def test_deflated_pictures_are_the_pictures(
     for size in (6.1, 9.9):
         screen = Screen(stack_of(root, size), machine, **options)
         rows, columns = screen.shape
+
         def made(layer: Layer, screen: Screen = screen) -> tuple[bytes, np.ndarray]:
             return screen.deflated(layer), screen.picture(layer)
 
