@@ -155,9 +155,12 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     if not how.whole:
         from .printing import printable
 
+        if not planned.root.facts.weak:
+            # Its bodies are chosen in the field: of walls thinner than a voxel a mesh has crumbs only.
+            how = replace(how, keep="all")
         with clock("changing"):
             size_of = partial(_mesh_box, what=what, how=how, size=what.size(scene), work=work)
-            planned, scale = printable(planned, what.size(scene), how, work, size_of)
+            planned, scale = printable(planned, what.size(scene), what.how(scene), work, size_of)
     with clock("sampling"):
         bricks = sample_scene(planned, work)
     with clock("meshing"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, mandelbulb, shell, sphere, transform, union
 from fracslice.kernel import compile_scene
 from fracslice.printing import printable
@@ -12,7 +13,7 @@ from fracslice.printing.altered import Altered
 from fracslice.printing.apart import resolved
 from fracslice.printing.make import COARSE
 from fracslice.printing.parts import Parts, parts_of
-from fracslice.scene import Print
+from fracslice.scene import Print, scene
 from fracslice.volume import Lattice, Plan, plan, sample
 from fracslice.work import Work
 
@@ -99,3 +100,15 @@ def test_what_is_thick_is_not_looked_at_again() -> None:
             compile_scene(planned.root), planned.root.facts, Lattice.around(planned.outer, planned.voxel)
         )
         assert resolved(planned.root, bricks, 1e-3, loose, Work()) is bricks
+
+
+def test_a_thin_shell_is_kept_and_thickened_in_a_mesh() -> None:
+    """Whose voxels are five times as large as its wall. The size is the shell's before it is thickened, as far
+    as these tell.
+    """
+    thin = scene(union(shell(sphere(), thickness=0.01), BALL), size="20mm")
+    how = Print(keep="largest", thickness=1.5)
+    result = make_mesh(thin, MeshJob(resolution=48, printing=how))
+    assert result.report.problems == ()
+    assert result.report.mesh.components == 1
+    assert result.mesh.size == pytest.approx([21.4] * 3, abs=0.4)
