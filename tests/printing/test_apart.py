@@ -103,8 +103,8 @@ def test_what_is_thick_is_not_looked_at_again() -> None:
 
 
 def test_a_thin_shell_is_kept_and_thickened_in_a_mesh() -> None:
-    """Whose voxels are five times as large as its wall. The size is the shell's before it is thickened, as far
-    as these tell.
+    """Whose voxels are five times as large as its wall. The size is the shell's before it is thickened, as
+    far as these tell.
     """
     thin = scene(union(shell(sphere(), thickness=0.01), BALL), size="20mm")
     how = Print(keep="largest", thickness=1.5)
