@@ -43,8 +43,8 @@ def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
 
 class RootLoops:
     """The loops of `fracslice.volume.root_loops` that find crossings: FIND in float32 and in float64, and
-    POLISH. lanes: segments come in multiples of it. steps: that all segments are given, and those that then are left. sure: a root is exact where it
-    moved less. batch: how many segments are worth a call."""
+    POLISH. lanes: segments come in multiples of it. batch: how many segments are worth a call. steps: that
+    all segments are given, and those that then are left. sure: a root is exact where it moved less."""
 
     def __init__(
         self,
