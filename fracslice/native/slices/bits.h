@@ -38,13 +38,6 @@ inline uint64_t transposed(uint64_t w) {
     return w;
 }
 
-// The samples of a word and those beside them, at their sides, or at their corners as well.
-inline uint64_t crosses(uint64_t w) { return w | (w << 1 & ~kFirstColumn) | (w >> 1 & ~kLastColumn) | w << 8 | w >> 8; }
-inline uint64_t squares(uint64_t w) {
-    w |= (w << 1 & ~kFirstColumn) | (w >> 1 & ~kLastColumn);
-    return w | w << 8 | w >> 8;
-}
-
 // The samples of a block of size x size, the first of a tile.
 constexpr uint64_t block(int size) {
     uint64_t line = (uint64_t(1) << size) - 1, word = 0;

@@ -30,7 +30,7 @@ void scatter_each(const Ask* asks, size_t n, const float* f, const Rim* rim, Til
             kept[bit] = v;
             if (!rim) return;
             const float scaled = v * v * (v < 0 ? rim->inside : rim->outside[asks[i].tile]);
-            for (int r = 0; r < 2; ++r) found[i].beyond[r] |= uint64_t(scaled > rim->least[r]) << bit;
+            found[i].beyond |= uint64_t(scaled > rim->least) << bit;
         });
     }
 }
@@ -65,8 +65,7 @@ FRACSLICE_WIDE inline int64_t before(uint64_t word, int q) { return _mm_popcnt_u
 
 template <bool kBeyond>
 FRACSLICE_WIDE void scatter_wide(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
-    const __m512 inside = _mm512_set1_ps(kBeyond ? rim->inside : 0), far = _mm512_set1_ps(kBeyond ? rim->least[0] : 0);
-    const __m512 near = _mm512_set1_ps(kBeyond ? rim->least[1] : 0);
+    const __m512 inside = _mm512_set1_ps(kBeyond ? rim->inside : 0), least = _mm512_set1_ps(kBeyond ? rim->least : 0);
     for (size_t i = 0; i < n; ++i) {
         const uint64_t samples = asks[i].samples;
         const int64_t count = _mm_popcnt_u64(samples);
@@ -77,18 +76,16 @@ FRACSLICE_WIDE void scatter_wide(const Ask* asks, size_t n, const float* f, cons
             _mm512_mask_storeu_ps(kept + 16 * q, chosen, _mm512_maskz_expand_ps(chosen, v));
         }
         const __m512 outside = _mm512_set1_ps(kBeyond ? rim->outside[asks[i].tile] : 0);
-        uint64_t negative = 0, beyond[2] = {};
+        uint64_t negative = 0, beyond = 0;
         for (int64_t at = 0; at < count; at += 16) {
             const __m512 v = _mm512_loadu_ps(f + at);
             const __mmask16 below = _mm512_cmp_ps_mask(v, _mm512_setzero_ps(), _CMP_LT_OQ);
             negative |= uint64_t(below) << at;
             if (!kBeyond) continue;
             const __m512 scaled = _mm512_mul_ps(_mm512_mul_ps(v, v), _mm512_mask_blend_ps(below, outside, inside));
-            beyond[0] |= uint64_t(_mm512_cmp_ps_mask(scaled, far, _CMP_GT_OQ)) << at;
-            beyond[1] |= uint64_t(_mm512_cmp_ps_mask(scaled, near, _CMP_GT_OQ)) << at;
+            beyond |= uint64_t(_mm512_cmp_ps_mask(scaled, least, _CMP_GT_OQ)) << at;
         }
-        found[i].negative = _pdep_u64(negative, samples);
-        if (kBeyond) found[i].beyond = {_pdep_u64(beyond[0], samples), _pdep_u64(beyond[1], samples)};
+        found[i] = {_pdep_u64(negative, samples), _pdep_u64(beyond, samples)};
         f += count;
     }
 }

@@ -1,6 +1,5 @@
 // Samples of tiles as a list, and what was found there back in the tiles.
 #pragma once
-#include <array>
 #include <cstddef>
 
 #include "tiles.h"
@@ -13,17 +12,16 @@ struct Ask {
     uint64_t samples;
 };
 
-// Those whose values are negative, and those whose values are beyond rims.
+// Those whose values are negative, and those whose values are beyond a rim.
 struct Found {
-    uint64_t negative;
-    std::array<uint64_t, 2> beyond;
+    uint64_t negative, beyond;
 };
 
 // What squared values are compared with: `least`, once they are scaled by a factor for inside, or of their tile for outside.
 struct Rim {
     float inside;
     const float* outside;
-    std::array<float, 2> least;
+    float least;
 };
 
 constexpr size_t kSlack = 64;  // numbers that `gather` may write and `scatter` may read behind the last one

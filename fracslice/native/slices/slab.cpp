@@ -64,9 +64,6 @@ class Likely {
     float across_, along_, least_, most_;
 };
 
-// What values of some samples reach.
-uint64_t around(const Found& found, uint64_t of) { return squares(found.beyond[0] & of) | crosses(found.beyond[1] & of); }
-
 }  // namespace
 
 Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const Bounds& bounds, const Frame& frame,
@@ -224,23 +221,19 @@ void Slab::begin(double height) {
 }
 
 // Evaluates those of the samples `among` that are not decided, each in a block of `size`, and decides what is within their
-// reach; in an even field of those beside them, unless they disagree.
+// reach; in an even field all of the block or nothing.
 void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
     asks_.clear();
     for (int32_t t = chunk.first; t < chunk.last; ++t)
         if (uint64_t samples = among & ~decided[t]) asks_.push_back({t, samples});
-    const float side = float(square(std::max(frame_.dx, frame_.dy) / std::min(frame_.dx, frame_.dy)));
-    const Rim rim{factor(bounds_.inside, frame_), reach.data(), {float(diagonal_), side}};
+    const Rim rim{factor(bounds_.inside, frame_), reach.data(), float(diagonal_)};
     const int back = size / 2 * (kTile + 1);
     const uint64_t own = uint64_t(1) << back, least_in = size <= bounds_.stop_inside ? block(size) : own,
                    least_out = size <= bounds_.stop_outside ? block(size) : own;
     evaluate(asks_, bounds_.even && size > 1 ? &rim : nullptr, [&](const Ask& ask, const Found& found) {
         uint64_t reached = 0, within = 0;
         if (bounds_.even) {
-            if (size > 1) {
-                within = around(found, found.negative);
-                reached = (within ^ around(found, ~found.negative)) & ~decided[ask.tile];
-            }
+            reached = (found.beyond >> back) * block(size), within = ((found.beyond & found.negative) >> back) * block(size);
         } else {
             const float *kept = values[ask.tile].data(), outside = reach[ask.tile];
             each(ask.samples, [&](int bit) {
