@@ -43,8 +43,10 @@ def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
 
 class RootLoops:
     """The loops of `fracslice.volume.root_loops` that find crossings: FIND in float32 and in float64, and
-    POLISH. lanes: segments come in multiples of it. batch: how many segments are worth a call. steps: that
-    all segments are given, and those that then are left. sure: a root is exact where it moved less."""
+    POLISH. field: the same float64 field, the addresses of `kernel.loops.POINTS` and of its parameters, or a
+    function of points [3, n] and of [1, n] for their values. lanes: segments and points come in multiples of
+    it. batch: how many segments are worth a call. steps: that all segments are given, and those that then are
+    left. sure: a root is exact where it moved less."""
 
     def __init__(
         self,
@@ -53,6 +55,7 @@ class RootLoops:
         guess: Loop,
         find: Loop,
         polish: Loop,
+        field: tuple[int, int] | Callable[[NDArray[float64], NDArray[float64]], None],
         steps: tuple[int, int],
         sure: float,
     ) -> None: ...
@@ -86,9 +89,9 @@ class Cells:
         t: NDArray[float64],
         normals: NDArray[float32],
     ) -> None:
-        """Writes where on these edges the surface is, as shares of them, to t, [n]; and its unit normals
-        there to normals, [3, n], each row contiguous. Raises ValueError as `segments`, or for arrays of
-        another length, and whatever Python functions raise."""
+        """Writes where on these edges, all of their bricks', the surface is, as shares of them, to t, [n];
+        and its unit normals there to normals, [3, n], each row contiguous. Raises ValueError as `segments`,
+        or for arrays of another length, and whatever Python functions raise."""
 
 class Contouring:
     """The surface of `marching_cubes` in some layers of cells, through exact crossings, its edges and corners

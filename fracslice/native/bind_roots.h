@@ -35,33 +35,45 @@ inline auto compiled_polish(const Code& code) {
     };
 }
 
-// A Python function of the rows of n segments, those that it writes, and perhaps a number of steps.
+inline auto compiled_field(const std::array<uintptr_t, 2>& code) {
+    using R = const double*;
+    auto run = reinterpret_cast<void (*)(R, R, R, R, double*, ptrdiff_t)>(code[0]);
+    auto p = reinterpret_cast<R>(code[1]);
+    return [=](R points, double* values, size_t n) { run(p, points, points + n, points + 2 * n, values, ptrdiff_t(n)); };
+}
+
+// A Python function of some rows of n numbers, those that it writes, and perhaps a number of steps.
 template <class Real, class... Steps>
-void call(const nb::object& function, const Real* segments, Real* out, size_t rows, size_t n, Steps... steps) {
+void call(const nb::object& function, const Real* in, size_t in_rows, Real* out, size_t out_rows, size_t n, Steps... steps) {
     nb::gil_scoped_acquire locked;
     auto view = [n](auto* p, size_t count) {
         return nb::cast(nb::ndarray<nb::numpy, Real, nb::ndim<2>>(const_cast<Real*>(p), {count, n}, nb::handle()),
                         nb::rv_policy::reference);
     };
-    function(view(segments, 6), view(out, rows), steps...);
+    function(view(in, in_rows), view(out, out_rows), steps...);
 }
 
 // Of a loop that is either.
 template <class Real>
 std::function<void(const Real*, Real*, size_t, size_t)> find_loop(nb::object loop) {
     if (nb::isinstance<nb::tuple>(loop)) return compiled_find<Real>(nb::cast<Code>(loop));
-    return [=](const Real* s, Real* roots, size_t steps, size_t n) { call(loop, s, roots, 1, n, steps); };
+    return [=](const Real* s, Real* roots, size_t steps, size_t n) { call(loop, s, 6, roots, 1, n, steps); };
 }
 
 inline std::function<void(const double*, double*, size_t)> polish_loop(nb::object loop) {
     if (nb::isinstance<nb::tuple>(loop)) return compiled_polish(nb::cast<Code>(loop));
-    return [=](const double* s, double* out, size_t n) { call(loop, s, out, 5, n); };
+    return [=](const double* s, double* out, size_t n) { call(loop, s, 6, out, 5, n); };
+}
+
+inline std::function<void(const double*, double*, size_t)> field_loop(nb::object loop) {
+    if (nb::isinstance<nb::tuple>(loop)) return compiled_field(nb::cast<std::array<uintptr_t, 2>>(loop));
+    return [=](const double* points, double* values, size_t n) { call(loop, points, 3, values, 1, n); };
 }
 
 // Machine code must outlive what is made of it.
-inline RootLoops root_loops(size_t lanes, size_t batch, nb::object guess, nb::object find, nb::object polish,
+inline RootLoops root_loops(size_t lanes, size_t batch, nb::object guess, nb::object find, nb::object polish, nb::object field,
                             std::pair<size_t, size_t> steps, double sure) {
-    return {lanes,        batch,       find_loop<float>(guess), find_loop<double>(find), polish_loop(polish),
+    return {lanes, batch, find_loop<float>(guess), find_loop<double>(find), polish_loop(polish), field_loop(field),
             steps.first, steps.second, sure};
 }
 

@@ -7,6 +7,8 @@
 namespace fracslice {
 namespace {
 
+constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
+
 // Finds a brick's crossings and returns their number.
 size_t find_crossings(const std::array<Corners, kSide + 1>& corners, Crossings& found) {
     for (int x = 0; x < kSide; ++x) {
@@ -64,34 +66,45 @@ CellGrid::CellGrid(const Layout& layout, std::vector<Signs> signs)
     for (const Place& place : ghosts(layout, signs_)) places_.push_back(place);
 }
 
-void CellGrid::segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, size_t stride,
-                        double* rows) const {
+size_t CellGrid::brick_of(size_t crossing) const {
     auto after = [](size_t number, const Crossings& brick) { return number < brick.base; };
-    size_t row = size_t(std::upper_bound(crossings_.begin(), crossings_.end(), begin, after) - crossings_.begin());
-    for (row = row ? row - 1 : 0; row < sampled() && crossings_[row].base < end; ++row) {
-        const int32_t* p = layout_.ijk + 3 * row;
-        auto starts = ranges(row);
-        for (int axis = 0; axis < 3; ++axis) {
-            size_t first = std::max(starts[axis], begin), last = std::min(starts[axis + 1], end);
-            if (first >= last) continue;
-            for (int k = 0; k < 3; ++k) {
-                double* to = rows + size_t(k + 3) * stride - begin;
-                std::fill(to + first, to + last, k == axis ? voxel : 0);
-            }
-            size_t number = starts[axis];
-            for (int x = 0; x < kSide; ++x) {
-                double px = origin[0] + voxel * (p[0] + x);
+    size_t row = size_t(std::upper_bound(crossings_.begin(), crossings_.end(), crossing, after) - crossings_.begin());
+    return row ? row - 1 : 0;
+}
+
+size_t CellGrid::end_of_brick(size_t crossing) const { return ranges(brick_of(crossing))[3]; }
+
+void CellGrid::lay(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, GridEdges& edges) const {
+    for (auto& row : edges.starts) row.resize(end - begin);
+    edges.led.resize(end - begin);
+    edges.leaders.clear();
+    edges.bricks.clear();
+    for (size_t row = brick_of(begin); row < sampled() && crossings_[row].base < end; ++row) {
+        std::array<std::array<double, kSide>, 3> grid;
+        for (size_t k = 0; k < 3; ++k) {
+            for (int x = 0; x < kSide; ++x) grid[k][size_t(x)] = origin[k] + voxel * (layout_.ijk[3 * row + k] + x);
+        }
+        size_t number = crossings_[row].base;
+        edges.bricks.push_back({uint32_t(std::max(number, begin) - begin), uint32_t(edges.leaders.size())});
+        for (uint8_t axis = 0; axis < 3; ++axis) {
+            std::array<uint32_t, kSide> leading;  // by plane
+            leading.fill(kNobody);
+            for (size_t x = 0; x < kSide; ++x) {
                 for (Slab bits = crossings_[row].bits[axis][x]; bits; bits &= bits - 1, ++number) {
-                    if (number < first || number >= last) continue;
-                    int bit = __builtin_ctzll(bits);
-                    double* to = rows + (number - begin);
-                    to[0] = px;
-                    to[stride] = origin[1] + voxel * (p[1] + bit / 8);
-                    to[2 * stride] = origin[2] + voxel * (p[2] + bit % 8);
+                    if (number < begin || number >= end) continue;
+                    size_t bit = size_t(__builtin_ctzll(bits)), at[] = {x, bit / 8, bit % 8}, edge = number - begin;
+                    for (size_t k = 0; k < 3; ++k) edges.starts[k][edge] = grid[k][at[k]];
+                    uint32_t& leader = leading[at[axis]];
+                    if (leader == kNobody) {
+                        leader = uint32_t(edges.leaders.size());
+                        edges.leaders.push_back({uint32_t(edge), axis});
+                    }
+                    edges.led[edge] = leader;
                 }
             }
         }
     }
+    edges.bricks.push_back({uint32_t(end - begin), uint32_t(edges.leaders.size())});
 }
 
 void CellGrid::collect(const Octant& near, Numbers& numbers) const {

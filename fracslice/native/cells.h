@@ -51,6 +51,23 @@ struct CellEdge {
     std::array<int32_t, 3> lower;  // its lower grid point
 };
 
+// Grid edges side by side. A leader is the first of those of one brick whose ends are in the same two planes across them.
+struct GridEdges {
+    struct Leader {
+        uint32_t edge;
+        uint8_t axis;
+    };
+    struct Brick {
+        uint32_t edge, leader;
+    };
+    std::array<std::vector<double>, 3> starts;  // where each starts, scene units
+    std::vector<uint32_t> led;                  // by which leader
+    std::vector<Leader> leaders;
+    std::vector<Brick> bricks;  // the first edge and leader of each, and behind the last
+
+    size_t axis(size_t edge) const { return leaders[led[edge]].axis; }
+};
+
 // A bit for each cell between two slabs of corners whose corners are not all alike.
 inline Slab mixed(const Corners& a, const Corners& b) {
     Slab any = a[0] | a[1] | a[2] | a[3] | b[0] | b[1] | b[2] | b[3];
@@ -191,10 +208,11 @@ class CellGrid {
         }
     }
 
-    // The grid edges of the crossings `begin` to `end` - 1, as six rows of `stride` numbers: where each starts, and from there
-    // to its end.
-    void segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, size_t stride,
-                  double* rows) const;
+    // The grid edges of the crossings `begin` to `end` - 1.
+    void lay(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, GridEdges& edges) const;
+
+    // The number after the last crossing of the brick that has this one.
+    size_t end_of_brick(size_t crossing) const;
 
     // The numbers of these crossings; the rest is not written.
     void collect(const Octant& near, Numbers& numbers) const;
@@ -229,6 +247,7 @@ class CellGrid {
     }
 
   private:
+    size_t brick_of(size_t crossing) const;
     size_t lower_bound(size_t begin, size_t end, int layer) const;
 
     Layout layout_;

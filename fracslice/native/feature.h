@@ -8,6 +8,7 @@ namespace fracslice {
 
 using Normal = std::array<float, 3>;
 
+inline Normal operator-(const Normal& n) { return {-n[0], -n[1], -n[2]}; }
 inline float dot(const Normal& a, const Normal& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // A crossing: where the surface meets an edge of the unit cell, and its normal there.

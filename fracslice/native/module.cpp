@@ -27,12 +27,18 @@ class Cells {
 
     nb::object segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel) const {
         if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
-        Array<double> rows(6, end - begin);
+        size_t n = end - begin;
+        Array<double> rows(6, n);
         {
             nb::gil_scoped_release released;
-            grid_.segments(begin, end, origin, voxel, end - begin, rows.data.get());
+            GridEdges edges;
+            grid_.lay(begin, end, origin, voxel, edges);
+            for (size_t k = 0; k < 3; ++k) {
+                double* to = std::copy(edges.starts[k].begin(), edges.starts[k].end(), &rows.data[k * n]) + 2 * n;
+                for (size_t i = 0; i < n; ++i) to[i] = edges.axis(i) == k ? voxel : 0;
+            }
         }
-        return to_numpy(std::move(rows), {6, end - begin});
+        return to_numpy(std::move(rows), {6, n});
     }
 
     void find_crossings(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, const RootLoops& loops,
@@ -116,8 +122,8 @@ NB_MODULE(_native, module) {
     module.def("open_edges", &fracslice::bind_open_edges, "ijk"_a, "values"_a, "index"_a);
     using fracslice::RootLoops;
     nanobind::class_<RootLoops>(module, "RootLoops")
-        .def(nanobind::new_(&fracslice::root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "steps"_a,
-             "sure"_a);
+        .def(nanobind::new_(&fracslice::root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "field"_a,
+             "steps"_a, "sure"_a);
     using fracslice::Cells;
     nanobind::class_<Cells>(module, "Cells")
         .def(nanobind::init<const fracslice::IjkArray&, const fracslice::SignsArray&, const fracslice::IndexArray&, int>(),

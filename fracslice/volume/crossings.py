@@ -7,12 +7,14 @@ pierce a mesh whose triangles stay in their cells.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from .._native import Cells, RootLoops
 from ..formulas.registry import Node
-from ..kernel import Compilable
+from ..kernel import Compilable, Kernel, compile_scene
+from ..kernel.cpu import CpuKernel
 from ..work import Work
 from .roots import MOST, QUICK, Roots
 
@@ -62,9 +64,11 @@ class Refiner:
         work: Work | None = None,
     ) -> None:
         fast, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-        loops = fast.native("find"), exact.native("find"), exact.native("polish"), (QUICK, MOST), SURE
+        kernel = compile_scene(root, "float64")
+        field = kernel.entry if isinstance(kernel, CpuKernel) else partial(_evaluated, kernel)
+        loops = fast.native("find"), exact.native("find"), exact.native("polish"), field, (QUICK, MOST), SURE
         self._loops = RootLoops(fast.width, BATCHES[not isinstance(root, Node)], *loops)
-        self._roots = fast, exact  # whose loops these are
+        self._owners = fast, exact, kernel  # of these loops
         self._placement = origin, voxel
         self._cells, self._work = cells, work or Work()
 
@@ -77,3 +81,7 @@ class Refiner:
         new = t[old:], normals[:, old:]
         self._cells.find_crossings(known.first + old, end, *self._placement, self._loops, *new)
         return Crossings(known.first, t, normals)
+
+
+def _evaluated(kernel: Kernel, points: np.ndarray, out: np.ndarray) -> None:
+    out[0] = kernel.points(*points)
