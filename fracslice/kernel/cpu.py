@@ -76,10 +76,11 @@ class CpuKernel:
         """
         shape, n = np.shape(x), np.size(x)
         padded = -(-max(n, 1) // self.width) * self.width
-        coordinates = np.zeros((4, padded), self.dtype)
+        coordinates = np.empty((4, padded), self.dtype)
+        coordinates[:3, n:] = 0
         with np.errstate(over="ignore"):
             for row, values in zip(coordinates, (x, y, z), strict=False):
-                row[:n] = np.ravel(values)
+                row[:n].reshape(shape)[...] = values
         self._points(self._address(self._parameters), *(row.ctypes.data for row in coordinates), padded)
         return coordinates[3, :n].reshape(shape)
 

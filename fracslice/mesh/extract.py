@@ -51,13 +51,12 @@ def contour(root: Node | Compilable, bricks: Bricks | SignBricks, work: Work | N
     proof. After Ho, Wu, Chen, Chuang and Ouhyoung 2005, "Cubical Marching Squares". Raises `MeshError` as
     `extract`, and `Cancelled`.
     """
-    work = work or Work()
+    work, signs = work or Work(), bricks.signs if isinstance(bricks, Bricks) else bricks
 
     def made() -> Arrays:
-        (piece,) = contour_pieces(root, bricks, work, len(bricks))
+        (piece,) = contour_pieces(root, signs, work, len(bricks))
         return {"vertices": piece.mesh.vertices, "triangles": piece.mesh.triangles}
 
-    signs = bricks.signs if isinstance(bricks, Bricks) else bricks
     parts = ("surface", bricks.origin, bricks.voxel, bricks.index.shape, bricks.ijk, signs.signs)
     return Mesh(**stored(work.store, parts, root, made))
 
@@ -67,13 +66,19 @@ class Piece:
     """The part of a surface in some layers of bricks, scene units.
 
     mesh: open where the surface goes on; pieces in turn meet in equal points, bit by bit. end: the x where
-    this piece ends. crossings: int64 [k], the numbers of its first vertices among the crossings of the grid's
-    edges with the whole surface, the same in all pieces; the other vertices are in cells and cells' faces.
+    this piece ends. used: bool [n], which of the crossings of the grid's edges with the whole surface, from
+    number `first` on, are its first vertices; the others are in cells and cells' faces.
     """
 
     mesh: Mesh
     end: float
-    crossings: np.ndarray
+    first: int
+    used: np.ndarray
+
+    @property
+    def crossings(self) -> np.ndarray:
+        """The numbers of its first vertices among these crossings, the same in all pieces, int64 [k]."""
+        return self.first + np.flatnonzero(self.used)
 
 
 def contour_pieces(
@@ -98,13 +103,13 @@ def contour_pieces(
         rooms = partial(_rooms, features, cases, signs)
         moved, places = settle(root, features, rooms, signs.voxel, work)
         features[moved] = places
-        numbers = cells.crossings_before(first) + np.arange(count)
-        mesh = Mesh(vertices, triangles)
+        mesh, used = Mesh(vertices, triangles), np.ones(count, bool)
         if last < len(signs.index):  # The next piece has what this one numbers and does not use.
             used = np.zeros(len(vertices), bool)
             used[triangles] = True
-            mesh, numbers = mesh.selected(np.ones(len(triangles), bool)), numbers[used[:count]]
-        yield Piece(mesh, signs.origin[0] + signs.voxel * BRICK * last, numbers)
+            mesh, used = mesh.selected(np.ones(len(triangles), bool)), used[:count]
+        border = signs.origin[0] + signs.voxel * BRICK * last
+        yield Piece(mesh, border, cells.crossings_before(first), used)
 
 
 def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[int, int]]:

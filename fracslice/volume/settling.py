@@ -45,7 +45,7 @@ def settle(
     """
     kernel, work = compile_scene(root, "float64"), work or Work()
     guess, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-    parts = chunks(len(points), 1 << 13)
+    parts = chunks(len(points), 1 << 14)
     moved = {}
 
     def task(part: slice) -> None:

@@ -264,7 +264,7 @@ def test_pieces_are_the_whole_bit_by_bit(root: Node, most: int) -> None:
     bricks = sample_scene(planned)
     whole, pieces = contour(planned.root, bricks), list(contour_pieces(planned.root, bricks, most=most))
     assert len(pieces) > 3
-    assert triangle_set(pieces) == triangle_set([Piece(whole, 0.0, np.empty(0))])
+    assert triangle_set(pieces) == triangle_set([Piece(whole, 0.0, 0, np.empty(0, bool))])
     for one, other in itertools.pairwise(pieces):
         low, high = one.mesh.vertices[:, 0].max(), other.mesh.vertices[:, 0].min()
         assert low <= one.end + 1e-12 and high >= one.end - 1e-12
