@@ -104,8 +104,8 @@ class Contouring:
     ) -> None: ...
     def advance(self, end: int, first: int, t: NDArray[float64], normals: NDArray[float32]) -> None:
         """Goes on to the layer before `end`. t: where on its edge the surface crosses each of those numbered
-        from `first` on, [n]; normals: unit, outward, [3, n]: all of these layers and of the layer `end`, or
-        ValueError is raised."""
+        from `first` on, [n]; normals: unit, outward, [3, n], each row contiguous: all of these layers and of
+        the layer `end`, or ValueError is raised."""
 
     def finish(self) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8]]:
         """Vertices and triangles as `marching_cubes`, how many vertices are crossings (the first: those of

@@ -14,7 +14,7 @@ from ..formulas.registry import Node
 from ..kernel import Compilable
 from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
-from ..volume.crossings import NONE, Refiner
+from ..volume.crossings import Refiner
 from ..volume.lattice import BRICK
 from ..volume.settling import Rooms, settle
 from ..work import Work
@@ -91,12 +91,11 @@ def contour_pieces(
     signs = bricks.signs if isinstance(bricks, Bricks) else bricks
     cells = _called(Cells, signs.ijk, signs.signs, signs.index, work.threads)
     origin, voxel, margin = _placement(signs)
-    known, refiner = NONE, Refiner(root, cells, origin, voxel, work)
+    refiner = Refiner(root, cells, origin, voxel, work)
     for first, last in _layers(signs, most):
         surface = Contouring(cells, first, last, origin, voxel, margin)
         for begin, end in _batches(cells, first - 1, last + 1, work.threads << 16):
-            known = known.since(cells.crossings_before(min(begin, last - 1)))
-            known = refiner.extended(known, cells.crossings_before(end + 1))
+            known = refiner.between(*map(cells.crossings_before, (min(begin, last - 1), end + 1)))
             _called(surface.advance, end, known.first, known.t, known.normals)
         vertices, triangles, count, cases = surface.finish()
         features = vertices[count:]

@@ -11,9 +11,9 @@
 namespace fracslice {
 
 // Where on its grid edge each of some crossings, `first` to `first + count - 1` as CellGrid numbers them, exactly lies, and
-// the surface's unit normal there, [3, count].
+// the surface's unit normal there, in three rows of `stride` numbers.
 struct Hermite {
-    size_t first, count;
+    size_t first, count, stride;
     const double* t;
     const float* normals;
     double margin;  // how near the ends of its edge a crossing may come
@@ -21,7 +21,7 @@ struct Hermite {
     // Whether the normals of the crossings `begin` to `end` - 1 are along that axis, as float32 rounds them.
     bool along(int axis, size_t begin, size_t end) const {
         constexpr float off = 1e-7f;
-        const float *u = normals + (axis == 0 ? count : 0), *v = normals + (axis == 2 ? 1 : 2) * count;
+        const float *u = normals + (axis == 0 ? stride : 0), *v = normals + (axis == 2 ? 1 : 2) * stride;
         int others = 0;
         for (size_t k = begin - first; k < end - first; ++k) others |= !(std::abs(u[k]) + std::abs(v[k]) <= off);
         return !others;
@@ -31,7 +31,7 @@ struct Hermite {
 
     Normal normal(size_t vertex) const {
         const float* n = normals + (vertex - first);
-        return {n[0], n[count], n[2 * count]};
+        return {n[0], n[stride], n[2 * stride]};
     }
 };
 

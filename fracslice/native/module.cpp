@@ -79,7 +79,8 @@ class Surfacing {
 
     void advance(int end, size_t first, const RootsArray& t, const NormalsArray& normals) {
         if (t.shape(0) != normals.shape(1)) throw nb::value_error("t and normals differ in length");
-        Hermite data{first, t.shape(0), t.data(), normals.data(), clamp_};
+        if (normals.stride(1) != 1) throw nb::value_error("each row of normals contiguous");
+        Hermite data{first, t.shape(0), size_t(normals.stride(0)), t.data(), normals.data(), clamp_};
         unlocked(threads_, [&] { return made_.advance(end, data), 0; });
     }
 

@@ -38,14 +38,6 @@ class Crossings:
     t: np.ndarray
     normals: np.ndarray
 
-    def since(self, number: int) -> Crossings:
-        """Those from that number on."""
-        gone = number - self.first
-        return Crossings(number, self.t[gone:], self.normals[:, gone:])
-
-
-NONE = Crossings(0, np.empty(0), np.empty((3, 0), np.float32))
-
 
 class Refiner:
     """Finds the exact crossings of grid edges whose ends have opposite signs, in the float64 field.
@@ -71,16 +63,34 @@ class Refiner:
         self._owners = fast, exact, kernel  # of these loops
         self._placement = origin, voxel
         self._cells, self._work = cells, work or Work()
+        self._memory: tuple[np.ndarray, np.ndarray] = np.empty(0), np.empty((3, 0), np.float32)
+        self._first, self._end = 0, 0  # what is known: where this memory starts, and behind the last one
 
-    def extended(self, known: Crossings, end: int) -> Crossings:
-        """Crossings that are known, and those after them up to the number `end` - 1. Raises `Cancelled`."""
+    def between(self, begin: int, end: int) -> Crossings:
+        """The crossings from `begin`, which only goes up, to `end` - 1 or what is known already, of whole
+        bricks; the next call writes over them. Raises `Cancelled`.
+        """
         self._work.check()
-        size, old = end - known.first, len(known.t)
-        t, normals = np.empty(size), np.empty((3, size), np.float32)
-        t[:old], normals[:, :old] = known.t, known.normals
-        new = t[old:], normals[:, old:]
-        self._cells.find_crossings(known.first + old, end, *self._placement, self._loops, *new)
-        return Crossings(known.first, t, normals)
+        known, end = max(self._end - begin, 0), max(self._end, end)
+        t, normals = self._room(begin, end - begin, known)
+        if end > self._end:
+            new = t[known:], normals[:, known:]
+            self._cells.find_crossings(begin + known, end, *self._placement, self._loops, *new)
+            self._end = end
+        return Crossings(begin, t, normals)
+
+    def _room(self, begin: int, size: int, known: int) -> tuple[np.ndarray, np.ndarray]:
+        """Memory for so many crossings, the first of which are known: these move only where there is no room
+        behind them."""
+        memory, here = self._memory, begin - self._first
+        if here + size > len(memory[0]):
+            if 2 * size > len(memory[0]):
+                self._memory = np.empty(2 * size), np.empty((3, 2 * size), np.float32)
+            for old, new in zip(memory, self._memory, strict=True):
+                new[..., :known] = old[..., here : here + known]
+            self._first, here = begin, 0
+        t, normals = self._memory
+        return t[here : here + size], normals[:, here : here + size]
 
 
 def _evaluated(kernel: Kernel, points: np.ndarray, out: np.ndarray) -> None:

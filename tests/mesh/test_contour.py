@@ -33,7 +33,6 @@ from fracslice.mesh.check import check
 from fracslice.mesh.extract import Piece, contour, contour_pieces, extract
 from fracslice.volume import Bricks, plan, sample_scene
 from fracslice.volume.accuracy import surface_error
-from fracslice.volume.crossings import NONE, Refiner
 from fracslice.work import Work
 
 
@@ -204,37 +203,6 @@ def test_threads_do_not_matter() -> None:
     first, other = (contour(planned.root, bricks, Work(threads=n)) for n in (1, 3))
     assert first.vertices.tobytes() == other.vertices.tobytes()
     assert first.triangles.tobytes() == other.triangles.tobytes()
-
-
-def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
-    planned = plan(torus(radius=1, tube=0.3), 64)
-    bricks = sample_scene(planned)
-    cells, placement = cells_of(bricks), (bricks.origin, bricks.voxel)
-    numbers = 0, cells.crossings_before(len(bricks.index))
-    exact = Refiner(planned.root, cells, *placement).extended(NONE, numbers[1])
-    edges = cells.segments(*numbers, *placement)
-    points = (edges[:3] + exact.t * edges[3:]).T
-    assert np.abs(reference(planned.root)(*points.T)).max() < 1e-7 * bricks.voxel
-    ring = points * [1, 1, 0]
-    truth = (points - ring / np.linalg.norm(ring, axis=1, keepdims=True)) / 0.3
-    assert np.abs(exact.normals.T - truth).max() < 3e-5
-
-
-@pytest.mark.parametrize("step", [1e-9, 1e-6, 1e-3])
-def test_planes_almost_in_one_are_told_apart(step: float) -> None:
-    """A brick's faces lie in planes less than a voxel apart and look both ways."""
-    high = transform(box(size=(2, 1, 1)), translate=(0.5, 0, step))
-    root = union(high, transform(box(size=(2, 1, 1)), translate=(-0.5, 0.2, 1 + step / 2)))
-    planned = plan(root, 64)
-    bricks = sample_scene(planned)
-    cells, placement = cells_of(bricks), (bricks.origin, bricks.voxel)
-    numbers = 0, cells.crossings_before(len(bricks.index))
-    exact = Refiner(planned.root, cells, *placement).extended(NONE, numbers[1])
-    edges = cells.segments(*numbers, *placement)
-    field = reference(planned.root)
-    assert np.abs(field(*(edges[:3] + exact.t * edges[3:]))).max() < 1e-9 * bricks.voxel
-    outward = np.where(field(*edges[:3]) < 0, 1, -1)
-    assert ((exact.normals * edges[3:]).sum(0) * outward > 0).all()
 
 
 def test_the_wrong_number_of_crossings_is_refused() -> None:

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from fracslice._native import Cells, Contouring
+from fracslice.formulas import Node
 from fracslice.kernel import compile_scene
 from fracslice.mesh.extract import clamp, contour, extract
 from fracslice.scene.reader import read
 from fracslice.volume import plan, sample_scene
-from fracslice.volume.crossings import NONE, Crossings, Refiner
+from fracslice.volume.crossings import Crossings, Refiner
 
 SCENES = Path(__file__).parents[3] / "scenes"
 RUNS = 5
@@ -35,6 +36,13 @@ def timed(acts: list[Callable[[], Any]]) -> np.ndarray:
             spent = time.process_time() - start[0], time.perf_counter() - start[1]
             seconds[:, k] = np.minimum(seconds[:, k], spent)
     return seconds
+
+
+def crossings(
+    root: Node, cells: Cells, place: tuple[tuple[float, float, float], float], end: int
+) -> Crossings:
+    """All of them, exact."""
+    return Refiner(root, cells, *place).between(0, end)
 
 
 def triangles(
@@ -74,7 +82,7 @@ def main() -> None:
         signs, last = bricks.signs, len(bricks.index)
         cells = Cells(signs.ijk, signs.signs, signs.index)
         place = bricks.origin, bricks.voxel
-        refining = partial(Refiner(planned.root, cells, *place).extended, NONE, cells.crossings_before(last))
+        refining = partial(crossings, planned.root, cells, place, cells.crossings_before(last))
         found = refining()
         seconds = timed(
             [
