@@ -115,7 +115,7 @@ struct FlatBrick {
 };
 
 // A brick looks flat where leaders lead so many on average.
-constexpr size_t kFlat = 10;
+constexpr size_t kLed = 10;
 
 // The field is compared so far beside two crossings, in voxels, in no direction that a scene would have: where it is the same
 // but for its sign and rounding, so are their distances from a plane and its normals.
@@ -143,7 +143,7 @@ class Search {
         for (size_t k = 0; k + 1 < edges_.bricks.size(); ++k) {
             auto [edge, leader] = edges_.bricks[k];
             auto [edge_end, leader_end] = edges_.bricks[k + 1];
-            if (edge_end - edge < kFlat * (leader_end - leader)) {
+            if (edge_end - edge < kLed * (leader_end - leader)) {
                 for (; edge < edge_end; ++edge) which_.push_back(edge);
             } else {
                 flat_.push_back({edge, edge_end, leader, leader_end});
@@ -167,10 +167,12 @@ class Search {
         if (!flat_.empty()) compare(found);
     }
 
+    // Adds an edge to `which_` that is no leader.
     void add_led(uint32_t edge) {
         if (leads_[edges_.led[edge]].edge != edge) which_.push_back(edge);
     }
 
+    // What the leaders of bricks that look flat have found.
     void look(const Found& found) {
         leads_.resize(edges_.leaders.size());
         for (const FlatBrick& brick : flat_) {
