@@ -114,8 +114,6 @@ class Finder {
     std::array<Crossing, sizeof(Case::loop)> loop_;
 };
 
-// How far from its planes a feature may lie, root mean square... (see feature.cpp)
-
 // What the loop of a case is, where each crossing's plane is across its edge.
 struct Planes {
     uint8_t length = 0, known = 0;                          // crossings; axes that they tell
