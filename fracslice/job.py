@@ -152,15 +152,16 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     with clock("planning"):
         refuse_what_does_not_fit(scene, voxels, what.size(scene), work)
         planned, scale = plan(scene.root, voxels, work), None
+    left = how  # to do on the mesh
     if not how.whole:
         from .printing import printable
 
         if not planned.root.facts.weak:
             # Its bodies are chosen in the field: of walls thinner than a voxel a mesh has crumbs only.
-            how = replace(how, keep="all")
+            left = replace(how, keep="all")
         with clock("changing"):
-            size_of = partial(_mesh_box, what=what, how=how, size=what.size(scene), work=work)
-            planned, scale = printable(planned, what.size(scene), what.how(scene), work, size_of)
+            size_of = partial(_mesh_box, what=what, how=left, size=what.size(scene), work=work)
+            planned, scale = printable(planned, what.size(scene), how, work, size_of)
     with clock("sampling"):
         bricks = sample_scene(planned, work)
     with clock("meshing"):
@@ -170,7 +171,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
             unit = float(raw.size.max()) / what.size(scene)
             raw = refine(planned.root, raw, what.chord_mm * unit, planned.voxel, work)
     with clock("finishing"):
-        mesh, removed, place = _finished(raw, what, how, what.size(scene), scale)
+        mesh, removed, place = _finished(raw, what, left, what.size(scene), scale)
     simplified = None
     if what.simplify_mm is not None:
         with clock("simplifying"):

@@ -19,6 +19,9 @@ struct Crossing {
 // Unit normals further apart than this (25 degrees) make a feature; Kobbelt et al. 2001 use the same.
 constexpr double kSharp = 0.9;
 
+// Whether a unit normal with these other two coordinates is along an axis, as float32 rounds it.
+inline bool along_axis(float u, float v) { return std::abs(u) + std::abs(v) <= 1e-7f; }
+
 // The cosine of half that angle: normals all nearer to one of them make none.
 constexpr float kHalfSharp = 0.975f;
 

@@ -18,12 +18,11 @@ struct Hermite {
     const float* normals;
     double margin;  // how near the ends of its edge a crossing may come
 
-    // Whether the normals of the crossings `begin` to `end` - 1 are along that axis, as float32 rounds them.
+    // Whether the normals of the crossings `begin` to `end` - 1 are along that axis.
     bool along(int axis, size_t begin, size_t end) const {
-        constexpr float off = 1e-7f;
         const float *u = normals + (axis == 0 ? stride : 0), *v = normals + (axis == 2 ? 1 : 2) * stride;
         int others = 0;
-        for (size_t k = begin - first; k < end - first; ++k) others |= !(std::abs(u[k]) + std::abs(v[k]) <= off);
+        for (size_t k = begin - first; k < end - first; ++k) others |= !along_axis(u[k], v[k]);
         return !others;
     }
 

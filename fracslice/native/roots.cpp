@@ -86,10 +86,10 @@ struct Found {
 
     Normal normal(size_t i) const { return {normals[i], normals[i + stride], normals[i + 2 * stride]}; }
 
-    // Whether it is along its edge, as float32 rounds it.
+    // Whether it is along its edge.
     bool along(size_t axis, size_t i) const {
         Normal n = normal(i);
-        return std::abs(n[(axis + 1) % 3]) + std::abs(n[(axis + 2) % 3]) <= 1e-7f;
+        return along_axis(n[(axis + 1) % 3], n[(axis + 2) % 3]);
     }
 
     void put(size_t i, double root, const Normal& normal) const {

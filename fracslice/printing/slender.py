@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import VolumeError
 from ..formulas import Node
 from ..kernel import Compilable, Kernel, compile_scene
+from ..rows import Rows
 from ..volume import Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
@@ -68,7 +69,7 @@ def slender(root: Node | Compilable, seen: Samples, work: Work) -> tuple[Slender
 
 
 @dataclass(frozen=True, eq=False)
-class _Rays:
+class _Rays(Rows):
     """From beside a surface through it. start, ways: float64 [n, 3]; area: [n], of the surface that each
     stands for; enter, leave: [n], how far along the thin wall or gap begins and ends.
     """
@@ -78,10 +79,6 @@ class _Rays:
     area: np.ndarray
     enter: np.ndarray
     leave: np.ndarray
-
-    def chosen(self, which: np.ndarray) -> _Rays:
-        """Some of them, bool [n]."""
-        return _Rays(*(values[which] for values in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from ..rows import Rows
 from ..work import Work, chunks
 from .samples import Samples, interpolated, sample_at
 
@@ -26,7 +27,7 @@ Direction = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Walls:
+class Walls(Rows):
     """Walls or gaps that are thinner than a limit. start, end: float64 [n, 3], on the two faces; width:
     float64 [n]; area: float64 [n], the part of the surface that each stands for. Scene units.
     """
@@ -45,14 +46,6 @@ class Walls:
     def none(cls) -> Walls:
         """No walls at all."""
         return cls(*np.empty((2, 0, 3)), *np.empty((2, 0)))
-
-    def chosen(self, which: np.ndarray) -> Walls:
-        """Some of them, bool [n]."""
-        return Walls(*(values[which] for values in vars(self).values()))
-
-    def __add__(self, more: Walls) -> Walls:
-        mine, others = vars(self).values(), vars(more).values()
-        return Walls(*(np.concatenate(pair) for pair in zip(mine, others, strict=True)))
 
     def along(self, direction: Direction) -> Walls:
         """Those whose faces look along a direction or against it, measured along it."""

@@ -130,8 +130,9 @@ class HostAccumulator:
         return np.asarray(squares.reshape(self.height, self.width))
 
     def wanted(self, most: int, tolerance: float) -> tuple[np.ndarray, int]:
-        if self.passes == 0 or self.passes == 1 < self.coarse:
-            pixels = first_two(self.width, self.height, self.coarse)[self.passes]
+        first = first_passes(self.width, self.height, self.coarse)
+        if self.passes < len(first):
+            pixels = first[self.passes]
         else:
             order, mask = ordered(self.width, self.height), self._pressing(most, tolerance)
             pixels = order[mask[order >> 16, order & 65535]]
@@ -179,9 +180,12 @@ class HostAccumulator:
 
 
 @lru_cache(maxsize=4)
-def first_two(width: int, height: int, coarse: int) -> tuple[np.ndarray, np.ndarray]:
-    """The pixels of the first pass and those of the second, as `ordered` has them."""
+def first_passes(width: int, height: int, coarse: int) -> tuple[np.ndarray, ...]:
+    """The pixels of the passes until each has a sample, as `ordered` has them: a grid, and the others if
+    there are any."""
     order = ordered(width, height)
+    if coarse == 1:
+        return (order,)
     first = ((order >> 16) % coarse == 0) & ((order & 65535) % coarse == 0)
     return order[first], order[~first]
 

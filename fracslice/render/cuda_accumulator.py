@@ -15,7 +15,7 @@ from ..kernel.cpu import Precision
 from ..kernel.cuda import launched, load_loops, require
 from ..kernel.linker import Linked
 from ..scene.view import Film
-from .accumulator import FEW, NEARLY, TRUSTED, HostAccumulator, first_two
+from .accumulator import FEW, NEARLY, TRUSTED, HostAccumulator, first_passes
 from .cpu import ordered
 
 PARTS = 8192
@@ -158,7 +158,7 @@ class CudaAccumulator:
         precision: Precision = "float32" if self.dtype == np.float32 else "float64"
         self._loops = load_loops(Linked("", np.zeros(1)), precision, LOOPS)
         self.sums = cuda.to_device(start.sums)
-        self._first_two = lru_cache(maxsize=4)(self._sent)
+        self._first_passes = lru_cache(maxsize=4)(self._sent)
         self._order = cuda.to_device(ordered(self.width, self.height))
         self._pixels = cuda.device_array(pixels, np.int32)
         self._squares, self._gains = (cuda.device_array(pixels, self.dtype) for _ in range(2))
@@ -179,7 +179,7 @@ class CudaAccumulator:
         return HostAccumulator(self.width, self.height, self.sums.copy_to_host(), self.passes, self.coarse)
 
     def _sent(self, coarse: int) -> list[Any]:
-        return [self._cuda.to_device(pixels) for pixels in first_two(self.width, self.height, coarse)]
+        return [self._cuda.to_device(pixels) for pixels in first_passes(self.width, self.height, coarse)]
 
     def _summed(self, loop: Any, *arguments: Any) -> np.ndarray:
         """Runs a loop over PARTS; returns the sums, float64 [3]."""
@@ -192,9 +192,9 @@ class CudaAccumulator:
         return samples / (self.width * self.height), math.sqrt(total / known) if known else math.inf
 
     def wanted(self, most: int, tolerance: float) -> tuple[Any, int]:
-        if self.passes == 0 or self.passes == 1 < self.coarse:
-            pixels = self._first_two(self.coarse)[self.passes]
-            return pixels, pixels.size
+        first = self._first_passes(self.coarse)
+        if self.passes < len(first):
+            return first[self.passes], first[self.passes].size
         self.statistics()
         real = self.dtype.type
         judged = (self.sums, self._squares, self._gains, self._parts, self.width)

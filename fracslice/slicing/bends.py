@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..rows import Rows
 from .section import Section, Vertices, alone, free
 
 SAGITTA = 2e-3
@@ -24,7 +25,7 @@ ROUNDS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class _Sides:
+class _Sides(Rows):
     """begin, end: float64 [n, 2]. after, share: of their middles, as of `Vertices`. height: float64 [n], how
     far to the left of its middle the outline is, pixels. low, high: int64 [n, 2], corners of the pixels that
     it may be in.
@@ -37,14 +38,6 @@ class _Sides:
     height: np.ndarray
     low: np.ndarray
     high: np.ndarray
-
-    def chosen(self, which: np.ndarray) -> _Sides:
-        """Some of them, bool [n]."""
-        return _Sides(*(values[which] for values in vars(self).values()))
-
-    def __add__(self, more: _Sides) -> _Sides:
-        mine, others = vars(self).values(), vars(more).values()
-        return _Sides(*(np.concatenate(pair) for pair in zip(mine, others, strict=True)))
 
     @property
     def way(self) -> np.ndarray:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernel import Kernel
+from ..rows import Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,7 @@ class Section:
 
 
 @dataclass(frozen=True, eq=False)
-class Vertices:
+class Vertices(Rows):
     """Points of contours, lattice units, float64 [n, 2]; the crossing that each is or comes after, int64 [n];
     and how far it is on the way to the next one, float64 [n], 0 to 1.
     """
@@ -37,10 +38,6 @@ class Vertices:
     def none(cls) -> Vertices:
         """No points at all."""
         return cls(np.empty((0, 2)), np.empty(0, np.int64), np.empty(0))
-
-    def __add__(self, more: Vertices) -> Vertices:
-        mine, others = vars(self).values(), vars(more).values()
-        return Vertices(*(np.concatenate(pair) for pair in zip(mine, others, strict=True)))
 
 
 def keys(pixels: np.ndarray) -> np.ndarray:

@@ -17,15 +17,7 @@ from fracslice_cli.main import run
 from fracslice.scene import library
 from fracslice.volume.grid import read_vdb
 
-BALL = '<scene version="1"><solid size="20mm"><sphere/></solid></scene>'
 COMMAND = [sys.executable, "-c", "from fracslice_cli import main; main()"]
-
-
-@pytest.fixture
-def ball(tmp_path: Path) -> Path:
-    path = tmp_path / "ball.xml"
-    path.write_text(BALL)
-    return path
 
 
 def fracslice(*arguments: object) -> int:

@@ -8,15 +8,6 @@ from pathlib import Path
 import pytest
 from fracslice_cli.main import run
 
-BALL = '<scene version="1"><solid size="20mm"><sphere/></solid></scene>'
-
-
-@pytest.fixture
-def ball(tmp_path: Path) -> Path:
-    path = tmp_path / "ball.xml"
-    path.write_text(BALL)
-    return path
-
 
 def sliced(*arguments: object) -> int:
     return run(["slice", *map(str, arguments), "--pixel", "0.2mm"])

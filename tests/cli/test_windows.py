@@ -10,26 +10,17 @@ from fracslice_cli.main import run
 from fracslice.mesh import Mesh
 from fracslice.scene.view import Camera
 
-SCENE = '<scene version="1"><solid size="40mm"><sphere/></solid></scene>'
 
-
-@pytest.fixture
-def scene(tmp_path: Path) -> Path:
-    path = tmp_path / "ball.xml"
-    path.write_text(SCENE)
-    return path
-
-
-def test_show_opens_on_the_mesh_of_a_scene(scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_show_opens_on_the_mesh_of_a_scene(ball: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     meshes: list[Mesh] = []
     monkeypatch.setattr("fracslice.viewer.show", meshes.append)
-    words = ["show", str(scene), "--resolution", "24", "--size", "2cm", "--base", "5mm", "--quiet"]
-    assert run(words) == 0
+    words = ["--set", "solid.size=4cm", "--size", "2cm", "--resolution", "24", "--base", "5mm", "--quiet"]
+    assert run(["show", str(ball), *words]) == 0
     assert meshes[0].size == pytest.approx((20, 20, 15), abs=0.1)
 
 
 def test_fly_says_where_it_ended(
-    scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ball: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked = []
 
@@ -38,9 +29,9 @@ def test_fly_says_where_it_ended(
         return Camera(eye=(1.5, 0, 2), fov=30)
 
     monkeypatch.setattr("fracslice.viewer.fly", fly)
-    assert run(["fly", str(scene), "--size", "80x60", "--set", "sphere.radius=2", "--device", "cpu"]) == 0
+    assert run(["fly", str(ball), "--size", "80x60", "--set", "sphere.radius=2", "--device", "cpu"]) == 0
     path, settings, size, work, device = asked[0]
-    assert (path, settings, size, device) == (scene, ("sphere.radius=2",), (80, 60), "cpu")
+    assert (path, settings, size, device) == (ball, ("sphere.radius=2",), (80, 60), "cpu")
     assert capsys.readouterr().out == '<camera eye="1.5 0 2" fov="30"/>\n'
 
 
