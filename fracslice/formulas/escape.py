@@ -40,7 +40,7 @@ def potential_distance(r2, slope2, level, first_level, last_level, least):  # ty
     r2 = minimum(maximum(r2, least), 1e30)
     level = minimum(level, last_level)
     height = log(r2)
-    damping = 2.0 * level + (2.0 * first_level) * height
+    damping = (2.0 * first_level) * height + 2.0 * level
     quotient = maximum(sqrt(r2 / slope2), 1e-30)  # where slope2 has overflown, something to carry the sign
     return (height - level) * (level * quotient) / damping
 

@@ -64,6 +64,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     fading,
     c,
     digits,
+    turns,
     half_digits,
     even,
     linear,
@@ -80,9 +81,10 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
-    w = (rho (u, v), z), (u, v) a unit vector, w^n = (Im (z + i rho)^n (u + iv)^n, Re (z + i rho)^n): both
-    powers are products, and Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The
-    real part of a square is 2 re^2 minus the squared norm, which is known.
+    w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n): both powers are products,
+    and Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The real part of a
+    square is 2 re^2 minus the squared norm, which is known. Of the azimuth only u + iv = e^(2 i phi) is taken,
+    which needs no root, to the power n/2; what is left of rho e^(i n phi) is x + iy if n is odd, else rho.
 
     The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
     latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
@@ -102,6 +104,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     r2 = rho2 + z * z
     dr = 0.0 * x + 1.0
     level = 0.0 * x + first_level
+    reached = first_level
     end_r2, slope = r2, dr
     alive = r2 < escape2
     if curved:
@@ -114,22 +117,24 @@ def mandelbulb(  # type: ignore[no-untyped-def]
         if not any_of(alive):
             break
         rho2 = maximum(rho2, 1e-30)
-        over_rho = rsqrt(rho2)
-        rho = rho2 * over_rho
+        if even:
+            rho = sqrt(rho2)
         if whole:
-            u = x * over_rho
-            v = y * over_rho
-            re, im, cu, cv = z, 0.0 * x + 1.0, u, v
-            norm2 = r2
+            re, im, norm2 = z, 1.0, r2
             for odd in digits:
                 twice = re + re
                 re, im = twice * re - norm2, twice * im
                 norm2 = norm2 * norm2
-                twice = cv + cv
-                cu, cv = 1.0 - twice * cv, twice * cu
                 if odd:
                     re, im = re * z - im * rho2, re + im * z
                     norm2 = norm2 * r2
+            over = y / rho2
+            u, v = 1.0 - (y + y) * over, (x + x) * over
+            cu, cv = u, v
+            for odd in turns:
+                twice = cv + cv
+                cu, cv = 1.0 - twice * cv, twice * cu
+                if odd:
                     cu, cv = cu * u - cv * v, cu * v + cv * u
             meridian = r2
             for odd in half_digits:
@@ -145,7 +150,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
             rn = exp(0.5 * power * log(safe))
             theta = power * atan2(rho, z)
             phi = power * atan2(y, x)
-            re, im = rn * cos(theta), rn * sin(theta) * over_rho
+            re, im = rn * cos(theta), rn * sin(theta) / rho
             cu, cv = cos(phi), sin(phi)
             meridian = rn * rsqrt(safe)
         if loose:
@@ -159,16 +164,19 @@ def mandelbulb(  # type: ignore[no-untyped-def]
         if curved:
             bend = where(alive, bend + slope * half_less * rsqrt(maximum(r2, CORE)), bend)
         dr = power * maximum(meridian, latitude) * dr + grow
-        s = im * rho
-        x = s * cu + cx
-        y = s * cv + cy
+        if even:
+            s = im * rho
+            x, y = s * cu + cx, s * cv + cy
+        else:
+            x, y = im * (cu * x - cv * y) + cx, im * (cu * y + cv * x) + cy
         z = re + cz
         rho2 = x * x + y * y
         r2 = rho2 + z * z
         orbit(r2, alive)
         end_r2 = where(alive, r2, end_r2)
         slope = where(alive, maximum(dr, slope), slope)
-        level = where(alive, level * power, level)
+        reached = reached * power
+        level = where(alive, reached, level)
         if loose:
             radius = sqrt(r2)
             apart = where(level < 0.75 * last_level, radius - reach, radius - bailout)
@@ -249,6 +257,7 @@ def _products(power: float) -> dict[str, Fixed]:
     return {
         "whole": Fixed(whole),
         "digits": Fixed(_digits(n)),
+        "turns": Fixed(_digits(n // 2)),
         "half_digits": Fixed(_digits((n - 1) // 2)),
         "even": Fixed(n % 2 == 0),
         "linear": Fixed(n == 2),

@@ -68,11 +68,13 @@ class Vec:
         return Vec(self.builder, tuple(emit(*p) for p in zip(self.parts, *rows, strict=True)))
 
     def __add__(self, other: Vec | float) -> Vec:
+        theirs = other.factors if isinstance(other, Vec) else None
+        if theirs is self.factors:  # neither is a product, or it is added to itself, which needs no fusing
+            return self.each(self.builder.fadd, other)
         if self.factors:
             return self._fused(1, other)
-        if isinstance(other, Vec) and other.factors:
-            return other._fused(1, self)
-        return self.each(self.builder.fadd, other)
+        assert isinstance(other, Vec)
+        return other._fused(1, self)
 
     def __sub__(self, other: Vec | float) -> Vec:
         if self.factors:
