@@ -163,13 +163,13 @@ def mandelbulb(  # type: ignore[no-untyped-def]
             tear = where(alive, minimum(tear, beside), tear)
         if curved:
             bend = where(alive, bend + slope * half_less * rsqrt(maximum(r2, CORE)), bend)
-        dr = power * maximum(meridian, latitude) * dr + grow
         if even:
             s = im * rho
             x, y = s * cu + cx, s * cv + cy
         else:
             x, y = im * (cu * x - cv * y) + cx, im * (cu * y + cv * x) + cy
         z = re + cz
+        dr = maximum(meridian, latitude) * (power * dr) + grow
         rho2 = x * x + y * y
         r2 = rho2 + z * z
         orbit(r2, alive)
