@@ -18,6 +18,7 @@ from .vocabulary import (
     maximum,
     minimum,
     orbit,
+    ratio,
     rsqrt,
     sin,
     sqrt,
@@ -128,7 +129,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
                 if odd:
                     re, im = re * z - im * rho2, re + im * z
                     norm2 = norm2 * r2
-            over = y / rho2
+            over = ratio(y, rho2)
             u, v = 1.0 - (y + y) * over, (x + x) * over
             cu, cv = u, v
             for odd in turns:

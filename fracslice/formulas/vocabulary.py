@@ -36,11 +36,17 @@ def rsqrt(a: np.ndarray) -> np.ndarray:
     return found
 
 
+def ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a/b of a normal, finite b whose inverse is normal too; a GPU has an instruction for the inverse."""
+    found: np.ndarray = a / b
+    return found
+
+
 def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
     """Marks a step of an orbit that is r2 = |w|^2 away from the origin where `alive`; only pictures with
     palettes look.
     """
 
 
-_FUNCTIONS = ("where", "sqrt", "rsqrt", "log", "exp", "sin", "cos", "atan2", "floor")
+_FUNCTIONS = ("where", "sqrt", "rsqrt", "ratio", "log", "exp", "sin", "cos", "atan2", "floor")
 NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))

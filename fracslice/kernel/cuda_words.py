@@ -83,6 +83,17 @@ else:
     def _log(a):  # type: ignore[no-untyped-def]
         return _log2(a) * LOG_2
 
+    _inverse = _word(1, "rcp.approx.ftz.f32", "rcp.approx.ftz.f64")
+
+    def _ratio(a, b):  # type: ignore[no-untyped-def]
+        return a * _inverse(b)
+
+    def _ratio_in_double(a, b):  # type: ignore[no-untyped-def]
+        """The estimate is right to 20 bits, and a step of the third order to all."""
+        y = _inverse(b)
+        e = 1.0 - b * y
+        return a * (y + y * (e + e * e))
+
     @device
     def _sine(x, quarter_turns):  # type: ignore[no-untyped-def]
         """As on the lanes (fdlibm's reduction by parts of pi/2): libdevice's own reduces in float64."""
@@ -118,6 +129,7 @@ else:
 
     sqrt = _word(1, "sqrt.approx.ftz.f32", "sqrt.rn.f64")
     rsqrt = _word(1, "rsqrt.approx.ftz.f32", "__nv_rsqrt")
+    ratio = _word(2, _ratio, _ratio_in_double)
     divide = _word(2, "div.full.ftz.f32", "div.rn.f64")
     log = _word(1, _log, "__nv_log")
     exp = _word(1, "__nv_expf", "__nv_exp")

@@ -164,6 +164,7 @@ def _function(emit: Callable[..., Vec]) -> Any:
 
 sqrt = _function(lanes_math.sqrt)
 rsqrt = _function(lanes_math.rsqrt)
+ratio = _function(lanes_math.ratio)
 log = _function(lanes_math.log)
 exp = _function(lanes_math.exp)
 sin = _function(lanes_math.sin)

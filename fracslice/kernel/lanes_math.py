@@ -61,6 +61,11 @@ def _extreme(a: Vec, b: Vec, which: str) -> Vec:
     return a.each(lambda x, y: a.builder.call(function, [x, y, current]), b)
 
 
+def ratio(a: Vec, b: Vec) -> Vec:
+    """a/b. The divider has little else to do, while an estimate and Newton steps take multiplications."""
+    return a / b
+
+
 def rsqrt(a: Vec) -> Vec:
     """1/sqrt(a): the hardware's 14-bit estimate and Newton steps where there is one, else a division."""
     if not _is_avx512(a):

@@ -95,6 +95,7 @@ WORDS = {
     "absolute": _chain(np.abs, np.sign),
     "sqrt": _chain(np.sqrt, lambda v: 0.5 / np.sqrt(v)),
     "rsqrt": _chain(lambda v: 1 / np.sqrt(v), lambda v: -0.5 / (v * np.sqrt(v))),
+    "ratio": lambda a, b: lifted(a) / b,
     "log": _chain(np.log, lambda v: 1 / v),
     "exp": _chain(np.exp, np.exp),
     "sin": _chain(np.sin, np.cos),

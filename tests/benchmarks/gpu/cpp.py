@@ -12,7 +12,7 @@ WORDS = {
     "any_of": "{}",
     "sqrt": "sqrtf({})",
     "rsqrt": "rsqrtf({})",
-    "inverse": "(1.0f / {})",
+    "ratio": "({} / {})",
     "log": "logf({})",
     "exp": "expf({})",
     "sin": "sinf({})",

@@ -31,6 +31,7 @@ def scalar_words() -> dict[str, Callable[..., float]]:
         "any_of": lambda mask: mask,
         "sqrt": math.sqrt,
         "rsqrt": lambda a: 1.0 / math.sqrt(a),
+        "ratio": lambda a, b: a / b,
         "log": math.log,
         "floor": math.floor,
         "minimum": lambda a, b: a if a < b else b,
