@@ -84,8 +84,8 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
     w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n): both powers are products,
     and Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The real part of a
-    square is 2 re^2 minus the squared norm, which is known. Of the azimuth u + iv = e^(2 i phi) is taken, which
-    needs no root, to the power n/2; what is left of rho e^(i n phi) is x + iy where n is odd, else rho.
+    square is 2 re^2 minus the squared norm, which is known. Of the azimuth u + iv = e^(2 i phi) is taken,
+    which needs no root, to the power n/2; what is left of rho e^(i n phi) is x + iy where n is odd, else rho.
 
     The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
     latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
