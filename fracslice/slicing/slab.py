@@ -12,9 +12,10 @@ far from what escape-time fractals do: their values are a fifth of the distance 
 inside (means on Mandelbulbs and Julia sets), and going down to single pixels by it would cost more than
 the contours. In a scene of nothing else smaller blocks are dropped by how steep the field is there, but
 not below `LIKELY`; and single samples where two blocks around theirs all have one sign, for inside, values
-tell less of how near the surface is than the signs around them do. What is lost, specks of a pixel or two, is
-below 0.1 % of the area (tests/slicing/test_layers.py). Where a scene mixes them with other shapes, probing ends at blocks of
-`STOP` pixels instead, and parts smaller than that which touch no probe are not found.
+tell less of how near the surface is than the signs around them do. What is lost, specks of a pixel or two,
+is below 0.1 % of the area (tests/slicing/test_layers.py). Where a scene mixes them with other shapes,
+probing ends at blocks of `STOP` pixels instead, and parts smaller than that which touch no probe are not
+found.
 """
 
 from __future__ import annotations
