@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kCoarsest = 8;        // tiles along a block of the first level
 constexpr double kSteep = 0.7;
+constexpr double kHigh = 0.5, kDeep = 0.1;  // shares of the proven bound for blocks of 16 pixels of an even field, outside and inside
 // Of a group of layers and of a pair: how much farther a likely bound must reach into them, and how many pixels it is from
 // their middle to the last one, at most.
 constexpr double kAside = 1.4, kThick = 2.2, kBeside = 1.2, kThin = 0.8;
@@ -127,7 +128,8 @@ std::vector<Slab::Block> Slab::coarse() {
         };
         evaluate(blocks.size(), middle, [&](size_t i, float f) {
             const Block& b = blocks[i];
-            if (std::fabs(f) > bounds_.proven * length(width * size, height)) {
+            const double share = bounds_.even && size == 2 ? f < 0 ? kDeep : kHigh : 1;
+            if (std::fabs(f) > share * bounds_.proven * length(width * size, height)) {
                 if (f < 0) fill(b);
                 return;
             }
