@@ -72,6 +72,9 @@ struct Axis {
     int count() const { return last - first; }
 };
 
+// Memory of one picture after the other.
+thread_local Runs runs_of_thread;
+
 constexpr int kAhead = 3;  // tiles
 
 // A layer on its way to a picture.
@@ -87,6 +90,7 @@ class Shown {
     Picture picture() {
         const uint64_t row = uint64_t(view_.columns) + 1;
         int64_t at = int64_t(row) * down_.at + 1 + across_.at;  // place of a row's first pixel among all bytes
+        runs_.clear();
         runs_.add(0, row * down_.at);
         for (int tile = down_.first / kTile; tile * kTile < down_.last; ++tile) {
             int from = std::max(down_.first - tile * kTile, 0), to = std::min(down_.last - tile * kTile, kTile);
@@ -98,7 +102,8 @@ class Shown {
                 runs_.add(0, row * (to - from));
         }
         runs_.add(0, row * (view_.rows - down_.at - down_.count()));
-        return {runs_.zlib(band_.checksum(row * uint64_t(view_.rows))), painted_};
+        painted_.area += coverage_.area();
+        return {&runs_.zlib(band_.checksum(row * uint64_t(view_.rows))), painted_};
     }
 
  private:
@@ -145,7 +150,7 @@ class Shown {
             painted_.area += __builtin_popcountll(whole);
             return false;
         }
-        painted_.area += coverage_(tiles, corners, levels_);
+        coverage_(tiles, corners, levels_);
         painted_.partly += __builtin_popcountll(cut);
         turn_(levels_, turned_);
         band_.put(i, turn_(whole), turn_(cut), turned_);
@@ -160,7 +165,7 @@ class Shown {
     Coverage coverage_;
     Levels levels_, turned_;
     InRows rows_;
-    Runs runs_;
+    Runs& runs_ = runs_of_thread;
     Painted painted_{0, 0};
 };
 
@@ -168,8 +173,9 @@ class Shown {
 
 Picture picture(const Slab& slab, const View& view) { return Shown(slab, view).picture(); }
 
-Rows<uint8_t> deflated(const Canvas& image) {
-    Runs runs;
+const Rows<uint8_t>& deflated(const Canvas& image) {
+    Runs& runs = runs_of_thread;
+    runs.clear();
     Adler sum;
     const int64_t stride = image.columns + 1;
     for (int y = 0; y < image.rows; ++y) {
@@ -179,7 +185,7 @@ Rows<uint8_t> deflated(const Canvas& image) {
             const uint8_t value = row[x * image.across];
             while (++x < image.columns && row[x * image.across] == value) {}
             runs.add(value, uint64_t(x - begin));
-            sum.add(value, y * stride + 1 + begin, 1, uint64_t(x - begin), 0);
+            sum.add(value, uint64_t(y * stride + 1 + begin), uint64_t(x - begin));
         }
     }
     return runs.zlib(sum.value(uint64_t(stride) * uint64_t(image.rows)));
