@@ -30,7 +30,7 @@ from ..errors import SliceError
 from ..formulas.registry import Facts, Node
 from ..kernel import Compilable, CpuKernel, Kernel
 
-LIKELY = 0.075, 0.01
+LIKELY = 0.06, 0.015
 """The least bounds for small blocks of a fractal, outside and inside, as shares of its own."""
 
 STOP = 2, 4
