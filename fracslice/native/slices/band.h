@@ -74,10 +74,11 @@ class Band {
         if (column < first_) cut &= kAll / 255 * (0xFF & 0xFF << (first_ - column));
         if (column > last_ - kTile) cut &= kAll / 255 * (0xFF >> (column + kTile - last_));
         add(column, levels);
+        const ptrdiff_t room = room_;  // as bytes may be anything
         uint8_t *rows = &cut_[n_], *to = &levels_[kTile * n_];
         for (int row = 0; row < kTile; ++row) {
-            rows[row * room_] = uint8_t(cut >> kTile * row);
-            std::memcpy(to + row * stride(), &levels[kTile * row], kTile);
+            rows[row * room] = uint8_t(cut >> kTile * row);
+            std::memcpy(to + kTile * row * room, &levels[kTile * row], kTile);
         }
         column_[n_] = column, full_[n_] = false, whole_[n_++] = whole;
     }
