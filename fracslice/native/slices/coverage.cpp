@@ -204,7 +204,7 @@ FRACSLICE_WIDE void cover_wide(const Slab& slab, float scale, const Quad& tiles,
     const __m512i order = _mm512_setr_epi32(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15);
     const __m512i bytes = _mm512_maskz_permutexvar_epi32(0xFFFF, order, _mm512_packus_epi16(low, high));
     _mm512_storeu_si512(levels.data(), bytes);
-    const __m256 both = _mm256_add_ps(_mm512_castps512_ps256(sum), _mm512_maskz_extractf32x8_ps(0xFF, sum, 1));
+    const __m256 both = _mm256_add_ps(_mm512_maskz_extractf32x8_ps(0xFF, sum, 0), _mm512_maskz_extractf32x8_ps(0xFF, sum, 1));
     _mm512_storeu_pd(sums, _mm512_add_pd(_mm512_loadu_pd(sums), _mm512_maskz_cvtps_pd(0xFF, both)));
 }
 const bool kWide = has_wide();
