@@ -25,6 +25,7 @@ from .altered import altered
 # What measures needs Numba and SciPy, which take as long to load as a small mesh: only where it is used.
 if TYPE_CHECKING:
     from .parts import Parts
+    from .samples import Samples
 
 COARSE, FINE = 128, 640
 """Samples along the longest side that distances are measured on, at least and at most."""
@@ -145,6 +146,13 @@ class _Run:
         """The same as distances."""
         return to_grid(self.sampled(length)).redistance()
 
+    def seen(self, length: float) -> Samples:
+        """The same, as distances where the field itself does not tell them."""
+        from .samples import Samples
+
+        weak = self.thing.facts.weak
+        return Samples(from_grid(self.distances(length)) if weak else self.sampled(length))
+
     def filled(self) -> Node | Compilable:
         """The space that nothing reaches becomes solid."""
         from .border import nearer
@@ -173,10 +181,9 @@ class _Run:
 
     def closed(self) -> Node | Compilable:
         """Gaps are filled from face to face."""
-        from .samples import Samples
         from .slender import all_walls
 
-        solid = Samples(from_grid(self.distances(self.how.gap)))
+        solid = self.seen(self.how.gap)
         found = all_walls(self.thing, solid, self.how.gap / self.scale, self.work, gaps=True)
         one = _apart(found.middle, solid.bricks.voxel)
         return self.added(found.start[one], found.end[one], solid.bricks.voxel, solid.bricks)
@@ -186,10 +193,9 @@ class _Run:
         with such a ball would take away (Serra 1982), along the part of the medial axis between opposite
         faces.
         """
-        from .samples import Samples
         from .slender import all_walls
 
-        solid, least = Samples(from_grid(self.distances(self.how.thickness))), self.how.thickness / self.scale
+        solid, least = self.seen(self.how.thickness), self.how.thickness / self.scale
         middle = all_walls(self.thing, solid, least, self.work).middle
         middle = middle[_apart(middle, solid.bricks.voxel)]
         return self.added(middle, middle, least / 2, solid.bricks)
@@ -234,8 +240,12 @@ class _Run:
 
 
 def _apart(points: np.ndarray, voxel: float) -> np.ndarray:
-    """Numbers of points of which no two are in the same half voxel."""
-    _, first = np.unique(np.round(2 * points / voxel).astype(np.int64), axis=0, return_index=True)
+    """Numbers of points of which no two are in the same half voxel, along x, then y, then z."""
+    if not len(points):
+        return np.empty(0, np.int64)
+    cells = np.round(2 * points / voxel).astype(np.int64)
+    cells -= cells.min(0)
+    _, first = np.unique(np.ravel_multi_index(tuple(cells.T), tuple(cells.max(0) + 1)), return_index=True)
     return np.asarray(first)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 from ..errors import VolumeError
 from ..formulas import Node
@@ -21,7 +22,7 @@ from ..volume import Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
 from .samples import Samples
-from .walls import OPPOSITE, Direction, Walls, crossed, normals_at, walls
+from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, walls
 
 NEAR = 0.9
 """Voxels: more than from any point to the nearest sample, half the diagonal."""
@@ -30,20 +31,24 @@ AWAY = 0.75
 """Voxels from the surface that the samples know, at least, that make another surface."""
 
 THIN = 3.0
-"""Voxels: what is thicker is measured by samples."""
+"""Voxels: what is thicker is measured by samples, too."""
 
 STEP = 0.05
 """Voxels: the least step along a ray; a wall or gap as thin as that may still be missed."""
 
+SLACK = 0.25
+"""Voxels before a thick wall or gap in which nothing else is looked for."""
+
 ROUNDS = 400
-HALVINGS = 16
+
+RAYS = 1 << 13
+"""At a time, by one thread."""
 
 
 @dataclass(frozen=True, eq=False)
 class Slender:
-    """Walls, or gaps, up to `THIN` voxels thick, right within a hundredth of one. replaces: below which width
-    (scene units) they stand for what the samples tell; 0 where the samples are right, and these are what they
-    miss.
+    """Walls, or gaps, that are thin, right within a hundredth of a voxel. replaces: below which width (scene
+    units) they stand for what the samples tell; 0 where the samples are right, and these are what they miss.
     """
 
     walls: Walls
@@ -64,7 +69,7 @@ def slender(root: Node | Compilable, seen: Samples, work: Work) -> tuple[Slender
     are far from distances: there the samples are better, and only what they miss is looked for. A gap between
     walls that are themselves thin is found behind them.
     """
-    look = _Look(root, seen, work)
+    look = _Look(root, seen, THIN * seen.bricks.voxel, work)
     return look.told(look.walls()), look.told(look.gaps())
 
 
@@ -80,13 +85,18 @@ class _Rays(Rows):
     enter: np.ndarray
     leave: np.ndarray
 
+    def points(self, s: np.ndarray) -> np.ndarray:
+        """So far along each, [3, n]."""
+        return np.asarray(self.start.T + s * self.ways.T)
+
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What is looked at, and what its samples tell."""
+    """What is looked at, what its samples tell, and how thick walls and gaps are at most, scene units."""
 
     root: Node | Compilable
     seen: Samples
+    most: float
     work: Work
 
     @cached_property
@@ -99,7 +109,7 @@ class _Look:
 
     def told(self, found: Walls) -> Slender:
         """Walls or gaps that were found, and what they are better than."""
-        return Slender(found, 0.0 if self.root.facts.weak else THIN * self.voxel)
+        return Slender(found, 0.0 if self.root.facts.weak else self.most)
 
     @cached_property
     def inwards(self) -> _Rays:
@@ -117,7 +127,8 @@ class _Look:
         found, rays = self.from_within(), self.inwards
         while len(rays.start):
             gap = self.stretch(rays, rays.leave, 1.0)
-            gap = gap.chosen(self.missed(gap, gap.enter) & self.missed(gap, gap.leave))
+            gap = self.missed(gap, gap.enter)
+            gap = self.missed(gap, gap.leave)
             found = found + self.facing(gap)
             near = gap.chosen(gap.leave - gap.enter < 2 * NEAR * self.voxel)
             rays = self.stretch(near, near.leave, -1.0)
@@ -129,15 +140,15 @@ class _Look:
             rays = self.rays(-1.0)
         except VolumeError:  # all walls are thin
             return Walls.none()
-        limit = np.full(len(rays.start), THIN * self.voxel)
+        limit = np.full(len(rays.start), self.most)
         back = self.first(replace(rays, ways=-rays.ways), 0 * limit, limit, -1.0)
         return self.facing(rays.chosen(rays.enter + back > limit))
 
     def stretch(self, rays: _Rays, begin: np.ndarray, sign: float) -> _Rays:
         """The rays on which the field times `sign`, which is positive from `begin` on, is negative within
-        `THIN` voxels; entered at the one, left at the other.
+        `most`; entered at the one, left at the other.
         """
-        end = begin + THIN * self.voxel
+        end = begin + self.most
         leave = self.first(rays, begin, end, sign)
         return replace(rays, enter=begin, leave=leave).chosen(leave < end)
 
@@ -145,19 +156,33 @@ class _Look:
         """Through all thin walls (sign 1), or from within all others through thin gaps (-1)."""
         reach = NEAR * self.voxel * self.root.facts.lipschitz
         raised = self.raised(sign * reach)
-        start, axis = crossed(raised)
-        normals = normals_at(raised, start)
-        area = self.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
-        far, none = np.full(len(start), 2 * reach + 2 * self.voxel), np.zeros(len(start))
-        rays = _Rays(start, -sign * normals, area, none, none)
-        enter = self.first(rays, none, far, sign)
-        rays = replace(rays, enter=enter).chosen((enter < far) & self.missed(rays, enter))
-        return self.stretch(rays, rays.enter, -sign)
 
-    def missed(self, rays: _Rays, s: np.ndarray) -> np.ndarray:
-        """Whether what is so far along each ray is to be looked at: of a fractal, what its samples miss."""
-        known = np.abs(self.seen.points(*(rays.start + s[:, None] * rays.ways).T)) <= AWAY * self.voxel
-        return np.asarray(~known | (not self.root.facts.weak))
+        def look(rows: slice) -> _Rays:
+            start, normals, area = crossed(raised, rows)
+            rays = self.narrow(_Rays(start, -sign * normals, area, 0 * area, 0 * area), sign)
+            far, none = 2 * (reach + self.voxel), np.zeros(len(rays.start))
+            rays = replace(rays, enter=self.first(rays, none, none + far, sign))
+            rays = rays.chosen(rays.enter < far)
+            rays = self.missed(rays, rays.enter)
+            return self.stretch(rays, rays.enter, -sign)
+
+        return gathered(look, len(raised.bricks), AT_ONCE, self.work)
+
+    def narrow(self, rays: _Rays, sign: float) -> _Rays:
+        """Those that may leave within `most` what they enter, `NEAR` voxels from where they begin at least:
+        most others are as far from any surface halfway.
+        """
+        half = self.most / 2
+        middle = np.full(len(rays.start), (NEAR + SLACK) * self.voxel + half)
+        f = sign * self.field(rays.points(middle))
+        return rays.chosen(~(f <= -half * self.root.facts.lipschitz))
+
+    def missed(self, rays: _Rays, s: np.ndarray) -> _Rays:
+        """Those that are to be looked at so far along: of a fractal, at what its samples miss."""
+        if not self.root.facts.weak:
+            return rays
+        known = np.abs(self.seen.points(*rays.points(s))) <= AWAY * self.voxel
+        return rays.chosen(~known)
 
     def raised(self, by: float) -> Samples:
         """Samples of the field less `by`: the flatter it is, the farther its inside reaches from the box."""
@@ -178,23 +203,31 @@ class _Look:
         """
 
         def field(which: np.ndarray, s: np.ndarray) -> np.ndarray:
-            points = rays.start[which] + s[:, None] * rays.ways[which]
-            return sign * values_at(self.kernel, points.T, self.work)
+            return sign * self.field(_points(rays.start, rays.ways, which, s))
 
         return _first(field, begin, end, self.root.facts.lipschitz, STEP * self.voxel)
 
+    def field(self, points: np.ndarray) -> np.ndarray:
+        """At points [3, n]."""
+        return values_at(self.kernel, points, self.work)
+
     def facing(self, rays: _Rays) -> Walls:
         """Those whose two faces are turned away from each other."""
-        ends = [rays.start + s[:, None] * rays.ways for s in (rays.enter, rays.leave)]
-        facing = (self.normals(ends[0]) * self.normals(ends[1])).sum(1)
-        return Walls(ends[0], ends[1], rays.leave - rays.enter, rays.area).chosen(facing < OPPOSITE)
+
+        def look(part: slice) -> Walls:
+            some = rays.chosen(part)
+            ends = [some.points(s) for s in (some.enter, some.leave)]
+            facing = (self.normals(ends[0]) * self.normals(ends[1])).sum(0)
+            found = Walls(ends[0].T, ends[1].T, some.leave - some.enter, some.area)
+            return found.chosen(facing < OPPOSITE)
+
+        return gathered(look, len(rays.start), RAYS, self.work)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Unit normals of the field itself, [n, 3]."""
-        shifts = STEP * self.voxel * np.eye(3)
-        values = [[values_at(self.kernel, (points + w).T, self.work) for w in (s, -s)] for s in shifts]
-        slope = np.stack([ahead - back for ahead, back in values], 1)
-        unit: np.ndarray = slope / np.maximum(np.linalg.norm(slope, axis=1), 1e-30)[:, None]
+        """Unit normals of the field itself at points [3, n], [3, n]."""
+        shifts = STEP * self.voxel * np.eye(3)[:, :, None]
+        slope = np.stack([self.field(points + s) - self.field(points - s) for s in shifts])
+        unit: np.ndarray = slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-30)
         return unit
 
 
@@ -202,9 +235,22 @@ def all_walls(
     root: Node | Compilable, seen: Samples, limit: float, work: Work, *, gaps: bool = False
 ) -> Walls:
     """The walls or gaps up to `limit` scene units, whether the samples tell of them or the field alone."""
-    look = _Look(root, seen, work)
-    found = look.told(look.gaps() if gaps else look.walls())
-    return found.beside(walls(seen, limit, work, gaps=gaps), limit)
+    weak, most = root.facts.weak, THIN * seen.bricks.voxel
+    look = _Look(root, seen, most if weak else max(most, limit), work)
+    found = look.gaps() if gaps else look.walls()
+    if weak:
+        found = walls(seen, limit, work, gaps=gaps) + found
+    return found.chosen(found.width < limit)
+
+
+@njit(cache=True, nogil=True)
+def _points(start, ways, which, s):  # type: ignore[no-untyped-def]
+    """So far along some rays, [3, n]."""
+    points = np.empty((3, len(s)))
+    for i in range(len(s)):
+        for axis in range(3):
+            points[axis, i] = start[which[i], axis] + s[i] * ways[which[i], axis]
+    return points
 
 
 def _first(
@@ -214,23 +260,26 @@ def _first(
     bound: float,
     least: float,
 ) -> np.ndarray:
-    """Where a field on rays, of their numbers and of how far along, is first below zero: in steps of the
-    distance (sphere tracing, Hart 1996), then by bisection.
+    """Where a field on rays, of their numbers and of how far along, is first below zero after `begin`: in
+    steps of the distance (sphere tracing, Hart 1996), the last one of `least`, in which it is taken for
+    straight. Beyond `end` where it never is.
     """
-    s, before, todo = begin.copy(), begin.copy(), np.arange(len(begin))
+    s, before, todo = begin + least, begin.copy(), np.arange(len(begin))
+    high, low = np.full((2, len(begin)), least * bound / 2)
     for _ in range(ROUNDS):
         f = field(todo, s[todo])
-        todo, f = todo[f >= 0], f[f >= 0]
-        before[todo] = s[todo]
-        s[todo] += np.maximum(f / bound, least)
-        todo = todo[s[todo] < end[todo]]
+        on, below = todo[f >= 0], todo[f < 0]
+        before[on], high[on], low[below] = s[on], f[f >= 0], f[f < 0]
+        s[on] += np.maximum(high[on] / bound, least)
+        far = below[s[below] - before[below] > 1.01 * least]
+        s[far] = (before[far] + s[far]) / 2
+        todo = np.concatenate([on[s[on] < end[on]], far])
         if not len(todo):
             break
-    found = np.flatnonzero((s < end) & (s > begin))
-    for _ in range(HALVINGS):
-        middle = (before[found] + s[found]) / 2
-        low = field(found, middle) < 0
-        s[found], before[found] = np.where(low, middle, s[found]), np.where(low, before[found], middle)
+    s[todo] = end[todo]
+    found = s < end
+    share = low[found] / (low[found] - high[found])
+    s[found] -= share * (s[found] - before[found])
     return s
 
 

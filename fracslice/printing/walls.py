@@ -9,7 +9,9 @@ diameter function (Shapira, Shamir and Cohen-Or 2008) with one ray.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numba import njit
@@ -22,8 +24,11 @@ OPPOSITE = -0.5
 """The cosine between the normals of two faces of a wall is at most this: wedges up to 60 degrees are walls.
 """
 
+AT_ONCE = 64
+"""Bricks whose surface is looked at by one thread at a time."""
 
 Direction = tuple[float, float, float]
+R = TypeVar("R", bound=Rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,49 +75,58 @@ def walls(
     within a voxel; what is thinner than one shows only where a sample lies in it, see `slender`.
     """
     b, towards = solid.bricks, -1.0 if gaps else 1.0
-    points, axis = crossed(solid)
-    ends, normals = np.empty(points.shape), np.empty(points.shape)
-    width, facing = np.empty(len(points)), np.ones(len(points))
 
-    def task(part: slice) -> None:
-        normals[part] = normals_at(solid, points[part])
-        ways = -towards * normals[part]
+    def look(rows: slice) -> Walls:
+        points, normals, area = crossed(solid, rows)
+        ways = -towards * normals
         if direction is not None:
             ways = np.copysign(1, ways @ np.array(direction))[:, None] * np.array(direction)
-        frame = (*b.origin, b.voxel, b.index, solid.bounds, b.values)
-        _through(points[part], ways, limit, towards, *frame, width[part])
-        ends[part] = points[part] + width[part, None] * ways
-        hit = part.start + np.flatnonzero(width[part] < limit)
-        facing[hit] = (normals_at(solid, ends[hit]) * normals[hit]).sum(1)
-        if direction is not None:
-            facing[part] = np.where(np.abs((normals[part] * ways).sum(1)) > -OPPOSITE, facing[part], 1)
+        width = np.empty(len(points))
+        _through(points, ways, limit, towards, *b.origin, b.voxel, b.index, solid.bounds, b.values, width)
+        thin = (width < limit) & (np.abs((normals * ways).sum(1)) > -OPPOSITE)
+        ends = points + width[:, None] * ways
+        thin[thin] = (normals_at(solid, ends[thin]) * normals[thin]).sum(1) < OPPOSITE
+        return Walls(points, ends, width, area).chosen(thin)
 
-    work.map(task, chunks(len(points), 1 << 13))
-    thin = facing < OPPOSITE
-    area = b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
-    return Walls(points[thin], ends[thin], width[thin], area[thin])
+    return gathered(look, len(b), AT_ONCE, work)
 
 
-def crossed(solid: Samples) -> tuple[np.ndarray, np.ndarray]:
-    """Where the surface crosses the edges of the grid, float64 [n, 3], and their axes, int64 [n]."""
+def gathered(look: Callable[[slice], R], count: int, size: int, work: Work) -> R:
+    """What is found by looking at `count` rows, `size` of them at a time, on all threads; in order."""
+    parts = chunks(count, size) or [slice(0, 0)]
+    found: dict[int, R] = {}
+
+    def task(part: slice) -> None:
+        found[part.start] = look(part)
+
+    work.map(task, parts)
+    return type(found[0]).joined([found[part.start] for part in parts])
+
+
+def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the surface crosses the edges of the grid that begin in some bricks, float64 [n, 3], its unit
+    normals there, [n, 3], and how much of it each crossing stands for, [n], scene units.
+    """
     b = solid.bricks
-    frame = (b.ijk, b.voxel, b.index, solid.bounds, b.values)
+    frame = (b.ijk[rows], b.voxel, b.index, solid.bounds, b.values[rows], b.values)
     lower = np.empty((_edges(*frame, np.empty((0, 3), np.int64), np.empty(0, np.int64)), 3), np.int64)
     axis = np.empty(len(lower), np.int64)
     _edges(*frame, lower, axis)
     here = np.asarray(b.origin) + b.voxel * lower
     beyond = here + (b.voxel * np.eye(3))[axis]
     f, g = solid.points(*here.T), solid.points(*beyond.T)
-    return here + (f / np.where(f == g, 1, f - g))[:, None] * (beyond - here), axis
+    points = here + (f / np.where(f == g, 1, f - g))[:, None] * (beyond - here)
+    normals = normals_at(solid, points)
+    return points, normals, b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
 
 
 @njit(cache=True, nogil=True)
-def _edges(ijk, voxel, index, bounds, values, lower, axis):  # type: ignore[no-untyped-def]
+def _edges(ijk, voxel, index, bounds, own, values, lower, axis):  # type: ignore[no-untyped-def]
     n = 0
     for row in range(len(ijk)):
         for s in range(512):
             x, y, z = ijk[row, 0] + (s >> 6), ijk[row, 1] + ((s >> 3) & 7), ijk[row, 2] + (s & 7)
-            inside = values[row, s] < 0
+            inside = own[row, s] < 0
             for a in range(3):
                 u, v, w = x + (a == 0), y + (a == 1), z + (a == 2)
                 if (sample_at(index, bounds, values, voxel, u, v, w) < 0) != inside:

@@ -7,13 +7,15 @@ each layer one sample of each block of 2 pixels and then the others are evaluate
 reaches them. Then follows closure: where two neighbours differ in sign and one of them is only implied by
 another, it is evaluated. Nothing within a layer is evaluated twice.
 
-For 16 pixels and more the bound is the formula's own, which is proven or measured with a margin. It is
+For more than 16 pixels the bound is the formula's own, which is proven or measured with a margin. It is
 far from what escape-time fractals do: their values are a fifth of the distance outside and a fiftieth
 inside (means on Mandelbulbs and Julia sets), and going down to single pixels by it would cost more than
-the contours. In a scene of nothing else smaller blocks are dropped by how steep the field is there, but
-not below `LIKELY`; what is lost, specks of a pixel or two, is below 0.1 % of the area
-(tests/slicing/test_layers.py). Where a scene mixes them with other shapes, probing ends at blocks of
-`STOP` pixels instead, and parts smaller than that which touch no probe are not found.
+the contours. In a scene of nothing else blocks of 16 are dropped by half of it outside and by a tenth
+inside, smaller ones by how steep the field is there, but not below `LIKELY`; and single samples where two
+blocks around theirs all have one sign, for inside, values tell less of how near the surface is than the
+signs around them do. What is lost, specks of a pixel or two, is below 0.1 % of the area
+(tests/slicing/test_layers.py). Where a scene mixes them with other shapes, probing ends at blocks of `STOP`
+pixels instead, and parts smaller than that which touch no probe are not found.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ from ..errors import SliceError
 from ..formulas.registry import Facts, Node
 from ..kernel import Compilable, CpuKernel, Kernel
 
-LIKELY = 0.075, 0.01
+LIKELY = 0.06, 0.015
 """The least bounds for small blocks of a fractal, outside and inside, as shares of its own."""
 
 STOP = 2, 4

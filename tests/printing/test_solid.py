@@ -218,6 +218,14 @@ def test_walls_thinner_than_the_samples_are_thickened() -> None:
     assert len(after) > 1000
 
 
+def test_walls_of_many_samples_are_thickened_alike() -> None:
+    """A fin of 1.4 mm, nine samples thick."""
+    thin = union(box(size=(2, 2, 0.5)), at(box(size=(1.4, 0.14, 1.5)), 0, 0.003, 0.75))
+    after, before = (measured(thin, **how) for how in ({"thickness": 2.5}, {}))
+    assert np.quantile(before, (0.05, 0.5)) == pytest.approx([1.4, 1.4], abs=0.1)
+    assert np.quantile(after, (0.05, 0.5)) == pytest.approx([2.5, 2.5], abs=0.2)
+
+
 def test_gaps_thinner_than_the_samples_are_closed() -> None:
     """A gap of 0.1 mm where samples are 0.2 mm apart."""
     apart = union(at(box(size=(1, 1, 0.995)), 0, 0, 0.5025), at(box(size=(1, 1, 0.995)), 0, 0, -0.5025))
@@ -235,6 +243,18 @@ def test_fractals_are_thickened() -> None:
         thing = scene(mandelbulb(iterations=6), size="40mm", printing=how)
         volumes.append(make_mesh(thing, MeshJob(resolution=48)).report.mesh.volume_mm3)
     assert volumes[1] > 1.005 * volumes[0]
+
+
+def test_gaps_of_fractals_are_closed() -> None:
+    """Also between walls that their samples miss."""
+    planned = plan(mandelbulb(iterations=6), 64)
+    points = np.random.default_rng(0).uniform(-1.2, 1.2, (3, 400_000))
+    before, after = (
+        compile_scene(root, "float64").points(*points) < 0
+        for root in (planned.root, printable(planned, 40, Print(gap=1))[0].root)
+    )
+    assert after[before].all()
+    assert 1.002 < after.sum() / before.sum() < 1.1
 
 
 def test_time_is_linear_in_the_holes() -> None:

@@ -65,7 +65,7 @@ class Band {
     // Begins with eight rows of which those from `from` to before `to` are on the picture; `at`: the place of the first one's
     // first byte among all bytes, `stride` from row to row.
     void clear(int from, int to, int64_t at, uint64_t stride) {
-        n_ = 0, from_ = from, to_ = to, at_ = at, across_ = stride;
+        n_ = 0, from_ = from, to_ = to, at_ = at, across_ = stride, eight_ = {};
     }
     // The tile as the next one, if it is on the picture.
     void put(int tile, uint64_t whole, uint64_t cut, const Levels& levels) {
@@ -74,10 +74,11 @@ class Band {
         if (column < first_) cut &= kAll / 255 * (0xFF & 0xFF << (first_ - column));
         if (column > last_ - kTile) cut &= kAll / 255 * (0xFF >> (column + kTile - last_));
         add(column, levels);
+        const ptrdiff_t room = room_;  // as bytes may be anything
         uint8_t *rows = &cut_[n_], *to = &levels_[kTile * n_];
         for (int row = 0; row < kTile; ++row) {
-            rows[row * room_] = uint8_t(cut >> kTile * row);
-            std::memcpy(to + row * stride(), &levels[kTile * row], kTile);
+            rows[row * room] = uint8_t(cut >> kTile * row);
+            std::memcpy(to + kTile * row * room, &levels[kTile * row], kTile);
         }
         column_[n_] = column, full_[n_] = false, whole_[n_++] = whole;
     }
@@ -93,54 +94,52 @@ class Band {
         for (int i = 0; i < n_; ++i) {
             if (!full_[i]) continue;
             const int begin = std::max(column_[i], first_);
-            sum_.add(255, at_ + begin - first_, uint64_t(to_ - from_), uint64_t(column_[i + 1] - begin), across_);
+            eight_.add(255, from_, to_, place(begin), uint64_t(column_[i + 1] - begin));
         }
+        sum_.add(eight_, at_ - int64_t(place(first_)) - from_ * int64_t(across_), across_);
     }
     // The checksum of all bands, of n bytes in all.
     uint32_t checksum(uint64_t n) const { return sum_.value(n); }
 
     // The rows, each after `before` zeros and before `after` ones.
     void write(uint32_t before, uint32_t after, Runs& runs) {
-        spans_.resize(size_t(to_ - from_) * (ends_.size() / 2 + 2));
-        Span* span = spans_.data();
-        uint8_t value = 0;
-        uint32_t length = 0;  // of the run of this value, so far
-        auto is = [&](uint8_t next) {
-            if (value != next) *span++ = {value, length, 0, 0}, value = next, length = 0;
-        };
+        Runs::End end = runs.room(size_t(to_ - from_) * size_t(2 * kTile * n_ + 8), size_t(to_ - from_) * across_);
         const int* column = column_.data();
         const uint64_t* whole = whole_.data();
         for (int row = from_; row < to_; ++row) {
+            const uint8_t* levels = &levels_[size_t(row * stride())];
             auto filled = [&](int at) { return uint8_t(-(whole[at >> 3] >> (kTile * row + (at & 7)) & 1)); };
-            is(0);
-            length += before;
-            is(filled(first_ & 7));
-            int begin = first_ - int(length);
+            end.add(0, before);
+            end.add(filled(first_ & 7), 0);
+            int begin = first_;
             const int* ends = ends_.data();
             for (const int* stop = turns(row); ends != stop; ends += 2) {
-                const int from = ends[0], to = ends[1];
-                const int at = column[from >> 3] + (from & 7);
-                *span++ = {value, uint32_t(at - begin), uint32_t(row * stride() + from), uint32_t(to - from)};
-                begin = column[to >> 3] + (to & 7), value = filled(to);
+                const int from = ends[0], n = ends[1] - from;
+                const uint8_t* bytes = levels + from;
+                end.length += uint64_t(column[from >> 3] + (from & 7) - begin);
+                if (n <= Runs::kAtOnce)
+                    end.cut(bytes, n);
+                else
+                    end.mixed(bytes, n);
+                begin = column[ends[1] >> 3] + (ends[1] & 7), end.value = filled(ends[1]);
             }
-            length = uint32_t(last_ - begin);
-            is(0);
-            length += after;
+            end.length += uint64_t(last_ - begin);
+            end.add(0, after);
         }
-        runs.add(spans_.data(), size_t(span - spans_.data()), levels_.data());
-        runs.add(0, length);
+        runs.set(end);
     }
 
  private:
+    // Of a column among the sums of eight rows: not negative.
+    uint32_t place(int column) const { return uint32_t(column - first_ + kTile); }
     // A tile to the sum of all bytes.
     void add(int column, const Levels& levels) {
-        const int64_t at = at_ + column - first_ - from_ * int64_t(across_);
-        if (from_ == 0 && to_ == kTile && column >= first_ && column <= last_ - kTile) return sum_.add(levels, at, across_);
+        if (from_ == 0 && to_ == kTile && column >= first_ && column <= last_ - kTile) return eight_.add(levels, place(column));
         Levels shown{};
         for (int row = from_; row < to_; ++row)
             for (int x = std::max(first_ - column, 0); x < std::min(last_ - column, kTile); ++x)
                 shown[size_t(kTile * row + x)] = levels[size_t(kTile * row + x)];
-        sum_.add(shown, at, across_);
+        eight_.add(shown, place(column));
     }
     // From row to row of the levels.
     int stride() const { return kTile * room_; }
@@ -155,10 +154,10 @@ class Band {
     std::vector<uint64_t> whole_;
     std::vector<uint8_t> cut_, levels_, full_;
     std::vector<int> ends_;
-    Rows<Span> spans_;
     int from_ = 0, to_ = 0;
     int64_t at_ = 0;
     uint64_t across_ = 0;
+    Eight eight_;
     Adler sum_;
 };
 

@@ -86,17 +86,17 @@ nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_colu
         nb::gil_scoped_release released;
         shown = picture(slab, view);
     }
-    return nb::make_tuple(bytes(shown.data), shown.painted.area, shown.painted.partly);
+    return nb::make_tuple(bytes(*shown.data), shown.painted.area, shown.painted.partly);
 }
 
 nb::bytes bind_deflated(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device::cpu>& image) {
-    Rows<uint8_t> data;
+    const Rows<uint8_t>* data;
     {
         nb::gil_scoped_release released;
         auto* first = const_cast<uint8_t*>(image.data());
-        data = deflated({first, int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)});
+        data = &deflated({first, int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)});
     }
-    return bytes(data);
+    return bytes(*data);
 }
 
 nb::tuple bind_crossings(const Slab& slab, int layer) {

@@ -38,6 +38,28 @@ inline uint64_t transposed(uint64_t w) {
     return w;
 }
 
+// The samples of odd rows and columns, a row of four in each byte; and such samples as the blocks of 2 x 2 that end there.
+inline uint32_t halved(uint64_t w) {
+    w = w >> 9 & 0x0055005500550055;
+    w = (w | w >> 1) & 0x0033003300330033, w = (w | w >> 2) & 0x000F000F000F000F;
+    w |= w >> 8;
+    return uint32_t(w & 0xFFFF) | uint32_t(w >> 32) << 16;
+}
+inline uint64_t doubled(uint32_t halves) {
+    uint64_t w = (halves & 0xFFFF) | uint64_t(halves & 0xFFFF0000) << 16;
+    w = (w | w << 8) & 0x00FF00FF00FF00FF;
+    w = (w | w << 2) & 0x0033003300330033, w = (w | w << 1) & 0x0055005500550055;
+    return w * 0x0303;
+}
+// Those of the first four rows and columns of which five rows and columns from there on are all ones.
+inline uint32_t all_of_five(uint64_t w) {
+    uint64_t row = w & w >> 1;
+    row &= row >> 2 & w >> 4;
+    uint64_t all = row & row >> 8;
+    all &= all >> 16 & row >> 32;
+    return uint32_t(all) & 0x0F0F0F0F;
+}
+
 // The samples of a block of size x size, the first of a tile.
 constexpr uint64_t block(int size) {
     uint64_t line = (uint64_t(1) << size) - 1, word = 0;

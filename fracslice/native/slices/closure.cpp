@@ -134,7 +134,8 @@ void Slab::corners() {
     for (int32_t t = kTiles, n = int32_t(count()); t < n; ++t) {
         Place p = place[t];
         int32_t there = at(p.y - 1, p.x - 1);
-        if (there < kTiles && (there == kFull) != bool(inside[t] & 1)) add(p.y - 1, p.x - 1);
+        const bool cut = (there < kTiles) & ((there == kFull) != bool(inside[t] & 1));
+        if (cut) add(p.y - 1, p.x - 1);
     }
 }
 

@@ -107,135 +107,127 @@ void by_crossings(const Slab& slab, const Quad& tiles, const Corners& corners, P
     }
 }
 
-// The sum of two rows.
-double total(const float* even, const float* odd) {
-    double sum = 0;
-    for (int i = 0; i < kTile; ++i) sum += even[i] + odd[i];
-    return sum;
-}
-
-// With b, r, a, l the inside parts of the lower, right, upper and left side of a cell that is cut once, of its area
-// (l + r) (a + b) / 2 - l r a b is inside: of a corner l and b alone are not 0, of all but a corner two are 1, and of a half
-// one is 0 and the opposite one 1. So it is of one wholly in or out.
-double measure(const Parts& parts, Levels& levels, float* area) {
+// Levels, areas, and these added to sums by columns. With b, r, a, l the inside parts of the lower, right, upper and left side
+// of a cell that is cut once, of its area (l + r) (a + b) / 2 - l r a b is inside: of a corner l and b alone are not 0, of all
+// but a corner two are 1, and of a half one is 0 and the opposite one 1. So it is of one wholly in or out.
+void measure(const Parts& parts, Levels& levels, double* sums, float* areas) {
     float sum[2][kTile] = {};
     for (int i = 0; i < 64; i += 4) {
         const int row = i / kTile, column = i % kTile;
         const Four b = load(&parts.across[row][column]), a = load(&parts.across[row + 1][column]);
         const Four l = load(&parts.up[row][column]), r = load(&parts.up[row][column + 1]);
         const Four within = (l + r) * (a + b) * 0.5f - l * r * (a * b);
-        store(within, area + i);
+        store(within, areas + i);
         store(load(&sum[row & 1][column]) + within, &sum[row & 1][column]);
         const Word level = __builtin_convertvector(255 * within + 0.5f, Word);
         for (int n = 0; n < 4; ++n) levels[i + n] = uint8_t(level[n]);
     }
-    return total(sum[0], sum[1]);
+    for (int i = 0; i < kTile; ++i) sums[i] += double(sum[0][i] + sum[1][i]);
 }
 
-double cover(const Slab& slab, float scale, const Quad& tiles, const Corners& corners, Levels& levels, float* area) {
+void cover(const Slab& slab, float scale, const Quad& tiles, const Corners& corners, Levels& levels, double* sums,
+           float* areas) {
     Parts parts;
     if (scale == 0)
         by_crossings(slab, tiles, corners, parts);
     else
         by_values(slab, tiles, scale, parts);
-    return measure(parts, levels, area);
+    measure(parts, levels, sums, areas);
 }
 
 #if defined(FRACSLICE_WIDE)
-// The same by values, two rows at a time.
-struct Wide {
-    __m512 all, inside;
+// The same by values, two rows at a time, with AVX-512.
 
-    FRACSLICE_WIDE void set(__m512 values, uint64_t known, uint64_t within, __m512 scale) {
-        const __mmask16 is_within = __mmask16(within);
-        const __m512 size = _mm512_maskz_andnot_ps(0xFFFF, _mm512_set1_ps(-0.f), values);
-        all = _mm512_maskz_max_ps(0xFFFF, size, _mm512_set1_ps(kLeast));
-        all = _mm512_maskz_min_ps(0xFFFF, all, _mm512_set1_ps(kMost));
-        all = _mm512_mask_blend_ps(__mmask16(known), _mm512_set1_ps(1), all);
-        all = _mm512_mask_mul_ps(all, is_within, all, scale);
-        inside = _mm512_maskz_mov_ps(is_within, all);
-    }
-};
-
-FRACSLICE_WIDE Wide sum_of(const Wide& first, __m512 second_all, __m512 second_inside) {
-    return {_mm512_add_ps(first.all, second_all), _mm512_add_ps(first.inside, second_inside)};
+// What samples weigh.
+FRACSLICE_WIDE __m512 weight(__m512 values, uint64_t known, uint64_t within, __m512 scale) {
+    constexpr int size_most = 0b1011;  // of the sizes the larger one
+    const __m512 some = _mm512_mask_range_ps(_mm512_set1_ps(1), __mmask16(known), values, _mm512_set1_ps(kLeast), size_most);
+    const __m512 weight = _mm512_maskz_min_ps(0xFFFF, some, _mm512_set1_ps(kMost));
+    return _mm512_mask_mul_ps(weight, __mmask16(within), weight, scale);
+}
+// What those weigh that are inside, and with others, of which some are inside.
+FRACSLICE_WIDE __m512 inside_of(__m512 weights, uint64_t within, __m512 others, uint64_t others_within) {
+    const __m512 inside = _mm512_maskz_mov_ps(__mmask16(within), weights);
+    return _mm512_mask_add_ps(inside, __mmask16(others_within), inside, others);
 }
 // The second row of one and the first of another.
 FRACSLICE_WIDE __m512 between(__m512 lower, __m512 upper) {
     return _mm512_maskz_shuffle_f32x4(0xFFFF, lower, upper, _MM_SHUFFLE(1, 0, 3, 2));
 }
 
-FRACSLICE_WIDE double cover_wide(const Slab& slab, float scale, const Quad& tiles, Levels& levels, float* area) {
+FRACSLICE_WIDE void cover_wide(const Slab& slab, float scale, const Quad& tiles, const Corners& corners, Levels& levels,
+                               double* sums, float* areas) {
     const float *own = slab.values[tiles.own].data(), *right = slab.values[tiles.right].data();
-    const uint64_t known = slab.known[tiles.own], within = slab.inside[tiles.own];
+    const uint64_t known = slab.known[tiles.own], *within = corners.word;
     const __m512 more = _mm512_set1_ps(scale);
-    Wide rows[4], rim, corner;
-    for (int i = 0; i < 4; ++i) rows[i].set(_mm512_loadu_ps(own + 16 * i), known >> 16 * i, within >> 16 * i, more);
+    __m512 rows[5];
+    for (int i = 0; i < 4; ++i) rows[i] = weight(_mm512_loadu_ps(own + 16 * i), known >> 16 * i, within[0] >> 16 * i, more);
     // The row above, then the column to the right.
     const __m256 column = _mm256_setr_ps(right[0], right[8], right[16], right[24], right[32], right[40], right[48], right[56]);
     const __m512 upper = _mm512_maskz_loadu_ps(0xFF, slab.values[tiles.upper].data());
-    auto both = [&](const std::vector<uint64_t>& words) __attribute__((always_inline)) {
-        return (words[tiles.upper] & kFirstRow) | first_column(words[tiles.right]) << 8;
-    };
-    rim.set(_mm512_maskz_insertf32x8(0xFFFF, upper, column, 1), both(slab.known), both(slab.inside), more);
-    corner.set(_mm512_set1_ps(slab.values[tiles.beyond][0]), slab.known[tiles.beyond] & 1 ? 0xFFFF : 0,
-               slab.inside[tiles.beyond] & 1 ? 0xFFFF : 0, more);
+    const uint64_t rim_known = (slab.known[tiles.upper] & kFirstRow) | first_column(slab.known[tiles.right]) << 8;
+    const uint64_t rim_within = within[3] >> 56 | first_column(within[1] >> 7) << 8;
+    const uint64_t over_within = within[2] >> 56 | first_column(within[2] >> 7) << 8;
+    const __m512 rim = rows[4] = weight(_mm512_maskz_insertf32x8(0xFFFF, upper, column, 1), rim_known, rim_within, more);
+    const __m512 corner = weight(_mm512_set1_ps(slab.values[tiles.beyond][0]), slab.known[tiles.beyond] & 1 ? 0xFFFF : 0,
+                                 within[2] >> 63 ? 0xFFFF : 0, more);
 
-    const __m512i over = _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 16, 9, 10, 11, 12, 13, 14, 15, 16);
-    const Wide rims = sum_of(rim, _mm512_permutex2var_ps(rim.all, over, corner.all),
-                             _mm512_permutex2var_ps(rim.inside, over, corner.inside));
-    const __m512 rim_parts = _mm512_div_ps(rims.inside, rims.all);
+    const __m512i next = _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 16, 9, 10, 11, 12, 13, 14, 15, 16);
+    const __m512 over = _mm512_permutex2var_ps(rim, next, corner);
+    const __m512 rim_parts = _mm512_div_ps(inside_of(rim, rim_within, over, over_within), _mm512_add_ps(rim, over));
     __m512i beside[4];
     __m512 across[5], up[4], sum = _mm512_setzero_ps();
     across[4] = rim_parts;
     for (int i = 0; i < 4; ++i) {
         beside[i] = _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 24 + 2 * i, 9, 10, 11, 12, 13, 14, 15, 25 + 2 * i);
-        const Wide& next = i < 3 ? rows[i + 1] : rim;
-        const Wide u = sum_of(rows[i], _mm512_permutex2var_ps(rows[i].all, beside[i], rim.all),
-                              _mm512_permutex2var_ps(rows[i].inside, beside[i], rim.inside));
-        const Wide v = sum_of(rows[i], between(rows[i].all, next.all), between(rows[i].inside, next.inside));
-        const __m512 one_over = _mm512_div_ps(_mm512_set1_ps(1), _mm512_mul_ps(u.all, v.all));  // one division for both
-        across[i] = _mm512_mul_ps(_mm512_mul_ps(u.inside, v.all), one_over);
-        up[i] = _mm512_mul_ps(_mm512_mul_ps(v.inside, u.all), one_over);
+        const int at = 16 * i;
+        const __m512 here = rows[i], right_one = _mm512_permutex2var_ps(here, beside[i], rim), above = between(here, rows[i + 1]);
+        const __m512 u = _mm512_add_ps(here, right_one), v = _mm512_add_ps(here, above);
+        const __m512 u_inside = inside_of(here, within[0] >> at, right_one, within[1] >> at);
+        const __m512 v_inside = inside_of(here, within[0] >> at, above, within[3] >> at);
+        const __m512 one_over = _mm512_div_ps(_mm512_set1_ps(1), _mm512_mul_ps(u, v));  // one division for both
+        across[i] = _mm512_mul_ps(_mm512_mul_ps(u_inside, v), one_over);
+        up[i] = _mm512_mul_ps(_mm512_mul_ps(v_inside, u), one_over);
     }
+    __m512i level[4];
     for (int i = 0; i < 4; ++i) {
         const __m512 b = across[i], a = between(b, across[i + 1]), l = up[i];
         const __m512 r = _mm512_permutex2var_ps(l, beside[i], rim_parts);
         const __m512 half = _mm512_mul_ps(_mm512_mul_ps(_mm512_add_ps(l, r), _mm512_add_ps(a, b)), _mm512_set1_ps(0.5f));
         const __m512 inside = _mm512_sub_ps(half, _mm512_mul_ps(_mm512_mul_ps(l, r), _mm512_mul_ps(a, b)));
         sum = _mm512_add_ps(sum, inside);
-        _mm512_storeu_ps(area + 16 * i, inside);
-        const __m512 level = _mm512_add_ps(_mm512_mul_ps(inside, _mm512_set1_ps(255)), _mm512_set1_ps(0.5f));
-        const __m128i bytes = _mm512_maskz_cvtepi32_epi8(0xFFFF, _mm512_maskz_cvttps_epi32(0xFFFF, level));
-        _mm_storeu_si128(reinterpret_cast<__m128i*>(&levels[16 * i]), bytes);
+        if (areas) _mm512_storeu_ps(areas + 16 * i, inside);
+        const __m512 rounded = _mm512_add_ps(_mm512_mul_ps(inside, _mm512_set1_ps(255)), _mm512_set1_ps(0.5f));
+        level[i] = _mm512_maskz_cvttps_epi32(0xFFFF, rounded);
     }
-    alignas(64) float sums[2][kTile];
-    _mm512_store_ps(sums, sum);
-    return total(sums[0], sums[1]);
+    const __m512i low = _mm512_packs_epi32(level[0], level[1]), high = _mm512_packs_epi32(level[2], level[3]);
+    const __m512i order = _mm512_setr_epi32(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15);
+    const __m512i bytes = _mm512_maskz_permutexvar_epi32(0xFFFF, order, _mm512_packus_epi16(low, high));
+    _mm512_storeu_si512(levels.data(), bytes);
+    const __m256 both = _mm256_add_ps(_mm512_maskz_extractf32x8_ps(0xFF, sum, 0), _mm512_maskz_extractf32x8_ps(0xFF, sum, 1));
+    _mm512_storeu_pd(sums, _mm512_add_pd(_mm512_loadu_pd(sums), _mm512_maskz_cvtps_pd(0xFF, both)));
 }
 const bool kWide = has_wide();
 #endif
 
 }  // namespace
 
-double Coverage::operator()(const Quad& tiles, const Corners& corners, Levels& levels) const {
-    alignas(64) float area[64];
-    double sum = 0;
+void Coverage::operator()(const Quad& tiles, const Corners& corners, Levels& levels) {
+    alignas(64) float areas[64];
+    const uint64_t alternating = corners.alternating(), special = alternating | slab_.sharp[tiles.own];
 #if defined(FRACSLICE_WIDE)
     if (kWide && scale_ != 0)
-        sum = cover_wide(slab_, scale_, tiles, levels, area);
+        cover_wide(slab_, scale_, tiles, corners, levels, sums_.data(), special ? areas : nullptr);
     else
 #endif
-        sum = cover(slab_, scale_, tiles, corners, levels, area);
-    const uint64_t alternating = corners.alternating(), sharp = slab_.sharp[tiles.own];
-    each(alternating | sharp, [&](int bit) {
+        cover(slab_, scale_, tiles, corners, levels, sums_.data(), areas);
+    each(special, [&](int bit) {
         const bool both = alternating >> bit & 1;
-        const float within = both ? Cells(slab_, scale_, tiles).area(bit, corners.signs(bit)) : area[bit];
+        const float within = both ? Cells(slab_, scale_, tiles).area(bit, corners.signs(bit)) : areas[bit];
         const float now = slab_.sharpened(tiles.own, bit, within);
-        sum += now - area[bit];
+        sums_[0] += double(now - areas[bit]);
         levels[bit] = uint8_t(int(255 * now + 0.5f));
     });
-    return sum;
 }
 
 }  // namespace fracslice

@@ -7,7 +7,7 @@ namespace fracslice {
 namespace {
 
 constexpr size_t kFew = 128;
-constexpr int32_t kOften = 8, kSeldom = 16, kEnough = 96;  // every so many tiles are looked at, and as many are enough
+constexpr int32_t kOften = 8, kSeldom = 40, kEnough = 96;  // every so many tiles are looked at, and as many are enough
 
 }  // namespace
 
@@ -36,7 +36,7 @@ Slab::Middles Slab::middles(int32_t step) const {
 }
 
 // How many times smaller inside values are than outside ones: the factor with which as many crossings lie before the middle
-// of their edge as do in truth. An eighth of the edges is enough to know it, and a sixteenth of many.
+// of their edge as do in truth. An eighth of the edges is enough to know it, and a fortieth of many.
 float Slab::inside_scale() {
     const int32_t tiles = int32_t(count()) - kTiles;
     int32_t step = std::clamp(tiles / kEnough, kOften, kSeldom);

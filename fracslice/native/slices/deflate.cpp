@@ -8,35 +8,8 @@ namespace fracslice {
 namespace {
 
 constexpr int kEnd = 256, kCodes = 286, kMostBits = 15;
-constexpr size_t kMany = 1 << 14;  // symbols: where there are more, `kTold` of each `kOf` say how often they come
-constexpr ptrdiff_t kTold = 256, kOf = 8 * kTold;
-
-// Symbols of `Runs` that are not bytes: so many bytes more, as a match of that length; that of two and three longest ones;
-// and none.
-constexpr int kMatches = 256 - kShortest, kTwice = kMatches + kLongest + 1, kThrice = kTwice + 1, kNothing = kThrice + 1,
-              kSymbols = kNothing + 1;
-
-// Writes a run: its byte, the rest of it as far as it is no longest matches, and those. Returns the end; three symbols more
-// may be written.
-inline uint16_t* put(uint8_t value, uint64_t length, uint16_t* end) {
-    int64_t more = int64_t(length) - 1, longest = 0;
-    if (more > kLongest) longest = more / kLongest, more %= kLongest;
-    const int64_t match = -int64_t(more >= kShortest);  // a mask: which it is cannot be foretold
-    end[0] = value, end[1] = uint16_t(value + (match & (kMatches + more - value))), end[2] = value;
-    end += more + 1 + (match & (1 - more));
-    for (; longest > 0; longest -= 3) *end++ = uint16_t(kMatches + kLongest - 1 + std::min<int64_t>(longest, 3));
-    return end;
-}
-
-// Bytes to symbols.
-inline void widen(const uint8_t* from, uint16_t* to) {
-    using Bytes = uint8_t __attribute__((vector_size(Runs::kAtOnce)));
-    using Symbols = uint16_t __attribute__((vector_size(2 * Runs::kAtOnce)));
-    Bytes bytes;
-    std::memcpy(&bytes, from, sizeof bytes);
-    const Symbols symbols = __builtin_convertvector(bytes, Symbols);
-    std::memcpy(to, &symbols, sizeof symbols);
-}
+constexpr ptrdiff_t kMany = 1 << 14;  // symbols: where there are more, `kTold` of each `kOf` say how often they come
+constexpr ptrdiff_t kTold = 64, kOf = 8 * kTold;
 
 // The code of a length: a symbol, and bits after it.
 struct Length {
@@ -119,21 +92,21 @@ class Bits {
     explicit Bits(uint8_t* out) : out_(out) {}
     void put(const Code& code) {
         word_ |= code.bits << size_;
-        size_ += code.size;
+        size_ += unsigned(code.size);
         std::memcpy(out_, &word_, 8);
         out_ += size_ / 8;
         word_ >>= size_ / 8 * 8;
         size_ %= 8;
     }
     uint8_t* end() {
-        if (size_) put({0, 8 - size_});
+        if (size_) put({0, 8 - int(size_)});
         return out_;
     }
 
  private:
     uint8_t* out_;
     uint64_t word_ = 0;
-    int size_ = 0;
+    unsigned size_ = 0;
 };
 
 // Dynamic codes: those of literals and lengths, and one of one bit for the only distance. The sizes of codes are written in
@@ -150,100 +123,120 @@ void put_head(Bits& out, const Sizes& sizes) {
     out.put({reversed(1, 4), 4});
 }
 
-}  // namespace
-
-// For so many symbols more.
-void Runs::reserve(size_t symbols) {
-    symbols += count_ + kAtOnce;
-    if (symbols > symbols_.size()) symbols_.resize(2 * symbols);
-}
-
-void Runs::close() {
-    reserve(length_ / kLongest + 4);
-    uint16_t* end = &symbols_[count_];
-    count_ += size_t(put(value_, length_, end) - end);
-    length_ = 0;
-}
-
-void Runs::add(const Span* spans, size_t count, const uint8_t* bytes) {
-    if (!count) return;
-    add(spans[0].value, spans[0].length);
-    close();
-    size_t room = 0;
-    for (size_t i = 0; i < count; ++i) room += spans[i].length / kLongest + 4 + spans[i].n;
-    reserve(room);
-    uint16_t* __restrict end = &symbols_[count_];
-    for (size_t i = 0; i < count; ++i) {
-        const Span span = spans[i];
-        const uint8_t* __restrict from = bytes + span.at;
-        if (i) end = put(span.value, span.length, end);
-        if (span.n <= kAtOnce) {
-            widen(from, end);
-            end += span.n;
-        } else {
-            count_ = size_t(end - symbols_.data());
-            compare(from, span.n);
-            end = &symbols_[count_];
-        }
+// A symbol of `Runs`: so many times a byte, then so many matches of a length.
+struct Meaning {
+    uint8_t byte, bytes, matches;
+    uint16_t length;
+};
+const std::array<Meaning, Runs::kSymbols> kMeanings = [] {
+    std::array<Meaning, Runs::kSymbols> meanings{};
+    for (int value = 0; value < 256; ++value) meanings[value] = {uint8_t(value), 1, 0, 0};
+    for (int rest = 0; rest < kLongest; ++rest) {
+        const bool match = rest >= kShortest;
+        const uint8_t bytes = match ? 1 : uint8_t(1 + rest);
+        meanings[Runs::kPlain + rest] = {0, bytes, match, uint16_t(rest)};
+        meanings[Runs::kPlain + kLongest + rest] = {255, bytes, match, uint16_t(rest)};
+        meanings[Runs::kMatch + rest] = {0, 0, match, uint16_t(rest)};
     }
-    count_ = size_t(end - symbols_.data());
-}
+    for (uint8_t n = 0; n < 4; ++n) meanings[Runs::kMore + n] = {0, 0, n, kLongest};
+    return meanings;
+}();
 
-// Bytes among which there may be runs.
-void Runs::compare(const uint8_t* bytes, uint32_t n) {
-    for (uint32_t begin = 0, end = 0; begin < n; begin = end) {
-        while (++end < n && bytes[end] == bytes[begin]) {}
-        add(bytes[begin], end - begin);
-    }
-    close();
-}
-
-Rows<uint8_t> Runs::zlib(uint32_t checksum) {
-    close();
-    while (count_ % 4) symbols_[count_++] = kNothing;
-    const uint16_t *symbols = symbols_.data(), *end = symbols + count_;
+// How often codes come in symbols, an even number.
+Counts counts_of(const uint16_t* symbols, const uint16_t* end) {
     // Two counts, for the same symbol may come twice in a row.
-    uint32_t uses[2][kSymbols] = {};
-    const ptrdiff_t step = count_ > kMany ? kOf : kTold;
-    for (const uint16_t* from = symbols; from < end; from += step)
-        for (const uint16_t *s = from, *to = from + std::min(kTold, end - from); s != to; s += 2) ++uses[0][s[0]], ++uses[1][s[1]];
+    uint32_t uses[2][Runs::kSymbols] = {};
+    const ptrdiff_t step = end - symbols > kMany ? kOf : kTold;
+    for (; symbols < end; symbols += std::min(step, end - symbols))
+        for (const uint16_t *s = symbols, *to = s + std::min(kTold, end - s); s != to; s += 2) ++uses[0][s[0]], ++uses[1][s[1]];
 
     Counts counts;
     counts.fill(step > kTold);
     counts[kEnd] = 1;
-    for (int s = 0; s < kSymbols; ++s) uses[0][s] += uses[1][s];
-    for (int value = 0; value < 256; ++value) counts[value] += uses[0][value];
-    for (int length = kShortest; length <= kLongest; ++length) counts[kLengths[length].symbol] += uses[0][kMatches + length];
-    counts[kCodes - 1] += 2 * uses[0][kTwice] + 3 * uses[0][kThrice];
-    const Sizes sizes = sizes_of(counts);
-    const std::array<Code, kCodes> codes = codes_of(sizes);
-
-    std::array<Code, kSymbols> says;
-    std::copy_n(codes.begin(), 256, says.begin());
-    for (int length = kShortest; length <= kLongest; ++length) {
-        const Length& l = kLengths[length];
-        says[kMatches + length] = codes[l.symbol].then({l.bits, l.extra}).then({0, 1});
+    for (int s = 0; s < Runs::kSymbols; ++s) {
+        const Meaning& meaning = kMeanings[s];
+        const uint32_t n = uses[0][s] + uses[1][s];
+        counts[meaning.byte] += meaning.bytes * n;
+        counts[kLengths[meaning.length].symbol] += meaning.matches * n;
     }
-    const Code longest = says[kMatches + kLongest];
-    says[kTwice] = longest.then(longest), says[kThrice] = says[kTwice].then(longest);
-    says[kNothing] = {0, 0};
+    return counts;
+}
 
-    Rows<uint8_t> data(1024 + 8 * count_);
-    Bits out(data.data());
+// What is written for each symbol.
+using Words = std::array<Code, Runs::kSymbols>;
+Words words_of(const std::array<Code, kCodes>& codes) {
+    Words words{};
+    for (int s = 0; s < Runs::kSymbols; ++s) {
+        const Meaning& meaning = kMeanings[s];
+        const Length& length = kLengths[meaning.length];
+        for (int i = 0; i < meaning.bytes; ++i) words[s] = words[s].then(codes[meaning.byte]);
+        for (int i = 0; i < meaning.matches; ++i)
+            words[s] = words[s].then(codes[length.symbol]).then({length.bits, length.extra}).then({0, 1});
+    }
+    return words;
+}
+
+}  // namespace
+
+Runs::End Runs::End::other(End end) {
+    const uint64_t rest = (end.length - 1) % kLongest;
+    *end.symbol++ = end.value;
+    if (rest >= kShortest)
+        *end.symbol++ = uint16_t(kMatch + rest);
+    else
+        end.symbol = std::fill_n(end.symbol, rest, end.value);
+    end.more((end.length - 1) / kLongest);
+    end.length = 0;
+    return end;
+}
+
+Runs::End Runs::End::mixed(End end, const uint8_t* from, int n) {
+    for (int i = 0; i < n; ++i) end.add(from[i], 1);
+    end.close();
+    return end;
+}
+
+void Runs::add(uint8_t value, uint64_t n) {
+    End end = room(kAtOnce, 0);
+    end.add(value, n);
+    set(end);
+}
+
+Runs::End Runs::room(size_t symbols, uint64_t n) {
+    const size_t count = size_t(end_.symbol - symbols_.data());
+    symbols += count + size_t((n + end_.length) / kLongest) + kAtOnce;
+    if (symbols > symbols_.size()) {
+        symbols_.resize(2 * symbols);
+        end_.symbol = symbols_.data() + count;
+    }
+    return end_;
+}
+
+const Rows<uint8_t>& Runs::zlib(uint32_t checksum) {
+    End last = room(kAtOnce, 0);
+    last.close();
+    while ((last.symbol - symbols_.data()) % 4) *last.symbol++ = kNothing;
+    const uint16_t *symbols = symbols_.data(), *end = last.symbol;
+    const Sizes sizes = sizes_of(counts_of(symbols, end));
+    const std::array<Code, kCodes> codes = codes_of(sizes);
+    const Words words = words_of(codes);
+
+    data_.resize(1024 + 8 * size_t(end - symbols));
+    Bits out(data_.data());
     put_head(out, sizes);
     for (const uint16_t* s = symbols; s != end; s += 4) {
-        const Code first = says[s[0]].then(says[s[1]]), second = says[s[2]].then(says[s[3]]);
+        const Code first = words[s[0]].then(words[s[1]]), second = words[s[2]].then(words[s[3]]);
         if (first.size + second.size <= 56) {
             out.put(first.then(second));
         } else {
-            for (int i = 0; i < 4; ++i) out.put(says[s[i]]);
+            for (int i = 0; i < 4; ++i) out.put(words[s[i]]);
         }
     }
     out.put(codes[kEnd]);
-    uint8_t* last = out.end();
-    for (int shift = 24; shift >= 0; shift -= 8) *last++ = uint8_t(checksum >> shift);
-    data.resize(size_t(last - data.data()));
-    return data;
+    uint8_t* to = out.end();
+    for (int shift = 24; shift >= 0; shift -= 8) *to++ = uint8_t(checksum >> shift);
+    data_.resize(size_t(to - data_.data()));
+    return data_;
 }
 
 }  // namespace fracslice

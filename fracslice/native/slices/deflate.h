@@ -1,7 +1,7 @@
 // Runs of equal bytes, deflated without ever being laid out.
 #pragma once
 #include <cstdint>
-#include <vector>
+#include <cstring>
 
 #include "tiles.h"
 
@@ -9,42 +9,84 @@ namespace fracslice {
 
 constexpr int kShortest = 3, kLongest = 258;  // bytes that a match repeats
 
-// A run of equal bytes, and n others after it, which are thought to differ: those from `at` on.
-struct Span {
-    uint8_t value;
-    uint32_t length, at, n;
-};
-
 // A string of bytes, said run by run; `zlib` writes it as RFC 1950 and 1951 have it, in one block with codes of its own.
-// Matches repeat the byte before them, no other is looked for.
+// Matches repeat the byte before them, no other is looked for. Its memory can be used again.
 class Runs {
  public:
-    // Bytes that may be read after those of a span.
-    static constexpr int kAtOnce = 8;
+    static constexpr int kAtOnce = 8;  // bytes
 
-    // A run, or more of the last one.
-    void add(uint8_t value, uint64_t n) {
-        if (value != value_) {
-            close();
-            value_ = value;
+    // Symbols: bytes; a zero or a 255 and how many times it comes again, less than a longest match; a match of any byte; and so
+    // many longest ones, at most three.
+    static constexpr int kPlain = 256, kMatch = kPlain + 2 * kLongest, kMore = kMatch + kLongest, kNothing = kMore + 4,
+                         kSymbols = kNothing + 1;
+
+    // Where the next symbol goes, and the run so far.
+    struct End {
+        uint16_t* symbol;
+        uint64_t length;
+        uint8_t value;
+
+        // A run, or more of the last one.
+        void add(uint8_t next, uint64_t n) {
+            if (next != value) {
+                close();
+                value = next;
+            }
+            length += n;
         }
-        length_ += n;
-    }
-    // The first run may be more of the last one, the others differ from what is before them.
-    void add(const Span* spans, size_t n, const uint8_t* bytes);
-    // checksum: of all bytes.
-    Rows<uint8_t> zlib(uint32_t checksum);
+        // Ends the run of zeros or 255s so far, which is not empty, with n bytes, at most `kAtOnce`; so many may be read.
+        void cut(const uint8_t* from, int n) {
+            using Bytes = uint8_t __attribute__((vector_size(kAtOnce)));
+            using Symbols = uint16_t __attribute__((vector_size(2 * kAtOnce)));
+            plain();
+            Bytes bytes;
+            std::memcpy(&bytes, from, sizeof bytes);
+            const Symbols symbols = __builtin_convertvector(bytes, Symbols);
+            std::memcpy(symbol, &symbols, sizeof symbols);
+            symbol += n;
+        }
+        // Ends any run.
+        void close() {
+            if (length == 0) return;
+            if (value == 0 || value == 255)
+                plain();
+            else
+                *this = other(*this);
+        }
+        // Bytes among which there may be runs.
+        void mixed(const uint8_t* from, int n) { *this = mixed(*this, from, n); }
+
+     private:
+        // By value, for what has an address is in no register.
+        static End other(End end);
+        static End mixed(End end, const uint8_t* from, int n);
+
+        void plain() {
+            uint64_t rest = length - 1, longest = 0;
+            if (rest >= kLongest) longest = rest / kLongest, rest %= kLongest;
+            *symbol++ = uint16_t(kPlain + kLongest * (value & 1) + int(rest));
+            more(longest);
+            length = 0;
+        }
+        void more(uint64_t longest) {
+            for (; longest > 3; longest -= 3) *symbol++ = kMore + 3;
+            if (longest) *symbol++ = uint16_t(kMore + longest);
+        }
+    };
+
+    // Begins.
+    void clear() { end_ = {symbols_.data(), 0, 0}; }
+    void add(uint8_t value, uint64_t n);
+    // Where so many symbols may be written, and longest matches of n bytes; then so far they were.
+    End room(size_t symbols, uint64_t n);
+    void set(const End& end) { end_ = end; }
+    // Ends; checksum: of all bytes. The result stays until another is asked for.
+    const Rows<uint8_t>& zlib(uint32_t checksum);
 
  private:
-    void reserve(size_t symbols);
-    void close();
-    void compare(const uint8_t* bytes, uint32_t n);
-
-    // Symbols: bytes; and how many times the byte before them comes again, two or three times the most among them.
     Rows<uint16_t> symbols_;
-    size_t count_ = 0;
-    uint64_t length_ = 0;
-    uint8_t value_ = 0;
+    Rows<uint8_t> data_;
+    End end_;
 };
 
 }  // namespace fracslice

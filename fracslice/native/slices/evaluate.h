@@ -8,6 +8,13 @@
 namespace fracslice {
 
 constexpr size_t kBatch = 2048;
+constexpr double kSurely = 0.99999;  // squared distances are rounded
+
+// Squared distances in units of the lesser step, from squared values.
+inline float factor(double bound, const Frame& frame) {
+    const double reach = bound * std::min(frame.dx, frame.dy);
+    return float(kSurely / (reach * reach));
+}
 
 // Points, and what the field is there.
 struct Batch {

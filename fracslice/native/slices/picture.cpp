@@ -15,21 +15,39 @@
 namespace fracslice {
 namespace {
 
-// The bytes that `from` names.
-void permute_each(const Levels& levels, const Levels& from, Levels& to) {
-    for (size_t at = 0; at < to.size(); ++at) to[at] = levels[from[at]];
-}
+// A tile, its cells that are wholly inside, and those that are cut.
+struct Tile {
+    Quad tiles;
+    Corners corners;
+    uint64_t whole, cut;
+    Levels levels;
+
+    Tile(const Slab& slab, const Quad& at) : tiles(at), corners(slab, at) {
+        const uint64_t sharp = slab.sharp[at.own];
+        whole = corners.whole() & ~sharp, cut = corners.mixed() | sharp;
+    }
+};
+
+// The same as a screen shows it.
+struct Turned {
+    uint64_t whole, cut;
+    Levels levels;
+};
+
 #if defined(FRACSLICE_WIDE)
-FRACSLICE_WIDE void permute_wide(const Levels& levels, const Levels& from, Levels& to) {
-    const __m512i order = _mm512_loadu_si512(from.data()), bytes = _mm512_loadu_si512(levels.data());
-    _mm512_storeu_si512(to.data(), _mm512_maskz_permutexvar_epi8(kAll, order, bytes));
+FRACSLICE_WIDE uint64_t turn_wide(uint64_t word, __m512i order) {
+    return _mm512_movepi8_mask(_mm512_maskz_permutexvar_epi8(kAll, order, _mm512_movm_epi8(word)));
 }
-const auto permute = has_wide() ? permute_wide : permute_each;
-#else
-constexpr auto permute = permute_each;
+// from: where in the tile its cells are.
+FRACSLICE_WIDE void turn_wide(const Tile& tile, const Levels& from, Turned& to) {
+    const __m512i order = _mm512_loadu_si512(from.data());
+    to.whole = turn_wide(tile.whole, order), to.cut = turn_wide(tile.cut, order);
+    _mm512_storeu_si512(to.levels.data(), _mm512_maskz_permutexvar_epi8(kAll, order, _mm512_loadu_si512(tile.levels.data())));
+}
+const bool kWide = has_wide();
 #endif
 
-// A tile as a screen shows it: its rows are rows of the picture, from above.
+// Turns tiles: their rows are rows of the picture, from above.
 class Turn {
  public:
     explicit Turn(const View& view) : transposed_(view.transposed), reversed_(view.backwards), shown_(view.levels) {
@@ -40,18 +58,28 @@ class Turn {
         }
         for (int level = 0; level < 256; ++level) plain_ &= shown_[level] == level;
     }
-    uint64_t operator()(uint64_t word) const {
+    void operator()(const Tile& tile, Turned& to) const {
+#if defined(FRACSLICE_WIDE)
+        if (kWide)
+            turn_wide(tile, from_, to);
+        else
+#endif
+            turn(tile, to);
+        if (!plain_)
+            for (uint8_t& level : to.levels) level = shown_[level];
+    }
+
+ private:
+    uint64_t turned(uint64_t word) const {
         if (transposed_) word = transposed(word);
         word = __builtin_bswap64(word);
         return reversed_ ? mirrored(word) : word;
     }
-    void operator()(const Levels& levels, Levels& to) const {
-        permute(levels, from_, to);
-        if (!plain_)
-            for (uint8_t& level : to) level = shown_[level];
+    void turn(const Tile& tile, Turned& to) const {
+        to.whole = turned(tile.whole), to.cut = turned(tile.cut);
+        for (size_t at = 0; at < from_.size(); ++at) to.levels[at] = tile.levels[from_[at]];
     }
 
- private:
     bool transposed_, reversed_, plain_ = true;
     std::array<uint8_t, 256> shown_;
     Levels from_;
@@ -72,7 +100,8 @@ struct Axis {
     int count() const { return last - first; }
 };
 
-constexpr int kAhead = 3;  // tiles
+// Memory of one picture after the other.
+thread_local Runs runs_of_thread;
 
 // A layer on its way to a picture.
 class Shown {
@@ -87,6 +116,7 @@ class Shown {
     Picture picture() {
         const uint64_t row = uint64_t(view_.columns) + 1;
         int64_t at = int64_t(row) * down_.at + 1 + across_.at;  // place of a row's first pixel among all bytes
+        runs_.clear();
         runs_.add(0, row * down_.at);
         for (int tile = down_.first / kTile; tile * kTile < down_.last; ++tile) {
             int from = std::max(down_.first - tile * kTile, 0), to = std::min(down_.last - tile * kTile, kTile);
@@ -98,7 +128,8 @@ class Shown {
                 runs_.add(0, row * (to - from));
         }
         runs_.add(0, row * (view_.rows - down_.at - down_.count()));
-        return {runs_.zlib(band_.checksum(row * uint64_t(view_.rows))), painted_};
+        painted_.area += coverage_.area();
+        return {&runs_.zlib(band_.checksum(row * uint64_t(view_.rows))), painted_};
     }
 
  private:
@@ -114,41 +145,45 @@ class Shown {
         const ptrdiff_t step = (view_.transposed ? slab_.columns() : 1) * (view_.backwards ? -1 : 1);
         // All between two tiles is as the one after the first is; the same is before the first tile and after the last.
         int next = across_.first / kTile;  // tile that the band may lack
-        auto put = [&](int i) {
+        auto put_next = [&](int i) {
             if (i == next && i < n) band_.put(i, slab_.inside[first[step * i]] & 1), ++next;
         };
-        if (next < n && next < begin->across) put(next);
+        if (next < n && next < begin->across) put_next(next);
+        cover(begin, end, first, step);
         for (const Spot* spot = begin; spot != end; ++spot) {
-            fetch(spot[std::min<ptrdiff_t>(kAhead, end - 1 - spot)].tile);
             const int i = spot->across, after = spot + 1 == end ? n : spot[1].across;
-            if (read(Quad(first + step * i, slab_.columns()), i)) next = std::max(next, i + 1);
-            put(i);
+            if (put(row_[size_t(spot - begin)], i)) next = std::max(next, i + 1);
+            put_next(i);
             if (i + 1 == after) continue;
-            put(i + 1);
+            put_next(i + 1);
             if (first[step * (i + 1)] == kFull) painted_.area += kTile * kTile * double(after - i - 1);
         }
         band_.close();
         return true;
     }
 
-    // A tile is needed soon.
-    void fetch(int32_t t) const {
-        const float* values = slab_.values[t].data();
-        for (int i = 0; i < 64; i += 16) __builtin_prefetch(values + i);
+    // Reads tiles, and covers those that are cut: one after the other, for the next begins before one is done.
+    void cover(const InRows::Spot* begin, const InRows::Spot* end, const int32_t* first, ptrdiff_t step) {
+        row_.clear(), cut_.resize(size_t(end - begin));
+        int* cut = cut_.data();
+        for (const auto* spot = begin; spot != end; ++spot) {
+            const float* values = slab_.values[spot->tile].data();
+            for (int i = 0; i < 64; i += 16) __builtin_prefetch(values + i);
+            row_.emplace_back(slab_, Quad(first + step * spot->across, slab_.columns()));
+            *cut = int(spot - begin), cut += row_.back().cut != 0;
+        }
+        for (const int* k = cut_.data(); k != cut; ++k) coverage_(row_[*k].tiles, row_[*k].corners, row_[*k].levels);
     }
 
     // Whether it is cut.
-    bool read(const Quad& tiles, int i) {
-        const Corners corners(slab_, tiles);
-        const uint64_t sharp = slab_.sharp[tiles.own], whole = corners.whole() & ~sharp, cut = corners.mixed() | sharp;
-        if (!cut) {
-            painted_.area += __builtin_popcountll(whole);
+    bool put(const Tile& tile, int i) {
+        if (!tile.cut) {
+            painted_.area += __builtin_popcountll(tile.whole);
             return false;
         }
-        painted_.area += coverage_(tiles, corners, levels_);
-        painted_.partly += __builtin_popcountll(cut);
-        turn_(levels_, turned_);
-        band_.put(i, turn_(whole), turn_(cut), turned_);
+        painted_.partly += __builtin_popcountll(tile.cut);
+        turn_(tile, turned_);
+        band_.put(i, turned_.whole, turned_.cut, turned_.levels);
         return true;
     }
 
@@ -158,9 +193,11 @@ class Shown {
     Axis down_, across_;
     Band band_;
     Coverage coverage_;
-    Levels levels_, turned_;
+    Rows<Tile> row_;
+    Rows<int> cut_;
+    Turned turned_;
     InRows rows_;
-    Runs runs_;
+    Runs& runs_ = runs_of_thread;
     Painted painted_{0, 0};
 };
 
@@ -168,8 +205,9 @@ class Shown {
 
 Picture picture(const Slab& slab, const View& view) { return Shown(slab, view).picture(); }
 
-Rows<uint8_t> deflated(const Canvas& image) {
-    Runs runs;
+const Rows<uint8_t>& deflated(const Canvas& image) {
+    Runs& runs = runs_of_thread;
+    runs.clear();
     Adler sum;
     const int64_t stride = image.columns + 1;
     for (int y = 0; y < image.rows; ++y) {
@@ -179,7 +217,7 @@ Rows<uint8_t> deflated(const Canvas& image) {
             const uint8_t value = row[x * image.across];
             while (++x < image.columns && row[x * image.across] == value) {}
             runs.add(value, uint64_t(x - begin));
-            sum.add(value, y * stride + 1 + begin, 1, uint64_t(x - begin), 0);
+            sum.add(value, uint64_t(y * stride + 1 + begin), uint64_t(x - begin));
         }
     }
     return runs.zlib(sum.value(uint64_t(stride) * uint64_t(image.rows)));

@@ -19,11 +19,12 @@ struct View {
 };
 
 struct Picture {
-    Rows<uint8_t> data;
+    const Rows<uint8_t>* data;  // until this thread makes another
     Painted painted;
 };
 
 Picture picture(const Slab& slab, const View& view);
-Rows<uint8_t> deflated(const Canvas& image);
+// Until this thread makes another.
+const Rows<uint8_t>& deflated(const Canvas& image);
 
 }  // namespace fracslice

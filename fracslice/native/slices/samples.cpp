@@ -31,6 +31,7 @@ void scatter_each(const Ask* asks, size_t n, const float* f, const Rim* rim, Til
             if (!rim) return;
             const float scaled = v * v * (v < 0 ? rim->inside : rim->outside[asks[i].tile]);
             found[i].beyond |= uint64_t(scaled > rim->least) << bit;
+            found[i].calm |= uint64_t(v < 0 || scaled > rim->calm) << bit;
         });
     }
 }
@@ -65,7 +66,8 @@ FRACSLICE_WIDE inline int64_t before(uint64_t word, int q) { return _mm_popcnt_u
 
 template <bool kBeyond>
 FRACSLICE_WIDE void scatter_wide(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
-    const __m512 inside = _mm512_set1_ps(kBeyond ? rim->inside : 0), least = _mm512_set1_ps(kBeyond ? rim->least : 0);
+    const __m512 inside = _mm512_set1_ps(kBeyond ? rim->inside : 0);
+    const __m512 least = _mm512_set1_ps(kBeyond ? rim->least : 0), calm = _mm512_set1_ps(kBeyond ? rim->calm : 0);
     for (size_t i = 0; i < n; ++i) {
         const uint64_t samples = asks[i].samples;
         const int64_t count = _mm_popcnt_u64(samples);
@@ -76,7 +78,7 @@ FRACSLICE_WIDE void scatter_wide(const Ask* asks, size_t n, const float* f, cons
             _mm512_mask_storeu_ps(kept + 16 * q, chosen, _mm512_maskz_expand_ps(chosen, v));
         }
         const __m512 outside = _mm512_set1_ps(kBeyond ? rim->outside[asks[i].tile] : 0);
-        uint64_t negative = 0, beyond = 0;
+        uint64_t negative = 0, beyond = 0, enough = 0;
         for (int64_t at = 0; at < count; at += 16) {
             const __m512 v = _mm512_loadu_ps(f + at);
             const __mmask16 below = _mm512_cmp_ps_mask(v, _mm512_setzero_ps(), _CMP_LT_OQ);
@@ -84,8 +86,9 @@ FRACSLICE_WIDE void scatter_wide(const Ask* asks, size_t n, const float* f, cons
             if (!kBeyond) continue;
             const __m512 scaled = _mm512_mul_ps(_mm512_mul_ps(v, v), _mm512_mask_blend_ps(below, outside, inside));
             beyond |= uint64_t(_mm512_cmp_ps_mask(scaled, least, _CMP_GT_OQ)) << at;
+            enough |= uint64_t(__mmask16(below | _mm512_cmp_ps_mask(scaled, calm, _CMP_GT_OQ))) << at;
         }
-        found[i] = {_pdep_u64(negative, samples), _pdep_u64(beyond, samples)};
+        found[i] = {_pdep_u64(negative, samples), _pdep_u64(beyond, samples), _pdep_u64(enough, samples)};
         f += count;
     }
 }

@@ -12,16 +12,17 @@ struct Ask {
     uint64_t samples;
 };
 
-// Those whose values are negative, and those whose values are beyond a rim.
+// Those whose values are negative, those whose values are beyond a rim, and those that are so where it is calm.
 struct Found {
-    uint64_t negative, beyond;
+    uint64_t negative, beyond, calm;
 };
 
 // What squared values are compared with: `least`, once they are scaled by a factor for inside, or of their tile for outside.
+// Where it is calm, less is enough outside, and any value inside.
 struct Rim {
     float inside;
     const float* outside;
-    float least;
+    float least, calm;
 };
 
 constexpr size_t kSlack = 64;  // numbers that `gather` may write and `scatter` may read behind the last one

@@ -10,16 +10,14 @@ namespace fracslice {
 namespace {
 
 constexpr int kCoarsest = 8;        // tiles along a block of the first level
-constexpr int32_t kChunk = 256;     // tiles that stay in a near cache
 constexpr double kSteep = 0.7;
+constexpr double kHigh = 0.5, kDeep = 0.1;  // shares of the proven bound for blocks of 16 pixels of an even field, outside and inside
 // Of a group of layers and of a pair: how much farther a likely bound must reach into them, and how many pixels it is from
 // their middle to the last one, at most.
 constexpr double kAside = 1.4, kThick = 2.2, kBeside = 1.2, kThin = 0.8;
 constexpr double kMiddle = (kTile + 1) / 2.0;  // from the next tile's first sample back to a tile's middle
-constexpr double kSurely = 0.99999;            // squared distances are rounded
 
-// One sample of each block of 2; every other sample; the four blocks of 4.
-constexpr uint64_t kTwos = 0xAA00AA00AA00AA00, kEven = 0xAA55AA55AA55AA55;
+// The four blocks of 4.
 constexpr uint64_t kQuarters[] = {block(4), block(4) << 4, block(4) << 32, block(4) << 36};
 
 // Places that are full: few, so that a call of `memset` would take longer.
@@ -29,9 +27,6 @@ __attribute__((optimize("no-tree-loop-distribute-patterns"))) void fill(int32_t*
 
 double square(double x) { return x * x; }
 double length(double x, double y) { return std::sqrt(x * x + y * y); }
-
-// Squared distances in units of the lesser step, from squared values.
-float factor(double bound, const Frame& frame) { return float(kSurely / square(bound * std::min(frame.dx, frame.dy))); }
 
 // Neighbouring layers of at most so little height, in halves of halves.
 void group(const std::vector<double>& z, int first, int last, double thick, std::vector<std::array<int, 2>>& groups) {
@@ -91,15 +86,13 @@ void Slab::sample(int layer) {
     auto of = [&](const auto& groups) { return *std::find_if(groups.begin(), groups.end(), [&](auto& g) { return layer <= g[1]; }); };
     const auto group = of(groups_), pair = of(pairs_);
     if (group[0] != group_) columns_ = columns(group[0], group[1]), torn_.reset(), group_ = group[0], pair_ = -1;
-    const double middle = (z_[pair[0]] + z_[pair[1]]) / 2;
-    if (pair[0] != pair_) quarter(middle), pair_ = pair[0];
-    begin(z_[layer] - middle);
-    for (int32_t t = kTiles, end = int32_t(count()); t < end; t += kChunk) {
-        Chunk chunk{t, std::min(t + kChunk, end)};
-        probe(chunk, 2, kTwos);
-        if (!bounds_.even) probe(chunk, 1, kEven);
-        probe(chunk, 1, kAll);
+    if (pair[0] != pair_) {
+        quarter((z_[pair[0]] + z_[pair[1]]) / 2);
+        open((z_[pair[1]] - z_[pair[0]]) / 2);
+        pair_ = pair[0];
     }
+    begin();
+    probe();
     mend();
     close();
     corners();
@@ -135,7 +128,8 @@ std::vector<Slab::Block> Slab::coarse() {
         };
         evaluate(blocks.size(), middle, [&](size_t i, float f) {
             const Block& b = blocks[i];
-            if (std::fabs(f) > bounds_.proven * length(width * size, height)) {
+            const double share = bounds_.even && size == 2 ? f < 0 ? kDeep : kHigh : 1;
+            if (std::fabs(f) > share * bounds_.proven * length(width * size, height)) {
                 if (f < 0) fill(b);
                 return;
             }
@@ -168,15 +162,18 @@ std::vector<Slab::Column> Slab::columns(int first, int last) {
     };
     evaluate(blocks_.size(), where, [&](size_t i, float f) { *middle(blocks_[i]) = f; });
     const Likely likely(bounds_, frame_, tx_);
-    std::vector<Column> open;
+    std::vector<Column> open(blocks_.size());
+    size_t n = 0;
     for (const Block& b : blocks_) {
-        const float* f = middle(b);
-        const bool full = *f < 0 && -*f > bounds_.inside * reach;
+        const float f = *middle(b);
+        const bool full = -f > bounds_.inside * reach;
         this->where[size_t(b.y) * tx_ + b.x] = full ? kFull : kEmpty;
-        if (full) continue;
-        const float outside = bounds_.even ? likely(f) : float(bounds_.outside);
-        if (*f <= double(outside) * reach) open.push_back({b.y, b.x, *f, factor(outside, frame_), {}});
+        const float outside = bounds_.even ? likely(middle(b)) : float(bounds_.outside);
+        open[n] = {b.y, b.x, f, outside, {}};
+        n += !full & (f <= double(outside) * reach);
     }
+    open.resize(n);
+    for (Column& c : open) c.reach = factor(c.reach, frame_);
     for (const Block& b : blocks_) *middle(b) = NAN;
     return open;
 }
@@ -192,68 +189,40 @@ void Slab::quarter(double height) {
     evaluate(4 * columns_.size(), where, [&](size_t i, float f) { columns_[i / 4].quarters[i & 3] = f; });
 }
 
-// The tiles of the layer that is `height` above the middles of quarters; none where all of these say that it is empty, unless
-// one beside it is said to be full.
-void Slab::begin(double height) {
+// The tiles of a pair of layers that are `height` from the middles of quarters; none where all of these say that it is empty,
+// unless one beside it is said to be full.
+void Slab::open(double height) {
     const float aside = float(square(height)) * factor(1, frame_), least = aside + float(2.25 * diagonal_ * square(bounds_.even ? kBeside : 1));
-    // What is farther than `rims` decides its quarter.
-    const float rims[] = {bounds_.stop_outside < 4 ? least : -1, bounds_.stop_inside < 4 ? least : -1};
+    // What is farther than its rim decides its quarter.
+    const float outside_rim = bounds_.stop_outside < 4 ? least : -1, inside_rim = bounds_.stop_inside < 4 ? least : -1;
     const float inside_reach = factor(bounds_.inside, frame_);
-    size_t t = kTiles;
-    grow(columns_.size());
+    open_.clear();
     for (const Column& c : columns_) {
         uint64_t now = c.value < 0 ? kAll : 0, reached = 0;
         for (int q = 0; q < 4; ++q) {
-            const float v = c.quarters[q], d2 = v * v * (v < 0 ? inside_reach : c.reach);
-            uint64_t near = kQuarters[q] & -uint64_t(d2 > rims[v < 0]);
+            const float v = c.quarters[q];
+            const uint64_t negative = -uint64_t(v < 0);
+            const float d2 = v * v * (v < 0 ? inside_reach : c.reach);
+            uint64_t near = kQuarters[q] & -uint64_t(d2 > (v < 0 ? inside_rim : outside_rim));
             if (!bounds_.even && d2 > aside) near |= (*centres_)(d2 - aside, 9 + 4 * (q & 1) + 16 * (q & 2));
-            now = (now & ~near) | (near & -uint64_t(v < 0));
+            now = (now & ~near) | (near & negative);
             reached |= near;
         }
-        int32_t* here = &where[size_t(c.y) * tx_ + c.x];
+        const int32_t* here = spot(c.y, c.x);
         const bool empty = reached == kAll && now == 0;
         if (empty && here[1] != kFull && here[-1] != kFull && here[tx_] != kFull && here[-tx_] != kFull) continue;
-        place[t] = {c.y, c.x, kEmpty};
-        reach[t] = c.reach, inside[t] = now, decided[t] = reached;
-        *here = int32_t(t++);
+        open_.push_back({{c.y, c.x, kEmpty}, c.reach, now, reached});
     }
-    cut(t);
 }
 
-// Evaluates those of the samples `among` that are not decided, each in a block of `size`, and decides what is within their
-// reach; in an even field all of the block or nothing.
-void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
-    asks_.clear();
-    for (int32_t t = chunk.first; t < chunk.last; ++t)
-        if (uint64_t samples = among & ~decided[t]) asks_.push_back({t, samples});
-    const Rim rim{factor(bounds_.inside, frame_), reach.data(), float(diagonal_)};
-    const int back = size / 2 * (kTile + 1);
-    const uint64_t own = uint64_t(1) << back, least_in = size <= bounds_.stop_inside ? block(size) : own,
-                   least_out = size <= bounds_.stop_outside ? block(size) : own;
-    evaluate(asks_, bounds_.even && size > 1 ? &rim : nullptr, [&](const Ask& ask, const Found& found) {
-        uint64_t reached = 0, within = 0;
-        if (bounds_.even) {
-            reached = (found.beyond >> back) * block(size), within = ((found.beyond & found.negative) >> back) * block(size);
-        } else {
-            const float *kept = values[ask.tile].data(), outside = reach[ask.tile];
-            each(ask.samples, [&](int bit) {
-                const float v = kept[bit], d2 = v * v * (v < 0 ? rim.inside : outside);
-                uint64_t near = (*discs_)(d2, bit) | (v < 0 ? least_in : least_out) << (bit - back);
-                within = v < 0 ? within | near : within & ~near;
-                reached |= near;
-            });
-        }
-        set(ask, found.negative, reached, within);
-    });
-}
-
-// What is evaluated is so; what is known stays.
-void Slab::set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t within) {
-    uint64_t kept = known[ask.tile], implied = reached & ~(kept | ask.samples);
-    uint64_t& now = inside[ask.tile];
-    now = (now & ~(implied | ask.samples)) | (within & implied) | negative;
-    decided[ask.tile] |= reached | ask.samples;
-    known[ask.tile] = kept | ask.samples;
+// The tiles of a layer of that pair.
+void Slab::begin() {
+    grow(open_.size());
+    size_t t = kTiles;
+    for (const Open& o : open_) {
+        place[t] = o.place, reach[t] = o.reach, inside[t] = o.inside, decided[t] = o.decided;
+        where[size_t(o.place.y) * tx_ + o.place.x] = int32_t(t++);
+    }
 }
 
 }  // namespace fracslice

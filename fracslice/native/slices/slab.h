@@ -47,9 +47,9 @@ struct Spot {
 // The samples of a layer, tile by tile; neighbouring layers share what is found out first.
 //
 // Top down, blocks of 64, 32 and 16 pixels over all layers, of 8 over groups of some and of 4 over pairs, then samples: one
-// of each block of 2, and the others. A value decides all samples within its reach. Then closure: where two neighbours
-// differ in sign and one of them is only implied, it is evaluated, until no such pair is left. So every edge that the contour
-// crosses has two evaluated ends.
+// of each block of 2, and the others. A value decides all samples within its reach; in an even field it is calm where all
+// around has one sign, and less is enough. Then closure: where two neighbours differ in sign and one of them is only implied,
+// it is evaluated, until no such pair is left. So every edge that the contour crosses has two evaluated ends.
 class Slab : public Tiles {
  public:
     // ny, nx: lattice points. z: of the layers, scene units.
@@ -103,6 +103,12 @@ class Slab : public Tiles {
         float value, reach;
         std::array<float, 4> quarters;
     };
+    // A tile before its layer is sampled.
+    struct Open {
+        Place place;
+        float reach;
+        uint64_t inside, decided;
+    };
     // The middles of crossed edges, and how many times the values outside are those inside.
     struct Middles {
         std::vector<float> x, y, quotients;
@@ -127,9 +133,15 @@ class Slab : public Tiles {
     void fill(const Block& block);
     std::vector<Column> columns(int first, int last);
     void quarter(double z);
-    void begin(double height);
+    void open(double height);
+    void begin();
+    void probe();
+    void list(const Chunk& chunk, uint64_t among);
     void probe(const Chunk& chunk, int size, uint64_t among);
     void set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t within);
+    void twos();
+    void calm();
+    void rest();
 
     int32_t add(int y, int x);
     void mend();
@@ -158,10 +170,15 @@ class Slab : public Tiles {
     double diagonal_;  // of a pixel, squared, in lesser steps
     std::vector<Block> blocks_;  // of 16 pixels, that are not decided
     std::vector<Column> columns_;  // of the group
+    std::vector<Open> open_;       // of the pair
     std::optional<std::vector<Place>> torn_;  // of that group, once they are known
     int group_ = -1, pair_ = -1, layer_ = -1;  // their first layers; the layer
     std::vector<float> middles_;   // values in the middles of places, NaN between uses
     std::vector<Ask> asks_;  // for use within a step
+    // Of tiles in an even field: the signs of blocks of 2, and of those in their rows; the blocks whose value is enough where
+    // it is calm.
+    std::vector<uint32_t> halves_, rows_;
+    std::vector<uint64_t> enough_;
     int ty_, tx_;
 };
 

@@ -40,7 +40,7 @@ void link(const Sides& sides, int signs, const int32_t* e, std::vector<Crossing>
 
 Painted paint(const Slab& slab, const Canvas& canvas) {
     Painted painted{0, 0};
-    const Coverage coverage(slab);
+    Coverage coverage(slab);
     Levels levels;
     for (int y = 1; y < slab.rows() - 1; ++y) {
         int y0 = kTile * (y - 1), full = 0;  // tiles before this one that are full
@@ -64,13 +64,14 @@ Painted paint(const Slab& slab, const Canvas& canvas) {
             }
             const uint64_t cut = empty || t < kTiles ? 0 : corners.mixed() | sharp;
             if (!cut) continue;
-            painted.area += coverage(tiles, corners, levels);
+            coverage(tiles, corners, levels);
             painted.partly += __builtin_popcountll(cut);
             each((cut | corners.whole()) & on(canvas, y0, x0), [&](int bit) {
                 canvas.data[(y0 + (bit >> 3)) * canvas.down + (x0 + (bit & 7)) * canvas.across] = levels[bit];
             });
         }
     }
+    painted.area += coverage.area();
     return painted;
 }
 

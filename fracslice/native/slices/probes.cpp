@@ -1,0 +1,116 @@
+// One sample of each block of 2 of undecided tiles, and the others, as long as no value reaches them.
+#include "evaluate.h"
+
+namespace fracslice {
+namespace {
+
+// One sample of each block of 2, the last; every other sample.
+constexpr uint64_t kTwos = 0xAA00AA00AA00AA00, kEven = 0xAA55AA55AA55AA55;
+constexpr int kBack = kTile + 1;     // bits from the last sample of a block of 2 to its first
+constexpr int32_t kChunk = 256;      // tiles that stay in a near cache
+constexpr float kCalm = 0.25f;       // where it is calm, a value need not reach farther than this part of the way
+
+// Of a block of 2 with this last sample, all.
+uint64_t blocks(uint64_t last) { return (last >> kBack) * block(2); }
+
+}  // namespace
+
+void Slab::probe() {
+    const int32_t end = int32_t(count());
+    if (bounds_.even) {
+        twos();
+        calm();
+        rest();
+    } else {
+        for (int32_t t = kTiles; t < end; t += kChunk) {
+            const Chunk chunk{t, std::min(t + kChunk, end)};
+            probe(chunk, 2, kTwos), probe(chunk, 1, kEven), probe(chunk, 1, kAll);
+        }
+    }
+}
+
+// Those of the samples `among` that are not decided.
+void Slab::list(const Chunk& chunk, uint64_t among) {
+    asks_.resize(size_t(chunk.last - chunk.first));
+    size_t n = 0;
+    for (int32_t t = chunk.first; t < chunk.last; ++t) {
+        asks_[n] = {t, among & ~decided[t]};
+        n += asks_[n].samples != 0;
+    }
+    asks_.resize(n);
+}
+
+// Evaluates those of the samples `among` that are not decided, each in a block of `size`, and decides what is within their
+// reach.
+void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
+    list(chunk, among);
+    const float inside_reach = factor(bounds_.inside, frame_);
+    const int back = size / 2 * (kTile + 1);
+    const uint64_t own = uint64_t(1) << back, least_in = size <= bounds_.stop_inside ? block(size) : own,
+                   least_out = size <= bounds_.stop_outside ? block(size) : own;
+    evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) {
+        const float *kept = values[ask.tile].data(), outside_reach = reach[ask.tile];
+        uint64_t reached = 0, within = 0;
+        each(ask.samples, [&](int bit) {
+            const float v = kept[bit], d2 = v * v * (v < 0 ? inside_reach : outside_reach);
+            uint64_t near = (*discs_)(d2, bit) | (v < 0 ? least_in : least_out) << (bit - back);
+            within = v < 0 ? within | near : within & ~near;
+            reached |= near;
+        });
+        set(ask, found.negative, reached, within);
+    });
+}
+
+// What is evaluated is so; what is known stays.
+void Slab::set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t within) {
+    uint64_t kept = known[ask.tile], implied = reached & ~(kept | ask.samples);
+    uint64_t& now = inside[ask.tile];
+    now = (now & ~(implied | ask.samples)) | (within & implied) | negative;
+    decided[ask.tile] |= reached | ask.samples;
+    known[ask.tile] = kept | ask.samples;
+}
+
+// --- in even fields ------------------------------------------------------------------------------------------------------
+// One sample of each block of 2, which decides all of it or nothing.
+void Slab::twos() {
+    list({kTiles, int32_t(count())}, kTwos);
+    enough_.resize(count());
+    const Rim rim{factor(bounds_.inside, frame_), reach.data(), float(diagonal_), float(diagonal_) * kCalm * kCalm};
+    evaluate(asks_, &rim, [&](const Ask& ask, const Found& found) {
+        enough_[ask.tile] = blocks(found.calm);
+        set(ask, found.negative, blocks(found.beyond), blocks(found.beyond & found.negative));
+    });
+}
+
+// Decides the blocks of 2 around which, two blocks wide, nothing has the other sign. How near the surface is shows in the signs
+// around a sample rather than in its value.
+void Slab::calm() {
+    const size_t n = count();
+    halves_.resize(n), rows_.resize(n);
+    for (size_t t = 0; t < n; ++t) halves_[t] = halved(inside[t]);
+    // The four rows of a tile's blocks, between two blocks of those beside it.
+    const uint32_t* halves = halves_.data();
+    rows_[kFull] = ~uint32_t(0), rows_[kEmpty] = 0;
+    for (size_t t = kTiles; t < n; ++t) {
+        const int32_t* here = spot(place[t].y, place[t].x);
+        rows_[t] = (halves[here[-1]] >> 2 & 0x03030303) | halves[t] << 2 | (halves[here[1]] & 0x03030303) << 6;
+    }
+    for (size_t t = kTiles; t < n; ++t) {
+        const int32_t* here = spot(place[t].y, place[t].x);
+        const uint64_t around = rows_[here[-tx_]] >> 16 | uint64_t(rows_[t]) << 16 | uint64_t(rows_[here[tx_]]) << 48;
+        const uint64_t full = doubled(all_of_five(around)), empty = doubled(all_of_five(~around)) & enough_[t];
+        const uint64_t implied = (full | empty) & ~decided[t];
+        inside[t] = (inside[t] & ~implied) | (full & implied);
+        decided[t] |= implied;
+    }
+}
+
+void Slab::rest() {
+    list({kTiles, int32_t(count())}, kAll);
+    evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) {
+        inside[ask.tile] = (inside[ask.tile] & ~ask.samples) | found.negative;
+        known[ask.tile] |= ask.samples;
+    });
+}
+
+}  // namespace fracslice
