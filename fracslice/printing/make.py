@@ -240,10 +240,10 @@ class _Run:
 
 
 def _apart(points: np.ndarray, voxel: float) -> np.ndarray:
-    """Numbers of points of which no two are in the same half voxel, along x, then y, then z."""
+    """Numbers of points of which no two are in the same quarter of a voxel, along x, then y, then z."""
     if not len(points):
         return np.empty(0, np.int64)
-    cells = np.round(2 * points / voxel).astype(np.int64)
+    cells = np.round(4 * points / voxel).astype(np.int64)
     cells -= cells.min(0)
     _, first = np.unique(np.ravel_multi_index(tuple(cells.T), tuple(cells.max(0) + 1)), return_index=True)
     return np.asarray(first)

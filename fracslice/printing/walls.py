@@ -24,7 +24,7 @@ OPPOSITE = -0.5
 """The cosine between the normals of two faces of a wall is at most this: wedges up to 60 degrees are walls.
 """
 
-AT_ONCE = 64
+AT_ONCE = 512
 """Bricks whose surface is looked at by one thread at a time."""
 
 Direction = tuple[float, float, float]
