@@ -154,14 +154,8 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         planned, scale = plan(scene.root, voxels, work), None
     left = how  # to do on the mesh
     if not how.whole:
-        from .printing import printable
-
-        if not planned.root.facts.weak:
-            # Its bodies are chosen in the field: of walls thinner than a voxel a mesh has crumbs only.
-            left = replace(how, keep="all")
         with clock("changing"):
-            size_of = partial(_mesh_box, what=what, how=left, size=what.size(scene), work=work)
-            planned, scale = printable(planned, what.size(scene), how, work, size_of)
+            planned, scale, left = _changed(planned, what, how, what.size(scene), work)
     with clock("sampling"):
         bricks = sample_scene(planned, work)
     with clock("meshing"):
@@ -196,6 +190,18 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         notes=planned.notes,
     )
     return Result(mesh, report, bricks, planned.root, place)
+
+
+def _changed(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> tuple[Plan, float, Print]:
+    """The plan of what is changed in the field to be printable, mm per scene unit, and what is left to do on
+    the mesh.
+    """
+    from .printing import printable
+
+    # Of walls thinner than a voxel a mesh has crumbs only: bodies are chosen in the field where it tells.
+    left = how if planned.root.facts.weak else replace(how, keep="all")
+    size_of = partial(_mesh_box, what=what, how=left, size=size, work=work)
+    return *printable(planned, size, how, work, size_of), left
 
 
 def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Work) -> None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .store import Store
 
 T = TypeVar("T")
+R = TypeVar("R")
 
 
 def _silent(stage: str, done: float) -> None:
@@ -40,6 +41,16 @@ class Work:
         """Raises `Cancelled` once somebody asked to stop."""
         if self.cancel.is_set():
             raise Cancelled("cancelled")
+
+    def collect(self, task: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """As `map`; returns what the tasks do, in the order of the items."""
+        found: dict[int, R] = {}
+
+        def numbered(index: int) -> None:
+            found[index] = task(items[index])
+
+        self.map(numbered, range(len(items)))
+        return [found[index] for index in range(len(items))]
 
     def map(self, task: Callable[[T], None], items: Sequence[T]) -> None:
         """Runs `task` on every item, in this thread and others. Tasks write to places of their own, and their

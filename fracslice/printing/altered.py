@@ -14,6 +14,7 @@ from ..formulas import Box, Node, difference, intersection, union
 from ..formulas.registry import Facts
 from ..kernel import Compilable, Kernel, compile_scene
 from ..kernel.cpu import Precision
+from .wrapped import Wrapped
 
 if TYPE_CHECKING:
     from .samples import Samples  # it needs Numba, whose import takes as long as a small mesh
@@ -76,19 +77,10 @@ def _box(term: Term) -> Box:
 
 
 @dataclass(frozen=True, eq=False)
-class Composite:
+class Composite(Wrapped):
     """Evaluates like a `CpuKernel`."""
 
-    kernel: Kernel
     steps: tuple[tuple[Kernel | Samples, Does], ...]
-
-    @property
-    def dtype(self) -> np.dtype:
-        return self.kernel.dtype
-
-    @property
-    def batch(self) -> int:
-        return self.kernel.batch
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Field values at points, as `CpuKernel.points`."""

@@ -21,9 +21,9 @@ from ..rows import Rows
 from ..volume import Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
-from .raised import Raised
 from .samples import Samples
 from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, walls
+from .wrapped import Raised
 
 NEAR = 0.9
 """Voxels: more than from any point to the nearest sample, half the diagonal."""

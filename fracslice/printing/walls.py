@@ -93,14 +93,8 @@ def walls(
 
 def gathered(look: Callable[[slice], R], count: int, size: int, work: Work) -> R:
     """What is found by looking at `count` rows, `size` of them at a time, on all threads; in order."""
-    parts = chunks(count, size) or [slice(0, 0)]
-    found: dict[int, R] = {}
-
-    def task(part: slice) -> None:
-        found[part.start] = look(part)
-
-    work.map(task, parts)
-    return type(found[0]).joined([found[part.start] for part in parts])
+    found = work.collect(look, chunks(count, size) or [slice(0, 0)])
+    return type(found[0]).joined(found)
 
 
 def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -45,16 +45,14 @@ def settle(
     """
     kernel, work = compile_scene(root, "float64"), work or Work()
     guess, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-    parts = chunks(len(points), 1 << 14)
-    moved = {}
 
-    def task(part: slice) -> None:
+    def task(part: slice) -> tuple[np.ndarray, np.ndarray]:
         values = kernel.points(*points[part].T)
         away = np.flatnonzero(np.abs(values) > NEAR * voxel)
-        if len(away):
-            own = guess.padded(away)
-            settled = brought(part.start + own, values[own])
-            moved[part.start] = part.start + away, settled[:, : len(away)].T
+        if not len(away):
+            return away, np.empty((0, 3))
+        own = guess.padded(away)
+        return part.start + away, brought(part.start + own, values[own])[:, : len(away)].T
 
     def brought(which: np.ndarray, f: np.ndarray) -> np.ndarray:
         p, room = np.ascontiguousarray(points[which].T), rooms(which, f < 0)
@@ -68,8 +66,7 @@ def settle(
         there = np.clip(p + t * ways[3:], room.low, room.high)
         return np.where(miss * voxel < np.abs(f), there, p)
 
-    work.map(task, parts)
-    found = [moved[part.start] for part in parts if part.start in moved]
+    found = work.collect(task, chunks(len(points), 1 << 14))
     if not found:
         return np.empty(0, np.int64), np.empty((0, 3))
     numbers, places = zip(*found, strict=True)

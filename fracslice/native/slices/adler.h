@@ -5,10 +5,6 @@
 
 #include "wide.h"
 
-#if defined(FRACSLICE_WIDE)
-#include <immintrin.h>
-#endif
-
 namespace fracslice {
 
 // Sums of eight rows of bytes.
@@ -44,7 +40,7 @@ class Eight {
         _mm512_storeu_si512(sums.rows.data(), _mm512_add_epi64(_mm512_loadu_si512(sums.rows.data()), rows));
         _mm512_storeu_si512(sums.weighted.data(), _mm512_add_epi64(_mm512_loadu_si512(sums.weighted.data()), weighted));
     }
-    inline static const auto add_tile = has_wide() ? add_wide : add_each;
+    inline static const auto add_tile = kWide ? add_wide : add_each;
 #else
     static constexpr auto add_tile = add_each;
 #endif

@@ -9,10 +9,6 @@
 #include "deflate.h"
 #include "wide.h"
 
-#if defined(FRACSLICE_WIDE)
-#include <immintrin.h>
-#endif
-
 namespace fracslice {
 
 // The numbers of bits that differ from the one before, of n bytes; returns the end. Up to 7 bytes after them are read, as zeros
@@ -48,7 +44,7 @@ FRACSLICE_WIDE inline int* turns_wide(const uint8_t* bytes, int n, int* end) {
     }
     return end;
 }
-inline const auto find_turns = has_wide() ? turns_wide : turns_each;
+inline const auto find_turns = kWide ? turns_wide : turns_each;
 #else
 inline constexpr auto find_turns = turns_each;
 #endif

@@ -4,10 +4,6 @@
 
 #include "wide.h"
 
-#if defined(FRACSLICE_WIDE)
-#include <immintrin.h>
-#endif
-
 namespace fracslice {
 namespace {
 
@@ -207,7 +203,6 @@ FRACSLICE_WIDE void cover_wide(const Slab& slab, float scale, const Quad& tiles,
     const __m256 both = _mm256_add_ps(_mm512_maskz_extractf32x8_ps(0xFF, sum, 0), _mm512_maskz_extractf32x8_ps(0xFF, sum, 1));
     _mm512_storeu_pd(sums, _mm512_add_pd(_mm512_loadu_pd(sums), _mm512_maskz_cvtps_pd(0xFF, both)));
 }
-const bool kWide = has_wide();
 #endif
 
 }  // namespace

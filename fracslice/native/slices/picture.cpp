@@ -8,10 +8,6 @@
 #include "in_rows.h"
 #include "wide.h"
 
-#if defined(FRACSLICE_WIDE)
-#include <immintrin.h>
-#endif
-
 namespace fracslice {
 namespace {
 
@@ -44,7 +40,6 @@ FRACSLICE_WIDE void turn_wide(const Tile& tile, const Levels& from, Turned& to) 
     to.whole = turn_wide(tile.whole, order), to.cut = turn_wide(tile.cut, order);
     _mm512_storeu_si512(to.levels.data(), _mm512_maskz_permutexvar_epi8(kAll, order, _mm512_loadu_si512(tile.levels.data())));
 }
-const bool kWide = has_wide();
 #endif
 
 // Turns tiles: their rows are rows of the picture, from above.

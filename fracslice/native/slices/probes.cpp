@@ -45,7 +45,7 @@ void Slab::list(const Chunk& chunk, uint64_t among) {
 void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
     list(chunk, among);
     const float inside_reach = factor(bounds_.inside, frame_);
-    const int back = size / 2 * (kTile + 1);
+    const int back = size / 2 * kBack;
     const uint64_t own = uint64_t(1) << back, least_in = size <= bounds_.stop_inside ? block(size) : own,
                    least_out = size <= bounds_.stop_outside ? block(size) : own;
     evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) {
@@ -107,10 +107,7 @@ void Slab::calm() {
 
 void Slab::rest() {
     list({kTiles, int32_t(count())}, kAll);
-    evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) {
-        inside[ask.tile] = (inside[ask.tile] & ~ask.samples) | found.negative;
-        known[ask.tile] |= ask.samples;
-    });
+    evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) { set(ask, found.negative, 0, 0); });
 }
 
 }  // namespace fracslice

@@ -5,10 +5,6 @@
 #include "bits.h"
 #include "wide.h"
 
-#if defined(FRACSLICE_WIDE)
-#include <immintrin.h>
-#endif
-
 namespace fracslice {
 namespace {
 
@@ -93,7 +89,6 @@ FRACSLICE_WIDE void scatter_wide(const Ask* asks, size_t n, const float* f, cons
     }
 }
 
-const bool kWide = has_wide();
 #endif
 
 }  // namespace

@@ -173,7 +173,7 @@ std::vector<Slab::Column> Slab::columns(int first, int last) {
         n += !full & (f <= double(outside) * reach);
     }
     open.resize(n);
-    for (Column& c : open) c.reach = factor(c.reach, frame_);
+    for (Column& c : open) c.reach = factor(c.reach, frame_);  // so far the bound, for most were not open
     for (const Block& b : blocks_) *middle(b) = NAN;
     return open;
 }

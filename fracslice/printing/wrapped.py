@@ -1,17 +1,19 @@
-"""A field whose inside reaches farther, or less far."""
+"""Kernels around another one."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..kernel import Kernel
 
 
-class Raised:
-    """A kernel whose values are lower by a constant: its inside reaches farther, or less far."""
+@dataclass(frozen=True, eq=False)
+class Wrapped:
+    """What changes the values of a kernel is of the same precision, and takes as many points at a time."""
 
-    def __init__(self, kernel: Kernel, by: float) -> None:
-        self.kernel, self.by = kernel, by
+    kernel: Kernel
 
     @property
     def dtype(self) -> np.dtype:
@@ -20,6 +22,13 @@ class Raised:
     @property
     def batch(self) -> int:
         return self.kernel.batch
+
+
+@dataclass(frozen=True, eq=False)
+class Raised(Wrapped):
+    """Lowers all values by a constant: the inside reaches farther, or less far."""
+
+    by: float
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Field values at points, as `CpuKernel.points`."""
