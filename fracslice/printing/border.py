@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numba import njit
 
-from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
-from .parts import Parts
+from .parts import Connected
 from .samples import Samples
 
 FAR = 255
@@ -19,10 +18,11 @@ REACH = 8
 """Voxels: samples farther from a border may have bricks without samples between, where it is not known."""
 
 
-def nearer(solid: Bricks, parts: Parts, these: np.ndarray, others: np.ndarray) -> Samples:
+def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
     """Negative where fewer samples are on the way to these parts than to the others: half the difference. So
     the border lies midway between them, and the surfaces of both stay as they are.
     """
+    solid, parts = found.solid, found.parts
     mine, tiles = parts.masks(these)
     to_these, to_others = (_steps(solid.index, solid.ijk, seeds) for seeds in (mine, parts.masks(others)[0]))
     half = np.clip((to_these.astype(np.float32) - to_others) / 2, -REACH, REACH)

@@ -24,7 +24,7 @@ from .altered import altered
 
 # What measures needs Numba and SciPy, which take as long to load as a small mesh: only where it is used.
 if TYPE_CHECKING:
-    from .parts import Parts
+    from .parts import Connected, Parts
     from .samples import Samples
 
 COARSE, FINE = 128, 640
@@ -74,6 +74,8 @@ class _Run:
     measure: Measure | None
     scale: float = 1.0
     """mm per scene unit, known when it is known which bodies stay."""
+    known: Connected | None = None
+    """What is connected, once it was looked at."""
 
     @property
     def thing(self) -> Node | Compilable:
@@ -104,8 +106,10 @@ class _Run:
         if how.cavities == "fill":
             yield "filling cavities", self.filled
         if how.keep == "largest":
+            before = self.thing
             yield "keeping the largest", self.largest
-            self.bound()
+            if self.thing is not before:
+                self.bound()
         self.weigh()
         self.scale = self.size / max(self.planned.box.size)
         if how.bridge:
@@ -131,16 +135,18 @@ class _Run:
 
         return shown(self.thing, self.planned.outer, max(self.planned.box.size), samples, self.work)
 
-    def parts(self) -> tuple[Bricks, Parts]:
-        """Samples that tell what is connected, and what is."""
+    def connected(self) -> Connected:
+        """Samples that tell what is connected, and what is: taken once, for cavities, bodies and bridges."""
         from .apart import resolved
-        from .parts import parts_of
+        from .parts import Connected, parts_of
 
-        coarse = self.sampled()
-        found = parts_of(coarse)
-        unit = max(self.planned.box.size) / self.size
-        bricks = resolved(self.thing, coarse, THIN * unit**2, len(_large(found)) > 1, self.work)
-        return (coarse, found) if bricks is coarse else (bricks, parts_of(bricks))
+        if self.known is None:
+            coarse = self.sampled()
+            found = parts_of(coarse)
+            unit = max(self.planned.box.size) / self.size
+            bricks = resolved(self.thing, coarse, THIN * unit**2, len(_large(found)) > 1, self.work)
+            self.known = Connected(bricks, found if bricks is coarse else parts_of(bricks))
+        return self.known
 
     def distances(self, length: float) -> Grid:
         """The same as distances."""
@@ -157,26 +163,29 @@ class _Run:
         """The space that nothing reaches becomes solid."""
         from .border import nearer
 
-        solid, parts = self.parts()
-        if not len(parts.cavities):
+        found = self.connected()
+        cavities = found.parts.cavities
+        if not len(cavities):
             return self.thing
-        return altered(self.thing, "add", nearer(solid, parts, parts.cavities, np.array([0])))
+        self.known = found.filled() if self.how.chooses else None
+        return altered(self.thing, "add", nearer(found, cavities, np.array([0])))
 
     def largest(self) -> Node | Compilable:
         """Only the largest body stays."""
         from .border import nearer
 
-        solid, parts = self.parts()
-        if len(parts.bodies) == 1:
+        found = self.connected()
+        bodies = found.parts.bodies
+        if len(bodies) == 1:
             return self.thing
-        return altered(self.thing, "keep", nearer(solid, parts, parts.bodies[:1], parts.bodies[1:]))
+        return altered(self.thing, "keep", nearer(found, bodies[:1], bodies[1:]))
 
     def bridged(self) -> Node | Compilable:
         """Struts between bodies, as few and as short as can be."""
         from .bridges import struts
 
-        solid, parts = self.parts()
-        ends = struts(solid, parts, _large(parts))
+        found = self.connected()
+        ends = struts(found.solid, found.parts, _large(found.parts))
         return self.added(*ends, self.how.bridge / self.scale / 2, self.sampled())
 
     def closed(self) -> Node | Compilable:

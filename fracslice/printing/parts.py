@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -45,6 +45,22 @@ class Parts:
         chosen = np.zeros(len(self.inside) + 1, bool)
         chosen[numbers] = True
         return np.asarray(chosen[self.labels]), np.asarray(chosen[self.tiles])
+
+
+@dataclass(frozen=True, eq=False)
+class Connected:
+    """Samples of a solid, and its parts."""
+
+    solid: Bricks
+    parts: Parts
+
+    def filled(self) -> Connected:
+        """As they are once the cavities are solid: what floats in one is of the body around it."""
+        samples, tiles = self.parts.masks(self.parts.cavities)
+        values = np.where(samples, np.float32(-self.solid.voxel), self.solid.values)
+        index = np.where(tiles, np.int32(INSIDE), self.solid.index)
+        solid = replace(self.solid, values=values, index=index)
+        return Connected(solid, parts_of(solid))
 
 
 def parts_of(bricks: Bricks) -> Parts:

@@ -42,6 +42,11 @@ class Print(Part):
             raise self.fail("keep and bridge: expected one of them; where one body stays, none is loose")
 
     @property
+    def chooses(self) -> bool:
+        """Whether it matters which bodies there are."""
+        return self.keep == "largest" or self.bridge > 0
+
+    @property
     def whole(self) -> bool:
         """Whether bodies and cavities stay or go as a whole, and nothing else is changed."""
         return not any((self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft))

@@ -8,11 +8,12 @@ import pytest
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, mandelbulb, shell, sphere, transform, union
 from fracslice.kernel import compile_scene
-from fracslice.printing import printable
+from fracslice.printing import apart, printable
 from fracslice.printing.altered import Altered
 from fracslice.printing.apart import resolved
 from fracslice.printing.make import COARSE
 from fracslice.printing.parts import Parts, parts_of
+from fracslice.printing.slender import slender
 from fracslice.scene import Print, scene
 from fracslice.volume import Lattice, Plan, plan, sample
 from fracslice.work import Work
@@ -70,6 +71,30 @@ def test_a_thin_shell_is_kept_whole(voxels: float) -> None:
     assert inside(kept, on_sphere(1 - 0.5 * voxels * VOXEL)).all()
     assert not inside(kept, on_sphere(0.9)).any()
     assert not inside(kept, np.array([[1.3, 0, 0], [1.39, 0, 0]])).any()
+
+
+def test_what_floats_in_a_cavity_is_of_the_body_around_it() -> None:
+    """Of a shell less than the ball in it, and than the one beside it."""
+    inner, beside = sphere(radius=0.7), at(sphere(radius=0.9), 2, 0, 0)
+    root = union(shell(sphere(), thickness=0.05), inner, beside)
+    kept = made(root, cavities="fill", keep="largest")
+    assert inside(kept, on_sphere(0.8)).all() and inside(kept, on_sphere(0.6)).all()
+    assert not inside(kept, np.array([[2.0, 0, 0]])).any()
+    joined = made(root, cavities="fill", bridge=1)
+    assert inside(joined, np.array([[1.05, 0, 0]])).all()
+    assert not inside(joined, np.array([[-1.05, 0, 0], [0, 0, 1.05]])).any()
+
+
+@pytest.mark.parametrize("then", [{"keep": "largest"}, {"bridge": 1}], ids=str)
+def test_cavities_and_bodies_are_told_by_the_same_samples(
+    then: dict[str, float | str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks = []
+    monkeypatch.setattr(apart, "slender", lambda *those: looks.append(those) or slender(*those))
+    root = union(shell(sphere(), thickness=0.1), BALL)
+    for how in ({"cavities": "fill"}, {"cavities": "fill", **then}):
+        made(root, **how)  # type: ignore[arg-type]
+    assert len(looks) == 2
 
 
 def test_a_thin_shell_is_not_bridged_to_itself() -> None:
