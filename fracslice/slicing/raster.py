@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from .._slices import deflated
 from ..errors import SliceError
@@ -52,6 +50,8 @@ class Screen:
         image = np.zeros(self.shape, np.uint8)
         bed, mine = self._bed(image), self._place
         if self.compensation:
+            from .compensation import compensated
+
             bed[mine.on_bed] = compensated(layer.coverage, self.compensation, self.stack.pixel)[mine.of_layer]
         else:
             bed[mine.on_bed] = layer.coverage[mine.of_layer]
@@ -118,38 +118,3 @@ def check_fits(stack: Stack, printer: Printer) -> None:
             raise SliceError(
                 f"the object is {mine:.4g} mm along {axis}, the {printer.title} has {room:.4g} mm"
             )
-
-
-def compensated(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.ndarray:
-    """Coverage with its outlines moved outwards by `by` mm, uint8.
-
-    A pixel's coverage is taken as its distance to the outline, in pixels, and grows as the distance does:
-    grey dilation with a cone. Exact for outlines along an axis; within a fifth of a pixel for all others.
-    """
-    unit = math.sqrt(pixel[0] * pixel[1])
-    amount, reach = abs(by) / unit, math.ceil(abs(by) / min(pixel)) + 1
-    dy, dx = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-    cone = 255 * (amount - np.hypot(dy * pixel[1], dx * pixel[0]) / unit)
-    grown = np.empty_like(image)
-    _dilate(image if by > 0 else 255 - image, cone, grown)
-    return grown if by > 0 else 255 - grown
-
-
-@njit(cache=True, nogil=True)
-def _dilate(image, cone, out):  # type: ignore[no-untyped-def]
-    ny, nx = image.shape
-    reach = cone.shape[0] // 2
-    out[:] = image
-    for y in range(ny):
-        for x in range(nx):
-            a = image[y, x]
-            if a == 0:
-                continue
-            beside = image[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
-            if beside.size == 9 and beside.min() == 255:
-                continue
-            for v in range(max(y - reach, 0), min(y + reach + 1, ny)):
-                for u in range(max(x - reach, 0), min(x + reach + 1, nx)):
-                    new = min(a + cone[v - y + reach, u - x + reach], 255.0)
-                    if new > out[v, u]:
-                        out[v, u] = np.uint8(new + 0.5)

@@ -180,6 +180,13 @@ def test_a_second_mesh_and_its_check_do_without_numba(ball, tmp_path, monkeypatc
     assert not loads_numba("check", model)
 
 
+def test_a_second_slice_does_without_numba(ball, tmp_path, monkeypatch):
+    """The same of layers."""
+    monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
+    options = "--size", "5mm", "--layer", "0.5mm", "--quiet"
+    assert [loads_numba("slice", ball, "-o", tmp_path / name, *options) for name in "ab"] == [True, False]
+
+
 def test_progress_is_shown_on_a_terminal_only(ball, tmp_path):
     reader, writer = os.openpty()
     arguments = ["mesh", str(ball), "-o", str(tmp_path / "b.stl"), "--resolution", "24"]

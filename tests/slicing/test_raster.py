@@ -14,8 +14,9 @@ from fracslice._slices import deflated
 from fracslice.errors import SliceError
 from fracslice.formulas import Node, box, mandelbulb, menger, sphere, transform, union
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
+from fracslice.slicing.compensation import compensated
 from fracslice.slicing.printers import PRINTERS, Printer, printer
-from fracslice.slicing.raster import Screen, compensated
+from fracslice.slicing.raster import Screen
 
 SMALL = Printer("small", "Small", (120, 100), (12.0, 10.0), 30)
 
