@@ -7,9 +7,12 @@
 namespace fracslice {
 
 int32_t Slab::add(int y, int x) {
-    int32_t& here = where[size_t(y) * tx_ + x];
-    push({y, x, here}, inside[here]);
-    return here = int32_t(count() - 1);
+    int32_t* here = &where[size_t(y) * tx_ + x];
+    push({y, x, *here}, inside[*here]);
+    *here = int32_t(count() - 1);
+    beside.back() = {here[1], here[-1], here[tx_], here[-tx_]};
+    for (int side = 0; side < 4; ++side) beside[beside.back()[side]][side ^ 1] = *here;
+    return *here;
 }
 
 // Tiles said to be full beside ones said to be empty, where a bound is wrong; the same in all layers of a group.
@@ -40,7 +43,7 @@ void Slab::close() {
     std::vector<int32_t> active(count() - kTiles), again;
     std::iota(active.begin(), active.end(), kTiles);
     std::vector<uint8_t> marked;  // tiles that are in `again`, and the two that never are
-    std::vector<Ask> turned;
+    Rows<Ask> turned;
     while (!active.empty()) {
         asks_.clear(), again.clear();
         ask(active, again);
@@ -63,10 +66,10 @@ void Slab::close() {
         };
         for (size_t i = 0; i < turns; ++i) {
             const auto [t, samples] = turned[i];
-            const int32_t* here = spot(place[t].y, place[t].x);
+            const auto [right, left, upper, lower] = beside[t];
             mark(true, t);
-            mark(samples & kLastColumn, here[1]), mark(samples & kFirstColumn, here[-1]);
-            mark(samples & kLastRow, here[tx_]), mark(samples & kFirstRow, here[-tx_]);
+            mark(samples & kLastColumn, right), mark(samples & kFirstColumn, left);
+            mark(samples & kLastRow, upper), mark(samples & kFirstRow, lower);
         }
         again.resize(marks);
         std::swap(active, again);
@@ -75,13 +78,10 @@ void Slab::close() {
 
 // The samples of a tile that differ from those to their right, left, above and below; and the tiles there.
 struct Slab::Differing {
-    int32_t beside[4];
+    std::array<int32_t, 4> beside;
     uint64_t words[4];
 
-    Differing(const Slab& slab, int32_t t) {
-        const int32_t* here = slab.spot(slab.place[t].y, slab.place[t].x);
-        const uint64_t *inside = slab.inside.data(), s = inside[t];
-        beside[0] = here[1], beside[1] = here[-1], beside[2] = here[slab.tx_], beside[3] = here[-slab.tx_];
+    Differing(const std::array<int32_t, 4>& beside, const uint64_t* inside, uint64_t s) : beside(beside) {
         words[0] = s ^ rights(s, inside[beside[0]]), words[1] = s ^ lefts(s, inside[beside[1]]);
         words[2] = s ^ uppers(s, inside[beside[2]]), words[3] = s ^ lowers(s, inside[beside[3]]);
     }
@@ -98,24 +98,29 @@ void Slab::ask(std::vector<int32_t>& active, std::vector<int32_t>& again) {
     std::vector<int32_t> open;
     for (size_t begin = 0, end; begin < active.size(); begin = end) {
         end = active.size();
-        size_t asked = asks_.size(), opened = 0;
+        const size_t asked = asks_.size();
         asks_.resize(asked + end - begin), open.resize(end - begin);
+        const uint64_t *signs = inside.data(), *evaluated = known.data();
+        const auto* around = beside.data();
+        const int32_t* tiles = active.data();
+        Ask* next = asks_.data() + asked;
+        int32_t* opened = open.data();
         for (size_t a = begin; a < end; ++a) {
-            const int32_t t = active[a];
-            const Differing d(*this, t);
-            asks_[asked] = {t, (d.words[0] | d.words[1] | d.words[2] | d.words[3]) & ~known[t]};
-            asked += asks_[asked].samples != 0;
-            open[opened] = t, opened += (d.open(0) | d.open(1) | d.open(2) | d.open(3)) != 0;
+            const int32_t t = tiles[a];
+            const Differing d(around[t], signs, signs[t]);
+            const uint64_t samples = (d.words[0] | d.words[1] | d.words[2] | d.words[3]) & ~evaluated[t];
+            *next = {t, samples}, next += samples != 0;
+            *opened = t, opened += (d.open(0) | d.open(1) | d.open(2) | d.open(3)) != 0;
         }
-        asks_.resize(asked);
-        for (size_t i = 0; i < opened; ++i) enlarge(open[i], active, again);
+        asks_.resize(size_t(next - asks_.data()));
+        for (const int32_t* t = open.data(); t != opened; ++t) enlarge(*t, active, again);
     }
 }
 
 // Makes the tiles beside one that samples in it ask for.
 void Slab::enlarge(int32_t t, std::vector<int32_t>& active, std::vector<int32_t>& again) {
     constexpr int dy[] = {0, 0, 1, -1}, dx[] = {1, -1, 0, 0};
-    const Differing d(*this, t);
+    const Differing d(beside[t], inside.data(), inside[t]);
     for (int side = 0; side < 4; ++side) {
         const uint64_t face = d.open(side);
         if (!face) continue;
@@ -129,13 +134,13 @@ void Slab::enlarge(int32_t t, std::vector<int32_t>& active, std::vector<int32_t>
     }
 }
 
-// Tiles of which the contour cuts nothing but the last cell, at the corner.
+// Tiles of which the contour cuts nothing but the last cell, at the corner: the two beside it have its sign there.
 void Slab::corners() {
     for (int32_t t = kTiles, n = int32_t(count()); t < n; ++t) {
-        Place p = place[t];
-        int32_t there = at(p.y - 1, p.x - 1);
-        const bool cut = (there < kTiles) & ((there == kFull) != bool(inside[t] & 1));
-        if (cut) add(p.y - 1, p.x - 1);
+        const auto [right, left, upper, lower] = beside[t];
+        const uint64_t own = inside[t];
+        const bool cut = (own ^ inside[left] >> 7) & (own ^ inside[lower] >> 56) & 1;
+        if (cut && at(place[t].y - 1, place[t].x - 1) < kTiles) add(place[t].y - 1, place[t].x - 1);
     }
 }
 

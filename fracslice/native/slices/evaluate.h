@@ -44,7 +44,7 @@ void Slab::evaluate(size_t n, const Where& where, const Take& take) {
 
 // Of samples; keeps the values. take(ask, found) for each tile.
 template <class Take>
-void Slab::evaluate(const std::vector<Ask>& asks, const Rim* rim, const Take& take) {
+void Slab::evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take) {
     Batch batch;
     std::array<Found, kBatch> found;
     std::fill(batch.z, batch.z + kBatch, float(z_[layer_]));

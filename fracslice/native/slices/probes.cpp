@@ -34,7 +34,7 @@ void Slab::list(const Chunk& chunk, uint64_t among) {
     asks_.resize(size_t(chunk.last - chunk.first));
     size_t n = 0;
     for (int32_t t = chunk.first; t < chunk.last; ++t) {
-        asks_[n] = {t, among & ~decided[t]};
+        asks_[n] = {t, among & ~decided_[t]};
         n += asks_[n].samples != 0;
     }
     asks_.resize(n);
@@ -49,7 +49,7 @@ void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
     const uint64_t own = uint64_t(1) << back, least_in = size <= bounds_.stop_inside ? block(size) : own,
                    least_out = size <= bounds_.stop_outside ? block(size) : own;
     evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) {
-        const float *kept = values[ask.tile].data(), outside_reach = reach[ask.tile];
+        const float *kept = values[ask.tile].data(), outside_reach = open_.reach[ask.tile];
         uint64_t reached = 0, within = 0;
         each(ask.samples, [&](int bit) {
             const float v = kept[bit], d2 = v * v * (v < 0 ? inside_reach : outside_reach);
@@ -66,7 +66,7 @@ void Slab::set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t wit
     uint64_t kept = known[ask.tile], implied = reached & ~(kept | ask.samples);
     uint64_t& now = inside[ask.tile];
     now = (now & ~(implied | ask.samples)) | (within & implied) | negative;
-    decided[ask.tile] |= reached | ask.samples;
+    decided_[ask.tile] |= reached | ask.samples;
     known[ask.tile] = kept | ask.samples;
 }
 
@@ -75,7 +75,7 @@ void Slab::set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t wit
 void Slab::twos() {
     list({kTiles, int32_t(count())}, kTwos);
     enough_.resize(count());
-    const Rim rim{factor(bounds_.inside, frame_), reach.data(), float(diagonal_), float(diagonal_) * kCalm * kCalm};
+    const Rim rim{factor(bounds_.inside, frame_), open_.reach.data(), float(diagonal_), float(diagonal_) * kCalm * kCalm};
     evaluate(asks_, &rim, [&](const Ask& ask, const Found& found) {
         enough_[ask.tile] = blocks(found.calm);
         set(ask, found.negative, blocks(found.beyond), blocks(found.beyond & found.negative));
@@ -87,20 +87,22 @@ void Slab::twos() {
 void Slab::calm() {
     const size_t n = count();
     halves_.resize(n), rows_.resize(n);
-    for (size_t t = 0; t < n; ++t) halves_[t] = halved(inside[t]);
+    const auto* around = beside.data();
+    uint32_t *halves = halves_.data(), *rows = rows_.data();
+    uint64_t *signs = inside.data(), *decided = decided_.data();
+    for (size_t t = 0; t < n; ++t) halves[t] = halved(signs[t]);
     // The four rows of a tile's blocks, between two blocks of those beside it.
-    const uint32_t* halves = halves_.data();
-    rows_[kFull] = ~uint32_t(0), rows_[kEmpty] = 0;
+    rows[kFull] = ~uint32_t(0), rows[kEmpty] = 0;
     for (size_t t = kTiles; t < n; ++t) {
-        const int32_t* here = spot(place[t].y, place[t].x);
-        rows_[t] = (halves[here[-1]] >> 2 & 0x03030303) | halves[t] << 2 | (halves[here[1]] & 0x03030303) << 6;
+        const auto [right, left, upper, lower] = around[t];
+        rows[t] = (halves[left] >> 2 & 0x03030303) | halves[t] << 2 | (halves[right] & 0x03030303) << 6;
     }
     for (size_t t = kTiles; t < n; ++t) {
-        const int32_t* here = spot(place[t].y, place[t].x);
-        const uint64_t around = rows_[here[-tx_]] >> 16 | uint64_t(rows_[t]) << 16 | uint64_t(rows_[here[tx_]]) << 48;
-        const uint64_t full = doubled(all_of_five(around)), empty = doubled(all_of_five(~around)) & enough_[t];
+        const auto [right, left, upper, lower] = around[t];
+        const uint64_t eight = rows[lower] >> 16 | uint64_t(rows[t]) << 16 | uint64_t(rows[upper]) << 48;
+        const uint64_t full = doubled(all_of_five(eight)), empty = doubled(all_of_five(~eight)) & enough_[t];
         const uint64_t implied = (full | empty) & ~decided[t];
-        inside[t] = (inside[t] & ~implied) | (full & implied);
+        signs[t] = (signs[t] & ~implied) | (full & implied);
         decided[t] |= implied;
     }
 }

@@ -81,12 +81,13 @@ Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, c
 
 void Slab::sample(int layer) {
     if (layer < 0 || layer >= layers()) throw std::out_of_range("a slab has no such layer");
-    drop(tx_), layer_ = layer;
-    if (group_ < 0) blocks_ = coarse();
+    layer_ = layer;
     auto of = [&](const auto& groups) { return *std::find_if(groups.begin(), groups.end(), [&](auto& g) { return layer <= g[1]; }); };
     const auto group = of(groups_), pair = of(pairs_);
-    if (group[0] != group_) columns_ = columns(group[0], group[1]), torn_.reset(), group_ = group[0], pair_ = -1;
     if (pair[0] != pair_) {
+        drop(kTiles, tx_), pair_ = -1;
+        if (group_ < 0) blocks_ = coarse();
+        if (group[0] != group_) columns(group[0], group[1]), torn_.reset(), group_ = group[0];
         quarter((z_[pair[0]] + z_[pair[1]]) / 2);
         open((z_[pair[1]] - z_[pair[0]]) / 2);
         pair_ = pair[0];
@@ -121,18 +122,18 @@ std::vector<Slab::Block> Slab::coarse() {
         for (int x = 1; x < tx_ - 1; x += kCoarsest) blocks.push_back({y, x, kCoarsest});
     double width = length(frame_.dx, frame_.dy) * kTile / 2, height = (z_.back() - z_[0]) / 2;
     for (int size = kCoarsest; size > 1; size /= 2) {
-        cut.clear();
+        const double rim = bounds_.proven * length(width * size, height);
+        const bool likely = bounds_.even && size == 2;
+        const double outside_rim = likely ? kHigh * rim : rim, inside_rim = likely ? kDeep * rim : rim;
+        cut.clear(), cut.reserve(4 * blocks.size());
         auto middle = [&](size_t i, float& x, float& y, float& z) {
             x = float(frame_.x0 + frame_.dx * kTile * (blocks[i].x - 1 + size / 2.0));
             y = float(frame_.y0 + frame_.dy * kTile * (blocks[i].y - 1 + size / 2.0)), z = float(z_[0] + height);
         };
         evaluate(blocks.size(), middle, [&](size_t i, float f) {
             const Block& b = blocks[i];
-            const double share = bounds_.even && size == 2 ? f < 0 ? kDeep : kHigh : 1;
-            if (std::fabs(f) > share * bounds_.proven * length(width * size, height)) {
-                if (f < 0) fill(b);
-                return;
-            }
+            if (f > outside_rim) return;
+            if (-f > inside_rim) return fill(b);
             for (int q = 0; q < 4; ++q) {
                 int y = b.y + (q >> 1) * size / 2, x = b.x + (q & 1) * size / 2;
                 if (y < ty_ - 1 && x < tx_ - 1) cut.push_back({y, x, size / 2});
@@ -149,7 +150,7 @@ void Slab::fill(const Block& block) {
 }
 
 // The places whose middle, halfway between two layers, leaves open what is around it in them and between.
-std::vector<Slab::Column> Slab::columns(int first, int last) {
+void Slab::columns(int first, int last) {
     double height = (z_[last] - z_[first]) / 2;
     const double margin = bounds_.even ? kAside : 1;
     double reach = margin * length(length(frame_.dx, frame_.dy) * (kTile - 1) / 2, height);
@@ -162,20 +163,19 @@ std::vector<Slab::Column> Slab::columns(int first, int last) {
     };
     evaluate(blocks_.size(), where, [&](size_t i, float f) { *middle(blocks_[i]) = f; });
     const Likely likely(bounds_, frame_, tx_);
-    std::vector<Column> open(blocks_.size());
+    columns_.resize(blocks_.size());
     size_t n = 0;
     for (const Block& b : blocks_) {
         const float f = *middle(b);
         const bool full = -f > bounds_.inside * reach;
         this->where[size_t(b.y) * tx_ + b.x] = full ? kFull : kEmpty;
         const float outside = bounds_.even ? likely(middle(b)) : float(bounds_.outside);
-        open[n] = {b.y, b.x, f, outside, {}};
+        columns_[n] = {b.y, b.x, f, outside};
         n += !full & (f <= double(outside) * reach);
     }
-    open.resize(n);
-    for (Column& c : open) c.reach = factor(c.reach, frame_);  // so far the bound, for most were not open
+    columns_.resize(n);
+    for (Column& c : columns_) c.reach = factor(c.reach, frame_);  // so far the bound, for most were not open
     for (const Block& b : blocks_) *middle(b) = NAN;
-    return open;
 }
 
 // The values in the middles of the columns' quarters, at a height.
@@ -186,7 +186,8 @@ void Slab::quarter(double height) {
         x = x_[kTile * (c.x - 1) + right] + float(frame_.dx / 2), y = y_[kTile * (c.y - 1) + above] + float(frame_.dy / 2);
         z = float(height);
     };
-    evaluate(4 * columns_.size(), where, [&](size_t i, float f) { columns_[i / 4].quarters[i & 3] = f; });
+    quarters_.resize(columns_.size());
+    evaluate(4 * columns_.size(), where, [&](size_t i, float f) { quarters_[i / 4][i & 3] = f; });
 }
 
 // The tiles of a pair of layers that are `height` from the middles of quarters; none where all of these say that it is empty,
@@ -196,33 +197,40 @@ void Slab::open(double height) {
     // What is farther than its rim decides its quarter.
     const float outside_rim = bounds_.stop_outside < 4 ? least : -1, inside_rim = bounds_.stop_inside < 4 ? least : -1;
     const float inside_reach = factor(bounds_.inside, frame_);
-    open_.clear();
-    for (const Column& c : columns_) {
+    grow(columns_.size());
+    open_.decided.resize(count()), open_.reach.resize(count());
+    size_t t = kTiles;
+    for (size_t i = 0; i < columns_.size(); ++i) {
+        const Column& c = columns_[i];
+        const Four v = quarters_[i], d2 = v * v * (v < 0 ? Four{} + inside_reach : Four{} + c.reach);
+        const auto far = d2 > (v < 0 ? Four{} + inside_rim : Four{} + outside_rim);
         uint64_t now = c.value < 0 ? kAll : 0, reached = 0;
         for (int q = 0; q < 4; ++q) {
-            const float v = c.quarters[q];
-            const uint64_t negative = -uint64_t(v < 0);
-            const float d2 = v * v * (v < 0 ? inside_reach : c.reach);
-            uint64_t near = kQuarters[q] & -uint64_t(d2 > (v < 0 ? inside_rim : outside_rim));
-            if (!bounds_.even && d2 > aside) near |= (*centres_)(d2 - aside, 9 + 4 * (q & 1) + 16 * (q & 2));
+            const uint64_t negative = -uint64_t(v[q] < 0);
+            uint64_t near = kQuarters[q] & uint64_t(int64_t(far[q]));
+            if (!bounds_.even && d2[q] > aside) near |= (*centres_)(d2[q] - aside, 9 + 4 * (q & 1) + 16 * (q & 2));
             now = (now & ~near) | (near & negative);
             reached |= near;
         }
         const int32_t* here = spot(c.y, c.x);
-        const bool empty = reached == kAll && now == 0;
-        if (empty && here[1] != kFull && here[-1] != kFull && here[tx_] != kFull && here[-tx_] != kFull) continue;
-        open_.push_back({{c.y, c.x, kEmpty}, c.reach, now, reached});
+        const bool beside_full = (here[1] == kFull) | (here[-1] == kFull) | (here[tx_] == kFull) | (here[-tx_] == kFull);
+        place[t] = {c.y, c.x, kEmpty}, inside[t] = now, open_.decided[t] = reached, open_.reach[t] = c.reach;
+        t += beside_full | (reached != kAll) | (now != 0);
     }
+    cut(t);
+    for (t = kTiles; t < count(); ++t) where[size_t(place[t].y) * tx_ + place[t].x] = int32_t(t);
+    for (t = kTiles; t < count(); ++t) {
+        const int32_t* here = spot(place[t].y, place[t].x);
+        beside[t] = {here[1], here[-1], here[tx_], here[-tx_]};
+    }
+    open_.beside = beside, open_.inside = inside;
 }
 
-// The tiles of a layer of that pair.
+// A layer of that pair: its tiles as they were opened.
 void Slab::begin() {
-    grow(open_.size());
-    size_t t = kTiles;
-    for (const Open& o : open_) {
-        place[t] = o.place, reach[t] = o.reach, inside[t] = o.inside, decided[t] = o.decided;
-        where[size_t(o.place.y) * tx_ + o.place.x] = int32_t(t++);
-    }
+    drop(open_.inside.size(), tx_);
+    beside = open_.beside, inside = open_.inside, decided_ = open_.decided;
+    known.assign(count(), 0), sharp.assign(count(), 0);
 }
 
 }  // namespace fracslice

@@ -75,9 +75,9 @@ class Slab : public Tiles {
     // visit(number, first, second) for each crossed edge from the samples `of` a tile, with the values at its ends.
     template <class Visit>
     void crossed(int32_t tile, uint64_t of, const Visit& visit) const {
-        const int32_t* here = spot(place[tile].y, place[tile].x);
-        const float *own = values[tile].data(), *right = values[here[1]].data(), *upper = values[here[tx_]].data();
-        uint64_t s = inside[tile], across = (s ^ rights(s, inside[here[1]])) & of, up = (s ^ uppers(s, inside[here[tx_]])) & of;
+        const int32_t next = beside[tile][0], over = beside[tile][2];
+        const float *own = values[tile].data(), *right = values[next].data(), *upper = values[over].data();
+        uint64_t s = inside[tile], across = (s ^ rights(s, inside[next])) & of, up = (s ^ uppers(s, inside[over])) & of;
         each(across & ~kLastColumn, [&](int bit) { visit(bit, own[bit], own[bit + 1]); });
         each(across & kLastColumn, [&](int bit) { visit(bit, own[bit], right[bit - 7]); });
         each(up & ~kLastRow, [&](int bit) { visit(64 + bit, own[bit], own[bit + 8]); });
@@ -96,18 +96,18 @@ class Slab : public Tiles {
     struct Block {
         int y, x, size;
     };
-    // A place whose tiles are open from layer to layer: the value in its middle, and how far outside values around it reach;
-    // and the values in the middles of its quarters.
+    // A place whose tiles are open from layer to layer: the value in its middle, and how far outside values around it reach.
     struct Column {
         int y, x;
         float value, reach;
-        std::array<float, 4> quarters;
     };
-    // A tile before its layer is sampled.
+    // The values in the middles of a place's quarters.
+    using Four = float __attribute__((vector_size(16)));
+    // The tiles of a pair before a layer is sampled, see `Tiles`.
     struct Open {
-        Place place;
-        float reach;
-        uint64_t inside, decided;
+        std::vector<std::array<int32_t, 4>> beside;
+        std::vector<uint64_t> inside, decided;
+        std::vector<float> reach;  // of outside values: how far they do, squared, as a factor
     };
     // The middles of crossed edges, and how many times the values outside are those inside.
     struct Middles {
@@ -126,12 +126,12 @@ class Slab : public Tiles {
     template <class Where, class Take>
     void evaluate(size_t n, const Where& where, const Take& take);
     template <class Take>
-    void evaluate(const std::vector<Ask>& asks, const Rim* rim, const Take& take);
+    void evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take);
     std::vector<float> values_at(const std::vector<Spot>& spots);
 
     std::vector<Block> coarse();
     void fill(const Block& block);
-    std::vector<Column> columns(int first, int last);
+    void columns(int first, int last);
     void quarter(double z);
     void open(double height);
     void begin();
@@ -169,12 +169,14 @@ class Slab : public Tiles {
     std::optional<Discs> discs_, centres_;  // in fields that are not even
     double diagonal_;  // of a pixel, squared, in lesser steps
     std::vector<Block> blocks_;  // of 16 pixels, that are not decided
-    std::vector<Column> columns_;  // of the group
-    std::vector<Open> open_;       // of the pair
+    Rows<Column> columns_;         // of the group
+    Rows<Four> quarters_;          // of the pair
+    Open open_;
     std::optional<std::vector<Place>> torn_;  // of that group, once they are known
     int group_ = -1, pair_ = -1, layer_ = -1;  // their first layers; the layer
     std::vector<float> middles_;   // values in the middles of places, NaN between uses
-    std::vector<Ask> asks_;  // for use within a step
+    std::vector<uint64_t> decided_;  // of opened tiles: what a value that reaches there implies, or what is known
+    Rows<Ask> asks_;  // for use within a step
     // Of tiles in an even field: the signs of blocks of 2, and of those in their rows; the blocks whose value is enough where
     // it is calm.
     std::vector<uint32_t> halves_, rows_;

@@ -6,18 +6,18 @@
 namespace fracslice {
 
 void Tiles::push(const Place& at, uint64_t signs) {
-    grow(1);
-    place.back() = at, inside.back() = signs;
+    place.push_back(at), beside.emplace_back(), inside.push_back(signs), known.push_back(0), sharp.push_back(0);
+    values.emplace_back();
 }
 
 void Tiles::grow(size_t n) {
     const size_t more = count() + n;
     if (more > place.capacity()) {
         const size_t room = more + more / 2;
-        place.reserve(room), inside.reserve(room), known.reserve(room), decided.reserve(room), sharp.reserve(room);
-        reach.reserve(room), values.reserve(room);
+        place.reserve(room), beside.reserve(room), inside.reserve(room), known.reserve(room);
+        sharp.reserve(room), values.reserve(room);
     }
-    place.resize(more), inside.resize(more), known.resize(more), decided.resize(more), sharp.resize(more), reach.resize(more);
+    place.resize(more), beside.resize(more), inside.resize(more), known.resize(more), sharp.resize(more);
     values.resize(more);
 }
 
@@ -30,13 +30,13 @@ void Tiles::clear(size_t places) {
 }
 
 void Tiles::cut(size_t n) {
-    place.resize(n), inside.resize(n), known.resize(n), decided.resize(n), sharp.resize(n), reach.resize(n), values.resize(n);
+    place.resize(n), beside.resize(n), inside.resize(n), known.resize(n), sharp.resize(n), values.resize(n);
     cross.clear(), tips.clear();
 }
 
-void Tiles::drop(int columns) {
-    for (size_t t = kTiles; t < count(); ++t) where[size_t(place[t].y) * columns + place[t].x] = place[t].otherwise;
-    cut(kTiles);
+void Tiles::drop(size_t first, int columns) {
+    for (size_t t = first; t < count(); ++t) where[size_t(place[t].y) * columns + place[t].x] = place[t].otherwise;
+    cut(first);
 }
 
 Tiles Memory::take(size_t places) {

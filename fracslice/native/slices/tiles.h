@@ -42,9 +42,8 @@ struct Place {
 struct Tiles {
     std::vector<int32_t> where;  // the tile at each place, row by row
     std::vector<Place> place;
+    std::vector<std::array<int32_t, 4>> beside;  // to the right, to the left, above and below; not of the two
     std::vector<uint64_t> inside, known;
-    std::vector<uint64_t> decided;  // implied by a value that reaches there, or known
-    std::vector<float> reach;       // outside values: how far they reach, squared, as a factor
     Rows<std::array<float, 64>> values;
     // The share of the edge before its crossing, of `kWhole`: of the edge from each sample to its right, then of the one
     // upwards.
@@ -57,7 +56,7 @@ struct Tiles {
     void push(const Place& at, uint64_t signs);
     void grow(size_t n);  // by so many tiles with no place yet, nothing known of them
     void clear(size_t places);  // all of them empty
-    void drop(int columns);     // all tiles but the two that stand for others; columns: of places
+    void drop(size_t first, int columns);  // the tiles from there on; columns: of places
     void cut(size_t n);         // to the first n
 };
 
