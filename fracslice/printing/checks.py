@@ -10,11 +10,11 @@ import numpy as np
 from ..formulas import Box, Node
 from ..kernel import Compilable
 from ..volume import Bricks
-from ..volume.grid import from_grid, to_grid
 from ..work import Work
 from .apart import resolved, shown
+from .faces import settled
 from .parts import parts_of
-from .samples import Samples
+from .samples import lengths
 from .slender import slender
 from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
@@ -102,13 +102,17 @@ def check_solid(
     """
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
-    solid = Samples(from_grid(to_grid(bricks).redistance()))
+    solid = lengths(bricks, root.facts)
     work.check()
     most = float(BINS[-1]) / scale
     thin, tight = slender(root, solid, work)
-    thick = thin.beside(walls(solid, most, work), most)
-    between = tight.beside(walls(solid, most, work, gaps=True), most)
-    floors = thin.beside(walls(solid, most, work, direction=UP), most, UP)
+
+    def seen(**how: Any) -> Walls:
+        return settled(root, walls(solid, most, work, **how), bricks.voxel, work)
+
+    thick = thin.beside(seen(), most)
+    between = tight.beside(seen(gaps=True), most)
+    floors = thin.beside(seen(direction=UP), most, UP)
     bare = _under(floors, limits.floor, scale)
     narrow = _under(thick, limits.wall, scale)
     speck = max(limits.speck, SPECK * (bricks.voxel * scale) ** 3) / scale**3

@@ -1,6 +1,7 @@
 """From an object to one that prints: each change is measured on samples of what the ones before it left.
 
-Distances come from the samples by fast sweeping (Zhao 2004), so a millimetre is a millimetre for any formula.
+Distances come from the field where it tells them, else from its samples by fast sweeping (Zhao 2004), so a
+millimetre is a millimetre for any formula.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._native import Grid
 from ..errors import VolumeError
 from ..formulas import Box, Node, box, cylinder, plane, transform
 from ..formulas.box import Triple
@@ -148,16 +148,11 @@ class _Run:
             self.known = Connected(bricks, found if bricks is coarse else parts_of(bricks))
         return self.known
 
-    def distances(self, length: float) -> Grid:
-        """The same as distances."""
-        return to_grid(self.sampled(length)).redistance()
-
     def seen(self, length: float) -> Samples:
-        """The same, as distances where the field itself does not tell them."""
-        from .samples import Samples
+        """The same, as distances by which walls and gaps are measured."""
+        from .samples import lengths
 
-        weak = self.thing.facts.weak
-        return Samples(from_grid(self.distances(length)) if weak else self.sampled(length))
+        return lengths(self.sampled(length), self.thing.facts)
 
     def filled(self) -> Node | Compilable:
         """The space that nothing reaches becomes solid."""
@@ -220,7 +215,8 @@ class _Run:
         """Everything farther inside than the walls are thick is taken away, and two holes made."""
         from .samples import Samples, positions
 
-        hollow = from_grid(self.distances(self.how.hollow).offset(-self.how.hollow / self.scale))
+        swept = to_grid(self.sampled(self.how.hollow)).redistance()
+        hollow = from_grid(swept.offset(-self.how.hollow / self.scale))
         rows, offsets = np.nonzero((hollow.values < 0) & (hollow.values > -hollow.voxel))
         if not len(rows):
             raise VolumeError(f"walls of {self.how.hollow:g} mm leave nothing to hollow out")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numba import njit
 
 from ..formulas.box import Box
+from ..formulas.registry import Facts
 from ..volume import Bricks
 from ..volume.bricks import INSIDE
+from ..volume.grid import from_grid, to_grid
 from ..volume.lattice import BRICK
 
 NEAR = 1.5
@@ -42,6 +46,15 @@ class Samples:
         u, v, w = (np.ascontiguousarray(a, np.float64).ravel() for a in (x, y, z))
         _interpolate(u, v, w, *b.origin, b.voxel, b.index, self.bounds, b.values, out.ravel())
         return out
+
+
+def lengths(bricks: Bricks, facts: Facts) -> Samples:
+    """Samples of a field as distances that none is larger than: its own values, or where those are far from
+    distances, as of escape-time fractals, swept ones (Zhao 2004).
+    """
+    if facts.weak:
+        return Samples(from_grid(to_grid(bricks).redistance()))
+    return Samples(replace(bricks, values=bricks.values / np.float32(facts.lipschitz)))
 
 
 def _bounds(bricks: Bricks) -> np.ndarray:

@@ -21,6 +21,7 @@ from ..rows import Rows
 from ..volume import Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
+from .faces import slopes
 from .samples import Samples
 from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, walls
 from .wrapped import Raised
@@ -226,10 +227,7 @@ class _Look:
 
     def normals(self, points: np.ndarray) -> np.ndarray:
         """Unit normals of the field itself at points [3, n], [3, n]."""
-        shifts = STEP * self.voxel * np.eye(3)[:, :, None]
-        slope = np.stack([self.field(points + s) - self.field(points - s) for s in shifts])
-        unit: np.ndarray = slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-30)
-        return unit
+        return slopes(self.kernel, points, STEP * self.voxel, self.work)[1]
 
 
 def all_walls(

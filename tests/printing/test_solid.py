@@ -16,12 +16,14 @@ from fracslice import MeshJob, make_mesh
 from fracslice.errors import VolumeError
 from fracslice.formulas import (
     Node,
+    bend,
     bounds,
     box,
     cylinder,
     difference,
     julia,
     mandelbulb,
+    menger,
     repeat,
     shell,
     sphere,
@@ -173,6 +175,36 @@ def checked(root: Node, size: float = SIZE) -> SolidReport:
 def test_seeded_defects_are_found_and_clean_solids_not_blamed(root: Node, problem: str | None) -> None:
     found = checked(root).problems
     assert found == [] if problem is None else any(problem in p for p in found)
+
+
+TUBE = difference(cylinder(radius=0.8, height=1.6), cylinder(radius=0.7, height=2))
+
+
+@pytest.mark.parametrize(
+    ("root", "told", "width"),
+    [
+        (shell(sphere(), thickness=0.1), "walls", 0.1),
+        (transform(TUBE, rotate=(1, 2, 3, 37)), "walls", 0.1),
+        (bend(box(size=(0.1, 2, 2)), axis="y", degrees=40), "walls", 0.1),
+        (transform(box(size=(2, 2, 0.4)), scale=(1, 1, 0.25), rotate=(1, 2, 3, 37)), "walls", 0.1),
+        (transform(TWO, rotate=(1, 2, 3, 37)), "gaps", 0.1),
+    ],
+    ids=["shell", "tube", "steep", "squeezed", "gap"],
+)
+def test_what_is_some_samples_thick_is_measured_on_the_field(root: Node, told: str, width: float) -> None:
+    """Eight samples, about, of fields steeper than distances and flatter, too."""
+    scale = SIZE / max(plan(root, 100).box.size)
+    found: Widths = getattr(checked(root), told)
+    assert found.thinnest_hundredth == pytest.approx(width * scale, rel=2e-3)
+    assert found.median == pytest.approx(width * scale, rel=1e-4)
+
+
+def test_holes_of_a_sponge_are_measured() -> None:
+    """Walls and gaps are a 27th wide, or two of them; counted in cells of the sponge."""
+    report = checked(menger(level=3))
+    for found, area in ((report.walls, 4635.4), (report.gaps, 5267.5)):
+        assert found and found.thinnest_hundredth == pytest.approx(SIZE / 27, rel=0.02)
+        assert area * 0.55 < found.counts[14] < area  # from 0.70 to 0.75 mm
 
 
 def fin(width: float) -> tuple[Node, float]:
