@@ -55,6 +55,18 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
         raise ExportError(f"{path}: {reason(error)}") from error
 
 
+def put(path: str, data: bytes) -> None:
+    """Writes a file in as few calls as can be: one of many, of which what an error leaves is looked at before
+    it is used. It is neither renamed into place nor forced to the disk.
+    """
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+    try:
+        while data:
+            data = data[os.write(handle, data) :]
+    finally:
+        os.close(handle)
+
+
 def _mode(target: Path) -> int:
     """The permissions the target has, or those a new file gets (mkstemp gives it to its owner alone)."""
     if target.exists():

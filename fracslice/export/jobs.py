@@ -7,13 +7,13 @@ import json
 import os
 import struct
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
+from fracslice._slices import crc32
 from fracslice.errors import ExportError
 from fracslice.export.files import check_target, reason, replacing
 from fracslice.slicing import Slicer, Stack
@@ -93,55 +93,56 @@ def resumable_folder(
         raise ExportError(f"{folder}: {reason(error)}") from error
 
 
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """The members of a ZIP file, uncompressed and without times; their list comes at its end."""
+
+    file: BinaryIO
+    members: list[zipfile.ZipInfo]
+
+    @property
+    def names(self) -> set[str]:
+        return {info.filename for info in self.members}
+
+    def add(self, name: str, data: bytes) -> None:
+        info = _info(name, crc32(data), len(data))
+        info.header_offset = _end(self.members)
+        self.file.write(info.FileHeader())
+        self.file.write(data)
+        self.members.append(info)
+
+    def close(self) -> None:
+        with zipfile.ZipFile(self.file, "w") as archive:
+            archive.filelist.extend(self.members)
+
+
 @contextmanager
-def resumable_zip(path: Path, first: tuple[str, bytes]) -> Iterator[tuple[zipfile.ZipFile, set[str]]]:
+def resumable_zip(path: Path, first: tuple[str, bytes]) -> Iterator[Stored]:
     """A stored ZIP file that appears at `path` when the block ends; what an interrupted block wrote is kept
     beside it.
 
     first: name and content of the first member; a remainder that begins with the same goes on, any other is
-    dropped. Yields the archive and the names it has already. Raises ExportError for what the file system
-    refuses.
+    dropped. Raises ExportError for what the file system refuses.
     """
     target = check_target(path)
     part = target.with_name(f".{target.name}.part")
     try:
         with open(part, "r+b" if part.exists() else "w+b") as file:
             whole = _members(file)
-            file.seek(0)
-            if not whole or whole[0].filename != first[0] or _content(file, whole[0]) != first[1]:
+            if whole and (whole[0].filename != first[0] or _content(file, whole[0]) != first[1]):
                 whole = []
-            file.seek(_end(whole[-1]) if whole else 0)
+            file.seek(_end(whole))
             file.truncate()
-            with zipfile.ZipFile(file, "w") as archive:
-                archive.filelist.extend(whole)
-                archive.NameToInfo.update({info.filename: info for info in whole})
-                if not whole:
-                    add(archive, *first)
-                try:
-                    yield archive, set(archive.NameToInfo)
-                except BaseException:
-                    _leave(archive, file)
-                    raise
+            archive = Stored(file, whole)
+            if not whole:
+                archive.add(*first)
+            yield archive
+            archive.close()
         part.replace(target)
     except OSError as error:
         raise ExportError(f"{path}: {reason(error)}") from error
 
 
-def add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
-    """A stored member that carries no time."""
-    info = zipfile.ZipInfo(name)
-    info.external_attr = _ATTRIBUTES
-    archive.writestr(info, data)
-
-
-def _leave(archive: zipfile.ZipFile, file: BinaryIO) -> None:
-    """No list of members at the end of a remainder: its members are found by themselves."""
-    archive._didModify = False  # type: ignore[attr-defined]
-    with suppress(OSError):
-        file.flush()
-
-
-_ATTRIBUTES = 0o644 << 16
 _HEADER = struct.Struct("<4s5H3L2H")
 
 
@@ -152,26 +153,33 @@ def _members(file: BinaryIO) -> list[zipfile.ZipInfo]:
         signature, _, flags, method, _, _, crc, size, _, name_size, extra_size = _HEADER.unpack(head)
         if signature != b"PK\x03\x04" or method != 0 or flags & 8:
             break
-        info = zipfile.ZipInfo(file.read(name_size).decode())
+        name = file.read(name_size).decode()
         file.seek(extra_size, 1)
         data = file.read(size)
-        if len(data) != size or zlib.crc32(data) != crc:
+        if len(data) != size or crc32(data) != crc:
             break
-        info.header_offset = found[-1].header_offset + _length(found[-1]) if found else 0
-        info.CRC, info.file_size, info.compress_size = crc, size, size
-        info.external_attr = _ATTRIBUTES
+        info = _info(name, crc, size)
+        info.header_offset = _end(found)
         found.append(info)
     return found
 
 
-def _length(info: zipfile.ZipInfo) -> int:
-    return _HEADER.size + len(info.filename.encode()) + info.file_size
+def _info(name: str, crc: int, size: int) -> zipfile.ZipInfo:
+    """A stored member that carries no time."""
+    info = zipfile.ZipInfo(name)
+    info.CRC, info.file_size, info.compress_size = crc, size, size
+    info.external_attr = 0o644 << 16
+    return info
 
 
-def _end(info: zipfile.ZipInfo) -> int:
-    return info.header_offset + _length(info)
+def _end(members: list[zipfile.ZipInfo]) -> int:
+    """Where the next one goes."""
+    if not members:
+        return 0
+    last = members[-1]
+    return last.header_offset + _HEADER.size + len(last.filename.encode()) + last.file_size
 
 
 def _content(file: BinaryIO, info: zipfile.ZipInfo) -> bytes:
-    file.seek(_end(info) - info.file_size)
+    file.seek(_end([info]) - info.file_size)
     return file.read(info.file_size)

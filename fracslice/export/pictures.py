@@ -7,8 +7,8 @@ from pathlib import Path
 
 from fracslice.errors import ExportError
 from fracslice.export import png
-from fracslice.export.files import reason, replacing
-from fracslice.export.jobs import JOB, SliceRun, add, resumable_folder, resumable_zip
+from fracslice.export.files import put, reason, replacing
+from fracslice.export.jobs import JOB, SliceRun, resumable_folder, resumable_zip
 from fracslice.slicing import Layer
 
 MOST_MEMBERS = 65_535
@@ -26,10 +26,8 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
 
     def write(layer: Layer) -> None:
         data = png.encode_layer(run.screen, layer)
-        # Not renamed into place, nor forced to the disk one by one: a remainder is read before it is used.
         try:
-            with open(f"{folder}/{layer.index:05d}.png", "wb") as file:
-                file.write(data)
+            put(f"{folder}/{layer.index:05d}.png", data)
         except OSError as error:
             raise ExportError(f"{folder}: {reason(error)}") from error
 
@@ -57,14 +55,15 @@ def write_sl1(run: SliceRun, path: str | Path) -> Path:
     if run.layers >= MOST_MEMBERS:
         raise ExportError(f"{path}: {run.layers} layers are too many for an archive")
     name = target.stem
-    with resumable_zip(target, ("config.ini", _ini(_config(run, name)))) as (archive, done):
+    with resumable_zip(target, ("config.ini", _ini(_config(run, name)))) as archive:
+        done = archive.names
         if "fracslice.json" not in done:
-            add(archive, "fracslice.json", run.describe())
-            add(archive, "prusaslicer.ini", _ini(_settings(run)))
+            archive.add("fracslice.json", run.describe())
+            archive.add("prusaslicer.ini", _ini(_settings(run)))
         start = sum(1 for n in done if n.endswith(".png"))
         pictures = run.slicer.map(lambda layer: png.encode_layer(run.screen, layer), range(start, run.layers))
         for index, data in enumerate(pictures, start):
-            add(archive, f"{name}{index:05d}.png", data)
+            archive.add(f"{name}{index:05d}.png", data)
     return target
 
 

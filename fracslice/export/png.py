@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import struct
-import zlib
 
 import numpy as np
 
-from fracslice._slices import deflated
+from fracslice._slices import crc32, deflated
 from fracslice.slicing import Layer
 from fracslice.slicing.raster import Screen
 
@@ -30,7 +29,7 @@ def _file(shape: tuple[int, int], rows: bytes) -> bytes:
 
 
 def _chunk(kind: bytes, data: bytes) -> tuple[bytes, bytes, bytes, bytes]:
-    return struct.pack(">I", len(data)), kind, data, struct.pack(">I", zlib.crc32(data, zlib.crc32(kind)))
+    return struct.pack(">I", len(data)), kind, data, struct.pack(">I", crc32(data, crc32(kind)))
 
 
 def is_whole(data: bytes) -> bool:

@@ -15,6 +15,7 @@ import pytest
 
 from fracslice.errors import ExportError
 from fracslice.export import check_target, replacing, write
+from fracslice.export.files import put
 from tests.mesh.shapes import cube
 
 
@@ -127,3 +128,14 @@ def test_kill_in_mid_write_leaves_no_broken_file(tmp_path: Path) -> None:
     assert [name for name in os.listdir(tmp_path) if not name.endswith(".part")] == ["model.stl"]
     write(cube(), path)
     assert path.stat().st_size == 84 + 12 * 50
+
+
+def test_a_file_is_put_however_little_the_system_takes_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "layer"
+    path.write_text("longer than what comes")
+    real = os.write
+    monkeypatch.setattr(os, "write", lambda handle, data: real(handle, data[:3]))
+    put(f"{path}", b"a picture")
+    assert path.read_bytes() == b"a picture"

@@ -7,6 +7,7 @@ import json
 import struct
 import xml.etree.ElementTree as ET
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from fracslice._slices import crc32
 from fracslice.errors import Cancelled, ExportError
 from fracslice.export import png
-from fracslice.export.jobs import SliceRun
+from fracslice.export.jobs import SliceRun, Stored
 from fracslice.export.slices import FORMATS, slice_format, write_slices
 from fracslice.formulas import difference, menger, sphere
 from fracslice.slicing import SliceJob, Slicer, plan_stack
@@ -51,6 +53,13 @@ def test_png_is_what_pillow_reads() -> None:
     with Image.open(io.BytesIO(data)) as read:
         assert read.mode == "L"
         assert (np.asarray(read) == image).all()
+
+
+def test_checksums_are_those_of_zlib() -> None:
+    data = np.random.default_rng(0).bytes(5000)
+    for size in [*range(200), *range(200, 5000, 97)]:
+        assert crc32(data[:size]) == zlib.crc32(data[:size])
+        assert crc32(data[:size], 12345) == zlib.crc32(data[:size], 12345)
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -262,11 +271,11 @@ def test_the_remainder_of_another_job_is_not_used(tmp_path: Path) -> None:
 def test_a_full_disk_leaves_the_remainder_and_no_archive(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(self: zipfile.ZipFile, *_: object) -> None:
+    def full(self: Stored, *_: object) -> None:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(zipfile.ZipFile, "writestr", full)
+        patch.setattr(Stored, "add", full)
         with pytest.raises(ExportError, match="disk is full"):
             write_slices(run(), tmp_path / "part.sl1")
     assert not (tmp_path / "part.sl1").exists()
