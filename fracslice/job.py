@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -17,7 +14,7 @@ from .formulas import Box
 from .memory import available_bytes, peak_rss_mb
 from .report import Report, SurfaceError, version
 from .scene import Print, Scene, parse_length
-from .work import Work
+from .work import Clock, Work
 
 if TYPE_CHECKING:
     from .formulas import Node
@@ -143,10 +140,10 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     what, work = what or MeshJob(), work or Work()
     voxels, clock = what.voxels(scene), Clock(work)
     from .mesh.check import check
-    from .mesh.extract import contour
+    from .mesh.components import in_pieces
     from .mesh.refine import refine
     from .mesh.simplify import simplify
-    from .volume import plan, sample_scene
+    from .volume import plan
 
     how = what.how(scene)
     with clock("planning"):
@@ -156,15 +153,18 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     if not how.whole:
         with clock("changing"):
             planned, scale, left = _changed(planned, what, how, what.size(scene), work)
-    with clock("sampling"):
-        bricks = sample_scene(planned, work)
-    with clock("meshing"):
-        raw = contour(planned.root, bricks, work)
+    bricks, raw = _surface(planned, clock)
+    if how.whole and how.sorts and in_pieces(raw, planned.voxel):  # what is one body only the field tells
+        with clock("changing"):
+            planned, scale, left = _changed(planned, what, how, what.size(scene), work)
+        bricks, raw = _surface(planned, clock)
     if what.chord_mm is not None:
         with clock("refining"):
             unit = float(raw.size.max()) / what.size(scene)
             raw = refine(planned.root, raw, what.chord_mm * unit, planned.voxel, work)
     with clock("finishing"):
+        pieces = in_pieces(raw, planned.voxel)
+        left = replace(left, keep="all") if pieces else left
         mesh, removed, place = _finished(raw, what, left, what.size(scene), scale)
     simplified = None
     if what.simplify_mm is not None:
@@ -187,9 +187,20 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         seconds=clock.seconds,
         peak_rss_mb=peak_rss_mb(),
         simplified=simplified,
-        notes=planned.notes,
+        notes=planned.notes + _thinner(pieces, bricks.voxel * place.scale),
     )
     return Result(mesh, report, bricks, planned.root, place)
+
+
+def _surface(planned: Plan, clock: Clock) -> tuple[Bricks, Mesh]:
+    """The samples of a planned scene, and their mesh, in scene units."""
+    from .mesh.extract import contour
+    from .volume import sample_scene
+
+    with clock("sampling"):
+        bricks = sample_scene(planned, clock.work)
+    with clock("meshing"):
+        return bricks, contour(planned.root, bricks, clock.work)
 
 
 def _changed(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> tuple[Plan, float, Print]:
@@ -228,6 +239,11 @@ def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Wor
         )
 
 
+def _thinner(pieces: str, voxel: float) -> tuple[str, ...]:
+    """What walls came to that are thinner than a voxel, mm, and what would hold them."""
+    return (f"{pieces}; expected a smaller voxel, or a thickness of {2 * voxel:.2g} mm",) if pieces else ()
+
+
 def _finished(
     raw: Mesh, what: MeshJob, how: Print, size: float, scale: float | None
 ) -> tuple[Mesh, Removed, Placement]:
@@ -256,10 +272,12 @@ def _kept(mesh: Mesh, what: MeshJob, how: Print) -> tuple[Mesh, Removed]:
 
 def _mesh_box(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> Box:
     """The box of the mesh that would be made of a planned scene, scene units."""
+    from .mesh.components import in_pieces
     from .mesh.extract import contour
     from .volume import sample_scene
 
     raw = contour(planned.root, sample_scene(planned, work), work)
+    how = replace(how, keep="all") if in_pieces(raw, planned.voxel) else how
     rough = size / float(raw.size.max())
     lo, hi = (_kept(raw.scaled(rough), what, how)[0].bounds / rough).tolist()
     return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
@@ -272,21 +290,3 @@ def _surface_error(planned: Plan, mesh: Mesh, place: Placement, work: Work) -> S
     points = (mesh.vertices - np.array(place.offset)) / place.scale
     mm = place.scale * surface_error(planned.root, points, planned.voxel, work)
     return SurfaceError(float(mm.mean()), float(np.quantile(mm, 0.99)), float(mm.max()))
-
-
-@dataclass(frozen=True)
-class Clock:
-    """The stages of a job: tells of each as it begins, stops between them when asked to, takes the time."""
-
-    work: Work
-    seconds: dict[str, float] = field(default_factory=lambda: {"total": 0.0})
-
-    @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
-        self.work.check()
-        self.work.progress(stage, 0.0)
-        started = time.perf_counter()
-        yield
-        self.seconds[stage] = time.perf_counter() - started
-        self.seconds["total"] += self.seconds[stage]
-        self.work.progress(stage, 1.0)

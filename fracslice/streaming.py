@@ -17,11 +17,11 @@ import numpy as np
 from .errors import SceneError
 from .export.files import check_target, replacing
 from .export.stl import write_pieces
-from .job import Clock, MeshJob
+from .job import MeshJob
 from .memory import peak_rss_mb
 from .report import Report, SurfaceError, version
 from .scene import Print, Scene
-from .work import Work
+from .work import Clock, Work
 
 if TYPE_CHECKING:
     from .mesh import Mesh

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, TypeVar
@@ -100,3 +102,22 @@ def _pool() -> ThreadPoolExecutor:
 def chunks(count: int, size: int) -> list[slice]:
     """The slices that cut `count` things into pieces of at most `size`."""
     return [slice(i, min(i + size, count)) for i in range(0, count, size)]
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The stages of a job: tells of each as it begins, stops between them when asked to, takes the time."""
+
+    work: Work
+    seconds: dict[str, float] = field(default_factory=lambda: {"total": 0.0})
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        self.work.check()
+        self.work.progress(stage, 0.0)
+        started = time.perf_counter()
+        yield
+        took = time.perf_counter() - started
+        for name in (stage, "total"):
+            self.seconds[name] = self.seconds.get(name, 0.0) + took
+        self.work.progress(stage, 1.0)

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from fracslice.errors import MeshError
 from fracslice.mesh.model import Mesh
 
+PIECES = 0.05
+"""The share of the material in bodies thinner than a voxel from which that is said."""
+
 
 @dataclass(frozen=True)
 class Removed:
@@ -62,6 +65,25 @@ def shells(mesh: Mesh) -> Shells:
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
     return Shells(labels, volumes, parent)
+
+
+def in_pieces(mesh: Mesh, voxel: float) -> str:
+    """What walls came to that are thinner than the voxel of a mesh, in words; empty where all are thicker.
+
+    Between samples such walls are missed: they have holes, or fall to pieces. A body counts if on average it
+    is thinner than a voxel; the dust around a fractal is such, too, but less than `PIECES` of the material.
+    """
+    from fracslice.mesh.links import parts, shell_volumes
+
+    if voxel * mesh.area < 2 * PIECES * mesh.volume:  # such bodies would have more surface
+        return ""
+    labels, count = parts(mesh.triangles, len(mesh.vertices))
+    volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
+    areas = np.bincount(labels, np.linalg.norm(mesh.normals, axis=1) / 2, minlength=count)
+    thin, bodies = (volumes > 0) & (2 * volumes < voxel * areas), int((volumes > 0).sum())
+    share = float(volumes[thin].sum() / mesh.volume)
+    holes = "have holes" if bodies == 1 else f"fell to pieces: {thin.sum()} of {bodies} bodies"
+    return f"walls thinner than a voxel {holes}, {share:.0%} of the material" if share >= PIECES else ""
 
 
 def select(

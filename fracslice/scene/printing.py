@@ -47,6 +47,11 @@ class Print(Part):
         return self.keep == "largest" or self.bridge > 0
 
     @property
+    def sorts(self) -> bool:
+        """Whether bodies or cavities go."""
+        return self.keep == "largest" or self.cavities == "fill"
+
+    @property
     def whole(self) -> bool:
         """Whether bodies and cavities stay or go as a whole, and nothing else is changed."""
         return not any((self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft))

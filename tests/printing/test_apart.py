@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fracslice import MeshJob, make_mesh
-from fracslice.formulas import Node, box, mandelbulb, shell, sphere, transform, union
+from fracslice.formulas import Node, box, julia, mandelbulb, shell, sphere, transform, union
 from fracslice.kernel import compile_scene
 from fracslice.printing import apart, printable
 from fracslice.printing.altered import Altered
@@ -137,3 +137,39 @@ def test_a_thin_shell_is_kept_and_thickened_in_a_mesh() -> None:
     assert result.report.problems == ()
     assert result.report.mesh.components == 1
     assert result.mesh.size == pytest.approx([21.4] * 3, abs=0.4)
+
+
+THIN = scene(union(shell(sphere(), thickness=0.01), BALL), size="20mm")
+"""Of which a mesh of 48 voxels has crumbs, the ball the largest of them."""
+
+
+def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest() -> None:
+    """The field does: of the shell all crumbs stay, at the shell's size, and it is said that they are."""
+    whole, kept = (
+        make_mesh(THIN, MeshJob(resolution=48, printing=Print(keep=keep))) for keep in ("all", "largest")
+    )
+    assert whole.report.mesh.components == kept.report.mesh.components + 1 > 100
+    assert kept.mesh.size == pytest.approx([20] * 3, rel=0.03)
+    for result, size in ((whole, 20 / 48), (kept, 20 / 48 * 2.4 / 2)):
+        (note,) = result.report.notes
+        assert note.startswith("walls thinner than a voxel fell to pieces: ")
+        assert float(note.split()[-2]) == pytest.approx(2 * size, rel=0.05)
+
+
+def test_a_mesh_in_pieces_is_filled_by_what_the_field_tells() -> None:
+    filled = make_mesh(THIN, MeshJob(resolution=48, printing=Print(cavities="fill"))).report
+    scale = 20 / 2.4
+    assert filled.notes == ()
+    assert filled.mesh.volume_mm3 == pytest.approx(4 / 3 * np.pi * (1 + 0.1**3) * scale**3, rel=0.02)
+
+
+def test_a_fractal_in_pieces_is_kept_and_thickened() -> None:
+    """It has the size that was asked for, not one of its crumbs; and plain fractals are not in pieces."""
+    julias = shell(julia(c=(-0.291, -0.399, 0.339, 0.437), iterations=8), thickness=0.001)
+    how = Print(keep="largest", thickness=1.7)
+    report = make_mesh(scene(julias, size="40mm"), MeshJob(resolution=48, printing=how)).report
+    low, high = np.array(report.mesh.bbox_mm)
+    assert (high - low).max() == pytest.approx(41.7, abs=0.5)
+    assert (report.mesh.components, report.notes) == (1, ())
+    for fractal in (mandelbulb(), shell(mandelbulb(iterations=6), thickness=0.02)):
+        assert make_mesh(scene(fractal, size="40mm"), MeshJob(resolution=48)).report.notes == ()
