@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from ..formulas.parameters import AUTO
@@ -54,13 +56,22 @@ def _within(node: Node, voxel: float) -> float:
 
 def _depth(node: Node, voxel: float) -> int:
     for depth in range(1, DEEPEST):
-        surface = _surface_points(node.changed(iterations=depth))
-        if surface.shape[1] == 0:
+        step = _step(node, depth)
+        if step is None:
             return max(depth - 1, 1)
-        moved = compile_scene(node.changed(iterations=depth + 1), "float64").points(*surface)
-        if np.quantile(moved, 0.9) < voxel / 2:
+        if step < voxel / 2:
             return depth
     return DEEPEST
+
+
+@lru_cache(maxsize=256)
+def _step(node: Node, depth: int) -> float | None:
+    """How far one more step moves nine tenths of the surface at most, scene units; None if there is none."""
+    surface = _surface_points(node.changed(iterations=depth))
+    if surface.shape[1] == 0:
+        return None
+    moved = compile_scene(node.changed(iterations=depth + 1), "float64").points(*surface)
+    return float(np.quantile(moved, 0.9))
 
 
 def _surface_points(node: Node) -> np.ndarray:

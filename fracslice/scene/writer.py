@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 from ..formulas import Node
 from .layout import SCENE, SECTIONS, SOLID, VERSION, Element
@@ -50,4 +49,5 @@ def _element(node: Node, indent: str) -> Iterator[str]:
 def _attributes(element: Element, values: Mapping[str, Any]) -> str:
     kinds = element.parameters
     changed = {name: value for name, value in values.items() if value != kinds[name].default}
-    return "".join(f" {name}={quoteattr(kinds[name].text(value))}" for name, value in changed.items())
+    # Numbers and words: nothing that XML would have quoted.
+    return "".join(f' {name}="{kinds[name].text(value)}"' for name, value in changed.items())
