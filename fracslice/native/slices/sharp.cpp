@@ -67,7 +67,9 @@ struct Outline {
 double bulge(Vector before, Vector side, Vector after) {
     const double square = dot(side, side), first = curvature(before, side), last = curvature(side, after);
     if (!(first * last > 0)) return 0;
-    return (std::fabs(first) < std::fabs(last) ? first : last) * square * std::sqrt(square) / 12;
+    const double sine = (std::fabs(first) < std::fabs(last) ? first : last) * std::sqrt(square) / 2;  // of half its angle
+    // (angle - its sine) / (8 sine^2), by its series.
+    return square * sine * (1 + sine * sine * (0.3 + 9. / 56 * sine * sine)) / 6;
 }
 
 // How much of the triangle between a, b and the tip lies in the pixel of the tip, if that is beside the one of a and b.
