@@ -52,8 +52,8 @@ def test_small_circles(radius: float) -> None:
 
 @pytest.mark.parametrize(("radius", "off"), [(1, 1e-3), (1.5, 3e-4), (2, 1e-4), (2.5, 1e-4)])
 def test_pixels_of_the_smallest_circles(radius: float, off: float) -> None:
-    """400 of them in sum, anywhere on the lattice; by parabolas instead of arcs 1.4, 0.28, 0.084, 0.038 % of the
-    area would be lost.
+    """400 of them in sum, anywhere on the lattice; by parabolas instead of arcs 1.4, 0.28, 0.084, 0.038 % of
+    the area would be lost.
     """
     root = rods(radius, 11.1373, 20)
     _, covered = middle(stack_of(root, max(root.facts.box.size), 0.1))
