@@ -89,9 +89,8 @@ def _search(kernel: Kernel, facts: Facts, box: Box, work: Work) -> Extent | None
         raise VolumeError("there is no surface: nothing in the scene is inside")
     outer_lo = np.minimum(lo, centres.min(1, initial=np.inf)) - step / 2
     outer_hi = np.maximum(hi, centres.max(1, initial=-np.inf)) + step / 2
-    for axis in range(3):
-        lo[axis] = min(lo[axis], -_climbed(kernel, starts, axis, -1, float(step.max()), work))
-        hi[axis] = max(hi[axis], _climbed(kernel, starts, axis, 1, float(step.max()), work))
+    reach = _climbed(kernel, starts, float(step.max()), work)
+    lo, hi = np.minimum(lo, -reach[0]), np.maximum(hi, reach[1])
     return Extent(_box(lo, hi), _box(np.minimum(outer_lo, lo), np.maximum(outer_hi, hi)))
 
 
@@ -105,28 +104,37 @@ def _outermost(found: np.ndarray) -> np.ndarray:
     return chosen
 
 
-def _climbed(kernel: Kernel, starts: np.ndarray, axis: int, side: int, step: float, work: Work) -> float:
-    """How far the object reaches along an axis, to one side.
+def _climbed(kernel: Kernel, starts: np.ndarray, first: float, work: Work) -> np.ndarray:
+    """How far the object reaches along each axis, downwards and upwards: [2, 3].
 
-    starts: inside points and their values [4, n]. From there steps outwards, straight or aslant, are taken as
-    long as they end inside, then shorter ones (pattern search: Hooke and Jeeves 1961).
+    starts: inside points and their values [4, n]. From those nearest to a side steps outwards, straight or
+    aslant, are taken as long as they end inside, `first` long at first, then shorter ones (pattern search:
+    Hooke and Jeeves 1961). All sides at once.
     """
     exact = EXACT * float(np.ptp(starts[:3], axis=1).max())
-    here = starts[:3, np.argsort(starts[3] - side * starts[axis], kind="stable")[:STARTS]]
     slants = 0.1 ** np.arange(0, 3.5, 0.5)
-    ways = side * np.roll(np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), slants)).reshape(3, -1), axis - 2, 0)
+    aslant = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), slants)).reshape(3, -1)
+    # [side, coordinate, way], and [side, coordinate, point, way]
+    ways = np.stack([side * np.roll(aslant, axis - 2, 0) for side in (-1, 1) for axis in range(3)])
+    outwards = np.concatenate([-starts[:3], starts[:3]])
+    order = np.argsort(starts[3] - outwards, axis=1, kind="stable")[:, :STARTS]
+    here = np.moveaxis(starts[:3, order], 0, 1)[..., None]
+    step = np.full((6, 1, 1, 1), first)
     for _ in range(STEPS):
-        tried = here[:, :, None] + step * ways[:, None, :]
-        inside = values_at(kernel, tried.reshape(3, -1), work).reshape(tried.shape[1:]) < 0
-        gain = np.where(inside, ways[axis] * side, 0.0)
-        best = gain.argmax(1)
-        here = np.where(gain.max(1) > 0, np.take_along_axis(tried, best[None, :, None], 2)[..., 0], here)
-        if not gain.any():
-            if step < exact:
-                break
-            step /= 2
+        tried = here + step * ways[:, :, None, :]
+        points = np.moveaxis(tried, 1, 0)
+        inside = values_at(kernel, points.reshape(3, -1), work).reshape(points.shape[1:]) < 0
+        gain = np.where(inside, aslant[2], 0.0)[:, None]
+        best = gain.argmax(3, keepdims=True)
+        here = np.where(gain.max(3, keepdims=True) > 0, np.take_along_axis(tried, best, 3), here)
+        stuck = ~gain.any((2, 3), keepdims=True)
+        if (stuck & (step < exact)).all():
+            break
+        step[stuck & (step >= exact)] /= 2
     # The face lies between that point and the next one, half a step on average.
-    return float((side * here[axis]).max()) + step / 2
+    ahead = np.stack([here[side, side % 3, :, 0] for side in range(6)]).reshape(2, 3, -1)
+    reach: np.ndarray = (ahead * [[[-1]], [[1]]]).max(2) + step.reshape(2, 3) / 2
+    return reach
 
 
 def _box(lo: np.ndarray, hi: np.ndarray) -> Box:
