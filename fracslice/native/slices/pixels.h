@@ -62,16 +62,19 @@ class Cells {
     }
     // Whether the inside corners q and q + 2 of an alternating cell are connected: if more of its border is inside.
     static bool joined(const Sides& s, int q) {
-        float more = s[0] + s[3] - s[2] - s[1];
-        return q == 0 ? more > 0 : more < 0;
+        const float more = s[0] + s[3] - s[2] - s[1];
+        return float(1 - 2 * q) * more > 0;
     }
     // The inside part of an alternating cell.
     float area(int bit, int signs) const {
         const Sides s = sides(bit);
         // The inside parts of the sides at one of the inside corners, and at the other one.
         const float a = s[0], b = s[3], c = 1 - s[1], d = 1 - s[2];
-        if (signs == 5) return joined(s, 0) ? 1 - ((1 - a) * (1 - c) + (1 - b) * (1 - d)) / 2 : (a * b + c * d) / 2;
-        return joined(s, 1) ? 1 - (a * b + c * d) / 2 : ((1 - a) * (1 - c) + (1 - b) * (1 - d)) / 2;
+        // Half of these corners' areas, or of the other corners' areas; what is inside between them, or outside.
+        const float halves[] = {(a * b + c * d) / 2, ((1 - a) * (1 - c) + (1 - b) * (1 - d)) / 2};
+        const bool first = signs == 5, whole = joined(s, first ? 0 : 1);
+        const float apart = halves[first == whole], areas[] = {apart, 1 - apart};
+        return areas[whole];
     }
 
  private:
