@@ -1,50 +1,53 @@
 // The checksum of a zlib stream (RFC 1950) from parts in any order.
 #pragma once
-#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "wide.h"
 
 namespace fracslice {
 
-// Sums of eight rows of bytes.
-class Eight {
- public:
-    // Eight bytes of each row, from a column on.
-    void add(const std::array<uint8_t, 64>& bytes, uint32_t column) { add_tile(bytes.data(), column, *this); }
-    // n equal bytes of the rows from `from` to before `to`.
-    void add(uint64_t value, int from, int to, uint64_t column, uint64_t n) {
-        for (int row = from; row < to; ++row) rows[row] += value * n;
-        weighted[0] += uint64_t(to - from) * value * (n * column + n * (n - 1) / 2);
-    }
-
-    std::array<uint64_t, 8> rows{}, weighted{};  // of the bytes of each row; of all bytes times their columns, in parts
-
- private:
-    static void add_each(const uint8_t* bytes, uint32_t column, Eight& sums) {
-        for (int row = 0; row < 8; ++row)
-            for (uint32_t i = 0; i < 8; ++i) {
-                const uint64_t byte = bytes[8 * row + i];
-                sums.rows[row] += byte, sums.weighted[row] += byte * (column + i);
-            }
-    }
-#if defined(FRACSLICE_WIDE)
-    FRACSLICE_WIDE static void add_wide(const uint8_t* bytes, uint32_t column, Eight& sums) {
-        const __m512i all = _mm512_loadu_si512(bytes), places = _mm512_set1_epi64(0x0706050403020100);
-        const __m512i rows = _mm512_sad_epu8(all, _mm512_setzero_si512());
-        // A row's bytes times their places are two numbers of 32 bits.
-        const __m512i inner = _mm512_madd_epi16(_mm512_maddubs_epi16(all, places), _mm512_set1_epi16(1));
-        __m512i weighted = _mm512_maskz_mul_epu32(0xFF, rows, _mm512_set1_epi64(column));
-        weighted = _mm512_add_epi64(weighted, _mm512_maskz_srli_epi64(0xFF, inner, 32));
-        weighted = _mm512_add_epi64(weighted, _mm512_maskz_and_epi64(0xFF, inner, _mm512_set1_epi64(0xFFFFFFFF)));
-        _mm512_storeu_si512(sums.rows.data(), _mm512_add_epi64(_mm512_loadu_si512(sums.rows.data()), rows));
-        _mm512_storeu_si512(sums.weighted.data(), _mm512_add_epi64(_mm512_loadu_si512(sums.weighted.data()), weighted));
-    }
-    inline static const auto add_tile = kWide ? add_wide : add_each;
-#else
-    static constexpr auto add_tile = add_each;
-#endif
+// Of the bytes of rows: the sum of all, of each times its column, and of each times how many rows there are from its own on.
+struct Sums {
+    uint64_t all = 0, columns = 0, rows = 0;
 };
+
+// Adds `tiles` times eight bytes of each row, the n rows `stride` apart. column: of the first of the eight, not negative.
+inline void add_each(const uint8_t* bytes, ptrdiff_t stride, int n, const int* column, int tiles, Sums& sums) {
+    for (int row = 0; row < n; ++row)
+        for (int at = 0; at < 8 * tiles; ++at) {
+            const uint64_t byte = bytes[row * stride + at];
+            sums.all += byte, sums.columns += byte * uint64_t(column[at / 8] + at % 8), sums.rows += byte * uint64_t(n - row);
+        }
+}
+#if defined(FRACSLICE_WIDE)
+// Eight tiles at a time; behind the last one bytes are zeros.
+FRACSLICE_WIDE inline void add_wide(const uint8_t* bytes, ptrdiff_t stride, int n, const int* column, int tiles, Sums& sums) {
+    const __m512i places = _mm512_set1_epi64(0x0706050403020100), none = _mm512_setzero_si512();
+    __m512i all = none, columns = none, rows = none;
+    for (int tile = 0; tile < tiles; tile += 8) {
+        __m512i sum = none, inner = none;  // by tiles; of bytes times their places in a tile, as numbers of 16 bits
+        for (int row = 0; row < n; ++row) {
+            const __m512i some = _mm512_loadu_si512(bytes + row * stride + 8 * tile);
+            sum = _mm512_add_epi64(sum, _mm512_sad_epu8(some, none));
+            rows = _mm512_add_epi64(rows, sum);
+            inner = _mm512_add_epi16(inner, _mm512_maddubs_epi16(some, places));
+        }
+        const __m256i eight = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(column + tile));
+        all = _mm512_add_epi64(all, sum);
+        columns = _mm512_add_epi64(columns, _mm512_maskz_mul_epu32(0xFF, sum, _mm512_maskz_cvtepu32_epi64(0xFF, eight)));
+        inner = _mm512_madd_epi16(inner, _mm512_set1_epi16(1));
+        columns = _mm512_add_epi64(columns, _mm512_maskz_srli_epi64(0xFF, inner, 32));
+        columns = _mm512_add_epi64(columns, _mm512_maskz_and_epi64(0xFF, inner, _mm512_set1_epi64(0xFFFFFFFF)));
+    }
+    uint64_t part[3][8];
+    _mm512_storeu_si512(part[0], all), _mm512_storeu_si512(part[1], columns), _mm512_storeu_si512(part[2], rows);
+    for (int i = 0; i < 8; ++i) sums.all += part[0][i], sums.columns += part[1][i], sums.rows += part[2][i];
+}
+inline const auto add_bytes = kWide ? add_wide : add_each;
+#else
+inline constexpr auto add_bytes = add_each;
+#endif
 
 // With d_i the n bytes: 1 + sum d_i, and n + sum (n - i) d_i, modulo 65521.
 class Adler {
@@ -54,12 +57,10 @@ class Adler {
         sum_ += value * n;
         weighted_ += value * ((n % kModulus * (at % kModulus) + n * (n - 1) / 2) % kModulus);
     }
-    // Rows of which column 0 is at place `at`, which may be before the first, and `stride` further from row to row.
-    void add(const Eight& sums, int64_t at, uint64_t stride) {
-        for (uint64_t row = 0; row < 8; ++row) {
-            sum_ += sums.rows[row];
-            weighted_ += sums.rows[row] % kModulus * modulo(at + int64_t(row * stride)) + sums.weighted[row] % kModulus;
-        }
+    // n rows of which column 0 is at place `at` and `stride` further from row to row.
+    void add(const Sums& sums, uint64_t at, uint64_t stride, uint64_t n) {
+        sum_ += sums.all;
+        weighted_ += (sums.all % kModulus * (at % kModulus) + stride * (n * sums.all - sums.rows) + sums.columns) % kModulus;
     }
     // Of n bytes in all.
     uint32_t value(uint64_t n) const {
@@ -69,8 +70,7 @@ class Adler {
     }
 
  private:
-    static constexpr int64_t kModulus = 65521;
-    static uint64_t modulo(int64_t at) { return uint64_t((at % kModulus + kModulus) % kModulus); }
+    static constexpr uint64_t kModulus = 65521;
 
     uint64_t sum_ = 0, weighted_ = 0;
 };

@@ -7,38 +7,36 @@
 #include "adler.h"
 #include "coverage.h"
 #include "deflate.h"
+#include "turn.h"
 #include "wide.h"
 
 namespace fracslice {
 
-// The numbers of bits that differ from the one before, of n bytes; returns the end. Up to 7 bytes after them are read, as zeros
-// or as they are, and up to `kSlack` numbers behind the end are written.
-inline int* turns_each(const uint8_t* bytes, int n, int* end) {
+// The numbers of bits that differ from the one before, of n words that are eight words apart; returns the end. Up to `kSlack`
+// numbers behind the end are written.
+inline int* turns_each(const uint64_t* words, int n, int* end) {
     uint64_t before = 0;
-    for (int i = 0; i < n; i += 8) {
-        uint64_t word;
-        std::memcpy(&word, bytes + i, 8);
-        each(word ^ (word << 1 | before), [&](int bit) { *end++ = kTile * i + bit; });
+    for (int i = 0; i < n; ++i) {
+        const uint64_t word = words[8 * i];
+        each(word ^ (word << 1 | before), [&](int bit) { *end++ = 64 * i + bit; });
         before = word >> 63;
     }
     return end;
 }
 #if defined(FRACSLICE_WIDE)
-FRACSLICE_WIDE inline int* turns_wide(const uint8_t* bytes, int n, int* end) {
+FRACSLICE_WIDE inline int* turns_wide(const uint64_t* words, int n, int* end) {
     alignas(64) uint8_t ramp[64], bits[64];
     for (int bit = 0; bit < 64; ++bit) ramp[bit] = uint8_t(bit);
     const __m512i all = _mm512_load_si512(ramp);
     uint64_t before = 0;
-    for (int i = 0; i < n; i += 8) {
-        uint64_t word;
-        std::memcpy(&word, bytes + i, 8);
-        const uint64_t turns = word ^ (word << 1 | before);
+    for (int i = 0; i < n; ++i) {
+        const uint64_t word = words[8 * i], turns = word ^ (word << 1 | before);
         before = word >> 63;
         _mm512_store_si512(bits, _mm512_maskz_compress_epi8(turns, all));
         const int count = int(_mm_popcnt_u64(turns));
         for (int at = 0; at < count; at += 16) {
             const __m512i some = _mm512_maskz_cvtepu8_epi32(0xFFFF, _mm_load_si128(reinterpret_cast<const __m128i*>(bits + at)));
-            _mm512_storeu_si512(end + at, _mm512_add_epi32(some, _mm512_set1_epi32(kTile * i)));
+            _mm512_storeu_si512(end + at, _mm512_add_epi32(some, _mm512_set1_epi32(64 * i)));
         }
         end += count;
     }
@@ -53,46 +51,28 @@ inline constexpr auto find_turns = turns_each;
 // after each of these. All else is as its left neighbour.
 class Band {
  public:
-    Band(int tiles, int first, int last)
-        : first_(first), last_(last), room_(tiles / 8 * 8 + 16), column_(room_), whole_(room_), cut_(kTile * room_),
-          levels_(kTile * stride() + Runs::kAtOnce), full_(room_),
-          ends_(kTile * room_ + 2 + kSlack) {}
+    Band(const Turn& turn, int tiles, int first, int last)
+        : turn_(turn), first_(first), last_(last), room_(tiles / 8 * 8 + 16), column_(room_), tiles_(room_), cut_(room_),
+          cut_rows_(room_), levels_(size_t(kTile * stride())), ends_(kTile * room_ + 2 + kSlack) {}
 
     // Begins with eight rows of which those from `from` to before `to` are on the picture; `at`: the place of the first one's
-    // first byte among all bytes, `stride` from row to row.
-    void clear(int from, int to, int64_t at, uint64_t stride) {
-        n_ = 0, from_ = from, to_ = to, at_ = at, across_ = stride, eight_ = {};
-    }
-    // The tile as the next one, if it is on the picture.
-    void put(int tile, uint64_t whole, uint64_t cut, const Levels& levels) {
-        const int column = kTile * tile;
-        if (column <= first_ - kTile || column >= last_) return;
-        if (column < first_) cut &= kAll / 255 * (0xFF & 0xFF << (first_ - column));
-        if (column > last_ - kTile) cut &= kAll / 255 * (0xFF >> (column + kTile - last_));
-        add(column, levels);
-        const ptrdiff_t room = room_;  // as bytes may be anything
-        uint8_t *rows = &cut_[n_], *to = &levels_[kTile * n_];
-        for (int row = 0; row < kTile; ++row) {
-            rows[row * room] = uint8_t(cut >> kTile * row);
-            std::memcpy(to + kTile * row * room, &levels[kTile * row], kTile);
-        }
-        column_[n_] = column, full_[n_] = false, whole_[n_++] = whole;
+    // first byte among all bytes, `across` from row to row.
+    void clear(int from, int to, uint64_t at, uint64_t across) { n_ = 0, from_ = from, to_ = to, at_ = at, across_ = across; }
+    // A tile of which some cells are cut as the next one, if it is on the picture. Its levels are to be set before the end.
+    Levels& cut(int tile, uint64_t cells) {
+        column_[n_] = kTile * tile, cut_[n_] = cells;
+        return tiles_[on(tile) ? n_++ : room_ - 1];
     }
     // One that is not cut.
-    void put(int tile, bool inside) {
-        if (kTile * tile <= first_ - kTile || kTile * tile >= last_) return;
-        for (int row = 0; row < kTile; ++row) cut_[n_ + row * room_] = 0;
-        column_[n_] = kTile * tile, full_[n_] = inside, whole_[n_++] = inside ? kAll : 0;
+    void even(int tile, bool inside) {
+        if (!on(tile)) return;
+        column_[n_] = kTile * tile, cut_[n_] = 0, tiles_[n_++].fill(inside ? 255 : 0);
     }
     void close() {
+        if (n_ == 0) return;
         column_[n_] = last_;
-        for (int row = 0; row < kTile; ++row) std::memset(&cut_[row * room_ + n_], 0, kTile);
-        for (int i = 0; i < n_; ++i) {
-            if (!full_[i]) continue;
-            const int begin = std::max(column_[i], first_);
-            eight_.add(255, from_, to_, place(begin), uint64_t(column_[i + 1] - begin));
-        }
-        sum_.add(eight_, at_ - int64_t(place(first_)) - from_ * int64_t(across_), across_);
+        lay_out();
+        sum_.add(sums(), at_, across_, uint64_t(to_ - from_));
     }
     // The checksum of all bands, of n bytes in all.
     uint32_t checksum(uint64_t n) const { return sum_.value(n); }
@@ -101,23 +81,20 @@ class Band {
     void write(uint32_t before, uint32_t after, Runs& runs) {
         Runs::End end = runs.room(size_t(to_ - from_) * size_t(2 * kTile * n_ + 8), size_t(to_ - from_) * across_);
         const int* column = column_.data();
-        const uint64_t* whole = whole_.data();
         for (int row = from_; row < to_; ++row) {
-            const uint8_t* levels = &levels_[size_t(row * stride())];
-            auto filled = [&](int at) { return uint8_t(-(whole[at >> 3] >> (kTile * row + (at & 7)) & 1)); };
+            const uint8_t* bytes = levels(row);
             end.add(0, before);
-            end.add(filled(first_ & 7), 0);
+            if (!(cut_rows_[row] >> (first_ & 7) & 1)) end.add(bytes[first_ & 7], 0);
             int begin = first_;
             const int* ends = ends_.data();
-            for (const int* stop = turns(row); ends != stop; ends += 2) {
+            for (const int* stop = find_turns(&cut_rows_[row], n_ / 8 + 1, ends_.data()); ends != stop; ends += 2) {
                 const int from = ends[0], n = ends[1] - from;
-                const uint8_t* bytes = levels + from;
                 end.length += uint64_t(column[from >> 3] + (from & 7) - begin);
                 if (n <= Runs::kAtOnce)
-                    end.cut(bytes, n);
+                    end.cut(bytes + from, n);
                 else
-                    end.mixed(bytes, n);
-                begin = column[ends[1] >> 3] + (ends[1] & 7), end.value = filled(ends[1]);
+                    end.mixed(bytes + from, n);
+                begin = column[ends[1] >> 3] + (ends[1] & 7), end.value = bytes[ends[1]];
             }
             end.length += uint64_t(last_ - begin);
             end.add(0, after);
@@ -126,34 +103,47 @@ class Band {
     }
 
  private:
-    // Of a column among the sums of eight rows: not negative.
-    uint32_t place(int column) const { return uint32_t(column - first_ + kTile); }
-    // A tile to the sum of all bytes.
-    void add(int column, const Levels& levels) {
-        if (from_ == 0 && to_ == kTile && column >= first_ && column <= last_ - kTile) return eight_.add(levels, place(column));
-        Levels shown{};
-        for (int row = from_; row < to_; ++row)
-            for (int x = std::max(first_ - column, 0); x < std::min(last_ - column, kTile); ++x)
-                shown[size_t(kTile * row + x)] = levels[size_t(kTile * row + x)];
-        eight_.add(shown, place(column));
-    }
+    bool on(int tile) const { return kTile * tile > first_ - kTile && kTile * tile < last_; }
     // From row to row of the levels.
-    int stride() const { return kTile * room_; }
-    // Where in a row pixels begin to be cut, and where they end to be, by turns; returns the end.
-    const int* turns(int row) {
-        const uint8_t* cut = &cut_[row * room_];
-        return find_turns(cut, n_ + 1, ends_.data());
+    ptrdiff_t stride() const { return kTile * room_; }
+    const uint8_t* levels(int row) const { return &levels_[size_t(row * stride())]; }
+    // Tiles as rows, in which zeros are what is not on the picture.
+    void lay_out() {
+        for (int i = n_; i < n_ + 8; ++i) cut_[i] = 0;
+        turn_(cut_.data(), n_ + 1, cut_rows_.data());
+        turn_(tiles_.data(), n_, levels_.data(), stride());
+        const int before = std::max(first_ - column_[0], 0), after = std::max(column_[n_ - 1] + kTile - last_, 0);
+        const int end = kTile * n_ - after;
+        for (int row = 0; row < kTile; ++row) {
+            cut_rows_[row] &= kAll << before, cut_rows_[end / 64 * 8 + row] &= ~(kAll << end % 64);
+            uint8_t* first = &levels_[size_t(row * stride())];
+            std::memset(first, 0, size_t(before)), std::memset(first + end, 0, size_t(after + 64));
+        }
+    }
+    // Of the rows on the picture, the columns counted from the first one's.
+    Sums sums() const {
+        const uint64_t rows = uint64_t(to_ - from_);
+        Sums between;  // the tiles, of one row
+        for (int i = 0; i < n_; ++i) {
+            const uint64_t value = levels(from_)[kTile * i + kTile - 1], begin = uint64_t(column_[i] + kTile);
+            const uint64_t n = uint64_t(std::max(column_[i + 1] - column_[i] - kTile, 0));
+            between.all += value * n, between.columns += value * (n * begin + n * (n - 1) / 2);
+        }
+        Sums sums{rows * between.all, rows * between.columns, rows * (rows + 1) / 2 * between.all};
+        add_bytes(levels(from_), stride(), to_ - from_, column_.data(), n_, sums);
+        sums.columns -= uint64_t(first_) * sums.all;
+        return sums;
     }
 
+    Turn turn_;
     int first_, last_, room_, n_ = 0;
     std::vector<int> column_;
-    std::vector<uint64_t> whole_;
-    std::vector<uint8_t> cut_, levels_, full_;
+    std::vector<Levels> tiles_;
+    std::vector<uint64_t> cut_, cut_rows_;  // by tiles; by eights of these, and by their rows
+    std::vector<uint8_t> levels_;
     std::vector<int> ends_;
     int from_ = 0, to_ = 0;
-    int64_t at_ = 0;
-    uint64_t across_ = 0;
-    Eight eight_;
+    uint64_t at_ = 0, across_ = 0;
     Adler sum_;
 };
 

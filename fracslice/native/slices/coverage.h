@@ -7,8 +7,8 @@
 
 namespace fracslice {
 
-// Of the cells of a tile, by their bits: 0 to 255.
-using Levels = std::array<uint8_t, 64>;
+// Of the cells of a tile, by their bits: 0 to 255, which are those wholly outside and inside.
+struct alignas(64) Levels : std::array<uint8_t, 64> {};
 
 class Coverage {
  public:

@@ -34,15 +34,14 @@ class Runs {
             }
             length += n;
         }
-        // Ends the run of zeros or 255s so far, which is not empty, with n bytes, at most `kAtOnce`; so many may be read.
+        // Ends the run of zeros or 255s so far, which is not empty, with n bytes, at most `kAtOnce`; twice as many may be read.
         void cut(const uint8_t* from, int n) {
-            using Bytes = uint8_t __attribute__((vector_size(kAtOnce)));
-            using Symbols = uint16_t __attribute__((vector_size(2 * kAtOnce)));
+            using Bytes = uint8_t __attribute__((vector_size(2 * kAtOnce)));
             plain();
             Bytes bytes;
             std::memcpy(&bytes, from, sizeof bytes);
-            const Symbols symbols = __builtin_convertvector(bytes, Symbols);
-            std::memcpy(symbol, &symbols, sizeof symbols);
+            bytes = __builtin_shuffle(bytes, Bytes{}, Bytes{0, 16, 1, 16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16});
+            std::memcpy(symbol, &bytes, sizeof bytes);
             symbol += n;
         }
         // Ends any run.
@@ -64,7 +63,7 @@ class Runs {
         void plain() {
             uint64_t rest = length - 1, longest = 0;
             if (rest >= kLongest) longest = rest / kLongest, rest %= kLongest;
-            *symbol++ = uint16_t(kPlain + kLongest * (value & 1) + int(rest));
+            *symbol++ = uint16_t(kPlain + (kLongest & int8_t(value)) + int(rest));
             more(longest);
             length = 0;
         }
