@@ -10,7 +10,7 @@ from .options import quiet_option, threads_option
 from .working import working
 
 
-@click.command()
+@click.command(short_help="Measure run time against error, beside other programs.")
 @click.option("-o", "--output", default="bench", metavar="DIR", help="Where to; the folder bench by default.")
 @click.option("--workload", "workloads", multiple=True, metavar="NAME", help="Only this one; repeatable.")
 @click.option(

@@ -10,12 +10,12 @@ import click
 
 from .inputs import is_model, load_model, load_scene
 from .options import job_of, job_options, length, print_options, quiet_option, set_option, threads_option
-from .slice import check_print, heights, limits_of, printer_option
+from .slice import check_print, heights, limits_of, printer_option, verdict
 from .summary import found, summary
 from .working import working
 
 
-@click.command()
+@click.command(short_help="Say whether a model, or a scene's mesh or layers, would print.")
 @click.argument("source", metavar="MODEL|SCENE")
 @click.option("--json", "as_json", is_flag=True, help="All numbers, as JSON.")
 @click.option("--layer", callback=heights, metavar="LENGTH[..LENGTH]", help="Check layers, so high.")
@@ -55,6 +55,7 @@ def check(
         refuse_scene_options(context)
         checked = examined(load_model(source), threads=threads)
         numbers, line, problems = checked.as_dict(), f"{source}: {found(checked)}", checked.problems
+        line += "" if problems else ", would print"
     else:
         from fracslice.printing.checks import check_solid  # it needs Numba, and a model does not
 
@@ -64,7 +65,8 @@ def check(
             solid = check_solid(result.root, result.bricks, result.place.scale, limits_of(options), work)
         numbers = result.report.as_dict() | {"solid": solid.as_dict()}
         problems = (*result.report.problems, *solid.thin)
-        line = os.linesep.join([summary(source, result.report), *(f"  {p}" for p in solid.thin)])
+        line = f"{summary(source, result.report)}{os.linesep}{verdict(problems)}"
+        line += "" if problems else "; --layer looks at islands, cups and traps, too"
     click.echo(json.dumps(numbers, indent=2) if as_json else line)
     return 1 if problems else 0
 

@@ -43,7 +43,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     return float(match[1]) * SECONDS[match[2] or "s"]
 
 
-@click.command()
+@click.command(short_help="Render a picture of SCENE.")
 @click.argument("source", metavar="SCENE")
 @click.option(
     "-o", "--output", required=True, metavar="FILE", help="A .png file, or .exr or .tif for linear floats."

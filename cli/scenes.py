@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 
-@click.command()
+@click.command(short_help="List the scenes that ship with fracslice.")
 def scenes() -> None:
     """List the scenes that ship with fracslice; each name can stand for a SCENE."""
     from fracslice.scene import library

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -121,7 +121,8 @@ def slice_(
     from fracslice.export.slices import slice_format, write_slices
     from fracslice.slicing.raster import Screen
 
-    slice_format(output, form)
+    if slice_format(output, form) == "sl1":
+        refuse_what_no_sl1_says(output, options)
     preview = options["preview"]
     if preview:
         if Path(preview).suffix.lower() not in (".png", ".webp"):
@@ -143,6 +144,14 @@ def slice_(
         for note in stack.notes:
             click.echo(note)
     return 0
+
+
+def refuse_what_no_sl1_says(output: str, options: dict[str, Any]) -> None:
+    """Before the object is made printable, which may take minutes."""
+    if options["machine"] is None:
+        raise click.UsageError(f'{output}: an SL1 archive needs --printer, such as sl1s; "list" shows all')
+    if options["layer"][1] is not None:
+        raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")
 
 
 def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
@@ -209,6 +218,9 @@ def told(source: str, report: PrintReport) -> str:
     first = (
         f"{source}: {report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
     )
-    if not report.problems:
-        return f"{first}, would print"
-    return os.linesep.join([f"{first}, would not print:", *(f"  {p}" for p in report.problems)])
+    return f"{first}, {verdict(report.problems)}"
+
+
+def verdict(problems: Sequence[str]) -> str:
+    """Whether it would print, and a line for each reason why not."""
+    return os.linesep.join(["would not print:", *(f"  {p}" for p in problems)]) if problems else "would print"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -126,7 +127,8 @@ def check_solid(
     if len(bodies) > 1:
         problems.append(f"{len(bodies)} loose bodies")
     if cavities:
-        problems.append(f"{len(cavities)} sealed cavities of {sum(cavities):.3g} mm3")
+        sealed = counted(cavities, "sealed cavity", "sealed cavities")
+        problems.append(f"{sealed} of {sum(cavities):.3g} mm3")
     if narrow >= limits.thin:
         problems.append(f"{narrow:.3g} mm2 of walls are thinner than {limits.wall:g} mm")
     if bare >= limits.thin:
@@ -135,6 +137,11 @@ def check_solid(
     return SolidReport(
         bricks.voxel * scale, bodies, cavities, told[0], told[1], told[2], narrow, bare, problems
     )
+
+
+def counted(things: Sequence[object], one: str, more: str = "") -> str:
+    """How many there are, and what: "1 suction cup", "2 suction cups"."""
+    return f"{len(things)} {one if len(things) == 1 else more or one + 's'}"
 
 
 def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:

@@ -58,6 +58,7 @@ def printable(
         run.work.check()
         run.work.progress(stage, 0.0)
         run.put(change())
+        run.work.progress(stage, 1.0)
     if (how.base or how.raft) and run.grown:
         run.weigh()
     return _standing(run.planned, how, run.scale), run.scale

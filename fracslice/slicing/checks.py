@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SliceError
-from ..printing.checks import Limits, SolidReport, check_object
+from ..printing.checks import Limits, SolidReport, check_object, counted
 from ..printing.widths import Widths, widths_of
 from ..work import Work
 from .graph import Found, Graph, Nodes
@@ -175,16 +175,16 @@ def _problems(r: PrintReport, limits: Limits, printer: Printer | None) -> list[s
         found.append(f"{len(r.bodies)} loose bodies")
     if r.islands:
         first = min(i.layers[0] for i in r.islands)
-        found.append(f"{len(r.islands)} islands begin in the air, the first in layer {first}")
+        found.append(f"{counted(r.islands, 'island')} in the air, the first from layer {first} on")
     if r.cavities:
-        found.append(
-            f"{len(r.cavities)} sealed cavities keep {sum(c.volume for c in r.cavities):.3g} mm3 of resin"
-        )
+        sealed = counted(r.cavities, "sealed cavity", "sealed cavities")
+        found.append(f"{sealed} with {sum(c.volume for c in r.cavities):.3g} mm3 of resin")
     cups = [c for c in r.cups if c not in r.cavities]
     if cups:
-        found.append(f"{len(cups)} suction cups, the largest {max(c.area for c in cups):.3g} mm2")
+        found.append(f"{counted(cups, 'suction cup')}, the largest {max(c.area for c in cups):.3g} mm2")
     if r.traps:
-        found.append(f"{len(r.traps)} resin traps hold {sum(t.volume for t in r.traps):.3g} mm3")
+        resin = sum(t.volume for t in r.traps)
+        found.append(f"{counted(r.traps, 'resin trap')} with {resin:.3g} mm3 of resin")
     if r.walls and r.walls.thinnest_hundredth < limits.wall:
         found.append(f"walls of {r.walls.thinnest_hundredth:.3g} mm: the limit is {limits.wall:g} mm")
     return found + r.solid.thin

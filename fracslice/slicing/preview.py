@@ -15,7 +15,7 @@ from .stack import Stack
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-CELLS, CELL, FRAMES = 24, 200, 60
+CELLS, CELL, CAPTION, FRAMES, ABREAST = 24, 200, 120, 60, 3
 INK = np.array([(24, 26, 33), (240, 196, 105)], float)
 ALARM = (214, 60, 60)
 
@@ -40,19 +40,24 @@ def contact_sheet(
     stack: Stack, file: BinaryIO, work: Work | None = None, layers: Sequence[int] | None = None
 ) -> None:
     """A PNG with chosen layers, or 24 over the height, each with its height above the bed."""
-    from PIL import Image, ImageDraw
-
     chosen = list(layers) if layers is not None else _spread(stack, CELLS)
     images = list(Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), chosen))
-    across = math.ceil(math.sqrt(1.5 * max(len(images), 1)))
-    down = math.ceil(max(len(images), 1) / across)
-    sheet = Image.new("RGB", (across * (CELL + 8) + 8, down * (CELL + 24) + 8), "white")
+    _sheet(stack, chosen, images, math.ceil(math.sqrt(1.5 * max(len(images), 1)))).save(file, "PNG")
+
+
+def _sheet(stack: Stack, layers: Sequence[int], images: Sequence[Image], across: int) -> Image:
+    """Images of layers in rows, each with what it shows."""
+    from PIL import Image, ImageDraw
+
+    width = max([CAPTION, *(i.width for i in images)]) + 8
+    height = max([0, *(i.height for i in images)]) + 24
+    sheet = Image.new("RGB", (across * width + 8, -(-len(images) // across) * height + 8), "white")
     draw = ImageDraw.Draw(sheet)
-    for n, (index, image) in enumerate(zip(chosen, images, strict=True)):
-        x, y = 8 + n % across * (CELL + 8), 8 + n // across * (CELL + 24)
+    for n, (index, image) in enumerate(zip(layers, images, strict=True)):
+        x, y = 8 + n % across * width, 8 + n // across * height
         sheet.paste(image, (x, y))
         draw.text((x, y + image.height + 2), f"layer {index}, {stack.tops[index]:.2f} mm", "black")
-    sheet.save(file, "PNG")
+    return sheet
 
 
 def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
@@ -64,9 +69,10 @@ def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
 
 
 def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work | None = None) -> None:
-    """A PNG of layers, what has nothing below it in red."""
+    """A PNG of layers, pixel by pixel, what has nothing below it in red; without any, of the lowest one."""
     from PIL import Image
 
+    layers = layers or [0]
     wanted = sorted({n for k in layers for n in (max(k - 1, 0), k)})
     solid = dict(zip(wanted, Slicer(stack, work or Work()).map(_solid, wanted), strict=True))
     pictures = []
@@ -74,13 +80,7 @@ def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work
         bare = solid[k] & ~solid[k - 1] if k else np.zeros_like(solid[k])
         colours = np.array([INK[0], INK[1], ALARM], np.uint8)
         pictures.append(Image.fromarray(colours[solid[k] + 1 * bare][::-1]))
-    width = sum(p.width + 8 for p in pictures) + 8
-    sheet = Image.new("RGB", (width, max((p.height for p in pictures), default=0) + 16), "white")
-    x = 8
-    for picture in pictures:
-        sheet.paste(picture, (x, 8))
-        x += picture.width + 8
-    sheet.save(file, "PNG")
+    _sheet(stack, layers, pictures, min(len(layers), ABREAST)).save(file, "PNG")
 
 
 def _solid(layer: Layer) -> np.ndarray:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fracslice_cli.main import run
+from PIL import Image
 
 TEXT = """<scene version="1">
   <solid size="20mm"><box/><transform translate="1.2 0 0"><box/></transform></solid>
@@ -60,3 +62,28 @@ def test_a_wrong_length_is_bad_input(pair: str, tmp_path: Path, capfd: pytest.Ca
     assert run(["mesh", pair, "-o", str(target), "--thickness", "1um", "-q"]) == 2
     assert "expected at least 0.0625 mm" in capfd.readouterr().err
     assert not target.exists()
+
+
+def test_check_ends_with_a_verdict(pair: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    def lines(*arguments: str) -> list[str]:
+        run(["check", *arguments, "-q"])
+        return capfd.readouterr().out.splitlines()
+
+    assert lines(pair, "--resolution", "32")[-1].startswith("would print; --layer")
+    said = lines(pair, "--resolution", "32", "--wall", "3mm")
+    assert said[-2] == "would not print:" and said[-1].endswith(" of walls are thinner than 3 mm")
+    said = lines(
+        pair, "--layer", "0.5mm", "--pixel", "0.2mm", "--bridge", "0", "--set", "transform.rotate=0 1 0 45"
+    )
+    assert said[0].endswith(", would not print:")
+    assert any(line.startswith("  1 island in the air, the first from layer ") for line in said)
+
+
+@pytest.mark.parametrize("flags", [["--bridge", "2mm"], ["--bridge", "0", "--keep", "largest"]])
+def test_the_worst_layers_are_named(pair: str, flags: list[str], tmp_path: Path) -> None:
+    """Of a solid that nothing is wrong with it is the lowest."""
+    sheet = tmp_path / "worst.png"
+    run(["check", pair, "--layer", "1mm", "--pixel", "0.5mm", "--picture", str(sheet), "-q", *flags])
+    with Image.open(sheet) as image:
+        assert min(image.size) > 20
+        assert (np.asarray(image.convert("L"))[-20:] < 64).any(), "a line says which layer it is"

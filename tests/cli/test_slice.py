@@ -51,12 +51,19 @@ def test_bad_input_is_one_line(
     assert [path.name for path in tmp_path.iterdir()] == ["ball.xml"]
 
 
-def test_an_archive_of_layers_of_one_height_refuses_a_range(
-    ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--layer", "0.2mm..0.6mm", "--printer", "sl1s"], "has layers of one height"),
+        (["--layer", "0.2mm"], "needs --printer, such as sl1s"),
+    ],
+)
+def test_what_an_archive_cannot_say_is_refused_before_the_object_is_changed(
+    options: list[str], said: str, ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    target = tmp_path / "out.sl1"
-    assert run(["slice", str(ball), "-o", str(target), "--layer", "0.2mm..0.6mm", "--printer", "sl1s"]) == 2
-    assert "has layers of one height" in capfd.readouterr().err
+    wrong = ["--hollow", "15mm"]
+    assert run(["slice", str(ball), "-o", str(tmp_path / "out.sl1"), *options, *wrong]) == 2
+    assert said in capfd.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["ball.xml"]
 
 

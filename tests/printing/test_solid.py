@@ -168,7 +168,7 @@ def checked(root: Node, size: float = SIZE) -> SolidReport:
         (sphere(), None),
         (union(box(size=(2, 2, 0.5)), at(box(size=(2, 0.03, 1)), 0, 0, 0.6)), "walls are thinner"),
         (union(box(size=(1, 1, 2)), at(box(size=(2, 1, 0.03)), 0, 0, 0.5)), "floors are thinner"),
-        (difference(box(), sphere(radius=0.2)), "1 sealed cavities of 268 mm3"),
+        (difference(box(), sphere(radius=0.2)), "1 sealed cavity of 268 mm3"),
         (union(box(), at(sphere(radius=0.1), 0.8, 0, 0)), "2 loose bodies"),
     ],
 )
