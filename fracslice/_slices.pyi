@@ -117,8 +117,3 @@ class Slab:
 
 def deflated(image: NDArray[uint8]) -> bytes:
     """The rows of an image of any strides, each after a byte 0, as a zlib stream."""
-
-def crc32(data: bytes, before: int = 0) -> int:
-    """The CRC-32 of bytes, after those whose it is `before`: as `zlib.crc32`, by carry-less products where
-    the machine has them.
-    """

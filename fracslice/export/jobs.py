@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
-from fracslice._slices import crc32
+from isal.isal_zlib import crc32
+
 from fracslice.errors import ExportError
 from fracslice.export.files import check_target, reason, replacing
 from fracslice.slicing import Slicer, Stack

@@ -5,8 +5,9 @@ from __future__ import annotations
 import struct
 
 import numpy as np
+from isal.isal_zlib import crc32
 
-from fracslice._slices import crc32, deflated
+from fracslice._slices import deflated
 from fracslice.slicing import Layer
 from fracslice.slicing.raster import Screen
 

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <memory>
 
-#include "crc.h"
 #include "picture.h"
 
 namespace nb = nanobind;
@@ -100,10 +99,6 @@ nb::bytes bind_deflated(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device
     return bytes(*data);
 }
 
-uint32_t bind_crc32(const nb::bytes& data, uint32_t before) {
-    return crc32(reinterpret_cast<const uint8_t*>(data.c_str()), data.size(), before);
-}
-
 nb::tuple bind_crossings(const Slab& slab, int layer) {
     held(slab, layer);
     Crossings found;
@@ -141,7 +136,6 @@ NB_MODULE(_slices, module) {
         .def(nb::init<double, double, double, int, int, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
              "stop_inside"_a, "even"_a);
     module.def("deflated", &bind_deflated, "image"_a);
-    module.def("crc32", &bind_crc32, "data"_a, "before"_a = 0);
     nb::class_<Memory>(module, "Memory").def(nb::init<>());
     nb::class_<Slab>(module, "Slab")
         .def("__init__",
