@@ -36,6 +36,9 @@ SHARP = 6
 DUST = 1e-5
 """The share of the whole below which a body is dust that no strut is built to."""
 
+POCKET = 0.1
+"""The share of the largest part of a hollow below which another one is not worth two holes."""
+
 THIN = 1.0
 """mm2 of walls or gaps that samples may miss, from which finer ones are taken."""
 
@@ -213,19 +216,27 @@ class _Run:
         return altered(self.thing, "add", strokes(start, end, radius, like)) if len(start) else self.thing
 
     def hollowed(self) -> Node | Compilable:
-        """Everything farther inside than the walls are thick is taken away, and two holes made."""
+        """Everything farther inside than the walls are thick is taken away, and two holes made into each part
+        of that. With holes, parts under `POCKET` of the largest stay solid.
+        """
+        from .parts import Connected, parts_of
         from .samples import Samples, positions
 
         swept = to_grid(self.sampled(self.how.hollow)).redistance()
         hollow = from_grid(swept.offset(-self.how.hollow / self.scale))
-        rows, offsets = np.nonzero((hollow.values < 0) & (hollow.values > -hollow.voxel))
-        if not len(rows):
+        found = Connected(hollow, parts_of(hollow))
+        numbers, count = found.parts.bodies, found.parts.count
+        if not len(numbers):
             raise VolumeError(f"walls of {self.how.hollow:g} mm leave nothing to hollow out")
-        thing = altered(self.thing, "cut", Samples(hollow))
-        points = np.array(hollow.origin) + hollow.voxel * positions(hollow, rows, offsets)
-        depth = -hollow.values[rows, offsets]
-        for hole in self.drains(points, depth) if self.how.drain else ():
-            thing = altered(thing, "cut", hole)
+        if not self.how.drain:
+            return altered(self.thing, "cut", Samples(hollow))
+        large = count[numbers] >= POCKET * count[numbers[0]]
+        thing = altered(self.thing, "cut", Samples(found.without(numbers[~large])))
+        for number in numbers[large]:
+            at = (found.parts.labels == number) & (hollow.values > -hollow.voxel)
+            points = np.array(hollow.origin) + hollow.voxel * positions(hollow, *np.nonzero(at))
+            for hole in self.drains(points, -hollow.values[at]):
+                thing = altered(thing, "cut", hole)
         return thing
 
     def drains(self, hollow: np.ndarray, depth: np.ndarray) -> Iterator[Node]:

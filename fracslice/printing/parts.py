@@ -10,7 +10,7 @@ from numba import njit
 
 from ..disjoint import find, roots, unite
 from ..volume import Bricks
-from ..volume.bricks import INSIDE
+from ..volume.bricks import INSIDE, OUTSIDE
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +56,18 @@ class Connected:
 
     def filled(self) -> Connected:
         """As they are once the cavities are solid: what floats in one is of the body around it."""
-        samples, tiles = self.parts.masks(self.parts.cavities)
-        values = np.where(samples, np.float32(-self.solid.voxel), self.solid.values)
-        index = np.where(tiles, np.int32(INSIDE), self.solid.index)
-        solid = replace(self.solid, values=values, index=index)
+        solid = self._turned(self.parts.cavities, -1.0, INSIDE)
         return Connected(solid, parts_of(solid))
+
+    def without(self, bodies: np.ndarray) -> Bricks:
+        """The samples of the solid without some bodies."""
+        return self._turned(bodies, 1.0, OUTSIDE)
+
+    def _turned(self, numbers: np.ndarray, sign: float, side: int) -> Bricks:
+        """With parts on the other side, a voxel from the surface."""
+        samples, tiles = self.parts.masks(numbers)
+        values = np.where(samples, np.float32(sign * self.solid.voxel), self.solid.values)
+        return replace(self.solid, values=values, index=np.where(tiles, np.int32(side), self.solid.index))
 
 
 def parts_of(bricks: Bricks) -> Parts:

@@ -321,6 +321,28 @@ def test_a_millimetre_is_a_millimetre(root: Node) -> None:
     np.testing.assert_allclose(size(hollow=3, drain=0), plain, atol=1e-3)
 
 
+def holes(root: Node) -> tuple[Callable[..., bool], float]:
+    """Hollowed to 2 mm, with holes of 3 mm: whether a point is solid; a millimetre."""
+    thing, scale = printable(plan(root, 100), SIZE, Print(hollow=2, drain=3))
+    kernel = compile_scene(thing.root, "float64")
+    return lambda *at: bool(kernel.points(*np.array(at)[:, None])[0] < 0), 1 / scale
+
+
+def test_a_hollow_is_drained_and_not_a_pocket_below_it() -> None:
+    solid, mm = holes(union(sphere(), at(sphere(radius=0.35), 0, 0, -1.3)))
+    low = -1 + 3.5 * mm
+    assert solid(0, 0, -1.3) and not solid(0, 0, 0)
+    assert solid(0.7, 0, low) != solid(-0.7, 0, low) and solid(0, 0.7, low)
+    assert not solid(0, 0, 1 - mm)
+
+
+def test_each_large_part_of_a_hollow_is_drained() -> None:
+    solid, mm = holes(union(*(at(sphere(), x, 0, 0) for x in (-0.95, 0.95))))
+    for x in (-0.95, 0.95):
+        assert not solid(x, 0, 0) and not solid(x, 0, 1 - mm)
+        assert not solid(1.8 * x, 0, -1 + 3.5 * mm)
+
+
 def test_layers_are_as_large_as_asked() -> None:
     """Of a solid whose box no formula tells: its contours, across and along, with a base cut off."""
     root = transform(
