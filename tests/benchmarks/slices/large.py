@@ -2,7 +2,8 @@
 
 LAYERS: only so many, around the middle. Prints the time of the whole job (a folder of PNG files), the share
 of it that pictures take, peak memory, and how many times longer evaluating each pixel with the same kernel
-would take, measured on a part of them.
+would take, measured on a part of them. All three run in turn, five times; times are medians, ratios those of
+each turn.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 
@@ -24,9 +26,10 @@ from fracslice.kernel import compile_scene
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.printers import printer
 from fracslice.slicing.raster import Screen
+from fracslice.work import Work
 
-LOOKED_AT = 16
-"""Layers."""
+LOOKED_AT, RUNS = 64, 5
+"""Layers; turns."""
 
 
 def seconds(make: Callable[[], object]) -> tuple[float, float]:
@@ -41,19 +44,23 @@ def part(stack: Stack, layers: Sequence[int]) -> Stack:
 
 
 def dense(stack: Stack, rows: int, columns: int) -> float:
-    """Processor seconds for each pixel of all layers, in order; measured on a tenth of the rows of a few
-    layers, the screen laid over the object's box."""
+    """Processor seconds for each pixel of all layers, in order, on all cores as the job; measured on a tenth
+    of the rows of a few layers, the screen laid over the object's box."""
     kernel, z = compile_scene(stack.root), stack.z[:: max(1, len(stack.z) // LOOKED_AT)].astype(np.float32)
     x, y = (np.linspace(-1.1, 1.1, n, dtype=np.float32) for n in (columns, rows // 10))
     x, y = (a.ravel() for a in np.meshgrid(x, y))
     planes = [np.full_like(x, height) for height in z]
 
-    def evaluate() -> None:
-        for plane in planes:
-            kernel.points(x, y, plane)  # let go at once: laying new pages takes longer than evaluating
+    def evaluate(plane: np.ndarray) -> None:
+        kernel.points(x, y, plane)  # let go at once: laying new pages takes longer than evaluating
 
-    evaluate()
-    return 10 * seconds(evaluate)[1] / len(z) * len(stack.z)
+    Work().map(evaluate, planes)
+    return 10 * seconds(lambda: Work().map(evaluate, planes))[1] / len(z) * len(stack.z)
+
+
+def times(longer: list[float], shorter: list[float]) -> str:
+    ratios = [a / b for a, b in zip(longer, shorter, strict=True)]
+    return f"{median(ratios):.1f} times ({min(ratios):.1f} to {max(ratios):.1f})"
 
 
 def main() -> None:
@@ -64,15 +71,20 @@ def main() -> None:
     run = SliceRun(stack, Screen(stack, machine))
     rows, columns = run.screen.shape
     list(Slicer(stack).map(run.screen.deflated, [count // 2]))
-    with tempfile.TemporaryDirectory() as folder:
-        wall, cpu = seconds(lambda: write_slices(run, Path(folder) / "layers", "png"))
-        size = sum(f.stat().st_size for f in Path(folder).rglob("*.png"))
-    sampling = seconds(lambda: list(Slicer(stack).map(lambda layer: layer.evaluations)))[1]
-    every = dense(stack, rows, columns)
-    print(f"{count} layers of {columns} x {rows}: {wall:.1f} s wall, {cpu:.1f} s CPU, {size / 1e6:.0f} MB")
-    print(f"pictures take {1 - sampling / cpu:.0%} of the CPU time; peak memory {peak_rss_mb():.0f} MB")
-    print(f"every pixel by the same kernel: {every:.0f} s CPU, {every / cpu:.1f} times; ", end="")
-    print(f"without pictures {every / sampling:.1f} times")
+    walls, jobs, sampling, every, peaks = [], [], [], [], []
+    for _ in range(RUNS):
+        with tempfile.TemporaryDirectory() as folder:
+            wall, cpu = seconds(lambda folder=folder: write_slices(run, Path(folder) / "layers", "png"))
+            size = sum(f.stat().st_size for f in Path(folder).rglob("*.png"))
+        walls.append(wall)
+        jobs.append(cpu)
+        sampling.append(seconds(lambda: list(Slicer(stack).map(lambda layer: layer.evaluations)))[1])
+        peaks.append(peak_rss_mb())
+        every.append(dense(stack, rows, columns))
+    print(f"{count} layers of {columns} x {rows}: {median(walls):.2f} s wall, {median(jobs):.2f} s CPU")
+    print(f"{size / 1e6:.0f} MB of pictures, peak memory {peaks[0]:.0f} MB")
+    print(f"every pixel by the same kernel: {median(every):.0f} s CPU")
+    print(f"the job against that: {times(every, jobs)}; without pictures {times(every, sampling)}")
 
 
 if __name__ == "__main__":
