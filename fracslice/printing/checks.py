@@ -35,13 +35,16 @@ UP = (0.0, 0.0, 1.0)
 @dataclass(frozen=True)
 class Limits:
     """What counts. speck: parts with less area (mm^2) in every layer, or less volume (mm^3), are dust that is
-    counted but no reason to stop. cup: the least area of a suction cup, mm^2. wall: the thinnest wall, mm; in
-    a layer it is judged by the thinnest hundredth. floor: the thinnest floor or roof, mm, measured upwards.
-    thin: walls and floors count from so much thin surface on, mm^2. density: of the resin, g/cm^3.
+    counted but no reason to stop. cup: the least area of a suction cup or a resin trap,
+    mm^2. deep: the least height of a suction cup, mm: any hole in the first layers is a shallow one. wall:
+    the thinnest wall, mm; in a layer it is judged by the thinnest hundredth. floor: the thinnest floor or
+    roof, mm, measured upwards. thin: walls and floors count from so much thin surface on, mm^2. density: of
+    the resin, g/cm^3.
     """
 
     speck: float = 0.02
     cup: float = 1.0
+    deep: float = 0.5
     wall: float = 0.1
     floor: float = 0.1
     thin: float = 1.0

@@ -116,8 +116,11 @@ class _Collector:
         parts, hollows, overhang = solid.nodes(), empty.nodes(), np.array(overhangs)
         islands = self.found(parts, parts.islands())
         bodies = self.bodies(parts)
-        cups = [c for c in self.found(hollows, hollows.shut(False)) if c.area >= self.limits.cup]
-        traps = [t for t in self.found(hollows, hollows.shut(True)) if t.area >= self.limits.cup]
+        large = [
+            [part for part in self.found(hollows, hollows.shut(backwards)) if part.area >= self.limits.cup]
+            for backwards in (False, True)
+        ]
+        cups, traps = [c for c in large[0] if self.height(c) >= self.limits.deep], large[1]
         real = [i for i in islands if i.area >= self.limits.speck]
         kept = [b for b in bodies if b.area >= self.limits.speck]
         report = PrintReport(
@@ -145,6 +148,10 @@ class _Collector:
 
     def found(self, nodes: Nodes, chosen: np.ndarray) -> list[Found]:
         return nodes.grouped(chosen, self.stack.heights, self.stack.pixel, self.stack.shape)
+
+    def height(self, part: Found) -> float:
+        first, last = part.layers
+        return float(self.stack.heights[first : last + 1].sum())
 
     def bodies(self, nodes: Nodes) -> list[Found]:
         return self.found(nodes, np.ones(len(nodes.layer), bool))
