@@ -97,6 +97,7 @@ class _Run:
             front = self.audit(states, turn)
             if not len(front):
                 break
+        self.work.progress("sampling", 1.0)
         return self.finished(states)
 
     # --- top down -------------------------------------------------------------------------------------------
