@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "wide.h"
 
@@ -14,10 +15,15 @@ struct Sums {
 
 // Adds `tiles` times eight bytes of each row, the n rows `stride` apart. column: of the first of the eight, not negative.
 inline void add_each(const uint8_t* bytes, ptrdiff_t stride, int n, const int* column, int tiles, Sums& sums) {
+    // Numbers of 16 bits that are multiplied by others and added are the last one of the product.
+    constexpr uint64_t even = 0x00FF00FF00FF00FF, ones = 0x0001000100010001, places[] = {0x0000000200040006, 0x0001000300050007};
     for (int row = 0; row < n; ++row)
-        for (int at = 0; at < 8 * tiles; ++at) {
-            const uint64_t byte = bytes[row * stride + at];
-            sums.all += byte, sums.columns += byte * uint64_t(column[at / 8] + at % 8), sums.rows += byte * uint64_t(n - row);
+        for (int tile = 0; tile < tiles; ++tile) {
+            uint64_t word;
+            std::memcpy(&word, bytes + row * stride + 8 * tile, sizeof word);
+            const uint64_t a = word & even, b = word >> 8 & even, sum = (a + b) * ones >> 48;
+            sums.all += sum, sums.rows += sum * uint64_t(n - row);
+            sums.columns += sum * uint64_t(column[tile]) + ((a * places[0] + b * places[1]) >> 48);
         }
 }
 #if defined(FRACSLICE_WIDE)

@@ -38,6 +38,20 @@ inline uint64_t transposed(uint64_t w) {
     return w;
 }
 
+// Eight words of eight bytes: the first bytes of all become the first word, and so on.
+inline void swap_rows_and_columns(uint64_t* w) {
+    auto swap = [&](int apart, uint64_t mask) {
+        for (int i = 0; i < 8; ++i) {
+            if (i & apart) continue;
+            uint64_t t = (w[i] >> 8 * apart ^ w[i + apart]) & mask;
+            w[i + apart] ^= t, w[i] ^= t << 8 * apart;
+        }
+    };
+    swap(4, 0x00000000FFFFFFFF);
+    swap(2, 0x0000FFFF0000FFFF);
+    swap(1, 0x00FF00FF00FF00FF);
+}
+
 // The samples of odd rows and columns, a row of four in each byte; and such samples as the blocks of 2 x 2 that end there.
 inline uint32_t halved(uint64_t w) {
     w = w >> 9 & 0x0055005500550055;

@@ -108,6 +108,7 @@ void by_crossings(const Slab& slab, const Quad& tiles, const Corners& corners, P
 // but a corner two are 1, and of a half one is 0 and the opposite one 1. So it is of one wholly in or out.
 void measure(const Parts& parts, Levels& levels, double* sums, float* areas) {
     float sum[2][kTile] = {};
+    int32_t whole[64];
     for (int i = 0; i < 64; i += 4) {
         const int row = i / kTile, column = i % kTile;
         const Four b = load(&parts.across[row][column]), a = load(&parts.across[row + 1][column]);
@@ -116,8 +117,9 @@ void measure(const Parts& parts, Levels& levels, double* sums, float* areas) {
         store(within, areas + i);
         store(load(&sum[row & 1][column]) + within, &sum[row & 1][column]);
         const Word level = __builtin_convertvector(255 * within + 0.5f, Word);
-        for (int n = 0; n < 4; ++n) levels[i + n] = uint8_t(level[n]);
+        std::memcpy(whole + i, &level, sizeof level);
     }
+    for (int i = 0; i < 64; ++i) levels[size_t(i)] = uint8_t(whole[i]);
     for (int i = 0; i < kTile; ++i) sums[i] += double(sum[0][i] + sum[1][i]);
 }
 

@@ -19,16 +19,19 @@ void gather_each(const Ask* asks, size_t n, const Tiles& tiles, const float* x, 
 void scatter_each(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
     for (size_t i = 0; i < n; ++i) {
         float* kept = tiles.values[asks[i].tile].data();
-        found[i] = {};
+        Found all{};
+        const float factors[] = {rim ? rim->outside[asks[i].tile] : 0, rim ? rim->inside : 0};
         each(asks[i].samples, [&](int bit) {
             const float v = *f++;
-            found[i].negative |= uint64_t(v < 0) << bit;
+            const bool negative = v < 0;
+            all.negative |= uint64_t(negative) << bit;
             kept[bit] = v;
             if (!rim) return;
-            const float scaled = v * v * (v < 0 ? rim->inside : rim->outside[asks[i].tile]);
-            found[i].beyond |= uint64_t(scaled > rim->least) << bit;
-            found[i].calm |= uint64_t(v < 0 || scaled > rim->calm) << bit;
+            const float scaled = v * v * factors[negative];
+            all.beyond |= uint64_t(scaled > rim->least) << bit;
+            all.calm |= uint64_t(negative | (scaled > rim->calm)) << bit;
         });
+        found[i] = all;
     }
 }
 
