@@ -140,7 +140,6 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     what, work = what or MeshJob(), work or Work()
     voxels, clock = what.voxels(scene), Clock(work)
     from .mesh.check import check
-    from .mesh.components import in_pieces
     from .mesh.refine import refine
     from .mesh.simplify import simplify
     from .volume import plan
@@ -153,17 +152,16 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     if not how.whole:
         with clock("changing"):
             planned, scale, left = _changed(planned, what, how, what.size(scene), work)
-    bricks, raw = _surface(planned, clock)
-    if how.whole and how.sorts and in_pieces(raw, planned.voxel):  # what is one body only the field tells
+    bricks, raw, pieces = _surface(planned, clock)
+    if how.whole and how.sorts and pieces:  # what is one body only the field tells
         with clock("changing"):
             planned, scale, left = _changed(planned, what, how, what.size(scene), work)
-        bricks, raw = _surface(planned, clock)
+        bricks, raw, pieces = _surface(planned, clock)
     if what.chord_mm is not None:
         with clock("refining"):
             unit = float(raw.size.max()) / what.size(scene)
             raw = refine(planned.root, raw, what.chord_mm * unit, planned.voxel, work)
     with clock("finishing"):
-        pieces = in_pieces(raw, planned.voxel)
         left = replace(left, keep="all") if pieces else left
         mesh, removed, place = _finished(raw, what, left, what.size(scene), scale)
     simplified = None
@@ -192,15 +190,17 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     return Result(mesh, report, bricks, planned.root, place)
 
 
-def _surface(planned: Plan, clock: Clock) -> tuple[Bricks, Mesh]:
-    """The samples of a planned scene, and their mesh, in scene units."""
+def _surface(planned: Plan, clock: Clock) -> tuple[Bricks, Mesh, str]:
+    """The samples of a planned scene, their mesh, in scene units, and what fell to pieces in it."""
+    from .mesh.components import in_pieces
     from .mesh.extract import contour
     from .volume import sample_scene
 
     with clock("sampling"):
         bricks = sample_scene(planned, clock.work)
     with clock("meshing"):
-        return bricks, contour(planned.root, bricks, clock.work)
+        mesh = contour(planned.root, bricks, clock.work)
+        return bricks, mesh, in_pieces(mesh, planned.voxel)
 
 
 def _changed(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> tuple[Plan, float, Print]:

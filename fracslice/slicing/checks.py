@@ -116,11 +116,8 @@ class _Collector:
         parts, hollows, overhang = solid.nodes(), empty.nodes(), np.array(overhangs)
         islands = self.found(parts, parts.islands())
         bodies = self.bodies(parts)
-        large = [
-            [part for part in self.found(hollows, hollows.shut(backwards)) if part.area >= self.limits.cup]
-            for backwards in (False, True)
-        ]
-        cups, traps = [c for c in large[0] if self.height(c) >= self.limits.deep], large[1]
+        cups = [c for c in self.shut(hollows, False) if self.height(c) >= self.limits.deep]
+        traps = self.shut(hollows, True)
         real = [i for i in islands if i.area >= self.limits.speck]
         kept = [b for b in bodies if b.area >= self.limits.speck]
         report = PrintReport(
@@ -149,7 +146,12 @@ class _Collector:
     def found(self, nodes: Nodes, chosen: np.ndarray) -> list[Found]:
         return nodes.grouped(chosen, self.stack.heights, self.stack.pixel, self.stack.shape)
 
+    def shut(self, hollows: Nodes, backwards: bool) -> list[Found]:
+        """What is shut and large, see `Nodes.shut`."""
+        return [p for p in self.found(hollows, hollows.shut(backwards)) if p.area >= self.limits.cup]
+
     def height(self, part: Found) -> float:
+        """mm."""
         first, last = part.layers
         return float(self.stack.heights[first : last + 1].sum())
 

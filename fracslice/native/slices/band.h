@@ -25,20 +25,14 @@ inline int* turns_each(const uint64_t* words, int n, int* end) {
 }
 #if defined(FRACSLICE_WIDE)
 FRACSLICE_WIDE inline int* turns_wide(const uint64_t* words, int n, int* end) {
-    alignas(64) uint8_t ramp[64], bits[64];
-    for (int bit = 0; bit < 64; ++bit) ramp[bit] = uint8_t(bit);
-    const __m512i all = _mm512_load_si512(ramp);
     uint64_t before = 0;
     for (int i = 0; i < n; ++i) {
-        const uint64_t word = words[8 * i], turns = word ^ (word << 1 | before);
+        const uint64_t word = words[8 * i];
+        const SetBits turns(word ^ (word << 1 | before));
         before = word >> 63;
-        _mm512_store_si512(bits, _mm512_maskz_compress_epi8(turns, all));
-        const int count = int(_mm_popcnt_u64(turns));
-        for (int at = 0; at < count; at += 16) {
-            const __m512i some = _mm512_maskz_cvtepu8_epi32(0xFFFF, _mm_load_si128(reinterpret_cast<const __m128i*>(bits + at)));
-            _mm512_storeu_si512(end + at, _mm512_add_epi32(some, _mm512_set1_epi32(64 * i)));
-        }
-        end += count;
+        for (int at = 0; at < turns.count; at += 16)
+            _mm512_storeu_si512(end + at, _mm512_add_epi32(turns.sixteen(at), _mm512_set1_epi32(64 * i)));
+        end += turns.count;
     }
     return end;
 }

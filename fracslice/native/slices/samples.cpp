@@ -41,22 +41,18 @@ void scatter_each(const Ask* asks, size_t n, const float* f, const Rim* rim, Til
 // Sixteen samples at a time, the chosen ones first brought together.
 FRACSLICE_WIDE void gather_wide(const Ask* asks, size_t n, const Tiles& tiles, const float* x, const float* y, float* to_x,
                                 float* to_y) {
-    alignas(64) uint8_t ramp[64], bits[64];
-    for (int bit = 0; bit < 64; ++bit) ramp[bit] = uint8_t(bit);
-    const __m512i all = _mm512_load_si512(ramp);
     for (const Ask* ask = asks; ask != asks + n; ++ask) {
         const Place& p = tiles.place[ask->tile];
         const __m512 columns = _mm512_castps256_ps512(_mm256_loadu_ps(x + kTile * (p.x - 1)));
         const __m512 rows = _mm512_castps256_ps512(_mm256_loadu_ps(y + kTile * (p.y - 1)));
-        const int64_t count = _mm_popcnt_u64(ask->samples);
-        _mm512_store_si512(bits, _mm512_maskz_compress_epi8(ask->samples, all));
-        for (int64_t at = 0; at < count; at += 16) {
-            const __m512i bit = _mm512_maskz_cvtepu8_epi32(0xFFFF, _mm_load_si128(reinterpret_cast<__m128i*>(bits + at)));
+        const SetBits bits(ask->samples);
+        for (int at = 0; at < bits.count; at += 16) {
+            const __m512i bit = bits.sixteen(at);
             const __m512i column = _mm512_and_si512(bit, _mm512_set1_epi32(7)), row = _mm512_maskz_srli_epi32(0xFFFF, bit, 3);
             _mm512_storeu_ps(to_x + at, _mm512_maskz_permutexvar_ps(0xFFFF, column, columns));
             _mm512_storeu_ps(to_y + at, _mm512_maskz_permutexvar_ps(0xFFFF, row, rows));
         }
-        to_x += count, to_y += count;
+        to_x += bits.count, to_y += bits.count;
     }
 }
 

@@ -19,7 +19,8 @@ class Turn {
     // n tiles as eight rows, `stride` bytes from row to row.
     void operator()(Levels* tiles, int n, uint8_t* rows, ptrdiff_t stride) const {
         for (int i = 0; i < n; ++i, rows += kTile) {
-            for (int at = 0; !plain_ && at < 64; ++at) tiles[i][at] = shown_[tiles[i][at]];
+            if (!plain_)
+                for (uint8_t& level : tiles[i]) level = shown_[level];
             uint64_t eight[8];
             std::memcpy(eight, tiles[i].data(), sizeof eight);
             if (transposed_) swap_rows_and_columns(eight);
