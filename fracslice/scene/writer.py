@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from html import escape
 from typing import Any
 
 from ..formulas import Node
@@ -49,5 +50,4 @@ def _element(node: Node, indent: str) -> Iterator[str]:
 def _attributes(element: Element, values: Mapping[str, Any]) -> str:
     kinds = element.parameters
     changed = {name: value for name, value in values.items() if value != kinds[name].default}
-    # Numbers and words: nothing that XML would have quoted.
-    return "".join(f' {name}="{kinds[name].text(value)}"' for name, value in changed.items())
+    return "".join(f' {name}="{escape(kinds[name].text(value))}"' for name, value in changed.items())
