@@ -11,7 +11,7 @@ PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
 NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
 
-.PHONY: demo test lint wheel setup packages clean
+.PHONY: demo test lint wheel peers setup packages clean
 
 demo: setup
 	mkdir -p out
@@ -33,6 +33,10 @@ wheel: setup
 	$(BIN)/pip wheel --quiet --no-deps --no-build-isolation -w dist/raw .
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/auditwheel repair -w dist dist/raw/*.whl
 	sh tests/wheel.sh dist/*.whl
+
+# The hand-written C++ programs that the benchmarks run beside ours.
+peers: setup
+	$(BIN)/python -m tests.benchmarks.programs
 
 setup: packages $(VENV)/.installed
 

@@ -1,7 +1,7 @@
 """A frame of the Mandelbulb, against hand-written AVX-512 C++ on the same rays: ratios of CPU seconds in one
 run.
 
-python -m tests.benchmarks.frame.peer PATH/cpp_ref [rounds]
+python -m tests.benchmarks.frame.peer [rounds]
 
 Both render 800 x 600 pixels with Phong's shading from the same place, on two threads, in turns. Ours finds
 its depth by itself elsewhere; here it is pinned to the peer's ten steps.
@@ -9,8 +9,6 @@ its depth by itself elsewhere; here it is pinned to the peer's ten steps.
 
 from __future__ import annotations
 
-import json
-import subprocess
 import sys
 import tempfile
 import time
@@ -22,6 +20,8 @@ from fracslice.render.cpu import BLOCK, CpuTracer, ordered
 from fracslice.render.linking import link_frame, optics
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
+
+from ..programs import told
 
 WIDTH, HEIGHT, SAMPLES, STEPS = 800, 600, 16, 300
 
@@ -48,17 +48,16 @@ def ours(of: CpuTracer, pixels: np.ndarray) -> tuple[float, float]:
     return first, time.process_time() - start
 
 
-def peer(program: str) -> tuple[float, float]:
+def peer() -> tuple[float, float]:
     with tempfile.NamedTemporaryFile(suffix=".ppm") as file:
-        command = [program, "render", file.name, str(WIDTH), str(HEIGHT), str(SAMPLES), "1"]
-        found = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+        (found,) = told("frame", file.name, WIDTH, HEIGHT, SAMPLES, "--runs", 1, "--threads", 2)
     return found["cpu_s"], found["cpu16_s"]
 
 
-def main(program: str, rounds: int = 9) -> None:
+def main(rounds: int = 9) -> None:
     of, pixels = tracer(), ordered(WIDTH, HEIGHT)
     ours(of, pixels)
-    pairs = np.array([(*ours(of, pixels), *peer(program)) for _ in range(rounds)])
+    pairs = np.array([(*ours(of, pixels), *peer()) for _ in range(rounds)])
     mine, other = np.median(pairs[:, :2], 0), np.median(pairs[:, 2:], 0)
     ratios = np.median(pairs[:, :2] / pairs[:, 2:], 0)
     for name, a, b, ratio in zip(("first sample", f"{SAMPLES} samples"), mine, other, ratios, strict=True):
@@ -66,4 +65,4 @@ def main(program: str, rounds: int = 9) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], *map(int, sys.argv[2:]))
+    main(*map(int, sys.argv[1:]))

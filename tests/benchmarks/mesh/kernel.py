@@ -1,6 +1,9 @@
-"""Evaluations per second: the lanes against the same linked scene as scalar code, one core, one run.
+"""Evaluations per second on one core, in one run: the lanes, the same linked scene as scalar code, and
+hand-written C++ on the same points.
 
-`python -m tests.benchmarks.mesh.kernel [N]`: the grid of N^3 points (64) in the scene's box.
+`python -m tests.benchmarks.mesh.kernel [N]`: the centres of N^3 cells (64) of a cube around the scene, then
+those of them that are nearer to the surface than four cells ("band"). Ours carries a sign, a bound and the
+inside's level; the C++ returns 0 there.
 """
 
 from __future__ import annotations
@@ -17,11 +20,18 @@ from numba import njit
 from fracslice.formulas import Node, julia, mandelbulb, menger
 from fracslice.kernel import compile_scene, link
 
+from ..programs import told
+from ..tables import table
+
 SCENES = {
     "mandelbulb": mandelbulb(iterations=10),
     "julia": julia(iterations=12),
     "menger": menger(level=4),
 }
+WORKS = {"mandelbulb": ("W1", 1.2), "julia": ("W2", 1.5), "menger": ("W3", 1.2)}
+"""The peer's name for it, and half the side of its cube."""
+
+BAND = 4
 
 
 def scalar_words() -> dict[str, Callable[..., float]]:
@@ -68,18 +78,40 @@ def rate(run: Callable[[], object], count: int) -> float:
     return count / sorted(times)[2] / 1e6
 
 
+def points(root: Node, half: float, n: int) -> dict[str, np.ndarray]:
+    """The cells' centres [3, m] by the name of their set."""
+    h = 2 * half / n
+    axis = -half + (np.arange(n) + 0.5) * h
+    grid = np.stack([a.ravel() for a in np.meshgrid(axis, axis, axis, indexing="ij")])
+    near = np.abs(compile_scene(root, "float64").points(*grid)) < BAND * h
+    return {"grid": grid, "band": grid[:, near]}
+
+
 def main() -> None:
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 64
-    print(f"{'million evaluations/s, one core':34}{'lanes':>9}{'scalar':>9}{'ratio':>8}")
+    lines = [line for line in told("kernels", n) if "form" in line]
+    peers: dict[tuple[str, ...], float] = {}
+    for line in lines:
+        key = line["workload"], line["form"].split("_")[-1], line["points"]
+        peers[key] = max(peers.get(key, 0.0), line["million_per_s"])
+    rows = []
     for name, root in SCENES.items():
-        half = max(root.facts.box.hi)
-        axis = np.linspace(-half, half, n, dtype=np.float32)
-        x, y, z = (a.ravel() for a in np.meshgrid(axis, axis, axis, indexing="ij"))
-        kernel, scalar = compile_scene(root), scalar_kernel(root)
-        parameters, out = link(root).parameters.astype(np.float32), np.empty(x.size, np.float32)
-        fast = rate(lambda k=kernel, p=(x, y, z): k.points(*p), x.size)
-        slow = rate(lambda s=scalar, a=(parameters, x, y, z, out): s(*a), x.size)
-        print(f"{name + ' float32':34}{fast:9.1f}{slow:9.1f}{fast / slow:7.1f}x")
+        work, half = WORKS[name]
+        scalar, parameters = scalar_kernel(root), link(root).parameters
+        for which, centres in points(root, half, n).items():
+            for precision in ("float32", "float64"):
+                at, kernel = centres.astype(precision), compile_scene(root, precision)
+                fast = rate(lambda k=kernel, p=at: k.points(*p), at.shape[1])
+                told_of, peer = "", peers[work, precision, which]
+                if precision == "float32":
+                    out, given = np.empty(at.shape[1], np.float32), parameters.astype(np.float32)
+                    slow = rate(lambda s=scalar, a=(given, *at, out): s(*a), at.shape[1])
+                    told_of = f"{fast / slow:.1f}"
+                rows.append(
+                    (name, precision, which, f"{fast:.0f}", told_of, f"{peer:.0f}", f"{fast / peer:.2f}")
+                )
+    head = ("", "", "points", "million/s", "/ scalar Numba", "C++, million/s", "/ C++")
+    print(table(head, rows))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,6 @@
-"""Run time against error, ours and all peers that are installed: ``python -m tests.benchmarks.peers [--cpp
-FOLDER] [--repeat N] [--write]``.
+"""Run time against error, ours and all peers that are installed: ``python -m tests.benchmarks.peers``.
 
---cpp: where the C++ programs of `program` are. With --write the table and the picture go where
-docs/accuracy.md shows them.
+The C++ programs are built first. With --write the table and the picture go where docs/accuracy.md shows them.
 """
 
 from __future__ import annotations
@@ -37,17 +35,14 @@ NAMES = {
 HEAD = ("", "voxels", "", "error, voxels", "volume", "area", "CPU s", "triangles", "evaluations", "peak MB")
 
 
-def peers(programs: str | None) -> tuple[Peer, ...]:
+def peers() -> tuple[Peer, ...]:
     """The commands of all that can be run here."""
     run, asked = (sys.executable, "-m"), ("{workload}", "{resolution}", "{output}")
     found = [name for name in MESHERS if name != "pyopenvdb" and find_spec(name)]
     if subprocess.run([SYSTEM_PYTHON, "-c", "import pyopenvdb"], capture_output=True).returncode == 0:
         found.append("pyopenvdb")
     made = [Peer(NAMES[name], (*run, f"{__package__}.mesher", name, *asked)) for name in found]
-    if programs:
-        made += [
-            Peer(NAMES[form], (*run, f"{__package__}.program", form, *asked, programs)) for form in FORMS
-        ]
+    made += [Peer(NAMES[form], (*run, f"{__package__}.program", form, *asked)) for form in FORMS]
     return tuple(made)
 
 
@@ -70,13 +65,12 @@ def rows(found: list[Measurement]) -> list[list[str]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cpp")
     parser.add_argument("--repeat", type=int, default=1)
     parser.add_argument("--limit", type=float, default=20.0)
     parser.add_argument("--resolution", type=int, nargs="+", default=[32, 64, 128, 256])
     parser.add_argument("--write", action="store_true")
     given = parser.parse_args()
-    task = Task(WORKLOADS, tuple(given.resolution), peers(given.cpp), given.repeat, given.limit)
+    task = Task(WORKLOADS, tuple(given.resolution), peers(), given.repeat, given.limit)
     found = measure(task, Work())
     publish("peers", table(HEAD, rows(found)))
     with tempfile.TemporaryDirectory() as folder:

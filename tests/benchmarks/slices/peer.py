@@ -1,16 +1,12 @@
-"""512 slices of 1024 x 1024 of a Mandelbulb, beside a peer: ``python -m tests.benchmarks.slices.peer [PEER
-...]``.
+"""512 slices of 1024 x 1024 of a Mandelbulb, beside hand-written C++: ``python -m
+tests.benchmarks.slices.peer``.
 
-PEER: the command of a program that writes the same slices and prints a line of JSON with "wall_s", "cpu_s"
-and "evals". Both run in turn, five times; medians and their ratio are printed. The bulb fills [-1.2, 1.2]^3
-and has 10 iterations.
+Both run in turn, five times; medians and their ratio are printed. The bulb fills [-1.2, 1.2]^3 and has 10
+iterations.
 """
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -23,6 +19,8 @@ from fracslice.formulas import mandelbulb
 from fracslice.formulas.box import Box
 from fracslice.slicing import Layer, Slicer, Stack
 from fracslice.slicing.raster import Screen
+
+from ..programs import told
 
 SIDE, LAYERS, REACH, RUNS = 1024, 512, 1.2, 5
 
@@ -60,15 +58,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         ours(job, Path(folder))  # compiles
         for _ in range(RUNS):
-            results.append([ours(job, Path(folder))])
-            if sys.argv[1:]:
-                output = subprocess.check_output(sys.argv[1:], text=True)
-                results[-1].append(json.loads(output.splitlines()[-1]))
-    for name, runs in zip(("fracslice", "peer"), zip(*results, strict=True), strict=False):
+            results.append([ours(job, Path(folder)), *told("slices", Path(folder, "peer"), SIDE, LAYERS)])
+    for name, runs in zip(("fracslice", "C++"), zip(*results, strict=True), strict=True):
         print(name, {key: round(median(run[key] for run in runs), 3) for key in runs[0]})
-    if sys.argv[1:]:
-        for key in ("wall_s", "cpu_s", "evals"):
-            print(f"{key}: peer / fracslice = {median(r[1][key] / r[0][key] for r in results):.2f}")
+    for key in ("wall_s", "cpu_s", "evals"):
+        print(f"{key}: C++ / fracslice = {median(r[1][key] / r[0][key] for r in results):.2f}")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,46 @@
+"""The hand-written C++ peers of tests/benchmarks/cpp, built when they are needed: `make peers` does only that."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+SOURCE = Path(__file__).parent / "cpp"
+BUILD = Path(__file__).parents[2] / "build/peers"
+NAMES = ("kernels", "sparse", "vdb", "slices", "frame")
+
+
+def program(name: str) -> Path:
+    """The path of a peer's program, brought up to date.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        What CMake or the compiler says goes to standard error.
+    """
+    if not (BUILD / "build.ninja").exists():
+        _quietly("cmake", "-G", "Ninja", "-S", SOURCE, "-B", BUILD)
+    _quietly("cmake", "--build", BUILD, "--target", name)
+    return BUILD / name
+
+
+def told(name: str, *arguments: object) -> list[dict[str, Any]]:
+    """Runs a peer; the lines of JSON that it prints."""
+    idle = {**os.environ, "OMP_WAIT_POLICY": "passive"}  # else threads that wait count as CPU seconds
+    command = [program(name), *map(str, arguments)]
+    output = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=idle).stdout
+    return [json.loads(line) for line in output.splitlines()]
+
+
+def _quietly(*command: object) -> None:
+    ran = subprocess.run([*map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if ran.returncode:
+        raise SystemExit(ran.stdout)
+
+
+if __name__ == "__main__":
+    for each in NAMES:
+        print(program(each))
