@@ -1,29 +1,23 @@
-"""The CPU back end: a scene's field as machine code, from the cache or compiled once.
+"""The CPU back end: a scene's field as machine code.
 
-A kernel is an object file named by the hash of everything that made it. Loading one needs llvmlite but not
-Numba, and takes milliseconds; its functions are called with the interpreter unlocked, so plain threads scale.
+Loading it needs llvmlite but not Numba, and takes milliseconds; its functions are called with the interpreter
+unlocked, so plain threads scale.
 """
 
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
-import tempfile
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any, Literal, Protocol, overload
 
 import numpy as np
 
 from ..formulas.registry import Facts, Node
+from .host import lane_count
 from .linker import Linked, link
 from .loops import BRICKS, POINTS, Loop
-
-REGISTERS = 2
-"""How many are in flight at once, which hides the latency of the arithmetic."""
+from .objects import object_code
 
 Precision = Literal["float32", "float64"]
 
@@ -141,72 +135,15 @@ def compile_scene(root: Node | Compilable, precision: Precision = "float32") -> 
     return _kernel(linked.source, linked.parameters.tobytes(), precision)
 
 
-def cache_folder() -> Path:
-    """Where kernels are kept: $FRACSLICE_CACHE, else fracslice/ in the user's cache folder."""
-    given = os.environ.get("FRACSLICE_CACHE")
-    base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(given or Path(base) / "fracslice" / "kernels").expanduser()
-
-
-def lane_count(bits: int) -> int:
-    """How many points of this float width are evaluated at once."""
-    register = 512 if "+avx512f" in host()[1].split(",") else 256
-    return REGISTERS * register // bits
-
-
-@lru_cache(maxsize=1)
-def host() -> tuple[str, str]:
-    """The CPU's name and features, as LLVM spells them."""
-    import llvmlite.binding as llvm
-
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
-
-
-@lru_cache(maxsize=1)
-def _toolchain() -> str:
-    """Everything beside the scene that the machine code depends on."""
-    here = Path(__file__).parent
-    texts = [
-        (here / name).read_text() for name in ("registers.py", "lanes.py", "lanes_math.py", "compiler.py")
-    ]
-    versions = [version(p) for p in ("numba", "llvmlite")]
-    return "\n".join([*host(), *versions, *texts])
-
-
 def load_functions(
     linked: Linked, bits: int, width: int, loops: Sequence[Loop]
 ) -> dict[str, Callable[..., None]]:
-    """The C functions of loops over a linked scene, by name: from the cache, or compiled and kept there.
+    """The C functions of loops over a linked scene, by name.
 
     They take addresses and whole numbers, release the interpreter, and may run in many threads. Raises
     `KernelError`.
     """
-    parts = [linked.source, *(loop.source for loop in loops), str(bits), str(width), _toolchain()]
-    key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
-    path = cache_folder() / f"{key}.o"
-    try:
-        code = path.read_bytes()
-    except OSError:
-        from .compiler import Target, compile_object
-
-        code = compile_object(linked, Target(bits, width, REGISTERS, *host()), loops)
-        _keep(path, code)
-    return _functions(code, loops)
-
-
-def _keep(path: Path, code: bytes) -> None:
-    """Written beside and renamed, so that two processes cannot spoil it; a folder that cannot be written is
-    no error.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(code)
-        os.replace(file.name, path)
-    except OSError:
-        return
+    return _functions(object_code(linked, bits, width, loops), loops)
 
 
 _ENGINES: list[Any] = []

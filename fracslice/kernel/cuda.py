@@ -26,8 +26,9 @@ import numpy as np
 from ..errors import KernelError
 from ..formulas.registry import Node
 from . import cuda_source
-from .cpu import Precision, cache_folder
+from .cpu import Precision
 from .linker import Linked, link
+from .objects import cache_folder
 
 BLOCK = 128
 """Threads of a block."""

@@ -7,7 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..kernel.cpu import lane_count, load_functions
+from ..kernel.cpu import load_functions
+from ..kernel.host import lane_count
 from ..work import Work
 from .linking import Frame
 from .sequence import points

@@ -17,7 +17,8 @@ import numpy as np
 from ..formulas import vocabulary
 from ..formulas.registry import Node
 from ..kernel import Compilable, compile_scene
-from ..kernel.cpu import Precision, lane_count, load_functions
+from ..kernel.cpu import Precision, load_functions
+from ..kernel.host import lane_count
 from ..kernel.linker import Linked, link
 from ..kernel.loops import Loop
 from .root_loops import AIM, FIND, LEAD, POLISH

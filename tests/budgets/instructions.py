@@ -13,7 +13,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
-from fracslice.kernel.cpu import REGISTERS
+from fracslice.kernel.host import REGISTERS
 from fracslice.kernel.linker import Linked, link
 from fracslice.kernel.loops import POINTS, Loop
 
