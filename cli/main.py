@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
 import click
 
@@ -17,6 +18,7 @@ from fracslice.errors import (
     DeviceError,
     ExportError,
     FracsliceError,
+    FracsliceWarning,
     RenderError,
     SceneError,
     SliceError,
@@ -66,7 +68,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
     try:
-        return commands.main(arguments, prog_name="fracslice", standalone_mode=False) or 0
+        with warnings.catch_warnings():
+            warnings.showwarning = told
+            return commands.main(arguments, prog_name="fracslice", standalone_mode=False) or 0
     except click.UsageError as error:
         hint = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
         return say(error.format_message() + hint, error.exit_code)
@@ -83,6 +87,22 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush at exit
         return FAILED
+
+
+def told(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """A warning of ours as one line, any other as Python shows it."""
+    if issubclass(category, FracsliceWarning):
+        say(str(message), 0)
+    else:
+        text = warnings.formatwarning(message, category, filename, lineno, line)
+        click.echo(text, file or sys.stderr, nl=False)
 
 
 def say(message: str, status: int) -> int:

@@ -47,3 +47,7 @@ class BenchError(FracsliceError):
 
 class Cancelled(FracsliceError):  # noqa: N818  it is no fault
     """The caller asked to stop."""
+
+
+class FracsliceWarning(UserWarning):
+    """Something was done another way than might be expected; the result is right."""

@@ -8,12 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fracslice import MeshJob, Work, make_mesh
-from fracslice.errors import VolumeError
-from fracslice.formulas import mandelbulb
+from fracslice import MeshJob, Work, keys, make_mesh
+from fracslice.errors import FracsliceWarning, VolumeError
+from fracslice.formulas import Box, Node, mandelbulb, offset, sphere
+from fracslice.kernel import compile_scene, field_key
+from fracslice.printing.altered import Altered, Term
+from fracslice.printing.samples import Samples
 from fracslice.scene import scene
 from fracslice.store import Store
+from fracslice.volume import Lattice, Plan, sample, sample_scene
 
+BOX = Box((-1.25, -1.25, -1.25), (1.25, 1.25, 1.25))
 BULB = scene(mandelbulb(iterations=4), size="40mm", name="bulb")
 
 
@@ -41,6 +46,83 @@ def test_what_does_not_change_the_samples_does_not_make_them_again(tmp_path: Pat
     assert finer.report.evaluations > 0 and other.report.evaluations > 0
 
 
+def sampled(work: Work, *roots: Node) -> list[int]:
+    """The evaluations that sampling each of them takes: none, if it was kept."""
+    plans = [Plan(root, BOX, BOX, 0.1) for root in roots]
+    return [sample_scene(planned, work).evaluations for planned in plans]
+
+
+def test_samples_follow_from_what_is_known_of_a_field(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its text and its numbers being the same: its bounds say where it is looked at."""
+    work = Work(store=Store(tmp_path))
+    first, again = sampled(work, sphere(), sphere())
+    assert first > 0 == again
+    monkeypatch.setattr(sphere, "lipschitz", 1.5)
+    assert sampled(work, sphere())[0] > first
+    assert sampled(work, sphere()) == [0]
+    monkeypatch.setitem(sphere.hooks, "bounds", lambda _: Box((-2, -2, -2), (2, 2, 2)))
+    assert sampled(work, sphere())[0] > 0
+
+
+def test_samples_follow_from_the_guard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    work = Work(store=Store(tmp_path))
+    assert sampled(work, sphere())[0] > 0
+    monkeypatch.setattr(Node, "guard", lambda self: offset(self, distance=0.1))
+    assert sampled(work, sphere())[0] > 0
+
+
+@pytest.mark.parametrize("changed", ["formulas/primitives.py", "kernel/linker.py", "rows.py", "_native"])
+def test_what_is_kept_follows_from_the_program(
+    changed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = Path.read_bytes
+
+    def edited(self: Path) -> bytes:
+        return read(self) + b"#" * (changed in str(self))
+
+    before = keys.program()
+    monkeypatch.setattr(Path, "read_bytes", edited)
+    keys.program.cache_clear()
+    after = keys.program()
+    monkeypatch.undo()
+    keys.program.cache_clear()
+    assert after != before == keys.program()
+
+
+def test_keys_tell_arrays_of_other_shapes_and_types_apart() -> None:
+    a = np.zeros((2, 3), np.float32)
+    parts = [(a,), (a.T,), (a.astype(np.int32),), (a, a), ("a", "b"), ("ab",), (1,), (1.0,), (True,), (b"1",)]
+    assert len({keys.key(*p) for p in parts}) == len(parts)
+    assert keys.key(a.T) == keys.key(np.ascontiguousarray(a.T))
+
+
+def test_what_is_altered_is_kept_and_known_by_all_its_parts(tmp_path: Path) -> None:
+    work, near = Work(store=Store(tmp_path)), Lattice.around(BOX, 0.2)
+    inner = [sample(compile_scene(s), s.facts, near) for s in (sphere(radius=0.5), sphere(radius=0.6))]
+    roots = [Altered(sphere(), (Term(Samples(bricks), does),)) for bricks in inner for does in ("cut", "add")]
+    assert len({field_key(root) for root in roots}) == len(roots)
+    planned = Plan(roots[0], BOX, BOX, 0.1)
+    found = [sample_scene(planned, work) for _ in range(2)]
+    assert found[0].evaluations > 0 == found[1].evaluations
+    assert found[0].values.tobytes() == found[1].values.tobytes()
+
+
+def test_a_folder_that_others_can_write_is_not_used(tmp_path: Path) -> None:
+    store, made = Store(tmp_path / "kept"), []
+    for mode in (0o755, 0o777):
+        for _ in range(2):
+            store.get(("x",), lambda: made.append(1) or {"a": np.arange(5)})
+        (tmp_path / "kept").chmod(mode)
+    assert len(made) == 1
+    with pytest.warns(FracsliceWarning, match="others can write in this folder: what is kept in"):
+        store.get(("x",), lambda: made.append(1) or {"a": np.arange(6)})
+    assert len(made) == 2
+    (tmp_path / "kept").chmod(0o700)
+    assert len(store.get(("x",), dict)["a"]) == 5
+
+
 def test_a_spoilt_file_is_made_again(tmp_path: Path) -> None:
     store, made = Store(tmp_path), []
 
@@ -48,10 +130,12 @@ def test_a_spoilt_file_is_made_again(tmp_path: Path) -> None:
         made.append(1)
         return {"a": np.arange(5)}
 
-    for spoil in (b"", b"no archive", None):
+    for spoil in (b"", b"no archive", b"\x00", None):
         store.get(("x", 1), make)
         (path,) = tmp_path.iterdir()
-        path.write_bytes(path.read_bytes()[:-9] if spoil is None else spoil)
+        whole = path.read_bytes()
+        flipped = whole[:150] + bytes([whole[150] ^ 1]) + whole[151:]
+        path.write_bytes(whole[:-9] if spoil is None else flipped if spoil == b"\x00" else spoil)
         count = len(made)
         assert (store.get(("x", 1), make)["a"] == np.arange(5)).all()
         assert len(made) == count + 1

@@ -1,16 +1,19 @@
-"""Files that are whole or not there: written beside the target, then renamed."""
+"""Files that are whole or not there, brought to the disk, and errors of the file system in words."""
 
 from __future__ import annotations
 
 import errno
 import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
+from fracslice import files
 from fracslice.errors import ExportError
+
+ANYONE = 0o666
+"""What the umask allows."""
 
 
 def check_target(path: str | Path) -> Path:
@@ -32,24 +35,18 @@ def check_target(path: str | Path) -> Path:
 def replacing(path: str | Path) -> Iterator[BinaryIO]:
     """Open a file that appears at `path` complete when the block ends, and never otherwise.
 
-    The bytes go to a hidden temporary file in the same folder, to the disk, and only then to their name. Any
-    error, KeyboardInterrupt too, removes the temporary file and leaves what was at `path` before. Raises
-    ExportError for what the file system refuses.
+    As `fracslice.files.replacing`, and on the disk before it gets its name; what was at `path` leaves its
+    permissions. Raises ExportError for what the file system refuses.
     """
     target = check_target(path)
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=".part", dir=target.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                yield file
-                file.flush()
-                os.fsync(file.fileno())
-            os.chmod(name, _mode(target))
-            os.replace(name, target)
-        except BaseException:
-            with suppress(FileNotFoundError):
-                os.unlink(name)
-            raise
+        before = target.stat().st_mode & 0o7777 if target.exists() else None
+        with files.replacing(target, ANYONE if before is None else files.OWNER_ONLY) as file:
+            yield file
+            file.flush()
+            if before is not None:
+                os.fchmod(file.fileno(), before)
+            os.fsync(file.fileno())
         _settle(target.parent)
     except OSError as error:
         raise ExportError(f"{path}: {reason(error)}") from error
@@ -59,21 +56,12 @@ def put(path: str, data: bytes) -> None:
     """Writes a file in as few calls as can be: one of many, of which what an error leaves is looked at before
     it is used. It is neither renamed into place nor forced to the disk.
     """
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, ANYONE)
     try:
         while data:
             data = data[os.write(handle, data) :]
     finally:
         os.close(handle)
-
-
-def _mode(target: Path) -> int:
-    """The permissions the target has, or those a new file gets (mkstemp gives it to its owner alone)."""
-    if target.exists():
-        return target.stat().st_mode & 0o7777
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
 
 
 def _settle(folder: Path) -> None:

@@ -45,6 +45,10 @@ class Compilable(Protocol):
     @property
     def facts(self) -> Facts: ...
 
+    @property
+    def key(self) -> str:
+        """As `identity.field_key`."""
+
     def guard(self) -> Compilable: ...
 
     def compiled(self, precision: Precision, /) -> Kernel: ...

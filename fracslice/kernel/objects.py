@@ -4,61 +4,64 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import BinaryIO
 
+from ..files import Kept, users_folder
+from ..formulas import vocabulary
+from ..keys import key, texts
 from .host import REGISTERS, host
 from .linker import Linked
 from .loops import Loop
 
+DIGEST = hashlib.sha256().digest_size
+
 
 def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> bytes:
-    """The object file of loops over a linked scene: from the cache, or compiled and kept there.
+    """The object file of loops over a linked scene: the one kept, or compiled now and kept.
 
-    Raises `KernelError`.
+    One that others could have written is not used. Raises `KernelError`.
     """
-    parts = [linked.source, *(loop.source for loop in loops), str(bits), str(width), _toolchain()]
-    key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
-    path = cache_folder() / f"{key}.o"
-    try:
-        code = path.read_bytes()
-    except OSError:
+    kept, name = Kept(cache_folder()), f"{key(linked.source, tuple(loops), bits, width, toolchain())}.o"
+    code = kept.get(name, _read)
+    if code is None:
         from .compiler import Target, compile_object
 
         code = compile_object(linked, Target(bits, width, REGISTERS, *host()), loops)
-        _keep(path, code)
+        sealed = hashlib.sha256(code).digest() + code
+        with suppress(OSError):
+            kept.put(name, lambda file: file.write(sealed))
     return code
 
 
 def cache_folder() -> Path:
-    """Where kernels are kept: $FRACSLICE_CACHE, else fracslice/ in the user's cache folder."""
+    """Where kernels are kept: $FRACSLICE_CACHE, else a folder in the user's cache folder."""
     given = os.environ.get("FRACSLICE_CACHE")
-    base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(given or Path(base) / "fracslice" / "kernels").expanduser()
+    return Path(given).expanduser() if given else users_folder("XDG_CACHE_HOME", "~/.cache") / "kernels"
 
 
 @lru_cache(maxsize=1)
-def _toolchain() -> str:
-    """Everything beside the scene that the machine code depends on."""
-    here = Path(__file__).parent
-    texts = [
-        (here / name).read_text() for name in ("registers.py", "lanes.py", "lanes_math.py", "compiler.py")
-    ]
+def toolchain() -> str:
+    """The key of everything beside the linked text that machine code depends on."""
+    own = texts(*sorted(Path(__file__).parent.glob("*.py")), Path(vocabulary.__file__))
     versions = [version(p) for p in ("numba", "llvmlite")]
-    return "\n".join([*host(), *versions, *texts])
+    return key(own, host(), sys.implementation.cache_tag, *versions, *numba_settings())
 
 
-def _keep(path: Path, code: bytes) -> None:
-    """Written beside and renamed, so that two processes cannot spoil it; a folder that cannot be written is
-    no error.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(code)
-        os.replace(file.name, path)
-    except OSError:
-        return
+def numba_settings() -> list[str]:
+    """What Numba is told to do otherwise: its variables and its file in the current folder."""
+    told = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
+    with suppress(OSError):
+        told.append(repr(Path(".numba_config.yaml").read_bytes()))
+    return told
+
+
+def _read(file: BinaryIO) -> bytes | None:
+    """The code in a file; None where it is not whole: what loads it would end the process."""
+    digest, code = file.read(DIGEST), file.read()
+    return code if hashlib.sha256(code).digest() == digest else None

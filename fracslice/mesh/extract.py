@@ -57,7 +57,7 @@ def contour(root: Node | Compilable, bricks: Bricks | SignBricks, work: Work | N
         (piece,) = contour_pieces(root, signs, work, len(bricks))
         return {"vertices": piece.mesh.vertices, "triangles": piece.mesh.triangles}
 
-    parts = ("surface", bricks.origin, bricks.voxel, bricks.index.shape, bricks.ijk, signs.signs)
+    parts = ("surface", bricks.origin, bricks.voxel, bricks.index, bricks.ijk, signs.signs)
     return Mesh(**stored(work.store, parts, root, made))
 
 

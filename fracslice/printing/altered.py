@@ -12,8 +12,9 @@ import numpy as np
 
 from ..formulas import Box, Node, difference, intersection, union
 from ..formulas.registry import Facts
-from ..kernel import Compilable, Kernel, compile_scene
+from ..kernel import Compilable, Kernel, compile_scene, field_key
 from ..kernel.cpu import Precision
+from ..keys import key
 from .wrapped import Wrapped
 
 if TYPE_CHECKING:
@@ -53,6 +54,12 @@ class Altered:
         own = self.root.facts
         box = reduce(Box.__or__, added, own.box)
         return Facts(box, max(own.lipschitz, *slopes), own.weak)
+
+    @property
+    def key(self) -> str:
+        """What it is known by, as `kernel.field_key`."""
+        shapes = [field_key(t.shape) if isinstance(t.shape, Node) else t.shape.key for t in self.terms]
+        return key(field_key(self.root), *((t.does, s) for t, s in zip(self.terms, shapes, strict=True)))
 
     def guard(self) -> Altered:
         """What space is skipped by, as `Node.guard`. What is cut away is not: less of it is more of all."""

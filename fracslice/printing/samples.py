@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numba import njit
 
 from ..formulas.box import Box
 from ..formulas.registry import Facts
+from ..keys import key
 from ..volume import Bricks
 from ..volume.bricks import INSIDE
 from ..volume.grid import from_grid, to_grid
@@ -39,6 +41,12 @@ class Samples:
         lo = np.asarray(self.bricks.origin)
         hi = lo + self.bricks.voxel * BRICK * np.array(self.bricks.index.shape)
         return Box(tuple(lo.tolist()), tuple(hi.tolist()))
+
+    @cached_property
+    def key(self) -> str:
+        """What it is known by, as `kernel.field_key`."""
+        b = self.bricks
+        return key(b.origin, b.voxel, b.ijk, b.values, b.index)
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Values at points, float64 of their shape."""

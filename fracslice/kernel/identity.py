@@ -1,0 +1,23 @@
+"""What a field is known by."""
+
+from __future__ import annotations
+
+from ..formulas.registry import Node
+from ..keys import key
+from .cpu import Compilable
+from .linker import link
+
+
+def field_key(root: Node | Compilable) -> str:
+    """The key of all that a field's values, and what is known of them, follow from.
+
+    Of the scene itself and of its guard: the linked text, the parameters and the facts. Depths must be
+    resolved; raises `KernelError`.
+    """
+    if not isinstance(root, Node):
+        return root.key
+    parts: list[object] = []
+    for node in (root, root.guard()):
+        linked = link(node)
+        parts += [linked.source, linked.parameters, node.facts]
+    return key(*parts)

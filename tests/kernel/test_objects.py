@@ -1,0 +1,161 @@
+"""Machine code that is kept: its name says all that it was made of, and nobody else's is run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fracslice.errors import FracsliceWarning
+from fracslice.formulas import sphere
+from fracslice.kernel import compiler, objects
+from fracslice.kernel.linker import Linked, link
+from fracslice.kernel.loops import POINTS, Loop
+from fracslice.kernel.objects import object_code
+
+LINKED = link(sphere())
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "kernels"))
+    return tmp_path / "kernels"
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """What was compiled: a stand-in for machine code, another one each time."""
+    made: list[bytes] = []
+
+    def compile_object(linked: Linked, target: compiler.Target, loops: Sequence[Loop]) -> bytes:
+        made.append(b"code %d" % len(made))
+        return made[-1]
+
+    monkeypatch.setattr(compiler, "compile_object", compile_object)
+    return made
+
+
+def code(linked: Linked = LINKED, bits: int = 32, loops: Sequence[Loop] = (POINTS,)) -> bytes:
+    return object_code(linked, bits, 16, loops)
+
+
+def test_it_is_compiled_once_for_this_user_alone(folder: Path, compiled: list[bytes]) -> None:
+    assert code() == code() == b"code 0"
+    assert folder.stat().st_mode & 0o777 == 0o700
+    (kept,) = folder.iterdir()
+    assert kept.suffix == ".o"
+    assert kept.stat().st_mode & 0o777 == 0o600
+
+
+def test_it_is_known_by_all_that_it_was_made_of(
+    folder: Path, compiled: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code()
+    code(bits=64)
+    code(loops=[replace(POINTS, arguments="rrrrin")])
+    code(Linked(LINKED.source + "#", LINKED.parameters))
+    monkeypatch.setenv("NUMBA_OPT", "0")
+    objects.toolchain.cache_clear()
+    code()
+    objects.toolchain.cache_clear()
+    assert len(compiled) == 5
+
+
+def others_write(path: Path) -> None:
+    path.chmod(path.stat().st_mode | 0o002)
+
+
+def group_writes(path: Path) -> None:
+    path.chmod(path.stat().st_mode | 0o020)
+
+
+def given_away(path: Path) -> None:
+    if os.geteuid():
+        pytest.skip("only root can give files away")
+    os.chown(path, 12345, 12345)
+
+
+@pytest.mark.parametrize("spoil", [others_write, group_writes, given_away])
+@pytest.mark.parametrize("what", ["folder", "file"])
+def test_what_others_can_write_is_compiled_anew(
+    what: str, spoil: object, folder: Path, compiled: list[bytes]
+) -> None:
+    assert callable(spoil)
+    code()
+    (kept,) = folder.iterdir()
+    spoil(folder if what == "folder" else kept)
+    with pytest.warns(FracsliceWarning, match=f"others can write .*what is kept in {folder} is not used"):
+        assert code() == b"code 1"
+    assert what == "folder" or code() == b"code 1"  # it is in its place
+    assert [p.name for p in folder.iterdir()] == [kept.name]
+
+
+def test_a_folder_above_that_others_can_write_is_not_trusted(folder: Path, compiled: list[bytes]) -> None:
+    code()
+    folder.parent.chmod(0o777)
+    with pytest.warns(FracsliceWarning, match=f"{folder.parent}: others can write"):
+        assert code() == b"code 1"
+    folder.parent.chmod(0o1777)  # as /tmp: what is there stays its owner's
+    assert code() == b"code 0"
+
+
+def test_a_link_or_a_pipe_is_not_followed(folder: Path, compiled: list[bytes], tmp_path: Path) -> None:
+    code()
+    (kept,) = folder.iterdir()
+    kept.rename(tmp_path / "elsewhere")
+    kept.symlink_to(tmp_path / "elsewhere")
+    assert code() == b"code 1"
+    kept.unlink()
+    os.mkfifo(kept, 0o600)
+    with pytest.warns(FracsliceWarning, match="others can write"):
+        assert code() == b"code 2"
+
+
+@pytest.mark.parametrize("spoilt", [b"", b"code 0", b"x" * 32 + b"code 0"])
+def test_a_spoilt_file_is_compiled_anew(spoilt: bytes, folder: Path, compiled: list[bytes]) -> None:
+    code()
+    (kept,) = folder.iterdir()
+    kept.write_bytes(spoilt)
+    assert code() == code() == b"code 1"
+
+
+def test_a_folder_that_cannot_be_is_no_error(compiled: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("FRACSLICE_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", "~no such user/cache")
+    assert code() == b"code 0"
+
+
+def test_threads_may_make_the_same_at_once(folder: Path) -> None:
+    with ThreadPoolExecutor(4) as pool:
+        made = list(pool.map(lambda _: code(), range(4)))
+    assert len(list(folder.iterdir())) == 1
+    assert code() in made
+
+
+def test_planted_code_does_not_run_and_is_told_of_once(folder: Path, tmp_path: Path) -> None:
+    """In a folder that all can write: a box under the name of a sphere."""
+
+    def values(*shapes: str) -> subprocess.CompletedProcess[str]:
+        program = (
+            "from fracslice.formulas import box, sphere; from fracslice.kernel import compile_scene\n"
+            f"for shape in ({', '.join(shapes)},): print(compile_scene(shape).points(1.0, 1.0, 0.0))"
+        )
+        return subprocess.run([sys.executable, "-c", program], text=True, capture_output=True, check=True)
+
+    values("box()")
+    (planted,) = folder.iterdir()
+    planted.rename(tmp_path / "planted")
+    right = values("sphere()").stdout
+    (kept,) = folder.iterdir()
+    (tmp_path / "planted").rename(kept)
+    assert values("sphere()").stdout != right  # it would run
+    folder.chmod(0o1777)
+    found = values("sphere()", "sphere(radius=0.5)", "box()")
+    assert found.stdout.startswith(right)
+    assert found.stderr.count("FracsliceWarning: ") == 1
