@@ -63,6 +63,12 @@ class Box:
     def grown(self, by: float) -> Box:
         return Box(_triple(a - by for a in self.lo), _triple(b + by for b in self.hi))
 
+    def about(self, middle: Triple) -> Box:
+        """The smallest box with this middle that encloses it."""
+        half = [max(m - a, b - m) for m, a, b in zip(middle, self.lo, self.hi, strict=True)]
+        lo, hi = (_triple(m + s * h for m, h in zip(middle, half, strict=True)) for s in (-1, 1))
+        return Box(lo, hi)
+
     def radius(self, *axes: int) -> float:
         """The greatest distance from the line or point where all `axes` are zero (default: the origin)."""
         if self.empty:

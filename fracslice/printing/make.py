@@ -14,8 +14,7 @@ import numpy as np
 
 from ..errors import VolumeError
 from ..formulas import Box, Node, box, cylinder, plane, transform
-from ..formulas.box import Triple
-from ..kernel import Compilable, compile_scene
+from ..kernel import Compilable
 from ..scene import Print
 from ..volume import Bricks, Plan, extent
 from ..volume.grid import from_grid, to_grid
@@ -91,7 +90,7 @@ class _Run:
 
     def bound(self) -> None:
         """Finds how large the object is now."""
-        found = extent(compile_scene(self.thing), self.thing.facts, self.work)
+        found = extent(self.thing, max(self.planned.box.size) / self.planned.voxel, self.work)
         self.planned = replace(self.planned, box=found.box, outer=found.outer)
 
     def weigh(self) -> None:
@@ -125,7 +124,7 @@ class _Run:
         if self.grown:
             middle = self.planned.outer.centre
             self.bound()
-            self.planned = replace(self.planned, outer=_around(middle, self.planned.outer))
+            self.planned = replace(self.planned, outer=self.planned.outer.about(middle))
         if how.hollow:
             yield "hollowing", self.hollowed
 
@@ -272,13 +271,6 @@ def _large(parts: Parts) -> np.ndarray:
     return np.asarray(bodies[parts.count[bodies] > DUST * parts.count[parts.inside].sum()])
 
 
-def _around(middle: Triple, box: Box) -> Box:
-    """A box that encloses another, with a middle that is given: samples stay where they were."""
-    half = np.maximum(np.subtract(middle, box.lo), np.subtract(box.hi, middle))
-    lo, hi = np.subtract(middle, half).tolist(), np.add(middle, half).tolist()
-    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
-
-
 def _standing(made: Plan, how: Print, scale: float) -> Plan:
     """With its bottom cut off and a raft under it.
 
@@ -301,5 +293,5 @@ def _standing(made: Plan, how: Print, scale: float) -> Plan:
         rim = max(found.size) / 10
         lying = Box((x0 - rim, y0 - rim, z0 - raft / 2), (x1 + rim, y1 + rim, z0 + raft / 2))
         thing = altered(thing, "add", transform(box(size=lying.size), translate=lying.centre))
-        found, outer = found | lying, _around(outer.centre, outer | lying)
+        found, outer = found | lying, (outer | lying).about(outer.centre)
     return replace(made, root=thing, box=found, outer=outer)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..formulas.box import Box
 from ..formulas.registry import Facts, Node
-from ..kernel import Compilable, Kernel, compile_scene
+from ..kernel import Compilable, Kernel
 from ..kernel.depth import resolve_depths, visible
 from ..kernel.devices import compile_for
 from ..store import Arrays, stored
@@ -52,7 +52,7 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
     size, finite = max(root.facts.box.size), root.facts.box.finite
     while True:
         rough = resolve_depths(root, size / resolution) if finite else root
-        found = extent(compile_scene(rough), rough.facts, work)
+        found = extent(rough, resolution, work)
         # A step more makes a solid of a large bailout much smaller, and then its depth was chosen too low.
         if rough is root or max(found.box.size) > size / 4:
             break

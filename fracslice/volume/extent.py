@@ -1,4 +1,4 @@
-"""How large the object itself is: branch and bound on the field."""
+"""How large the object itself is: what is proved of its six sides, and how near it comes to that."""
 
 from __future__ import annotations
 
@@ -8,134 +8,145 @@ import numpy as np
 
 from ..errors import VolumeError
 from ..formulas.box import Box
-from ..formulas.registry import Facts
-from ..kernel import Kernel
+from ..formulas.registry import Node
+from ..kernel import Compilable, compile_scene
 from ..work import Work
-from .values import values_at
+from .sides import UNKNOWN, Field, Side
+
+TURNS = 8
+"""How often what is searched is made larger, for the object goes on there, or smaller."""
+
+MARGIN = 1 / 14
+"""Of the longest side: how far beyond the box that formulas promise is searched."""
 
 FIRST = 16
-"""Cells along each axis of the first level; the outermost lie beyond the box that the formulas promise."""
+"""Points along each axis that are looked at first."""
 
-LEVELS = 9
-GROWTHS = 6
-MOST = 1_000_000
-"""Cells of the last level; a flat face has ever more of them."""
+SHIFT = np.array([[0.5497], [0.2451], [0.4302]])
+"""Of a step: where they lie, which is in no plane of symmetry."""
 
-STARTS = 16
+BOLD = 0.15, 0.4
+"""Of the bound of an escape-time fractal, by which its values are a fifth of the distance: shares by
+which its tips are looked for before anything is proved.
+"""
+
+SHARE = 0.25
+"""Of a voxel: how near sides are proved, if `MOST` columns do; and `FINER` times finer while `LITTLE` do."""
+
+FINER = 16
+LITTLE, MOST = 1 << 14, 1 << 17
+
+EXACT = 2.5e-7
+"""Of the longest side: the last step that tips are taken outwards."""
+
 STEPS = 256
-EXACT = 1e-6
-"""Of the longest side: the last step that the outermost points known take outwards."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Extent:
-    """The object's box, as near as it was found, and a box that surely encloses it."""
+    """The object's box, as near as it was found; one with the same middle that surely encloses it; and the
+    points of the object that are farthest out along -x, -y, -z, x, y and z: float64 [3, 6].
+    """
 
     box: Box
     outer: Box
+    tips: np.ndarray
 
 
-def extent(kernel: Kernel, facts: Facts, work: Work | None = None) -> Extent:
-    """The box of the points where the field is negative: smooth faces and edges to 1e-6 of the longest side,
-    the tips of a fractal to 1/4000 or better.
+def extent(root: Node | Compilable, resolution: float, work: Work | None = None) -> Extent:
+    """The box of the points where a scene's field is negative.
 
-    Cells that cannot be inside (``f > L * half diagonal``), or that do not reach beyond an inside point known
-    already, are dropped; the rest are cut in eight. Then the surface is climbed from the outermost inside
-    points. The box that the formulas promise is doubled as long as the object reaches its border (an offset
-    or smooth union of a field that underestimates distances can).
-    Raises `VolumeError` if nothing is inside, or the object has no end.
+    resolution: voxels along the longest side. Nothing is farther than a quarter of a voxel outside the box,
+    as the scene's bound proves; where that takes too much (a bound that is far too large, something as thin
+    as paper) the outer box is larger. Smooth faces, edges and tips are found to 1e-6 of the longest side. The
+    box that the formulas promise is doubled as long as the object goes on beyond it (an offset or smooth
+    union of a field that underestimates distances can). Raises `VolumeError` if nothing is inside, or the
+    object has no end.
     """
-    box = facts.box
+    box, found = root.facts.box, None
     if box.empty:
         raise VolumeError("the scene is empty: its elements have no point in common")
     if not box.finite:
         axes = [a for a, s in zip("xyz", box.size, strict=True) if not np.isfinite(s)]
         raise VolumeError(f"the scene has no end along {' and '.join(axes)}; put <bounds> around it")
-    for _ in range(GROWTHS):
-        found = _search(kernel, facts, box, work or Work())
-        if found:
+    guard, work = root.guard(), work or Work()
+    facts = guard.facts
+    field = Field(compile_scene(root), compile_scene(guard), facts.lipschitz, not facts.weak, work)
+    for _ in range(TURNS):
+        found = _search(field, box, resolution)
+        if found and max(found.outer.size) > max(box.size) / 2:
             return found
-        box = box.grown(max(box.size) / 2)
-    raise VolumeError("the object has no end that could be found; put <bounds> around it")
+        box = found.outer if found else box.grown(max(box.size) / 2)
+    if not found:
+        raise VolumeError("the object has no end that could be found; put <bounds> around it")
+    return found
 
 
-def _search(kernel: Kernel, facts: Facts, box: Box, work: Work) -> Extent | None:
-    """The object's extent within `box`; None if it reaches into the cells on the border."""
+def _search(field: Field, box: Box, resolution: float) -> Extent | None:
+    """The object's extent, if it is in `box`; None if it goes on beyond it."""
     longest = max(box.size) or 1.0
-    half = np.maximum(np.array(box.size), longest * 1e-3) / 2 * FIRST / (FIRST - 2)
-    step = 2 * half / FIRST
-    cells = np.indices((FIRST,) * 3).reshape(3, -1)
-    centres = np.array(box.centre)[:, None] - half[:, None] + step[:, None] * (cells + 0.5)
-    rim = ((cells == 0) | (cells == FIRST - 1)).any(0)
-    lo, hi, starts = np.full(3, np.inf), np.full(3, -np.inf), np.empty((4, 0))
-    offsets = np.array(np.meshgrid(*[(-0.25, 0.25)] * 3)).reshape(3, 1, 8)
-    for level in range(LEVELS):
-        f = values_at(kernel, centres, work)
-        inside = f < 0
-        if level == 0 and (inside & rim).any():
-            return None
-        if inside.any():
-            lo, hi = np.minimum(lo, centres[:, inside].min(1)), np.maximum(hi, centres[:, inside].max(1))
-            starts = _outermost(np.column_stack([starts, [*centres[:, inside], f[inside]]]))
-        possible = ~(f > facts.lipschitz * np.linalg.norm(step) / 2)
-        reach = step[:, None] / 2
-        beyond = ((centres + reach > hi[:, None]) | (centres - reach < lo[:, None])).any(0)
-        centres = centres[:, possible & beyond]
-        if level == LEVELS - 1 or (8 * centres.shape[1] > MOST and level > 3):
+    region = box.grown(MARGIN * longest)
+    sides = [Side(field, region, axis, sign, UNKNOWN) for sign in (-1, 1) for axis in range(3)]
+    cells = (np.indices((FIRST,) * 3).reshape(3, -1) + SHIFT) / FIRST
+    points = np.array(box.lo)[:, None] + cells * np.array(box.size)[:, None]
+    _learn(sides, points[:, field.inside(points)])
+    step, aim, exact, most = longest / FIRST, SHARE * longest / resolution, EXACT * longest, MOST
+    for share in () if field.far else BOLD:
+        _climb(field, sides, step, exact)
+        for side in sides:
+            side.guess(share, exact, LITTLE)
+    while True:
+        _climb(field, sides, step, exact)
+        for side in sides:
+            side.prove(aim, most)
+        if not np.isfinite([side.known for side in sides]).all():
+            raise VolumeError("there is no surface: nothing in the scene is inside")
+        _learn(sides, np.stack([side.tip for side in sides], 1))
+        if aim <= exact or all(side.spent >= LITTLE for side in sides):
             break
-        centres = (centres[:, :, None] + offsets * step[:, None, None]).reshape(3, -1)
-        step = step / 2
-    if not (lo <= hi).all():
-        raise VolumeError("there is no surface: nothing in the scene is inside")
-    outer_lo = np.minimum(lo, centres.min(1, initial=np.inf)) - step / 2
-    outer_hi = np.maximum(hi, centres.max(1, initial=-np.inf)) + step / 2
-    reach = _climbed(kernel, starts, float(step.max()), work)
-    lo, hi = np.minimum(lo, -reach[0]), np.maximum(hi, reach[1])
-    return Extent(_box(lo, hi), _box(np.minimum(outer_lo, lo), np.maximum(outer_hi, hi)))
+        step, aim, most = aim, max(aim / FINER, exact), LITTLE
+    _climb(field, sides, aim, exact)
+    way, limits = np.array([[-1], [1]]), np.array([box.lo, box.hi])
+    reach = way * np.reshape([side.known for side in sides], (2, 3))
+    above = way * np.reshape([side.above for side in sides], (2, 3))
+    if (way * (reach - limits) > MARGIN / 2 * longest).any():
+        return None
+    found = _box(np.where(np.abs(reach - limits) <= 2 * exact, limits, reach + way * exact / 2))
+    outer = _box(above) | found.grown(exact)
+    return Extent(found, outer.about(found.centre), np.stack([side.tip for side in sides], 1))
 
 
-def _outermost(found: np.ndarray) -> np.ndarray:
-    """Of points and their values [4, n] those from which the surface is farthest out along an axis, if values
-    are distances; `STARTS` for each side of each axis.
+def _learn(sides: list[Side], points: np.ndarray) -> None:
+    for side in sides:
+        side.learn(points)
+
+
+def _climb(field: Field, sides: list[Side], first: float, exact: float) -> None:
+    """Takes all sides' tips outwards as far as they go.
+
+    Steps outwards, straight or aslant, are taken as long as they end inside, `first` long at first, then
+    shorter ones down to `exact` (pattern search: Hooke and Jeeves 1961). All sides at once.
     """
-    reach = np.concatenate([found[:3] + found[3], -found[:3] + found[3]])
-    order = np.argsort(reach, axis=1, kind="stable")[:, :STARTS]
-    chosen: np.ndarray = found[:, np.unique(order)]
-    return chosen
-
-
-def _climbed(kernel: Kernel, starts: np.ndarray, first: float, work: Work) -> np.ndarray:
-    """How far the object reaches along each axis, downwards and upwards: [2, 3].
-
-    starts: inside points and their values [4, n]. From those nearest to a side steps outwards, straight or
-    aslant, are taken as long as they end inside, `first` long at first, then shorter ones (pattern search:
-    Hooke and Jeeves 1961). All sides at once.
-    """
-    exact = EXACT * float(np.ptp(starts[:3], axis=1).max())
     slants = 0.1 ** np.arange(0, 3.5, 0.5)
     aslant = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), slants)).reshape(3, -1)
-    # [side, coordinate, way], and [side, coordinate, point, way]
-    ways = np.stack([side * np.roll(aslant, axis - 2, 0) for side in (-1, 1) for axis in range(3)])
-    outwards = np.concatenate([-starts[:3], starts[:3]])
-    order = np.argsort(starts[3] - outwards, axis=1, kind="stable")[:, :STARTS]
-    here = np.moveaxis(starts[:3, order], 0, 1)[..., None]
-    step = np.full((6, 1, 1, 1), first)
+    # [coordinate, side, start, way]
+    ways = np.stack([side.sign * np.roll(aslant, side.axis - 2, 0) for side in sides], 1)[:, :, None]
+    here, step = np.stack([side.best for side in sides], 1), np.full(len(sides), first)
     for _ in range(STEPS):
-        tried = here + step * ways[:, :, None, :]
-        points = np.moveaxis(tried, 1, 0)
-        inside = values_at(kernel, points.reshape(3, -1), work).reshape(points.shape[1:]) < 0
-        gain = np.where(inside, aslant[2], 0.0)[:, None]
-        best = gain.argmax(3, keepdims=True)
-        here = np.where(gain.max(3, keepdims=True) > 0, np.take_along_axis(tried, best, 3), here)
-        stuck = ~gain.any((2, 3), keepdims=True)
+        tried = here[..., None] + step[:, None, None] * ways
+        inside = field.inside(tried.reshape(3, -1)).reshape(tried.shape[1:])
+        gain = np.where(inside, aslant[2], 0.0)
+        best = gain.argmax(2)
+        free = np.take_along_axis(inside, best[..., None], 2)[..., 0]
+        here = np.where(free, np.take_along_axis(tried, best[None, ..., None], 3)[..., 0], here)
+        stuck = ~free.any(1)
         if (stuck & (step < exact)).all():
             break
         step[stuck & (step >= exact)] /= 2
-    # The face lies between that point and the next one, half a step on average.
-    ahead = np.stack([here[side, side % 3, :, 0] for side in range(6)]).reshape(2, 3, -1)
-    reach: np.ndarray = (ahead * [[[-1]], [[1]]]).max(2) + step.reshape(2, 3) / 2
-    return reach
+    for side, points in zip(sides, here.swapaxes(0, 1), strict=True):
+        side.learn(points)
 
 
-def _box(lo: np.ndarray, hi: np.ndarray) -> Box:
-    return Box(tuple(lo.tolist()), tuple(hi.tolist()))
+def _box(corners: np.ndarray) -> Box:
+    lo, hi = corners.tolist()
+    return Box(tuple(lo), tuple(hi))

@@ -127,7 +127,7 @@ def test_a_pocket_breaks_no_bound() -> None:
 def test_the_voxel_is_that_of_the_object() -> None:
     """One step less and this one is 20 times as large."""
     planned = plan(mandelbulb(power=2, bailout=5e5), 64)
-    own = extent(compile_scene(planned.root), planned.root.facts).box
+    own = extent(planned.root, 64).box
     assert max(own.size) / planned.voxel == pytest.approx(64, rel=0.05)
 
 
@@ -163,7 +163,7 @@ def test_scenes_without_a_solid(root: Node, message: str) -> None:
 
 def test_what_is_too_thin_for_any_sample_says_so() -> None:
     with pytest.raises(VolumeError, match=r"thinner than a voxel of 0\.0417; more voxels"):
-        sample_scene(plan(shell(sphere(), thickness=1e-3), 48))
+        sample_scene(plan(shell(sphere(), thickness=1e-4), 48))
 
 
 def test_too_fine_a_voxel_is_refused_before_starting() -> None:
