@@ -81,6 +81,13 @@ def _is_guarded(node: Node) -> bool:
     return node.guarded and not _is_sharp(node) and any(child.facts.weak for child in node.children)
 
 
+@union.unordered
+@intersection.unordered
+@difference.unordered
+def _(node: Node) -> bool:
+    return _is_sharp(node)
+
+
 @union.select
 def _(node: Node):  # type: ignore[no-untyped-def]
     return hard_union if _is_sharp(node) else guarded_union if _is_guarded(node) else union.function

@@ -128,6 +128,10 @@ class Formula:
         """True if the node changes nothing and can be left out."""
         return self._hook("identity", hook)
 
+    def unordered(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """True if the elements of a blend but the first may be folded in any order, to the same bits."""
+        return self._hook("unordered", hook)
+
     def visible(self, hook: Callable[[Node, float], Node]) -> Callable[[Node, float], Node]:
         """The node with no more detail than voxels of a size in its own units can show."""
         return self._hook("visible", hook)
@@ -228,6 +232,11 @@ class Node:
     @property
     def is_identity(self) -> bool:
         hook = self.formula.hooks.get("identity")
+        return bool(hook and hook(self))
+
+    @property
+    def is_unordered(self) -> bool:
+        hook = self.formula.hooks.get("unordered")
         return bool(hook and hook(self))
 
 

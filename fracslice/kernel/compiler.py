@@ -15,7 +15,7 @@ from numba.core.errors import NumbaError
 from ..errors import KernelError
 from ..formulas.vocabulary import NAMES
 from . import lanes, lanes_math
-from .linker import Linked
+from .linker import CALLED, Linked
 from .loops import Loop
 
 SOURCE = "<linked scene>"
@@ -38,9 +38,10 @@ def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> byt
     kind = lanes.Lanes(target.bits, target.width, target.registers)
     scope: dict[str, Any] = {name: getattr(lanes, name) for name in NAMES}
     scope |= {"load": lanes.loader(kind), "store": lanes.store, "WIDTH": target.width}
-    exec(compile(linked.source, SOURCE, "exec"), scope)
     options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     inlined = njit(forceinline=True, error_model="numpy", **options)
+    scope[CALLED] = njit(error_model="numpy", **options)
+    exec(compile(linked.source, SOURCE, "exec"), scope)
     for name, value in list(scope.items()):
         if isinstance(value, FunctionType) and value.__code__.co_filename == SOURCE:
             scope[name] = inlined(value)

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..errors import KernelError
 from ..formulas.vocabulary import NAMES
-from .linker import Linked
+from .linker import CALLED, Linked
 
 WORDS = "fracslice.kernel.cuda_words"
 
@@ -51,6 +51,7 @@ def module(linked: Linked, bits: int, loops: str) -> str:
     """
     words = [
         *sorted(NAMES),
+        CALLED,
         "device",
         "divide",
         f"float{bits} as real",
@@ -85,10 +86,10 @@ class _Typed(ast.NodeTransformer):
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         loops = [n for n in ast.walk(node) if isinstance(n, ast.For)]
-        self.counters = {loop.target.id for loop in loops if isinstance(loop.target, ast.Name)}
+        self.counters = {loop.target.id for loop in loops if isinstance(loop.target, ast.Name)} | {"P0"}
         self.shifts = node.name in self.shifting
         self.generic_visit(node)
-        node.decorator_list = [ast.Name("device", ast.Load())]
+        node.decorator_list = node.decorator_list or [ast.Name("device", ast.Load())]
         return node
 
     def whole(self, node: ast.expr) -> bool:
@@ -146,7 +147,8 @@ class _Typed(ast.NodeTransformer):
         if called == "int":
             return _call("whole", *node.args)
         if called not in self.shifting:
-            node.args = [self.real(a) for a in node.args]
+            places = _after_parameters(node)
+            node.args = [*(self.real(a) for a in node.args[: len(node.args) - len(places)]), *places]
         return node
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:
@@ -170,6 +172,12 @@ class _Typed(ast.NodeTransformer):
 
 def _listed(found: Any) -> list[ast.stmt]:
     return found if isinstance(found, list) else [found]
+
+
+def _after_parameters(call: ast.Call) -> list[ast.expr]:
+    """What a call says after P: from where in P on its numbers lie."""
+    names = [a.id if isinstance(a, ast.Name) else "" for a in call.args]
+    return call.args[names.index("P") + 1 :] if "P" in names[:-1] else []
 
 
 _SHIFTS = (ast.LShift, ast.RShift, ast.BitXor)

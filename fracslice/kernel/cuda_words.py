@@ -31,6 +31,7 @@ SIMULATED = bool(cuda.config.ENABLE_CUDASIM)
 _types: Any = np if SIMULATED else import_module("numba.cuda.types")
 float32, float64, int32 = _types.float32, _types.float64, int if SIMULATED else _types.int32
 device = cuda.jit(device=True) if SIMULATED else cuda.jit(device=True, forceinline=True)
+called = cuda.jit(device=True)
 kernel = cuda.jit(cache=True)
 
 Instruction = str | Callable[..., Any]

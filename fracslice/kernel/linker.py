@@ -1,33 +1,37 @@
 """A whole scene as one self-contained Python module: only what the scene uses, its numbers as arguments.
 
-Every node becomes one function of ``x, y, z, P``. Shapes and blends are called with their arguments taken
-from the parameter array P; `Fixed` arguments are written into a copy of the function, where Python drops the
-dead branches and loops over fixed tuples are unrolled. A warp's copy calls its child by name. Identities are
-left out.
+Parts of a scene that differ in numbers only have one function, ``N0(x, y, z, P, P0)``: their numbers lie in
+the parameter array P from P0 on, those of the elements inside after their own. So a union of a hundred
+spheres is one sphere and a loop, and the text is the same for scenes that differ in numbers only: editing a
+value compiles nothing.
 
-The text is the same for scenes that differ in numbers only, so editing a value compiles nothing.
+Shapes and blends are called with their arguments taken from P; `Fixed` arguments are written into a copy of
+the function, where Python drops the dead branches and loops over fixed tuples are unrolled. A warp's copy
+calls its child by name. Identities are left out.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
-import inspect
-import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
-from types import FunctionType
 from typing import Any
 
 import numpy as np
 
 from ..errors import KernelError
-from ..formulas import vocabulary
 from ..formulas.parameters import AUTO
 from ..formulas.registry import Fixed, Node
+from . import language, source
+from .structure import UNROLLED, Arguments, Part, Run, arguments, link_tree, read
 
 FIELD = "field"
+
+CALLED = "called"
+"""Decorates the functions that are called, not inlined."""
+
+LEADING = {"shape": 3, "blend": 2, "warp": 4}
 
 
 @dataclass(frozen=True)
@@ -43,98 +47,72 @@ class Linked:
 
 
 def link(root: Node) -> Linked:
-    """Links a scene tree. Raises `KernelError` where a depth is still "auto"."""
+    """Links a scene tree. Raises `KernelError` where a depth is "auto" or a formula is not one."""
     linker = Linker()
-    top = linker.node(root)
-    linker.functions.append(f"def {FIELD}(x, y, z, P):\n    return {top}(x, y, z, P)")
+    linker.field(root)
     return Linked(linker.text(), np.array(linker.parameters or [0.0], dtype=np.float64))
 
 
 @dataclass
 class Linker:
-    """Writes functions and collects parameters; `given` are names that the text will have from elsewhere."""
+    """Writes functions and collects parameters; `given` are names that the text will have from elsewhere.
+
+    functions: their texts by name. apart: the names of those that are called, not inlined.
+    """
 
     given: frozenset[str] = frozenset()
     parameters: list[float] = field(default_factory=list)
-    functions: list[str] = field(default_factory=list)
-    shared: dict[str, str] = field(default_factory=dict)
+    functions: dict[str, str] = field(default_factory=dict)
+    apart: set[str] = field(default_factory=set)
+    _parts: dict[Any, Part] = field(default_factory=dict)
+    _shared: dict[Any, str] = field(default_factory=dict)
 
-    def node(self, node: Node) -> str:
-        """Writes the functions of a node and all below it; returns the name of its own."""
-        if AUTO in [v for v in node.values.values() if isinstance(v, str)]:
-            raise KernelError(
-                f"<{node.formula.name}>: the depth is still auto; resolve it for a voxel size first"
-            )
-        if node.is_identity:
-            return self.node(node.children[0])
-        children = [self.node(child) for child in node.children]
-        if node.formula.kind != "warp" and len(children) == 1 and node.formula.children[1] is None:
-            return children[0]
-        fixed = {k: v.value for k, v in node.arguments.items() if isinstance(v, Fixed)}
-        passed = [self.argument(v) for v in node.arguments.values() if not isinstance(v, Fixed)]
-        name = f"n{len(self.functions)}"
-        write = {"shape": self.shape, "blend": self.blend, "warp": self.warp}[node.formula.kind]
-        self.functions.append(write(name, node.function, fixed, passed, children))
-        return name
+    def field(self, root: Node) -> None:
+        """Writes the field of a scene tree."""
+        call = link_tree(self, root, FieldDialect(self))
+        self.functions[FIELD] = f"def {FIELD}(x, y, z, P):\n    return {call}"
+
+    def part(self, prefix: str, key: tuple[Any, ...], write: Callable[[str], Part]) -> Part:
+        """The function of a structure, written once."""
+        if (prefix, *key) not in self._parts:
+            self._parts[prefix, *key] = write(f"{prefix}{len(self._parts)}")
+        return self._parts[prefix, *key]
 
     def argument(self, value: Any) -> str:
         """Appends a number or a tuple of numbers to P; returns the expression that reads it back."""
-        if isinstance(value, tuple):
-            return f"({', '.join(self.argument(v) for v in value)},)"
-        self.parameters.append(float(value))
-        place = f"P[{len(self.parameters) - 1}]"
-        return f"int({place})" if isinstance(value, int) else place
+        return read(value, self.parameters)
 
-    def shape(
-        self, name: str, function: Callable[..., Any], fixed: dict[str, Any], passed: list[str], _: list[str]
+    def share(
+        self, function: Callable[..., Any], fixed: Sequence[tuple[str, Any]] = (), prefix: str = ""
     ) -> str:
-        called = self.share(function, fixed)
-        return f"def {name}(x, y, z, P):\n    return {called}({', '.join(['x', 'y', 'z', *passed])})"
+        """Writes a copy of the function with its fixed arguments filled in, once; returns its name.
 
-    def blend(
-        self,
-        name: str,
-        function: Callable[..., Any],
-        fixed: dict[str, Any],
-        passed: list[str],
-        children: list[str],
-    ) -> str:
-        called = self.share(function, fixed)
-        lines = [f"def {name}(x, y, z, P):", f"    f = {children[0]}(x, y, z, P)"]
-        if len(children) == 1:
-            lines.append(f"    f = {called}({', '.join(['f', *passed])})")
-        for child in children[1:]:
-            lines.append(f"    f = {called}({', '.join(['f', f'{child}(x, y, z, P)', *passed])})")
-        return "\n".join([*lines, "    return f"])
+        prefix: of its name, and of those of the functions it calls.
+        """
+        suffix = "".join(f"_{k}_{v}" for k, v in sorted(fixed))
+        name = prefix + function.__name__ + "".join(c if c.isalnum() else "_" for c in suffix)
+        found = source.shared(function, tuple(fixed), self.given)
+        return self.add((prefix, function, tuple(fixed)), name, found, prefix)
 
-    def warp(
-        self,
-        name: str,
-        function: Callable[..., Any],
-        fixed: dict[str, Any],
-        passed: list[str],
-        children: list[str],
-    ) -> str:
-        tree = specialised(function, fixed)
-        arguments = [a.arg for a in tree.args.args][4:]
-        tree.name = name
-        tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P")]
-        tree = _CallsChild(children[0]).visit(tree)
-        taken = [ast.parse(f"{a} = {p}").body[0] for a, p in zip(arguments, passed, strict=True)]
-        tree.body = [*taken, *tree.body]
-        self.helpers(tree, function)
-        return ast.unparse(ast.fix_missing_locations(tree))
+    def add(self, key: tuple[Any, ...], name: str, copy: source.Copy, prefix: str) -> str:
+        """Writes a copy and the functions it calls, once a key; returns its name: another one if that is
+        taken.
+        """
+        if key not in self._shared:
+            taken = {*self._shared.values()}
+            number = next(
+                n for n in range(1, len(taken) + 2) if (f"{name}_{n}" if n > 1 else name) not in taken
+            )
+            name = self._shared[key] = f"{name}_{number}" if number > 1 else name
+            names = {called: self.share(f, (), prefix) for called, f in copy.calls.items()}
+            self.functions[name] = copy.renamed({**names, copy.name: name})
+        return self._shared[key]
 
-    def share(self, function: Callable[..., Any], fixed: dict[str, Any]) -> str:
-        """Writes a copy of the function with its fixed arguments filled in, once; returns its name."""
-        suffix = "".join(f"_{k}_{v}" for k, v in sorted(fixed.items()))
-        name = function.__name__ + "".join(c if c.isalnum() else "_" for c in suffix)
-        if name not in self.shared:
-            text, needed = _copied(function, tuple(fixed.items()), name, self.given)
-            for helper in needed:
-                self.share(helper, {})
-            self.shared[name] = text
-        return name
+    def named(self, name: str, tree: ast.FunctionDef, function: Callable[..., Any]) -> str:
+        """The text under a name of a tree made from a formula, of which it writes what it calls."""
+        copy = source.copied(tree, function, self.given | self.functions.keys())
+        names = {called: self.share(f, (), OF_FORMULAS) for called, f in copy.calls.items()}
+        return copy.renamed({**names, copy.name: name})
 
     def bind(self, name: str, function: Callable[..., Any], values: dict[str, Any]) -> None:
         """Writes ``name(rest..., P)``: the function with `values` taken from P (or fixed), the rest of its
@@ -143,135 +121,116 @@ class Linker:
         A function that has an argument P of its own is passed it.
         """
         fixed = {k: v.value for k, v in values.items() if isinstance(v, Fixed)}
-        called = self.share(function, fixed)
-        arguments = [a for a in inspect.signature(function).parameters if a not in fixed]
-        passed = [self.argument(values[a]) if a in values else a for a in arguments]
-        rest = [a for a in arguments if a not in values and a != "P"]
-        self.functions.append(
+        called = self.share(function, tuple(fixed.items()))
+        names = [a for a in language.parameters(function) if a not in fixed]
+        passed = [self.argument(values[a]) if a in values else a for a in names]
+        rest = [a for a in names if a not in values and a != "P"]
+        self.functions[name] = (
             f"def {name}({', '.join([*rest, 'P'])}):\n    return {called}({', '.join(passed)})"
         )
 
     def text(self) -> str:
-        """All that was written, callees first."""
-        return "\n\n\n".join([*self.shared.values(), *self.functions]) + "\n"
-
-    def helpers(self, tree: ast.FunctionDef, function: Callable[..., Any]) -> None:
-        """Writes the functions and fills in the numbers that a function takes from its module."""
-        for helper in _filled(tree, function, self.given):
-            self.share(helper, {})
+        """All that was written."""
+        texts = (f"@{CALLED}\n{t}" if name in self.apart else t for name, t in self.functions.items())
+        return "\n\n\n".join(texts) + "\n"
 
 
-def _filled(
-    tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset[str]
-) -> list[Callable[..., Any]]:
-    """Fills in the numbers that a function takes from its module; returns the functions it takes from
-    there."""
-    scope = function.__globals__
-    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
-    used = {n.id for n in names if isinstance(n.ctx, ast.Load)}
-    used -= {n.id for n in names if isinstance(n.ctx, ast.Store)} | vocabulary.NAMES | given
-    needed = []
-    for name in sorted(used & set(scope)):
-        if isinstance(scope[name], FunctionType):
-            needed.append(scope[name])
-        elif isinstance(scope[name], (int, float)):
-            _Substitute({name: scope[name]}).visit(tree)
-    return needed
+OF_FORMULAS = "f_"
+"""What the names of formulas and of their helpers begin with, so that they are no loop's and no unit's."""
 
 
-@lru_cache(maxsize=1024)
-def _copied(
-    function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], name: str, given: frozenset[str]
-) -> tuple[str, list[Callable[..., Any]]]:
-    """The text of a function's copy under a name, and the functions it needs. A scene is linked anew for
-    every camera, and this is nine tenths of the time."""
-    tree = _Forget().visit(specialised(function, dict(fixed)))
-    tree.name = name
-    needed = _filled(tree, function, given)
-    return ast.unparse(ast.fix_missing_locations(tree)), needed
+@dataclass
+class FieldDialect:
+    """Functions that return the value of the field."""
+
+    linker: Linker
+    prefix: str = "N"
+
+    def kept(self, node: Node) -> Node:
+        while node.is_identity or (node.formula.kind == "blend" and _folds(node) and len(node.children) == 1):
+            node = node.children[0]
+        return node
+
+    def arguments(self, node: Node) -> Arguments:
+        if AUTO in [v for v in node.values.values() if isinstance(v, str)]:
+            raise KernelError(
+                f"<{node.formula.name}>: the depth is still auto; resolve it for a voxel size first"
+            )
+        return arguments(node, leading(node))
+
+    def order(self, node: Node, parts: Sequence[Part]) -> Sequence[int]:
+        """Elements of one structure side by side, where their order changes no bit of the result."""
+        places = range(len(parts))
+        if not node.is_unordered:
+            return places
+        first = list(dict.fromkeys(part.name for part in parts))
+        return sorted(places, key=lambda k: first.index(parts[k].name))
+
+    def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
+        write = {"shape": self.shape, "blend": self.blend, "warp": self.warp}[node.formula.kind]
+        return write(name, given, runs)
+
+    def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
+        called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
+        passed = ", ".join(["x", "y", "z", *given.passed])
+        return function(name, [f"return {called}({passed})"])
+
+    def blend(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
+        lines = [f"f = {runs[0].call()}"]
+        if sum(run.count for run in runs) == 1:
+            lines.append(f"f = {called}({', '.join(['f', *given.passed])})")
+        for k, run in enumerate(runs):
+            lines += folded(
+                run, k == 0, lambda call: [f"f = {called}({', '.join(['f', call, *given.passed])})"]
+            )
+        return function(name, [*lines, "return f"])
+
+    def warp(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        tree = source.specialised(given.function, dict(given.fixed))
+        arguments = [a.arg for a in tree.args.args][4:]
+        tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]
+        tree = _CallsChild(runs[0]).visit(tree)
+        taken = [ast.parse(f"{a} = {p}").body[0] for a, p in zip(arguments, given.passed, strict=True)]
+        tree.body = [*taken, *tree.body]
+        return self.linker.named(name, tree, given.function)
 
 
-@lru_cache(maxsize=256)
-def _text(function: Callable[..., Any]) -> str:
-    return textwrap.dedent(inspect.getsource(function))
+def _folds(node: Node) -> bool:
+    """Whether a blend's function takes the values of two elements, and is called once for each more."""
+    return node.formula.children[1] is None
 
 
-def specialised(function: Callable[..., Any], fixed: dict[str, Any]) -> ast.FunctionDef:
-    """The function's tree without decorators, docstring and hints, its fixed arguments replaced by their
-    values.
+def leading(node: Node) -> int:
+    """How many of a node's arguments are points, values or its child."""
+    return 1 if node.formula.kind == "blend" and not _folds(node) else LEADING[node.formula.kind]
+
+
+def folded(run: Run, begun: bool, lines: Callable[[str], list[str]]) -> list[str]:
+    """The lines that take in the elements of a run, one after the other or in a loop.
+
+    begun: whether its first element is taken in already. lines: those for one call.
     """
-    tree = ast.parse(_text(function)).body[0]
-    assert isinstance(tree, ast.FunctionDef)
-    tree.decorator_list, tree.returns = [], None
-    if ast.get_docstring(tree) is not None:
-        tree.body = tree.body[1:]
-    tree.args.args = [ast.arg(a.arg) for a in tree.args.args if a.arg not in fixed]
-    pruned: ast.FunctionDef = _Prune().visit(_Substitute(fixed).visit(tree))
-    return pruned
+    if run.count <= UNROLLED:
+        return [line for call in run.calls[begun:] for line in lines(call)]
+    rest = Run(run.part, run.count - begun, run.start + begun * run.part.size)
+    return [f"for i in range({rest.count}):", *(f"    {line}" for line in lines(rest.call("i")))]
 
 
-class _Substitute(ast.NodeTransformer):
-    """Names replaced by constants; loops over a constant tuple unrolled."""
-
-    def __init__(self, values: dict[str, Any]) -> None:
-        self.values = values
-
-    def visit_Name(self, node: ast.Name) -> ast.AST:
-        if isinstance(node.ctx, ast.Load) and node.id in self.values:
-            return ast.Constant(self.values[node.id])
-        return node
-
-    def visit_For(self, node: ast.For) -> Any:
-        name = node.iter.id if isinstance(node.iter, ast.Name) else None
-        values = self.values.get(name) if name else None
-        if not isinstance(values, tuple):
-            return self.generic_visit(node)
-        assert isinstance(node.target, ast.Name)
-        unrolled: list[ast.stmt] = []
-        for value in values:
-            inner = _Substitute({**self.values, node.target.id: value})
-            unrolled += [inner.visit(ast.parse(ast.unparse(statement)).body[0]) for statement in node.body]
-        return unrolled
-
-
-class _Prune(ast.NodeTransformer):
-    """Branches and choices on a constant reduced to the one that is taken."""
-
-    def visit_If(self, node: ast.If) -> Any:
-        self.generic_visit(node)
-        if isinstance(node.test, ast.Constant):
-            return node.body if node.test.value else node.orelse
-        return node
-
-    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
-        self.generic_visit(node)
-        if isinstance(node.test, ast.Constant):
-            return node.body if node.test.value else node.orelse
-        return node
-
-
-class _Forget(ast.NodeTransformer):
-    """Marks of orbits left out: a field does not look at them."""
-
-    def visit_Expr(self, node: ast.Expr) -> Any:
-        return None if is_mark(node) else node
-
-
-def is_mark(node: ast.AST) -> bool:
-    """True of the statement ``orbit(...)``."""
-    call = node.value if isinstance(node, ast.Expr) else None
-    return isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "orbit"
+def function(name: str, lines: Sequence[str]) -> str:
+    """The text of a part's function."""
+    return "\n    ".join([f"def {name}(x, y, z, P, P0):", *lines])
 
 
 class _CallsChild(ast.NodeTransformer):
     """``child(a, b, c)`` becomes a call of the child's function, with P."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, child: Run) -> None:
+        self.child = child
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
-        if isinstance(node.func, ast.Name) and node.func.id == "child":
-            node.func.id = self.name
-            node.args.append(ast.Name("P", ast.Load()))
+        if isinstance(node.func, ast.Name) and node.func.id == language.CHILD:
+            points = ", ".join(map(ast.unparse, node.args))
+            return ast.parse(self.child.call(points=points), mode="eval").body
         return node

@@ -8,13 +8,14 @@ import numpy as np
 
 from ..formulas import vocabulary
 from ..formulas.registry import Node
-from .linker import FIELD, link
+from .linker import CALLED, FIELD, link
 
 
 def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:
     """``f(x, y, z)`` of float64 arrays of one shape, the signed field of a scene tree."""
     linked = link(root)
     scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
+    scope[CALLED] = lambda function: function
     exec(compile(linked.source, "<linked scene>", "exec"), scope)
     function = scope[FIELD]
 

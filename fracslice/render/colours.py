@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from ..formulas import material
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linker
-from .tracing import Tracer
+from ..kernel.structure import link_tree
+from .tracing import TraceDialect
 from .units import shade
 
 
@@ -43,8 +44,8 @@ class Look:
         """Sets cr, cg, cb, specular, shininess and what else some material has."""
         lines = []
         if len(self.all) > 1 or self.palettes:
-            name = Tracer(self.linker, self.paints).node(self.root)
-            lines.append(f"_, paint, tone = {name}(x, y, z, P)")
+            trace = link_tree(self.linker, self.root, TraceDialect(self.linker, materials=self.paints))
+            lines.append(f"_, paint, tone = {trace}")
         lines += self.chosen([self.colour(k, n) for k, n in enumerate(self.all)], ("cr", "cg", "cb"))
         names = ["specular", "shininess"]
         names += ["glow"] * self.glows + ["reflect"] * self.bounces + ["clear", "index"] * self.inside

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..formulas.registry import Fixed, Node
-from ..kernel.linker import FIELD, Linked, Linker
+from ..kernel.linker import Linked, Linker
 from ..scene.view import Camera, Light, View
 from .colours import Look, linear
 from .units import camera as cameras
@@ -88,17 +88,16 @@ class _Frame:
 
     def linked(self) -> Frame:
         linker = self.linker
-        top = linker.node(self.root)
-        linker.functions.append(f"def {FIELD}(x, y, z, P):\n    return {top}(x, y, z, P)")
+        linker.field(self.root)
         self.marching()
         camera_samples = self.cameras()
         look = Look(linker, self.root)
         far = linker.argument(self.seen.far)
         self.bounces = self.view.shading.bounces if look.bounces and self.view.shading.mode == "light" else 0
         surface = self.surface(look)
-        linker.functions += [surface, self.background()]
+        linker.functions |= {"surface": surface, "background": self.background()}
         for function in (sample, centred):
-            linker.share(function, {})
+            linker.share(function)
         linked = Linked(linker.text(), np.array(linker.parameters, np.float64))
         return Frame(
             linked, camera_samples, self.dimensions, self.bounces, self.inside, self.camera.aperture == 0, far
@@ -157,7 +156,7 @@ class _Frame:
         mode = self.view.shading.mode
         lines = ["h = width_at(path + t, P)"]
         if mode in ("light", "normal"):
-            self.linker.share(normal, {})
+            self.linker.share(normal)
             lines.append("nx, ny, nz = normal(x, y, z, h, P)")
         if mode == "light":
             lines += look.lines() + self.lit(look) + self.onward(look)
@@ -195,7 +194,7 @@ class _Frame:
 
     def light(self, k: int, light: Light) -> list[str]:
         """One sun or lamp."""
-        self.linker.share(shade.phong, {})
+        self.linker.share(shade.phong)
         u, v = self.draw(2) if light.size else ("t", "t")
         self.bind_light(f"light{k}", light)
         colour = [self.linker.argument(c * light.strength) for c in linear(light.colour)]
@@ -229,7 +228,7 @@ class _Frame:
             lines = ["kr, kg, kb = sky_(nx, ny, nz, P)", "open = ambient * 0.0 + 1.0"]
         else:
             u, v = self.draw(2)
-            self.linker.share(lights.upward, {})
+            self.linker.share(lights.upward)
             far = self.linker.argument(self.seen.far)
             lines = [
                 f"lx, ly, lz = upward(nx, ny, nz, {u}, {v})",
@@ -249,7 +248,7 @@ class _Frame:
             return []
         (u,) = self.draw(1) if look.inside else ("t",)
         for function in (shade.mirrored, shade.fresnel, shade.bent, shade.goes_on, shade.reflects):
-            self.linker.share(function, {})
+            self.linker.share(function)
         if not look.inside:
             return [
                 "tr, ex, ey, ez = reflects(dx, dy, dz, nx, ny, nz, reflect)",

@@ -9,95 +9,98 @@ called once per hit.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from ..formulas.registry import Fixed, Node
-from ..kernel.linker import Linker, is_mark, specialised
-
-TRACE = "trace"
+from ..formulas import material
+from ..formulas.registry import Node
+from ..kernel import source
+from ..kernel.linker import OF_FORMULAS, FieldDialect, folded, function, leading
+from ..kernel.structure import Arguments, Part, Run, arguments, read
 
 
 @dataclass
-class Tracer:
-    """Writes the traced functions of a tree into a linker. materials: the paint of every material node, from
-    1."""
+class TraceDialect(FieldDialect):
+    """Functions that return (f, paint, tone). materials: by its id, the paint of every material node."""
 
-    linker: Linker
-    materials: dict[int, int]
+    materials: dict[int, int] = field(default_factory=dict)
+    prefix: str = "T"
 
-    def node(self, node: Node) -> str:
-        """Writes a node and all below it; returns its function's name."""
-        if node.formula.name == "material":
-            return self.painted(node)
-        if node.is_identity:
-            return self.node(node.children[0])
-        children = [self.node(child) for child in node.children]
-        fixed = {k: v.value for k, v in node.arguments.items() if isinstance(v, Fixed)}
-        passed = [self.linker.argument(v) for v in node.arguments.values() if not isinstance(v, Fixed)]
-        if node.formula.kind == "shape":
-            return self.shape(node.function, fixed, passed)
-        if node.formula.kind == "blend":
-            return self.blend(node.function, fixed, passed, children)
-        return self.warp(node.function, fixed, passed, children[0])
+    def kept(self, node: Node) -> Node:
+        while node.is_identity and node.formula.name != material.name:
+            node = node.children[0]
+        return node
 
-    def write(self, lines: list[str]) -> str:
-        name = f"{TRACE}{len(self.linker.functions)}"
-        self.linker.functions.append("\n    ".join([f"def {name}(x, y, z, P):", *lines]))
-        return name
+    def arguments(self, node: Node) -> Arguments:
+        if node.formula.name != material.name:
+            return arguments(node, leading(node))
+        paint: list[float] = []
+        passed = read(float(self.materials[id(node)]), paint, "P0")
+        return Arguments(node.function, (), (passed,), tuple(paint))
 
-    def painted(self, node: Node) -> str:
-        child, paint = self.node(node.children[0]), self.materials[id(node)]
-        return self.write(
-            [f"f, paint, tone = {child}(x, y, z, P)", f"return f, where(paint > 0.5, paint, {paint}.0), tone"]
+    def order(self, node: Node, parts: Sequence[Part]) -> Sequence[int]:
+        """As they stand: where two are as near, the first one's paint is taken."""
+        return range(len(parts))
+
+    def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
+        if node.formula.name == material.name:
+            return self.painted(name, given, runs[0])
+        return super().write(name, node, given, runs)
+
+    def painted(self, name: str, given: Arguments, child: Run) -> str:
+        return function(
+            name,
+            [
+                f"f, paint, tone = {child.call()}",
+                f"return f, where(paint > 0.5, paint, {given.passed[0]}), tone",
+            ],
         )
 
-    def shape(self, function: Callable[..., Any], fixed: dict[str, Any], passed: list[str]) -> str:
-        tree = specialised(function, fixed)
-        tree.name = f"{TRACE}{len(self.linker.functions)}_{tree.name}"
-        tree = _KeepsNearest().visit(tree)
+    def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
+        tree = _KeepsNearest().visit(source.specialised(given.function, dict(given.fixed)))
         tree.body.insert(0, ast.parse("nearest = 0.0 * x + 1e30").body[0])
-        self.linker.helpers(tree, function)
-        self.linker.functions.append(ast.unparse(ast.fix_missing_locations(tree)))
-        called = f"{tree.name}({', '.join(['x', 'y', 'z', *passed])})"
-        return self.write([f"f, nearest = {called}", "return f, 0.0 * x, sqrt(minimum(nearest, 1.0))"])
+        called = f"{name}_of"
+        self.linker.functions[called] = self.linker.named(called, tree, given.function)
+        return function(
+            name,
+            [
+                f"f, nearest = {called}({', '.join(['x', 'y', 'z', *given.passed])})",
+                "return f, 0.0 * x, sqrt(minimum(nearest, 1.0))",
+            ],
+        )
 
-    def blend(
-        self, function: Callable[..., Any], fixed: dict[str, Any], passed: list[str], children: list[str]
-    ) -> str:
-        called = self.linker.share(function, fixed)
-        lines = [f"f, paint, tone = {children[0]}(x, y, z, P)"]
-        if len(children) == 1:
-            lines.append(f"f = {called}({', '.join(['f', *passed])})")
-        for child in children[1:]:
-            lines += [
-                f"g, p, t = {child}(x, y, z, P)",
-                f"a, f = f, {called}({', '.join(['f', 'g', *passed])})",
-                "mine = absolute(absolute(f) - absolute(a)) <= absolute(absolute(f) - absolute(g))",
-                "paint, tone = where(mine, paint, p), where(mine, tone, t)",
-            ]
-        return self.write([*lines, "return f, paint, tone"])
+    def blend(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
+        lines = [f"f, paint, tone = {runs[0].call()}"]
+        if sum(run.count for run in runs) == 1:
+            lines.append(f"f = {called}({', '.join(['f', *given.passed])})")
+        taken = [
+            "g, p, t = {}",
+            f"a, f = f, {called}({', '.join(['f', 'g', *given.passed])})",
+            "mine = absolute(absolute(f) - absolute(a)) <= absolute(absolute(f) - absolute(g))",
+            "paint, tone = where(mine, paint, p), where(mine, tone, t)",
+        ]
+        for k, run in enumerate(runs):
+            lines += folded(run, k == 0, lambda call: [taken[0].format(call), *taken[1:]])
+        return function(name, [*lines, "return f, paint, tone"])
 
-    def warp(self, function: Callable[..., Any], fixed: dict[str, Any], passed: list[str], child: str) -> str:
-        tree = specialised(function, fixed)
+    def warp(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        tree = source.specialised(given.function, dict(given.fixed))
         arguments = [a.arg for a in tree.args.args][4:]
-        tree.name = f"{TRACE}{len(self.linker.functions)}"
-        tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P")]
-        tree = _KeepsChild(child).visit(tree)
-        start = [f"{a} = {p}" for a, p in zip(arguments, passed, strict=True)]
+        tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]
+        tree = _KeepsChild(runs[0]).visit(tree)
+        start = [f"{a} = {p}" for a, p in zip(arguments, given.passed, strict=True)]
         start += ["lowest = 0.0 * x + 1e30", "paint = 0.0 * x", "tone = 0.0 * x"]
         tree.body = [*(ast.parse(line).body[0] for line in start), *tree.body]
-        self.linker.helpers(tree, function)
-        self.linker.functions.append(ast.unparse(ast.fix_missing_locations(tree)))
-        return str(tree.name)
+        return self.linker.named(name, tree, given.function)
 
 
 class _KeepsNearest(ast.NodeTransformer):
     """Marks of the orbit become the least r2 so far, which is returned beside the value."""
 
     def visit_Expr(self, node: ast.Expr) -> Any:
-        if not is_mark(node):
+        if not source.is_mark(node):
             return node
         assert isinstance(node.value, ast.Call)
         r2, alive = map(ast.unparse, node.value.args)
@@ -112,8 +115,8 @@ class _KeepsChild(ast.NodeTransformer):
     """Before every statement that looks at the child, its triple is taken; the child with the lowest value
     stays."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, child: Run) -> None:
+        self.child = child
 
     def visit_Assign(self, node: ast.Assign) -> Any:
         return self.taken(node)
@@ -134,7 +137,7 @@ class _KeepsChild(ast.NodeTransformer):
         point = ", ".join(map(ast.unparse, calls[0].args))
         text = ast.unparse(node).replace(ast.unparse(calls[0]), "inner")
         lines = [
-            f"inner, p, t = {self.name}({point}, P)",
+            f"inner, p, t = {self.child.call(points=point)}",
             "paint, tone = where(inner < lowest, p, paint), where(inner < lowest, t, tone)",
             "lowest = minimum(lowest, inner)",
         ]

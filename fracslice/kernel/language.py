@@ -1,0 +1,300 @@
+"""The language of formulas: which Python it is, and the text of a function in the words of the vocabulary.
+
+A formula is plain Python over points: arithmetic, comparisons, the words of `formulas.vocabulary`, ``for``
+over a range and ``if not any_of(...): break``. What else Python's own functions mean the same (abs, min, max,
+pow, ``math.sqrt``, ``np.sqrt``) is written as the word it is. All the rest is refused here, by file and line,
+before anything is compiled.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import inspect
+import math
+import textwrap
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from types import FunctionType, ModuleType
+from typing import Any, NoReturn
+
+from ..errors import KernelError
+from ..formulas import vocabulary
+from ..scene.nearest import hint
+
+CHILD = "child"
+"""What a warp calls its element."""
+
+_PLAIN = ("range", "int")
+_PYTHON = {"abs": "absolute", "min": "minimum", "max": "maximum", "fabs": "absolute", "pow": "pow"}
+_HIGHEST = 16
+"""The largest exponent that is written as products."""
+
+_STATEMENTS = (ast.Assign, ast.AugAssign, ast.Return, ast.For, ast.If, ast.Break, ast.Expr, ast.Pass)
+_EXPRESSIONS = (
+    ast.BinOp,
+    ast.UnaryOp,
+    ast.BoolOp,
+    ast.Compare,
+    ast.Call,
+    ast.Name,
+    ast.Constant,
+    ast.Tuple,
+    ast.Subscript,
+    ast.IfExp,
+)
+_ON_NUMBERS_ALONE = {
+    ast.Mod: "a - b * floor(a / b)",
+    ast.FloorDiv: "floor(a / b)",
+    ast.NotEq: "(a < b) | (a > b)",
+    ast.And: "&",
+    ast.Or: "|",
+    ast.Not: "the opposite comparison",
+}
+
+
+def parameters(function: Callable[..., Any]) -> list[str]:
+    """The names of a function's arguments."""
+    code = function.__code__
+    return list(code.co_varnames[: code.co_argcount])
+
+
+def scope(function: Callable[..., Any]) -> dict[str, Any]:
+    """All that a function sees from outside: Python's own names, its module's, those around it."""
+    assert isinstance(function, FunctionType)
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    return {**vars(builtins), **function.__globals__, **{name: cell.cell_contents for name, cell in cells}}
+
+
+@lru_cache(maxsize=1024)
+def text(function: Callable[..., Any]) -> str:
+    """A function in the words of the vocabulary. Raises `KernelError` for what is not in the language."""
+    try:
+        lines, first = inspect.getsourcelines(function)
+    except (OSError, TypeError):
+        raise KernelError(
+            f"formula {function.__name__}: its source cannot be read; expected a def in a file or a notebook"
+        ) from None
+    tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
+    place = f"{function.__code__.co_filename}:{{}}: formula {function.__name__}: "
+    if not isinstance(tree, ast.FunctionDef):
+        raise KernelError(place.format(first) + "expected a def")
+    found = _Language(function, tree, place, first).visit(tree)
+    return ast.unparse(ast.fix_missing_locations(found))
+
+
+def word(value: Any) -> str | None:
+    """The word that something means, if it is one: ``np.sqrt`` is ``sqrt``."""
+    return _WORDS.get(id(value))
+
+
+WORDS = frozenset({*vocabulary.NAMES, *_PLAIN})
+"""All names that a text in the language has without saying what they are."""
+
+_WORDS = {id(getattr(vocabulary, name)): name for name in (*vocabulary.NAMES, "orbit")} | {
+    id(getattr(module, name)): _PYTHON.get(name, name)
+    for module in (builtins, math)
+    for name in (*_PYTHON, *vocabulary.NAMES)
+    if hasattr(module, name)
+}
+
+
+class _Language(ast.NodeTransformer):
+    """Checks a function statement by statement, and writes what it uses from elsewhere as what it is."""
+
+    def __init__(self, function: Callable[..., Any], tree: ast.FunctionDef, place: str, first: int) -> None:
+        self.scope, self.place, self.first = scope(function), place, first
+        arguments = parameters(function)
+        self.local = {*arguments, *(n.id for n in _names(tree) if isinstance(n.ctx, ast.Store))}
+        self.points = _points(tree, {a for a in arguments if a in ("x", "y", "z", "a", "b")})
+
+    def fail(self, node: ast.AST, message: str) -> NoReturn:
+        line = self.first + getattr(node, "lineno", 1) - 1
+        raise KernelError(self.place.format(line) + message)
+
+    def refuse(self, node: ast.AST, instead: str) -> NoReturn:
+        self.fail(node, f"{_short(node)} is not in the language of formulas: expected {instead}")
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        if node.args.vararg or node.args.kwarg or node.args.kwonlyargs or node.args.defaults:
+            self.fail(node, "expected plain arguments, without * and without defaults")
+        node.decorator_list, node.returns = [], None
+        node.args.args = [ast.arg(a.arg) for a in [*node.args.posonlyargs, *node.args.args]]
+        node.args.posonlyargs = []
+        body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+        node.body = [self.visit(statement) for statement in body]
+        return node
+
+    def visit(self, node: ast.AST) -> Any:
+        if isinstance(node, ast.stmt) and not isinstance(node, (*_STATEMENTS, ast.FunctionDef)):
+            self.refuse(node, "assignments, for over a range, if, break and return")
+        if isinstance(node, ast.expr) and not isinstance(node, (*_EXPRESSIONS, ast.Attribute)):
+            self.refuse(node, "numbers, points, arithmetic and comparisons")
+        return super().visit(node)
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
+        if not isinstance(node.target, ast.Name):
+            self.refuse(node, "a name to assign to")
+        value = ast.BinOp(ast.Name(node.target.id, ast.Load()), node.op, node.value)
+        assign = ast.Assign([node.target], ast.copy_location(value, node))
+        return self.generic_visit(ast.copy_location(assign, node))
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST:
+        if not (isinstance(node.value, ast.Call) and _short(node.value.func) == "'orbit'"):
+            self.refuse(node, "a value that is used")
+        return self.generic_visit(node)
+
+    def visit_If(self, node: ast.If) -> ast.AST:
+        self.one_for_all(node.test)
+        return self.generic_visit(node)
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        self.one_for_all(node.test)
+        return self.generic_visit(node)
+
+    def one_for_all(self, test: ast.expr) -> None:
+        if self.on_points(test):
+            self.fail(
+                test, f"if {_short(test)} may differ from point to point: expected where(..., ..., ...)"
+            )
+
+    def on_points(self, node: ast.expr) -> bool:
+        return _is_of_points(node, self.points)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        return self.of_numbers(node, node.op)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        if isinstance(node.op, ast.UAdd):
+            operand: ast.expr = self.visit(node.operand)
+            return operand
+        return self.of_numbers(node, node.op)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        if len(node.ops) > 1 and self.on_points(node):
+            self.refuse(node, "one comparison at a time, joined by &")
+        return self.of_numbers(node, node.ops[0])
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        if isinstance(node.op, ast.Pow):
+            return self.power(node, self.visit(node.left), self.visit(node.right))
+        return self.of_numbers(node, node.op)
+
+    def of_numbers(self, node: ast.expr, op: ast.AST) -> ast.AST:
+        """What is only for numbers that are the same for all points."""
+        if type(op) in _ON_NUMBERS_ALONE and self.on_points(node):
+            self.refuse(node, _ON_NUMBERS_ALONE[type(op)])
+        return self.generic_visit(node)
+
+    def power(self, node: ast.expr, base: ast.expr, exponent: ast.expr) -> ast.AST:
+        match exponent:
+            case ast.Constant(0.5):
+                return _call("sqrt", base)
+            case ast.Constant(int(n)) if 1 <= n <= _HIGHEST:
+                product = base
+                for _ in range(n - 1):
+                    product = ast.BinOp(product, ast.Mult(), base)
+                return product
+        self.refuse(
+            node, f"a whole exponent from 1 to {_HIGHEST}, or 0.5; for others exp(exponent * log(base))"
+        )
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
+            self.refuse(node, "arguments by their place")
+        node.func, node.args = self.visit(node.func), [self.visit(a) for a in node.args]
+        called = node.func.id if isinstance(node.func, ast.Name) else ""
+        if called == "pow" and len(node.args) == 2:
+            return self.power(node, *node.args)
+        if called in ("minimum", "maximum") and len(node.args) > 2:
+            first, *others = node.args
+            for other in others:
+                first = _call(called, first, other)
+            return first
+        return node
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        if not isinstance(node.value, (int, float)):
+            self.refuse(node, "numbers")
+        return node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        """``np.sqrt`` and ``math.pi``."""
+        module = self.scope.get(node.value.id) if isinstance(node.value, ast.Name) else None
+        value = getattr(module, node.attr, None) if isinstance(module, ModuleType) else None
+        return self.known(node, value, node.attr)
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if isinstance(node.ctx, ast.Store) or node.id in self.local:
+            return node
+        return self.known(node, self.scope.get(node.id), node.id)
+
+    def known(self, node: ast.expr, value: Any, name: str) -> ast.AST:
+        meant = word(value)
+        if meant:
+            return ast.Name(meant, ast.Load())
+        if isinstance(value, (int, float)) and isinstance(node, ast.Attribute):
+            return ast.Constant(value)
+        if isinstance(node, ast.Name) and (
+            is_number(value) or isinstance(value, FunctionType) or name in _PLAIN
+        ):
+            return node
+        near = hint(name, {*vocabulary.NAMES, *self.local, *_PYTHON}, "{}")
+        self.fail(node, f"{_short(node)} is not a word of the language of formulas; {near}")
+
+
+def is_number(value: Any) -> bool:
+    """True of a number, or a tuple of them, that a function takes from outside."""
+    if isinstance(value, tuple):
+        return all(map(is_number, value))
+    return isinstance(value, (int, float))
+
+
+def _names(tree: ast.AST) -> Iterator[ast.Name]:
+    return (n for n in ast.walk(tree) if isinstance(n, ast.Name))
+
+
+def _points(tree: ast.FunctionDef, first: set[str]) -> set[str]:
+    """The names of what differs from point to point: these, and what follows from them."""
+    found = set(first)
+    while True:
+        more = {
+            name.id
+            for node in ast.walk(tree)
+            if isinstance(node, (ast.Assign, ast.AugAssign)) and _is_of_points(node.value, found)
+            for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
+            for name in _assigned(target, node.value, found)
+        }
+        if more <= found:
+            return found
+        found |= more
+
+
+def _assigned(target: ast.expr, value: ast.expr, points: set[str]) -> Iterator[ast.Name]:
+    """The names of a target that are given points: of ``a, b = x, 1.0`` the first."""
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
+        for part, given in zip(target.elts, value.elts, strict=True):
+            if _is_of_points(given, points):
+                yield from _names(part)
+    else:
+        yield from _names(target)
+
+
+def _is_of_points(node: ast.expr, points: set[str]) -> bool:
+    """Whether a value may differ from point to point; ``any_of`` and what a tuple is do not."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("any_of", CHILD):
+        return node.func.id == CHILD
+    if isinstance(node, ast.Name):
+        return node.id in points
+    return any(
+        _is_of_points(part, points) for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr)
+    )
+
+
+def _call(name: str, *arguments: ast.expr) -> ast.Call:
+    return ast.Call(ast.Name(name, ast.Load()), list(arguments), [])
+
+
+def _short(node: ast.AST) -> str:
+    line = " ".join(ast.unparse(node).split())
+    return repr(line if len(line) <= 40 else line[:37] + "...")

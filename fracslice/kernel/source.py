@@ -1,0 +1,121 @@
+"""Copies of formulas as text: fixed arguments filled in, dead branches dropped, the names they take from
+elsewhere told.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import FunctionType
+from typing import Any
+
+from . import language
+
+
+@dataclass(frozen=True)
+class Copy:
+    """A function's text under its own name, and the functions it calls, by the names it calls them by."""
+
+    name: str
+    text: str
+    calls: Mapping[str, Callable[..., Any]]
+
+    def renamed(self, names: Mapping[str, str]) -> str:
+        """The text with other names for itself and for what it calls."""
+        changed = {old: new for old, new in names.items() if old != new}
+        if not changed:
+            return self.text
+        return re.sub(rf"\b({'|'.join(map(re.escape, changed))})\b", lambda m: changed[m[0]], self.text)
+
+
+def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.FunctionDef:
+    """A function's tree without decorators, docstring and hints, its fixed arguments replaced by their
+    values.
+    """
+    tree = ast.parse(language.text(function)).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    tree.args.args = [a for a in tree.args.args if a.arg not in fixed]
+    pruned: ast.FunctionDef = _Prune().visit(_Substitute(fixed).visit(tree))
+    return pruned
+
+
+def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset[str] = frozenset()) -> Copy:
+    """A function's specialised tree as text, the numbers that it takes from outside filled in."""
+    tree = _Forget().visit(tree)
+    scope = language.scope(function)
+    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    stored = {n.id for n in names if isinstance(n.ctx, ast.Store)} | {a.arg for a in tree.args.args}
+    outside = sorted({n.id for n in names} - stored - language.WORDS - given)
+    numbers = {name: _plain(scope[name]) for name in outside if language.is_number(scope.get(name))}
+    calls = {name: scope[name] for name in outside if isinstance(scope.get(name), FunctionType)}
+    tree = _Substitute(numbers).visit(tree)
+    return Copy(tree.name, ast.unparse(ast.fix_missing_locations(tree)), calls)
+
+
+@lru_cache(maxsize=1024)
+def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str]) -> Copy:
+    """A function's copy. A scene is linked anew for every camera, and this is nine tenths of the time."""
+    return copied(specialised(function, dict(fixed)), function, given)
+
+
+def _plain(value: Any) -> Any:
+    """A number as Python's own, whatever library it is of."""
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return int(value) if isinstance(value, int) else float(value)
+
+
+class _Substitute(ast.NodeTransformer):
+    """Names replaced by constants; loops over a constant tuple unrolled."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self.values = values
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if isinstance(node.ctx, ast.Load) and node.id in self.values:
+            return ast.Constant(self.values[node.id])
+        return node
+
+    def visit_For(self, node: ast.For) -> Any:
+        name = node.iter.id if isinstance(node.iter, ast.Name) else None
+        values = self.values.get(name) if name else None
+        if not isinstance(values, tuple):
+            return self.generic_visit(node)
+        assert isinstance(node.target, ast.Name)
+        unrolled: list[ast.stmt] = []
+        for value in values:
+            inner = _Substitute({**self.values, node.target.id: value})
+            unrolled += [inner.visit(ast.parse(ast.unparse(statement)).body[0]) for statement in node.body]
+        return unrolled
+
+
+class _Prune(ast.NodeTransformer):
+    """Branches and choices on a constant reduced to the one that is taken."""
+
+    def visit_If(self, node: ast.If) -> Any:
+        self.generic_visit(node)
+        if isinstance(node.test, ast.Constant):
+            return node.body if node.test.value else node.orelse
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        self.generic_visit(node)
+        if isinstance(node.test, ast.Constant):
+            return node.body if node.test.value else node.orelse
+        return node
+
+
+class _Forget(ast.NodeTransformer):
+    """Marks of orbits left out: a field does not look at them."""
+
+    def visit_Expr(self, node: ast.Expr) -> Any:
+        return None if is_mark(node) else node
+
+
+def is_mark(node: ast.AST) -> bool:
+    """True of the statement ``orbit(...)``."""
+    call = node.value if isinstance(node, ast.Expr) else None
+    return isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "orbit"
