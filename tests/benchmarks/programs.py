@@ -1,4 +1,4 @@
-"""The hand-written C++ peers of tests/benchmarks/cpp, built when they are needed: `make peers` does only that."""
+"""The hand-written C++ peers of tests/benchmarks/cpp, built when needed; `make peers` builds them all."""
 
 from __future__ import annotations
 
