@@ -6,14 +6,17 @@ run.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 from numpy import bool_, float32, float64, int32, int64, uint8, uint32
 from numpy.typing import NDArray
 
+from .kernel.machine import Function
+
 Point = tuple[float, float, float]
-Loop = tuple[int, int, int] | Callable[..., None]
-"""The addresses of a loop, of its parameters and of its frame, which must outlive its use; or a function of
-the rows that it reads, [6, n], those that it writes, and where it takes steps their number."""
+Loop = tuple[Function, NDArray[Any], NDArray[Any]] | Callable[..., None]
+"""A compiled loop, its parameters and its frame, in its precision; or a function of the rows that it reads,
+[6, n], those that it writes, and where it takes steps their number."""
 
 def marching_cubes(
     ijk: NDArray[int32],
@@ -43,10 +46,10 @@ def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
 
 class RootLoops:
     """The loops of `fracslice.volume.root_loops` that find crossings: FIND in float32 and in float64, and
-    POLISH. field: the same float64 field, the addresses of `kernel.loops.POINTS` and of its parameters, or a
-    function of points [3, n] and of [1, n] for their values. lanes: segments and points come in multiples of
-    it. batch: how many segments are worth a call. steps: that all segments are given, and those that then are
-    left. sure: a root is exact where it moved less."""
+    POLISH. field: the same float64 field, `CpuKernel.entry` or a function of points [3, n] and of [1, n] for
+    their values. Holds all of them. lanes: segments and points come in multiples of it. batch: how many
+    segments are worth a call. steps: that all segments are given, and those that then are left. sure: a root
+    is exact where it moved less."""
 
     def __init__(
         self,
@@ -55,7 +58,7 @@ class RootLoops:
         guess: Loop,
         find: Loop,
         polish: Loop,
-        field: tuple[int, int] | Callable[[NDArray[float64], NDArray[float64]], None],
+        field: tuple[Function, NDArray[float64]] | Callable[[NDArray[float64], NDArray[float64]], None],
         steps: tuple[int, int],
         sure: float,
     ) -> None: ...

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from numpy import float32, float64, int32, uint8
 from numpy.typing import NDArray
 
+from .kernel.machine import Function
+
 class BorderError(ValueError):
     """The solid reaches the rim of the lattice."""
 
@@ -16,11 +18,9 @@ class Field:
     """What is sampled."""
 
 class Compiled(Field):
-    """Machine code ``void points(parameters, x, y, z, f, n)`` on float32, by its address, and that of its
-    parameters; both must outlive it.
-    """
+    """Machine code: `loops.POINTS` for float32 and its parameters, which it holds."""
 
-    def __init__(self, code: int, parameters: int) -> None: ...
+    def __init__(self, entry: tuple[Function, NDArray[float32]]) -> None: ...
 
 class Called(Field):
     """A function of x, y, z, float32 [n], that returns values float32 [n]."""

@@ -1,15 +1,14 @@
 """The CPU back end: a scene's field as machine code.
 
-Loading it needs llvmlite but not Numba, and takes milliseconds; its functions are called with the interpreter
-unlocked, so plain threads scale.
+Loading it needs llvmlite but not Numba, and takes milliseconds; its functions (`machine`) are called with the
+interpreter unlocked, so plain threads scale.
 """
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable, Sequence
-from functools import cached_property, lru_cache
-from typing import Any, Literal, Protocol, overload
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Literal, Protocol, overload
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from ..formulas.registry import Facts, Node
 from .host import lane_count
 from .linker import Linked, link
 from .loops import BRICKS, POINTS, Loop
+from .machine import Function, constant, loaded
 from .objects import object_code
 
 Precision = Literal["float32", "float64"]
@@ -55,16 +55,21 @@ class Compilable(Protocol):
 
 
 class CpuKernel:
-    """The compiled field of one scene. Safe to call from many threads at once."""
+    """The compiled field of one scene. Safe to call from many threads at once.
+
+    entry: `loops.POINTS` as compiled, and its parameters, for native code.
+    """
 
     batch = 1 << 17
 
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype: np.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
-        self._parameters = linked.parameters.astype(self.dtype)
         functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (POINTS, BRICKS))
         self._points, self._bricks = functions["points"], functions["bricks"]
+        self._parameters = constant(linked.parameters, self.dtype)
+        self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
+        self.entry = self._points, self._parameters
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Field values at points.
@@ -79,17 +84,8 @@ class CpuKernel:
         with np.errstate(over="ignore"):
             for row, values in zip(coordinates, (x, y, z), strict=False):
                 row[:n].reshape(shape)[...] = values
-        self._points(self._address(self._parameters), *(row.ctypes.data for row in coordinates), padded)
+        self._points(self._parameters, *coordinates, padded)
         return coordinates[3, :n].reshape(shape)
-
-    @property
-    def entry(self) -> tuple[int, int]:
-        """The addresses of `loops.POINTS` as compiled and of its parameters, for native code; they live as
-        long as the kernel.
-        """
-        code = ctypes.cast(self._points, ctypes.c_void_p).value  # type: ignore[arg-type]
-        assert code
-        return code, self._address(self._parameters)
 
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
@@ -100,26 +96,9 @@ class CpuKernel:
         kernel's dtype, C-contiguous, offset x*64 + y*8 + z. A grid point lies at ``origin + voxel * index``;
         its value depends on nothing else.
         """
-        assert corners.dtype == np.int32 and corners.flags.c_contiguous and out.flags.c_contiguous
-        assert out.dtype == self.dtype and out.shape == (len(corners), 512)
+        assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
         frame = np.array([*origin, voxel], self.dtype)
-        offsets = (row.ctypes.data for row in self._brick_offsets)
-        self._bricks(
-            self._address(self._parameters),
-            frame.ctypes.data,
-            *offsets,
-            corners.ctypes.data,
-            out.ctypes.data,
-            len(corners),
-        )
-
-    @cached_property
-    def _brick_offsets(self) -> np.ndarray:
-        return np.ascontiguousarray(np.indices((8, 8, 8)).reshape(3, 512).astype(self.dtype))
-
-    @staticmethod
-    def _address(array: np.ndarray) -> int:
-        return array.ctypes.data
+        self._bricks(self._parameters, frame, *self._offsets, corners, out, len(corners))
 
 
 @lru_cache(maxsize=32)
@@ -139,32 +118,6 @@ def compile_scene(root: Node | Compilable, precision: Precision = "float32") -> 
     return _kernel(linked.source, linked.parameters.tobytes(), precision)
 
 
-def load_functions(
-    linked: Linked, bits: int, width: int, loops: Sequence[Loop]
-) -> dict[str, Callable[..., None]]:
-    """The C functions of loops over a linked scene, by name.
-
-    They take addresses and whole numbers, release the interpreter, and may run in many threads. Raises
-    `KernelError`.
-    """
-    return _functions(object_code(linked, bits, width, loops), loops)
-
-
-_ENGINES: list[Any] = []
-_C_TYPES = {"r": ctypes.c_void_p, "i": ctypes.c_void_p, "n": ctypes.c_ssize_t}
-
-
-def _functions(code: bytes, loops: Sequence[Loop]) -> dict[str, Callable[..., None]]:
-    import llvmlite.binding as llvm
-
-    machine = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(jit=True)
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    _ENGINES.append(engine)  # the code lives as long as its engine
-    return {
-        loop.name: ctypes.CFUNCTYPE(None, *[_C_TYPES[a] for a in loop.arguments])(
-            engine.get_function_address(loop.name)
-        )
-        for loop in loops
-    }
+def load_functions(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:
+    """The functions of loops over a linked scene, by name. Raises `KernelError`."""
+    return loaded(object_code(linked, bits, width, loops), loops, np.dtype(f"float{bits}"))

@@ -117,9 +117,8 @@ class CudaKernel:
         the kernel's dtype, C-contiguous, offset x*64 + y*8 + z. A grid point lies at ``origin + voxel *
         index``; its value depends on nothing else, and can differ from that of `points` in the last place.
         """
-        assert corners.dtype == np.int32
-        assert out.dtype == self.dtype
-        assert out.shape == (len(corners), 512)
+        assert corners.dtype == np.int32 and corners.flags.c_contiguous and out.flags.c_contiguous
+        assert out.dtype == self.dtype and out.shape == (len(corners), 512)
         if len(corners):
             filled = self._cuda.device_array(out.shape, self.dtype)
             self.bricks_on_device(self._cuda.to_device(corners), origin, voxel, filled)

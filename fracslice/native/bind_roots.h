@@ -2,44 +2,40 @@
 #pragma once
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/pair.h>
 
+#include "machine.h"
 #include "roots.h"
 
 namespace fracslice {
 
 namespace nb = nanobind;
 
-// Machine code: the addresses of a loop, of its parameters and of its frame.
-using Code = std::array<uintptr_t, 3>;
-
 template <class Real>
-auto compiled_find(const Code& code) {
+auto compiled_find(const Machine<Real>& code) {
     using R = const Real*;
-    auto run = reinterpret_cast<void (*)(R, R, R, R, R, R, R, R, Real*, ptrdiff_t, ptrdiff_t)>(code[0]);
-    auto p = reinterpret_cast<R>(code[1]), frame = reinterpret_cast<R>(code[2]);
-    return [=](R s, Real* roots, size_t steps, size_t n) {
+    auto run = code.template function<R, R, R, R, R, R, R, R, Real*, ptrdiff_t, ptrdiff_t>();
+    return [code, run, p = code.array(1), frame = code.array(2)](R s, Real* roots, size_t steps, size_t n) {
         run(p, frame, s, s + n, s + 2 * n, s + 3 * n, s + 4 * n, s + 5 * n, roots, ptrdiff_t(steps), ptrdiff_t(n));
     };
 }
 
-inline auto compiled_polish(const Code& code) {
+inline auto compiled_polish(const Machine<double>& code) {
     using R = const double*;
     using W = double*;
-    auto run = reinterpret_cast<void (*)(R, R, R, R, R, R, R, R, W, W, W, W, W, ptrdiff_t)>(code[0]);
-    auto p = reinterpret_cast<R>(code[1]), frame = reinterpret_cast<R>(code[2]);
-    return [=](R s, W out, size_t n) {
+    auto run = code.function<R, R, R, R, R, R, R, R, W, W, W, W, W, ptrdiff_t>();
+    return [code, run, p = code.array(1), frame = code.array(2)](R s, W out, size_t n) {
         run(p, frame, s, s + n, s + 2 * n, s + 3 * n, s + 4 * n, s + 5 * n, out, out + n, out + 2 * n, out + 3 * n, out + 4 * n,
             ptrdiff_t(n));
     };
 }
 
-inline auto compiled_field(const std::array<uintptr_t, 2>& code) {
+inline auto compiled_field(const Machine<double>& code) {
     using R = const double*;
-    auto run = reinterpret_cast<void (*)(R, R, R, R, double*, ptrdiff_t)>(code[0]);
-    auto p = reinterpret_cast<R>(code[1]);
-    return [=](R points, double* values, size_t n) { run(p, points, points + n, points + 2 * n, values, ptrdiff_t(n)); };
+    auto run = code.function<R, R, R, R, double*, ptrdiff_t>();
+    return [code, run, p = code.array(1)](R points, double* values, size_t n) {
+        run(p, points, points + n, points + 2 * n, values, ptrdiff_t(n));
+    };
 }
 
 // A Python function of some rows of n numbers, those that it writes, and perhaps a number of steps.
@@ -56,21 +52,20 @@ void call(const nb::object& function, const Real* in, size_t in_rows, Real* out,
 // Of a loop that is either.
 template <class Real>
 std::function<void(const Real*, Real*, size_t, size_t)> find_loop(nb::object loop) {
-    if (nb::isinstance<nb::tuple>(loop)) return compiled_find<Real>(nb::cast<Code>(loop));
+    if (nb::isinstance<nb::tuple>(loop)) return compiled_find(Machine<Real>(loop));
     return [=](const Real* s, Real* roots, size_t steps, size_t n) { call(loop, s, 6, roots, 1, n, steps); };
 }
 
 inline std::function<void(const double*, double*, size_t)> polish_loop(nb::object loop) {
-    if (nb::isinstance<nb::tuple>(loop)) return compiled_polish(nb::cast<Code>(loop));
+    if (nb::isinstance<nb::tuple>(loop)) return compiled_polish(Machine<double>(loop));
     return [=](const double* s, double* out, size_t n) { call(loop, s, 6, out, 5, n); };
 }
 
 inline std::function<void(const double*, double*, size_t)> field_loop(nb::object loop) {
-    if (nb::isinstance<nb::tuple>(loop)) return compiled_field(nb::cast<std::array<uintptr_t, 2>>(loop));
+    if (nb::isinstance<nb::tuple>(loop)) return compiled_field(Machine<double>(loop));
     return [=](const double* points, double* values, size_t n) { call(loop, points, 3, values, 1, n); };
 }
 
-// Machine code must outlive what is made of it.
 inline RootLoops root_loops(size_t lanes, size_t batch, nb::object guess, nb::object find, nb::object polish, nb::object field,
                             std::pair<size_t, size_t> steps, double sure) {
     return {lanes, batch, find_loop<float>(guess), find_loop<double>(find), polish_loop(polish), field_loop(field),

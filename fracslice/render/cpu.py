@@ -9,6 +9,7 @@ import numpy as np
 
 from ..kernel.cpu import load_functions
 from ..kernel.host import lane_count
+from ..kernel.machine import constant
 from ..work import Work
 from .linking import Frame
 from .sequence import points
@@ -38,7 +39,7 @@ class CpuTracer:
     def aim(self, frame: Frame) -> None:
         """Takes the numbers of another frame of the same source: another camera, another depth."""
         self.frame = frame
-        self._parameters = frame.linked.parameters.astype(self.dtype)
+        self._parameters = constant(frame.linked.parameters, self.dtype)
         self.blocks = -(-self.width // BLOCK)
         self._starts = np.zeros(self.blocks * -(-self.height // BLOCK), self.dtype)
 
@@ -51,7 +52,7 @@ class CpuTracer:
 
         def task(part: np.ndarray) -> None:
             m, space, who = self._room(part)
-            cones(*_addresses(self._parameters, self._starts, who, space), len(part), m, self.blocks, limit)
+            cones(self._parameters, self._starts, who, space, len(part), m, self.blocks, limit)
 
         work.map(task, np.array_split(ids, max(1, len(ids) // 512)))
 
@@ -66,8 +67,8 @@ class CpuTracer:
 
         def task(part: np.ndarray) -> None:
             m, space, who = self._room(part)
-            places = _addresses(self._parameters, self._points, self._starts, space, who, sums)
-            self._tile(*places, len(part), m, self.width, limit, self.blocks)
+            arrays = self._parameters, self._points, self._starts, space, who, sums
+            self._tile(*arrays, len(part), m, self.width, limit, self.blocks)
 
         work.map(task, [pixels[i : i + TILE] for i in range(0, len(pixels), TILE)])
 
@@ -89,7 +90,3 @@ def ordered(width: int, height: int) -> np.ndarray:
     pixels = (y << 16 | x)[np.lexsort((x, y, x // 8, y // 4, x // 64, y // 32))]
     pixels.setflags(write=False)
     return pixels
-
-
-def _addresses(*arrays: np.ndarray) -> list[int]:
-    return [a.ctypes.data for a in arrays]

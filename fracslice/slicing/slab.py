@@ -70,7 +70,7 @@ class Sampler:
     @cached_property
     def _field(self) -> Field:
         return (
-            Compiled(*self.kernel.entry) if isinstance(self.kernel, CpuKernel) else Called(self.kernel.points)
+            Compiled(self.kernel.entry) if isinstance(self.kernel, CpuKernel) else Called(self.kernel.points)
         )
 
     @cached_property

@@ -60,7 +60,6 @@ class Refiner:
         field = kernel.entry if isinstance(kernel, CpuKernel) else partial(_evaluated, kernel)
         loops = fast.native("find"), exact.native("find"), exact.native("polish"), field, (QUICK, MOST), SURE
         self._loops = RootLoops(fast.width, BATCHES[not isinstance(root, Node)], *loops)
-        self._owners = fast, exact, kernel  # of these loops
         self._placement = origin, voxel
         self._cells, self._work = cells, work or Work()
         self._memory: tuple[np.ndarray, np.ndarray] = np.empty(0), np.empty((3, 0), np.float32)

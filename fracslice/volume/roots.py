@@ -6,9 +6,8 @@ for itself: what it finds does not depend on its neighbours, nor on how the segm
 
 from __future__ import annotations
 
-import ctypes
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
@@ -21,6 +20,7 @@ from ..kernel.cpu import Precision, load_functions
 from ..kernel.host import lane_count
 from ..kernel.linker import Linked, link
 from ..kernel.loops import Loop
+from ..kernel.machine import Function, constant
 from .root_loops import AIM, FIND, LEAD, POLISH
 
 FRAMES = {"float32": (1e-6, 1e-5, 1e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-5, 1e-6, 1e-7)}
@@ -42,7 +42,8 @@ class Roots:
     def __init__(self, root: Node | Compilable, precision: Precision, voxel: float) -> None:
         self.dtype = np.dtype(precision)
         small, near, reach, tight, close = FRAMES[precision]
-        self._frame = np.array([1 / voxel, small, near, reach * voxel, tight * voxel, close], self.dtype)
+        frame = np.array([1 / voxel, small, near, reach * voxel, tight * voxel, close])
+        self._frame = constant(frame, self.dtype)
         if isinstance(root, Node):
             linked = link(root)
             made = _compiled(linked.source, linked.parameters.tobytes(), precision)
@@ -74,7 +75,7 @@ class Roots:
         """One of the loops for native code."""
         run = self._functions[name]
         if isinstance(run, CompiledLoop):
-            return run.code, run.parameters.ctypes.data, self._frame.ctypes.data
+            return run.function, run.parameters, self._frame
         return partial(run, self._frame)
 
     def aimed(self, segments: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -95,42 +96,27 @@ class Roots:
 Run = Callable[..., None]
 """A loop on its frame, the rows that it reads, those that it writes, both C-contiguous, and its numbers."""
 
-Native = tuple[int, int, int] | Callable[..., None]
-"""The addresses of a loop, of its parameters and of its frame; or a function of the rows that it reads, those
-that it writes and its numbers."""
+Native = tuple[Function, np.ndarray, np.ndarray] | Callable[..., None]
+"""A loop, its parameters and its frame; or a function of the rows that it reads, those that it writes and its
+numbers."""
 
 
 @dataclass(frozen=True, eq=False)
 class CompiledLoop:
     """A `Run` in machine code."""
 
-    function: Callable[..., None]
+    function: Function
     parameters: np.ndarray
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
-        places = (*_places(rows), *_places(out))
-        self.function(self.parameters.ctypes.data, frame.ctypes.data, *places, *numbers, rows.shape[1])
-
-    @property
-    def code(self) -> int:
-        """Its address."""
-        address = ctypes.cast(self.function, ctypes.c_void_p).value  # type: ignore[arg-type]
-        assert address
-        return address
-
-
-def _places(rows: np.ndarray) -> Iterable[int]:
-    """The addresses of the rows of an array."""
-    start, step = rows.ctypes.data, rows.strides[0]
-    return range(start, start + len(rows) * step, step)
+        self.function(self.parameters, frame, *rows, *out, *numbers, rows.shape[1])
 
 
 @lru_cache(maxsize=32)
 def _compiled(source: str, numbers: bytes, precision: Precision) -> tuple[int, dict[str, Run]]:
     """How many lanes the compiled loops take at once, and these by name."""
-    parameters = np.frombuffer(numbers).astype(precision)
+    parameters = constant(np.frombuffer(numbers), precision)
     bits = parameters.dtype.itemsize * 8
-
     width = lane_count(bits)
     functions = load_functions(Linked(source, parameters), bits, width, LOOPS[precision])
     return width, {name: CompiledLoop(function, parameters) for name, function in functions.items()}

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "../machine.h"
 #include "picture.h"
 
 namespace nb = nanobind;
@@ -15,19 +16,21 @@ namespace nb = nanobind;
 namespace fracslice {
 namespace {
 
-// Machine code of a scene: void points(parameters, x, y, z, f, n).
+// Machine code of a scene, `fracslice.kernel.loops.POINTS` on float.
 class Compiled : public Field {
  public:
-    Compiled(uintptr_t code, uintptr_t parameters)
-        : code_(reinterpret_cast<Code>(code)), parameters_(reinterpret_cast<const void*>(parameters)) {}
+    explicit Compiled(const nb::tuple& entry)
+        : machine_(entry),
+          points_(machine_.function<const float*, const float*, const float*, const float*, float*, ptrdiff_t>()),
+          parameters_(machine_.array(1)) {}
     void values(const float* x, const float* y, const float* z, float* f, size_t n) const override {
-        code_(parameters_, x, y, z, f, ptrdiff_t(n));
+        points_(parameters_, x, y, z, f, ptrdiff_t(n));
     }
 
  private:
-    using Code = void (*)(const void*, const float*, const float*, const float*, float*, ptrdiff_t);
-    Code code_;
-    const void* parameters_;
+    Machine<float> machine_;
+    void (*points_)(const float*, const float*, const float*, const float*, float*, ptrdiff_t);
+    const float* parameters_;
 };
 
 // A Python function of three float32 arrays that returns one.
@@ -130,7 +133,7 @@ NB_MODULE(_slices, module) {
     using namespace fracslice;
     nb::exception<std::domain_error>(module, "BorderError", PyExc_ValueError);
     nb::class_<Field>(module, "Field");
-    nb::class_<Compiled, Field>(module, "Compiled").def(nb::init<uintptr_t, uintptr_t>(), "code"_a, "parameters"_a);
+    nb::class_<Compiled, Field>(module, "Compiled").def(nb::init<nb::tuple>(), "entry"_a);
     nb::class_<Called, Field>(module, "Called").def(nb::init<nb::callable>(), "function"_a);
     nb::class_<Bounds>(module, "Bounds")
         .def(nb::init<double, double, double, int, int, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
