@@ -43,18 +43,21 @@ Tiles Memory::take(size_t places) {
     Tiles tiles;
     {
         std::lock_guard<std::mutex> lock(mutex_);
+        free_.reserve(free_.size() + lent_ + 1);
         if (!free_.empty()) {
             tiles = std::move(free_.back());
             free_.pop_back();
         }
+        ++lent_;
     }
     tiles.clear(places);
     return tiles;
 }
 
-void Memory::give(Tiles&& tiles) {
+void Memory::give(Tiles&& tiles) noexcept {
     std::lock_guard<std::mutex> lock(mutex_);
     free_.push_back(std::move(tiles));
+    --lent_;
 }
 
 Discs::Discs(double dx, double dy, double aside) {

@@ -64,11 +64,13 @@ struct Tiles {
 class Memory {
  public:
     Tiles take(size_t places);
-    void give(Tiles&& tiles);
+    // What was taken; there is room for it.
+    void give(Tiles&& tiles) noexcept;
 
  private:
     std::mutex mutex_;
     std::vector<Tiles> free_;
+    size_t lent_ = 0;
 };
 
 // The samples of a tile within a distance of a place in it, by its square in units of the lesser step.

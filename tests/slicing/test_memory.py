@@ -1,0 +1,18 @@
+"""The memory of slabs, where memory is short."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+SOURCES = Path(__file__).parents[2] / "fracslice" / "native" / "slices"
+
+
+def test_tiles_are_given_back_without_memory(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """A slab's destructor does so: what it threw would end the process."""
+    program = tmp_path / "memory"
+    sources = [Path(__file__).with_name("memory.cpp"), SOURCES / "tiles.cpp"]
+    compiler = os.environ.get("CXX", "g++")
+    subprocess.run([compiler, "-std=c++17", "-I", SOURCES, *sources, "-o", program], check=True)
+    subprocess.run([program], check=True)
