@@ -1,7 +1,8 @@
 # make demo: a shipped scene becomes a printable mesh. make test: tests and linters. make wheel: a wheel that needs no OpenVDB.
 # All of them set up what is missing first: Debian packages (as root or with sudo) and an own .venv. Debian 12, Ubuntu 24.04.
+# Another Python, in a venv of its own: make test PYTHON=python3.13 VENV=.venv-3.13
 PYTHON ?= python3
-VENV := .venv
+VENV ?= .venv
 BIN := $(VENV)/bin
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
@@ -11,7 +12,7 @@ PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
 NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
 
-.PHONY: demo test lint wheel peers setup packages clean
+.PHONY: demo test suite lint wheel peers setup packages clean
 
 demo: setup
 	mkdir -p out
@@ -19,8 +20,10 @@ demo: setup
 	$(BIN)/fracslice mesh scenes/mandelbulb.xml -o out/mandelbulb.stl --quiet
 	@ls -l out/mandelbulb.*
 
-test: lint
-	$(BIN)/python -m pytest -n 2
+test: lint suite
+
+suite: setup
+	$(BIN)/python -m pytest -n 2 $(SELECT)
 
 lint: setup
 	$(BIN)/ruff check .
@@ -55,4 +58,4 @@ $(VENV)/.installed: $(VENV)/.locked pyproject.toml $(NATIVE)
 	touch $@
 
 clean:
-	rm -rf $(VENV) build dist out
+	rm -rf .venv .venv-* build dist out
