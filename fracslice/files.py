@@ -28,14 +28,14 @@ class NotPrivateError(PermissionError):
 
 
 @contextmanager
-def replacing(target: Path, mode: int = OWNER_ONLY) -> Iterator[BinaryIO]:
+def replacing(target: Path) -> Iterator[BinaryIO]:
     """Opens a file that appears at `target` complete when the block ends, and never otherwise.
 
-    mode: its permissions, less the umask. What is written lies beside the target until then; any error,
-    KeyboardInterrupt too, removes it.
+    It is this user's alone, and lies beside the target until then; any error, KeyboardInterrupt too, removes
+    it.
     """
     part = target.with_name(f".{target.name[:100]}.{token_hex(8)}.part")
-    handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
+    handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, OWNER_ONLY)
     try:
         with os.fdopen(handle, "wb") as file:
             yield file
@@ -62,7 +62,7 @@ class Kept:
             with _private_folder(self.folder) as here, opened(name, "rb", folder=here) as file:
                 return read(file)
         except NotPrivateError as error:
-            _warn(f"{error}: what is kept in {self.folder} is not used")
+            warn(f"{error}: what is kept in {self.folder} is not used")
         except OSError:
             pass
         return None
@@ -149,8 +149,8 @@ def _alone_in(group: int) -> bool:
 
 
 @cache
-def _warn(text: str) -> None:
-    """Each text once."""
+def warn(text: str) -> None:
+    """Says something, in one line, once."""
     warnings.warn(text, FracsliceWarning, stacklevel=2)
 
 

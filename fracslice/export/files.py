@@ -12,9 +12,6 @@ from typing import BinaryIO
 from fracslice import files
 from fracslice.errors import ExportError
 
-ANYONE = 0o666
-"""What the umask allows."""
-
 
 def check_target(path: str | Path) -> Path:
     """Where a file for `path` would go (links followed), if it can be made there; changes nothing.
@@ -40,14 +37,10 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
     """
     target = check_target(path)
     try:
-        before = target.stat().st_mode & 0o7777 if target.exists() else None
-        with files.replacing(target, ANYONE if before is None else files.OWNER_ONLY) as file:
+        with files.replacing(target) as file:
             yield file
-            file.flush()
-            if before is not None:
-                os.fchmod(file.fileno(), before)
-            os.fsync(file.fileno())
-        _settle(target.parent)
+            _settle(file, target)
+        _settle_folder(target.parent)
     except OSError as error:
         raise ExportError(f"{path}: {reason(error)}") from error
 
@@ -56,7 +49,7 @@ def put(path: str, data: bytes) -> None:
     """Writes a file in as few calls as can be: one of many, of which what an error leaves is looked at before
     it is used. It is neither renamed into place nor forced to the disk.
     """
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, ANYONE)
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o666)
     try:
         while data:
             data = data[os.write(handle, data) :]
@@ -64,7 +57,24 @@ def put(path: str, data: bytes) -> None:
         os.close(handle)
 
 
-def _settle(folder: Path) -> None:
+def into_place(file: BinaryIO, path: str | Path) -> None:
+    """Renames an open file that is whole to `path`, as `replacing` does. Raises OSError."""
+    target = check_target(path)
+    _settle(file, target)
+    os.replace(file.name, target)
+    _settle_folder(target.parent)
+
+
+def _settle(file: BinaryIO, target: Path) -> None:
+    """Brings a file to the disk, with the permissions that the target has, or a new file gets."""
+    file.flush()
+    mask = os.umask(0o077)  # there is no other way to ask for it
+    os.umask(mask)
+    os.fchmod(file.fileno(), target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~mask)
+    os.fsync(file.fileno())
+
+
+def _settle_folder(folder: Path) -> None:
     """Bring the folder's new entry to the disk, where the system can."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)

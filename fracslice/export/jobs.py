@@ -1,22 +1,23 @@
-"""What the layer formats have in common: the run of a job, and files that an interrupted job goes on with."""
+"""What the layer formats have in common: the run of a job, and archives that are written layer by layer."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
 import struct
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import BinaryIO
 
 from isal.isal_zlib import crc32
 
-from fracslice.errors import ExportError
-from fracslice.export.files import check_target, reason, replacing
+from fracslice.export.files import into_place
+from fracslice.export.resuming import remainder
+from fracslice.kernel import field_key
+from fracslice.kernel.objects import toolchain
+from fracslice.keys import key, program
 from fracslice.slicing import Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
@@ -43,13 +44,21 @@ class SliceRun:
     def layers(self) -> int:
         return len(self.stack.z)
 
+    def key(self, form: str | bytes) -> str:
+        """The key of all that the bytes of the layers follow from. form: of the file."""
+        stack = [getattr(self.stack, f.name) for f in fields(self.stack) if f.name != "root"]
+        screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
+        field = field_key(self.stack.root)
+        return key(
+            program(), toolchain(), form, field, *stack, *screen, self.exposure, sorted(self.metadata.items())
+        )
+
     def describe(self) -> bytes:
-        """All that determines the layers, as JSON: equal for equal jobs."""
+        """What files say of the layers, as JSON."""
         stack, screen = self.stack, self.screen
         said = {
             "application": "fracslice",
             "metadata": self.metadata,
-            "field": hashlib.sha256(repr(stack.root).encode()).hexdigest(),
             "size_mm": stack.size,
             "pixel_mm": stack.pixel,
             "pixels": screen.shape[::-1],
@@ -62,36 +71,6 @@ class SliceRun:
             ],
         }
         return json.dumps(said, indent=1).encode()
-
-
-JOB = "job.json"
-"""What an unfinished folder says of itself."""
-
-
-def resumable_folder(
-    folder: Path, said: bytes, name: Callable[[int], str], is_whole: Callable[[bytes], bool]
-) -> int:
-    """Makes the folder of a job, or finds how many layers of it an interrupted one left; they must be whole.
-
-    name: of each layer's file. Raises ExportError for a folder with anything else in it.
-    """
-    try:
-        folder.mkdir(exist_ok=True)
-        names = set(os.listdir(folder))
-        if not names:
-            with replacing(folder / JOB) as file:
-                file.write(said)
-            return 0
-        if JOB not in names or (folder / JOB).read_bytes() != said:
-            raise ExportError(
-                f"{folder}: the folder is not empty, and what is in it is not this job interrupted"
-            )
-        index = 0
-        while name(index) in names and is_whole((folder / name(index)).read_bytes()):
-            index += 1
-        return index
-    except OSError as error:
-        raise ExportError(f"{folder}: {reason(error)}") from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,30 +97,18 @@ class Stored:
 
 
 @contextmanager
-def resumable_zip(path: Path, first: tuple[str, bytes]) -> Iterator[Stored]:
-    """A stored ZIP file that appears at `path` when the block ends; what an interrupted block wrote is kept
-    beside it.
-
-    first: name and content of the first member; a remainder that begins with the same goes on, any other is
-    dropped. Raises ExportError for what the file system refuses.
+def resumable_zip(path: Path, job: str) -> Iterator[Stored]:
+    """A stored ZIP file that appears at `path` when the block ends; what an interrupted block wrote is a
+    `remainder`, gone on with after its last whole member.
     """
-    target = check_target(path)
-    part = target.with_name(f".{target.name}.part")
-    try:
-        with open(part, "r+b" if part.exists() else "w+b") as file:
-            whole = _members(file)
-            if whole and (whole[0].filename != first[0] or _content(file, whole[0]) != first[1]):
-                whole = []
-            file.seek(_end(whole))
-            file.truncate()
-            archive = Stored(file, whole)
-            if not whole:
-                archive.add(*first)
-            yield archive
-            archive.close()
-        part.replace(target)
-    except OSError as error:
-        raise ExportError(f"{path}: {reason(error)}") from error
+    with remainder(path, job) as file:
+        whole = _members(file)
+        file.seek(_end(whole))
+        file.truncate()
+        archive = Stored(file, whole)
+        yield archive
+        archive.close()
+        into_place(file, path)
 
 
 _HEADER = struct.Struct("<4s5H3L2H")
@@ -179,8 +146,3 @@ def _end(members: list[zipfile.ZipInfo]) -> int:
         return 0
     last = members[-1]
     return last.header_offset + _HEADER.size + len(last.filename.encode()) + last.file_size
-
-
-def _content(file: BinaryIO, info: zipfile.ZipInfo) -> bytes:
-    file.seek(_end([info]) - info.file_size)
-    return file.read(info.file_size)

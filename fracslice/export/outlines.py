@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from fracslice.errors import ExportError
-from fracslice.export.files import reason, replacing
-from fracslice.export.jobs import JOB, SliceRun, resumable_folder
+from fracslice.export.files import put, reason, replacing
+from fracslice.export.jobs import SliceRun
 from fracslice.export.journal import journal
+from fracslice.export.resuming import JOB, resumable_folder
 from fracslice.slicing import Contours, Layer
 
 MICRON = 0.001
@@ -22,7 +23,7 @@ MICRON = 0.001
 def _streamed(
     run: SliceRun, path: str | Path, head: bytes, make: Callable[[Layer], bytes], tail: bytes
 ) -> Path:
-    with journal(path, head + run.describe()) as kept:
+    with journal(path, run.key(head)) as kept:
         for layer in run.slicer.map(make, range(kept.count, run.layers)):
             kept.append(layer)
         with replacing(path) as file:
@@ -74,7 +75,7 @@ def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
     folder = Path(path)
 
     name = "{:05d}.svg".format
-    start = resumable_folder(folder, run.describe(), name, lambda data: data.endswith(b"</svg>\n"))
+    start = resumable_folder(folder, run.key("svg"), name, lambda data: data.endswith(b"</svg>\n"))
 
     def make(layer: Layer) -> bytes:
         found = layer.contours
@@ -84,7 +85,7 @@ def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
 
     def write(layer: Layer) -> None:
         try:
-            (folder / name(layer.index)).write_bytes(make(layer))
+            put(f"{folder}/{name(layer.index)}", make(layer))
         except OSError as error:
             raise ExportError(f"{folder}: {reason(error)}") from error
 

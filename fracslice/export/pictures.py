@@ -8,7 +8,8 @@ from pathlib import Path
 from fracslice.errors import ExportError
 from fracslice.export import png
 from fracslice.export.files import put, reason, replacing
-from fracslice.export.jobs import JOB, SliceRun, resumable_folder, resumable_zip
+from fracslice.export.jobs import SliceRun, resumable_zip
+from fracslice.export.resuming import JOB, resumable_folder
 from fracslice.slicing import Layer
 
 MOST_MEMBERS = 65_535
@@ -21,8 +22,7 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
     that it was the same job. Raises ExportError for a folder with anything else in it.
     """
     folder = Path(path)
-    said = run.describe()
-    start = resumable_folder(folder, said, "{:05d}.png".format, png.is_whole)
+    start = resumable_folder(folder, run.key("png"), "{:05d}.png".format, png.is_whole)
 
     def write(layer: Layer) -> None:
         data = png.encode_layer(run.screen, layer)
@@ -34,7 +34,7 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
     for _ in run.slicer.map(write, range(start, run.layers)):
         pass
     with replacing(folder / "manifest.json") as file:
-        file.write(said)
+        file.write(run.describe())
     (folder / JOB).unlink()
     return folder
 
@@ -55,12 +55,15 @@ def write_sl1(run: SliceRun, path: str | Path) -> Path:
     if run.layers >= MOST_MEMBERS:
         raise ExportError(f"{path}: {run.layers} layers are too many for an archive")
     name = target.stem
-    with resumable_zip(target, ("config.ini", _ini(_config(run, name)))) as archive:
-        done = archive.names
-        if "fracslice.json" not in done:
-            archive.add("fracslice.json", run.describe())
-            archive.add("prusaslicer.ini", _ini(_settings(run)))
-        start = sum(1 for n in done if n.endswith(".png"))
+    about = {
+        "config.ini": _ini(_config(run, name)),
+        "fracslice.json": run.describe(),
+        "prusaslicer.ini": _ini(_settings(run)),
+    }
+    with resumable_zip(target, run.key(f"sl1 {name}")) as archive:
+        for member, data in list(about.items())[len(archive.members) :]:
+            archive.add(member, data)
+        start = len(archive.members) - len(about)
         pictures = run.slicer.map(lambda layer: png.encode_layer(run.screen, layer), range(start, run.layers))
         for index, data in enumerate(pictures, start):
             archive.add(f"{name}{index:05d}.png", data)

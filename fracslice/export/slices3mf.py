@@ -42,7 +42,7 @@ def write_3mf(run: SliceRun, path: str | Path) -> Path:
     """The slice stack of one object, streamed. The mesh has "low resolution": its box, which the extension
     allows where the slices are what is printed.
     """
-    with journal(path, b"3mf" + run.describe()) as kept:
+    with journal(path, run.key("3mf")) as kept:
         for slice_ in run.slicer.map(lambda layer: _slice(run, layer), range(kept.count, run.layers)):
             kept.append(slice_)
         with (

@@ -7,28 +7,32 @@ the text that it was made of.
 
 from __future__ import annotations
 
+import atexit
 import ctypes
-import hashlib
 import importlib.util
 import math
 import os
+import shutil
 import sys
 import tempfile
 import threading
+from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ..errors import KernelError
+from ..files import Kept
 from ..formulas.registry import Node
+from ..keys import key, texts
 from . import cuda_source
 from .cpu import Precision
 from .linker import Linked, link
-from .objects import cache_folder
+from .objects import cache_folder, numba_settings
 
 BLOCK = 128
 """Threads of a block."""
@@ -167,19 +171,23 @@ def load_loops(linked: Linked, precision: Precision, loops: str) -> ModuleType:
     """
     require()
     text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)
-    name = f"cuda_{hashlib.sha256((text + _toolchain()).encode()).hexdigest()[:32]}"
+    name = f"cuda_{key(text, _toolchain())}"
     return sys.modules.get(name) or _imported(name, text)
 
 
 @lru_cache(maxsize=1)
 def _toolchain() -> str:
-    """Everything beside the module's own text that the machine code depends on."""
-    return (Path(__file__).parent / "cuda_words.py").read_text() + version("numba-cuda")
+    """The key of everything beside the module's own text that the machine code depends on."""
+    words = texts(Path(__file__).parent / "cuda_words.py")
+    versions = (version(name) for name in ("numba-cuda", "numba", "llvmlite"))
+    return key(words, *versions, *numba_settings())
 
 
 def _imported(name: str, text: str) -> ModuleType:
-    """Numba caches the machine code of a function beside its file, so the text becomes a file that stays."""
-    path = _kept(cache_folder(), name, text) or _kept(Path(tempfile.mkdtemp(prefix="fracslice-")), name, text)
+    """Numba caches the machine code of a function beside its file, so the text becomes a file that stays; one
+    for this process alone where others could write it.
+    """
+    path = _kept(cache_folder(), name, text) or _kept(_own_folder(), name, text)
     assert path
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
@@ -189,16 +197,24 @@ def _imported(name: str, text: str) -> ModuleType:
     return sys.modules.setdefault(name, module)
 
 
+@lru_cache(maxsize=1)
+def _own_folder() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="fracslice-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
 def _kept(folder: Path, name: str, text: str) -> Path | None:
-    """The file with this text; None if the folder cannot be written. Its date is that of the first who
-    wrote it, which Numba's cache asks for."""
-    path = folder / f"{name}.py"
-    try:
-        if not path.exists():
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile("w", dir=folder, delete=False) as file:
-                file.write(text)
-            os.replace(file.name, path)
-    except OSError:
-        return None
-    return path
+    """The file with this text; None if it cannot be kept. Its date is that of the first who wrote it, which
+    Numba's cache asks for."""
+    kept, file, whole = Kept(folder), f"{name}.py", text.encode()
+    if kept.get(file, _read) != whole:
+        with suppress(OSError):
+            kept.put(file, lambda to: to.write(whole))
+        if kept.get(file, _read) != whole:
+            return None
+    return Path(os.path.realpath(folder), file)
+
+
+def _read(file: BinaryIO) -> bytes:
+    return file.read()

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from fracslice_cli.main import run
 
+from fracslice.export.jobs import Stored
+
 
 def sliced(*arguments: object) -> int:
     return run(["slice", *map(str, arguments), "--pixel", "0.2mm"])
@@ -72,3 +74,35 @@ def test_a_folder_that_is_not_this_job(ball: Path, tmp_path: Path, capfd: pytest
     (tmp_path / "layers" / "job.json").write_text("{}")
     assert sliced(ball, "-o", tmp_path / "layers", "--layer", "1mm") == 2
     assert "is not this job interrupted" in capfd.readouterr().err
+
+
+def test_an_edited_scene_begins_afresh_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Interrupted, edited, and the same command again: not a layer of the scene before."""
+    scene, target, add = tmp_path / "a.xml", tmp_path / "a.sl1", Stored.add
+    text = (
+        '<scene version="1"><solid size="20mm"><difference><box size="1 1 1.5"/>'
+        '<cylinder radius="{}" height="3"/></difference></solid></scene>'
+    )
+    options = ("-o", target, "--layer", "1mm", "--printer", "sl1s", "--quiet")
+
+    def stopped(self: Stored, name: str, data: bytes) -> None:
+        if name == "a00008.png":
+            raise KeyboardInterrupt
+        add(self, name, data)
+
+    scene.write_text(text.format(0.3))
+    with monkeypatch.context() as patch:
+        patch.setattr(Stored, "add", stopped)
+        assert run(["slice", str(scene), *map(str, options)]) == 130
+    scene.write_text(text.format(0.1))
+    capfd.readouterr()
+    assert run(["slice", str(scene), *map(str, options)]) == 0
+    said = capfd.readouterr().err
+    assert said.startswith(f"fracslice: {target}: ") and "begun afresh" in said and said.count("\n") == 1
+    edited = target.read_bytes()
+    target.unlink()
+    assert run(["slice", str(scene), *map(str, options)]) == 0
+    assert target.read_bytes() == edited
+    assert capfd.readouterr().err == ""

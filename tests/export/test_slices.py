@@ -7,6 +7,8 @@ import json
 import struct
 import xml.etree.ElementTree as ET
 import zipfile
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +16,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fracslice.errors import Cancelled, ExportError
+from fracslice.errors import Cancelled, ExportError, FracsliceWarning
 from fracslice.export import png
 from fracslice.export.jobs import SliceRun, Stored
+from fracslice.export.journal import journal
 from fracslice.export.slices import FORMATS, slice_format, write_slices
-from fracslice.formulas import difference, menger, sphere
+from fracslice.formulas import Node, difference, menger, sphere
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.printers import Printer
 from fracslice.slicing.raster import Screen
@@ -28,8 +31,8 @@ MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
 ROOT = difference(menger(level=1), sphere(radius=0.9))
 
 
-def run(work: Work | None = None, layer: float = 0.5) -> SliceRun:
-    stack = plan_stack(ROOT, SliceJob(size=12, layer=layer, pixel=MACHINE.pixel))
+def run(work: Work | None = None, layer: float = 0.5, root: Node = ROOT) -> SliceRun:
+    stack = plan_stack(root, SliceJob(size=12, layer=layer, pixel=MACHINE.pixel))
     return SliceRun(stack, Screen(stack, MACHINE), work or Work(), metadata={"Title": "test"})
 
 
@@ -223,7 +226,7 @@ def test_an_interrupted_job_goes_on(form: str, tmp_path: Path, monkeypatch: pyte
         write_slices(run(), target, form)
     assert 0 < len(made) < 24
     assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1"), form))
-    assert not [p for p in tmp_path.iterdir() if p.name.endswith(".part")]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["again", "part.sl1"]
 
 
 def _beside(folder: Path, name: str) -> Path:
@@ -248,15 +251,95 @@ def test_a_truncated_remainder_goes_on_from_what_is_whole(form: str, cut: int, t
     assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1"), form))
 
 
-def test_the_remainder_of_another_job_is_not_used(tmp_path: Path) -> None:
+SMALLER = difference(menger(level=1), sphere(radius=0.8))
+"""As large, and all that an archive's first member says of it is the same."""
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_the_remainder_of_another_job_is_not_used(form: str, tmp_path: Path) -> None:
+    target = tmp_path / "part.sl1"
     with pytest.raises(Cancelled):
-        write_slices(run(cancelled_after(8), layer=0.4), tmp_path / "part.sl1")
-    target = write_slices(run(), tmp_path / "part.sl1")
-    assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1")))
+        write_slices(run(cancelled_after(8), root=SMALLER), target, form)
+    with pytest.warns(
+        FracsliceWarning, match=r"part.sl1: what was left there by another job, .* begun afresh"
+    ):
+        write_slices(run(), target, form)
+    assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1"), form))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["again", "part.sl1"]
+
+
+@pytest.mark.parametrize(("before", "after"), [("cli", "cli-binary"), ("sl1", "3mf"), ("png", "svg")])
+def test_the_remainder_of_another_format_is_not_used(before: str, after: str, tmp_path: Path) -> None:
     with pytest.raises(Cancelled):
-        write_slices(run(cancelled_after(8), layer=0.4), tmp_path / "layers")
-    with pytest.raises(ExportError, match="not this job"):
+        write_slices(run(cancelled_after(8)), tmp_path / "part", before)
+    with pytest.warns(FracsliceWarning, match="begun afresh"):
+        write_slices(run(), tmp_path / "part", after)
+
+
+def test_a_job_is_known_by_all_that_its_layers_follow_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    job = run()
+    changes: dict[str, list[dict[str, Any]]] = {
+        "stack": [
+            {"root": SMALLER},
+            {"tops": job.stack.tops + 1e-9},
+            {"corner": (0.0, 0.0)},
+            {"notes": ("a",)},
+        ],
+        "screen": [{"gamma": 1.1}, {"compensation": 0.01}, {"mirror": True}, {"printer": None}],
+        "": [{"exposure": (8.0, 36.0)}, {"metadata": {"Title": "other"}}],
+    }
+    jobs = [job]
+    for part, values in changes.items():
+        whole = getattr(job, part) if part else job
+        changed = [replace(whole, **value) for value in values]
+        jobs += [replace(job, **{part: each}) for each in changed] if part else changed
+    keys = [each.key("png") for each in jobs] + [job.key("svg")]
+    monkeypatch.setattr(sphere, "lipschitz", 1.5)
+    keys.append(run(root=difference(menger(level=1), sphere(radius=0.9))).key("png"))
+    assert len(set(keys)) == len(keys)
+    monkeypatch.undo()
+    assert run().key("png") == keys[0]
+
+
+@pytest.mark.parametrize("spoil", ["forged", "linked", "lent"])
+def test_a_remainder_that_somebody_else_can_have_written_is_not_used(spoil: str, tmp_path: Path) -> None:
+    target, part, said = (tmp_path / name for name in ("part.cli", ".part.cli.part", ".part.cli.job"))
+    with pytest.raises(Cancelled):
+        write_slices(run(cancelled_after(8)), target)
+    if spoil == "forged":
+        said.write_text(json.dumps({"application": "fracslice", "job": run().key("cli")}))
+    elif spoil == "linked":
+        part.rename(tmp_path / "mine")
+        part.symlink_to(tmp_path / "mine")
+    else:
+        part.chmod(0o666)
+    before = part.read_bytes()
+    with pytest.warns(FracsliceWarning, match="begun afresh") if spoil == "forged" else nullcontext():
+        write_slices(run(), target)
+    assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.cli")))
+    if spoil == "linked":
+        assert (tmp_path / "mine").read_bytes() == before
+
+
+def test_two_at_once_do_not_spoil_each_other(tmp_path: Path) -> None:
+    with journal(tmp_path / "part.cli", "one") as kept:
+        kept.append(b"layer")
+        with (
+            pytest.raises(ExportError, match="another process is at it"),
+            journal(tmp_path / "part.cli", "two"),
+        ):
+            pass
+        assert list(kept) == [b"layer"]
+
+
+def test_a_layer_that_is_a_link_is_not_written_through(tmp_path: Path) -> None:
+    with pytest.raises(Cancelled):
+        write_slices(run(cancelled_after(8)), tmp_path / "layers")
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "layers" / "00023.png").symlink_to(tmp_path / "mine")
+    with pytest.raises(ExportError, match="layers: "):
         write_slices(run(), tmp_path / "layers")
+    assert (tmp_path / "mine").read_text() == "mine"
 
 
 def test_a_full_disk_leaves_the_remainder_and_no_archive(
