@@ -21,6 +21,7 @@ from typing import Any, NoReturn
 from ..errors import KernelError
 from ..formulas import vocabulary
 from ..scene.nearest import hint
+from .seen import seen
 
 CHILD = "child"
 """What a warp calls its element."""
@@ -66,9 +67,13 @@ def scope(function: Callable[..., Any]) -> dict[str, Any]:
     return {**vars(builtins), **function.__globals__, **{name: cell.cell_contents for name, cell in cells}}
 
 
-@lru_cache(maxsize=1024)
 def text(function: Callable[..., Any]) -> str:
     """A function in the words of the vocabulary. Raises `KernelError` for what is not in the language."""
+    return _text(function, seen(function))
+
+
+@lru_cache(maxsize=1024)
+def _text(function: Callable[..., Any], _: object) -> str:
     try:
         lines, first = inspect.getsourcelines(function)
     except (OSError, TypeError):

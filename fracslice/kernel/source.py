@@ -13,6 +13,7 @@ from types import FunctionType
 from typing import Any
 
 from . import language
+from .seen import seen
 
 
 @dataclass(frozen=True)
@@ -55,9 +56,16 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
     return Copy(tree.name, ast.unparse(ast.fix_missing_locations(tree)), calls)
 
 
-@lru_cache(maxsize=1024)
 def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str]) -> Copy:
     """A function's copy. A scene is linked anew for every camera, and this is nine tenths of the time."""
+    return _shared(function, fixed, given, (seen(function), repr(fixed)))
+
+
+@lru_cache(maxsize=1024)
+def _shared(
+    function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str], _: object
+) -> Copy:
+    """The last argument tells what is equal and not the same apart: 1 and 1.0, a function before and after."""
     return copied(specialised(function, dict(fixed)), function, given)
 
 

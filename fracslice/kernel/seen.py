@@ -1,0 +1,33 @@
+"""What a function's text follows from: in a notebook, all of it may change while the function stays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from functools import lru_cache
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+
+def seen(function: Callable[..., Any]) -> Hashable:
+    """Equal as long as a function's code, and all that it takes from elsewhere, is the same."""
+    assert isinstance(function, FunctionType)
+    code, names = function.__code__, _names(function.__code__)
+    cells = zip(code.co_freevars, function.__closure__ or (), strict=True)
+    around = {name: cell.cell_contents for name, cell in cells}
+    return code, tuple(_mark(around.get(n, function.__globals__.get(n)), names) for n in names)
+
+
+@lru_cache(maxsize=4096)
+def _names(code: CodeType) -> tuple[str, ...]:
+    """All names that a function takes from elsewhere, and attributes of these."""
+    inner = (_names(c) for c in code.co_consts if isinstance(c, CodeType))
+    return tuple(sorted({*code.co_names, *code.co_freevars, *(n for names in inner for n in names)}))
+
+
+def _mark(value: Any, attributes: tuple[str, ...] = ()) -> Hashable:
+    """What is to be known of a value: functions by identity, numbers by type and every digit."""
+    if isinstance(value, FunctionType):
+        return value
+    if isinstance(value, ModuleType):
+        return value, tuple(_mark(vars(value).get(name)) for name in attributes)
+    return type(value), repr(value) if isinstance(value, (int, float, tuple)) else None
