@@ -65,7 +65,7 @@ def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], giv
 def _shared(
     function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str], _: object
 ) -> Copy:
-    """The last argument tells what is equal and not the same apart: 1 and 1.0, a function before and after."""
+    """The last argument tells what is equal and not the same apart: 1 and 1.0, a function and its next."""
     return copied(specialised(function, dict(fixed)), function, given)
 
 

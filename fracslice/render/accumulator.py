@@ -11,6 +11,7 @@ from typing import Any, BinaryIO, Protocol
 from zipfile import BadZipFile
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 
 from ..errors import RenderError
 from ..scene.view import Film
@@ -24,6 +25,12 @@ COARSE = 4
 """The first pass looks at every fourth pixel of every fourth row, unless it is told otherwise."""
 NEARLY = 0.999
 """The largest of some numbers is not below so much of their mean, however that is rounded."""
+
+COARSEST, MOST_PASSES = 64, 1 << 24
+"""What a saved picture may say of itself."""
+HEADER = 1 << 12
+"""Bytes of an array in a file that are not its numbers', at most."""
+NO_PICTURE = "expected a picture in the making, whole, as it was saved"
 
 FEW = 1 / 256
 """When no more than this share of the pixels is unfinished, there is no choosing among them: a pass costs its
@@ -164,19 +171,44 @@ class HostAccumulator:
         np.savez(file, sums=self.sums, shape=shape, key=np.array(key))
 
     @classmethod
-    def load(cls, path: str | Path, key: str) -> HostAccumulator:
-        """Reads what `save` wrote. Raises `RenderError` if it is of another picture, or no such file."""
+    def load(cls, path: str | Path, key: str, like: HostAccumulator) -> HostAccumulator:
+        """Reads what `save` wrote. like: a picture of the same size and float type.
+
+        Raises `RenderError` if it is of another picture, or no such file: nothing that native code could trip
+        over is let in.
+        """
         try:
-            with np.load(path, allow_pickle=False) as stored:
-                width, height, passes, coarse = map(int, stored["shape"])
-                sums, found = np.ascontiguousarray(stored["sums"]), str(stored["key"])
+            with open(path, "rb") as file, NpzFile(file) as stored:
+                if str(_small(stored, "key")) != key:
+                    raise RenderError(f"{path}: is of another scene, view, size or version")
+                width, height, passes, coarse = map(int, _small(stored, "shape"))
+                found = cls(width, height, _small(stored, "sums", like.sums.nbytes), passes, coarse)
         except OSError as error:
             raise RenderError(f"{path}: {error.strerror or error}") from None
-        except (ValueError, KeyError, EOFError, BadZipFile, zlib.error):
-            raise RenderError(f"{path}: expected a picture in the making, whole, as it was saved") from None
-        if found != key or sums.shape != (width * height, CHANNELS):
-            raise RenderError(f"{path}: is of another scene, view, size or version")
-        return cls(width, height, sums, passes, coarse)
+        except (ValueError, KeyError, EOFError, BadZipFile, NotImplementedError, zlib.error):
+            raise RenderError(f"{path}: {NO_PICTURE}") from None
+        if not found._fits(like):
+            raise RenderError(f"{path}: {NO_PICTURE}")
+        return found
+
+    def _fits(self, like: HostAccumulator) -> bool:
+        """Whether a picture can go on as one like another."""
+        sums, n = self.sums, self.sums[..., -1]
+        return (
+            (self.width, self.height) == (like.width, like.height)
+            and (sums.shape, sums.dtype, sums.flags.c_contiguous) == (like.sums.shape, like.sums.dtype, True)
+            and 0 <= self.passes < MOST_PASSES
+            and 1 <= self.coarse <= COARSEST
+            and bool(((n >= 0) & (n <= self.passes) & (n == np.floor(n))).all())
+        )
+
+
+def _small(stored: NpzFile, name: str, most: int = 0) -> np.ndarray:
+    """An array of a file, if it is of about so many bytes at most: a small file can hold a large one."""
+    assert stored.zip
+    if stored.zip.getinfo(f"{name}.npy").file_size > most + HEADER:
+        raise ValueError(name)
+    return np.asarray(stored[name])
 
 
 @lru_cache(maxsize=4)

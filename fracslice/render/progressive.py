@@ -3,7 +3,6 @@ needed."""
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -16,6 +15,7 @@ import numpy as np
 from ..errors import RenderError
 from ..formulas.registry import Node
 from ..kernel.devices import chosen
+from ..keys import key, program
 from ..scene.view import Camera, Film, View
 from ..work import Work
 from .accumulator import COARSE, Accumulator, HostAccumulator
@@ -101,17 +101,21 @@ class Renderer:
         self.dtype = np.dtype(self.setting.precision)
         tracer, self._kept = _machinery(self.device)
         self.tracer = tracer(self._frame(0), self.dtype, self.width, self.height)
-        self.accumulator = self._kept(HostAccumulator.empty(self.width, self.height, self.dtype))
+        self.accumulator = self._kept(self._empty)
         self._aimed: tuple[Node, bool] | None = None
         self._rate = 0.0
+
+    @property
+    def _empty(self) -> HostAccumulator:
+        return HostAccumulator.empty(self.width, self.height, self.dtype)
 
     @property
     def key(self) -> str:
         """Equal for pictures that the same samples make."""
         what: Setting = self.setting
-        numbers = [self._frame(k).linked for k in range(len(what.roots))]
-        text = "".join(n.source + repr(n.parameters.tolist()) for n in numbers)
-        return hashlib.sha256(f"{self.width} {self.height} {what.precision} {text}".encode()).hexdigest()[:20]
+        frames = [self._frame(k).linked for k in range(len(what.roots))]
+        parts = [part for frame in frames for part in (frame.source, frame.parameters)]
+        return key(program(), self.width, self.height, what.precision, *parts)
 
     def look(self, camera: Camera, within: float | None = None) -> None:
         """Begins the picture anew from elsewhere; depths and precision stay as they are.
@@ -139,7 +143,7 @@ class Renderer:
 
     def resume(self, path: str | Path) -> None:
         """Goes on with a file that `save` wrote. Raises `RenderError` if it is of another picture."""
-        self.accumulator = self._kept(HostAccumulator.load(path, self.key))
+        self.accumulator = self._kept(HostAccumulator.load(path, self.key, self._empty))
 
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
         """Yields the picture after every pass, until all pixels have so many samples or are within the

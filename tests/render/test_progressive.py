@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import pytest
 
 from fracslice.errors import Cancelled, RenderError
 from fracslice.formulas import material, menger, sphere, union
-from fracslice.render import Renderer
+from fracslice.render import Renderer, progressive
 from fracslice.scene.view import Camera, Film, Light, View
 from fracslice.work import Work
 
@@ -87,6 +89,52 @@ def test_a_state_that_was_cut_off_is_refused(tmp_path: Path, left: int) -> None:
     path.write_bytes(path.read_bytes()[:left])
     with pytest.raises(RenderError, match=r"state.npz: expected a picture in the making"):
         of.resume(path)
+
+
+FORGED: dict[str, Callable[[dict[str, np.ndarray]], object]] = {
+    "of another type": lambda s: s.update(sums=s["sums"].astype(np.float16)),
+    "of fewer pixels": lambda s: s.update(sums=s["sums"][:-1]),
+    "smaller": lambda s: s.update(sums=s["sums"][: 8 * 8], shape=np.array([8, 8, 1, 4])),
+    "turned": lambda s: s.update(sums=np.asfortranarray(s["sums"])),
+    "with more samples than passes": lambda s: s["sums"].__setitem__((0, 5), 1e9),
+    "with half a sample": lambda s: s["sums"].__setitem__((0, 5), 0.5),
+    "with less than none": lambda s: s["sums"].__setitem__((0, 5), -1),
+    "with no number of them": lambda s: s["sums"].__setitem__((0, 5), np.nan),
+    "without a grid": lambda s: s.update(shape=np.array([*s["shape"][:3], 0])),
+    "without a shape": lambda s: s.pop("shape"),
+    "with code": lambda s: s.update(shape=np.array([print] * 4, dtype=object)),
+    "too large": lambda s: s.update(sums=np.zeros((len(s["sums"]) + 1000, 6), s["sums"].dtype)),
+}
+
+
+@pytest.mark.parametrize("forged", FORGED)
+def test_a_state_that_no_renderer_wrote_is_refused(tmp_path: Path, forged: str) -> None:
+    """Native code is given its numbers and its size."""
+    of, path = renderer(), tmp_path / "state.npz"
+    with open(path, "wb") as file:
+        of.save(file)
+    with np.load(path) as arrays:
+        state = {name: arrays[name].copy() for name in arrays}
+    FORGED[forged](state)
+    np.savez_compressed(path, allow_pickle=True, **state)
+    with pytest.raises(RenderError, match=r"state.npz: expected a picture in the making"):
+        of.resume(path)
+
+
+def test_a_state_is_of_one_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open(tmp_path / "state.npz", "wb") as file:
+        renderer().save(file)
+    monkeypatch.setattr(progressive, "program", lambda: "another")
+    with pytest.raises(RenderError, match="another scene, view, size or version"):
+        renderer().resume(tmp_path / "state.npz")
+
+
+@pytest.mark.parametrize("saved", [np.save, lambda file, a: file.write(b"text")])
+def test_what_is_no_state_is_refused(tmp_path: Path, saved: Callable[[BinaryIO, np.ndarray], object]) -> None:
+    with open(tmp_path / "state.npz", "wb") as file:
+        saved(file, np.zeros(4))
+    with pytest.raises(RenderError, match=r"state.npz: expected a picture in the making"):
+        renderer().resume(tmp_path / "state.npz")
 
 
 def test_a_picture_that_was_not_looked_at_in_time_is_gone() -> None:
