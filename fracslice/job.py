@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -159,11 +160,11 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         bricks, raw, pieces = _surface(planned, clock)
     if what.chord_mm is not None:
         with clock("refining"):
-            unit = float(raw.size.max()) / what.size(scene)
+            unit = 1 / (scale or what.size(scene) / max(planned.box.size))
             raw = refine(planned.root, raw, what.chord_mm * unit, planned.voxel, work)
     with clock("finishing"):
         left = replace(left, keep="all") if pieces else left
-        mesh, removed, place = _finished(raw, what, left, what.size(scene), scale)
+        mesh, removed, place = _finished(planned, raw, what, left, what.size(scene), scale, work)
     simplified = None
     if what.simplify_mm is not None:
         with clock("simplifying"):
@@ -211,7 +212,7 @@ def _changed(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) 
 
     # Of walls thinner than a voxel a mesh has crumbs only: bodies are chosen in the field where it tells.
     left = how if planned.root.facts.weak else replace(how, keep="all")
-    size_of = partial(_mesh_box, what=what, how=left, size=size, work=work)
+    size_of = partial(_box_of_mesh, what=what, how=left, size=size, work=work)
     return *printable(planned, size, how, work, size_of), left
 
 
@@ -245,7 +246,7 @@ def _thinner(pieces: str, voxel: float) -> tuple[str, ...]:
 
 
 def _finished(
-    raw: Mesh, what: MeshJob, how: Print, size: float, scale: float | None
+    planned: Plan, raw: Mesh, what: MeshJob, how: Print, size: float, scale: float | None, work: Work
 ) -> tuple[Mesh, Removed, Placement]:
     """The mesh that is wanted, in mm on the bed, as a file will hold it. scale: mm per scene unit; without
     one, what stays is made to be of that size.
@@ -253,13 +254,38 @@ def _finished(
     from .mesh.clean import clean
     from .mesh.solid import place_on_bed
 
-    rough = scale or size / float(raw.size.max())
+    rough = scale or size / max(planned.box.size)
     kept, removed = _kept(raw.scaled(rough), what, how)
-    exact = 1.0 if scale else size / float(kept.size.max())
-    mesh = kept.scaled(exact)
-    placed = place_on_bed(mesh)
+    box = _box_of_kept(planned, raw, kept, rough, work)
+    exact = scale or size / max(box.size)
+    mesh = kept.scaled(exact / rough)
+    placed = place_on_bed(mesh, (exact * box.centre[0], exact * box.centre[1]))
     x, y, z = (placed.bounds[0] - mesh.bounds[0]).tolist()
-    return clean(placed), removed, Placement(rough * exact, (x, y, z))
+    return clean(placed), removed, Placement(exact, (x, y, z))
+
+
+def box_of_the_rest(
+    planned: Plan, whole: np.ndarray, rest: np.ndarray, tips: Callable[[], np.ndarray], work: Work
+) -> Box:
+    """The box of the bodies that stay, scene units: the field's, for a mesh does not have all of its tips.
+
+    whole, rest: bounds of the mesh [2, 3] with all bodies, and with those. tips: the outermost vertices that
+    stay, [n, 3], scene units, from which a side is looked for where bodies that were removed reach farther.
+    """
+    from .volume import reached
+
+    if (rest == whole).all():
+        return planned.box
+    found = reached(planned.root, tips().T, planned.voxel, work)
+    own = np.array([planned.box.lo, planned.box.hi])
+    lo, hi = np.where(rest == whole, own, [found.lo, found.hi]).tolist()
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
+
+
+def outermost(vertices: np.ndarray) -> np.ndarray:
+    """Those of [n, 3] that are farthest out along each axis, [6, 3]."""
+    found: np.ndarray = vertices[[*vertices.argmin(0), *vertices.argmax(0)]]
+    return found
 
 
 def _kept(mesh: Mesh, what: MeshJob, how: Print) -> tuple[Mesh, Removed]:
@@ -270,17 +296,23 @@ def _kept(mesh: Mesh, what: MeshJob, how: Print) -> tuple[Mesh, Removed]:
     return select(mesh, keep=how.keep, dust_mm3=what.dust(mesh.volume), cavities=cavities)
 
 
-def _mesh_box(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> Box:
-    """The box of the mesh that would be made of a planned scene, scene units."""
+def _box_of_mesh(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> Box:
+    """The box of what would stay in the mesh of a planned scene, scene units."""
     from .mesh.components import in_pieces
     from .mesh.extract import contour
     from .volume import sample_scene
 
     raw = contour(planned.root, sample_scene(planned, work), work)
     how = replace(how, keep="all") if in_pieces(raw, planned.voxel) else how
-    rough = size / float(raw.size.max())
-    lo, hi = (_kept(raw.scaled(rough), what, how)[0].bounds / rough).tolist()
-    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
+    rough = size / max(planned.box.size)
+    kept, _ = _kept(raw.scaled(rough), what, how)
+    return _box_of_kept(planned, raw, kept, rough, work)
+
+
+def _box_of_kept(planned: Plan, raw: Mesh, kept: Mesh, scale: float, work: Work) -> Box:
+    """kept: of `raw`, `scale` times as large."""
+    tips = partial(outermost, kept.vertices / scale)
+    return box_of_the_rest(planned, scale * raw.bounds, kept.bounds, tips, work)
 
 
 def _surface_error(planned: Plan, mesh: Mesh, place: Placement, work: Work) -> SurfaceError:

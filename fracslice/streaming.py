@@ -17,7 +17,7 @@ import numpy as np
 from .errors import SceneError
 from .export.files import check_target, replacing
 from .export.stl import write_pieces
-from .job import MeshJob
+from .job import MeshJob, box_of_the_rest, outermost
 from .memory import peak_rss_mb
 from .report import Report, SurfaceError, version
 from .scene import Print, Scene
@@ -126,16 +126,17 @@ class _Finish:
         from .mesh.window import Window
 
         self.planned, self.pieces, self.whole, self.work = planned, pieces, whole, work
-        longest = float((whole.high.max(axis=0) - whole.low.min(axis=0)).max())
-        unit = (size / longest) ** 3
+        unit = (size / max(planned.box.size)) ** 3
         dust = what.dust(float(whole.volumes.sum()) * unit)
         shells, self.misplaced = whole.nested(pieces)
         sized = replace(shells, volumes=shells.volumes * unit)
         how = what.printing or Print()
         self.stays, self.removed = choose(sized, keep=how.keep, dust_mm3=dust, cavities=how.cavities)
-        low, high = whole.low[self.stays].min(axis=0), whole.high[self.stays].max(axis=0)
-        self.scale = size / float((high - low).max())
-        self.offset = -self.scale * np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
+        bounds = np.stack([whole.low.min(axis=0), whole.high.max(axis=0)])
+        rest = np.stack([whole.low[self.stays].min(axis=0), whole.high[self.stays].max(axis=0)])
+        box = box_of_the_rest(planned, bounds, rest, self.tips, work)
+        self.scale = size / max(box.size)
+        self.offset = -self.scale * np.array([*box.centre[:2], rest[0, 2]])
         self.voxel = planned.voxel * self.scale
         self.window = Window(self.voxel, work.threads)
         self.errors: list[np.ndarray] = []
@@ -146,12 +147,21 @@ class _Finish:
         for number, (mesh, labels) in enumerate(self.pieces):
             self.work.check()
             self.work.progress("finishing", number / len(self.pieces.ends))
-            stays = self.stays[self.whole.of_label[labels]]
-            kept = mesh.selected(stays).scaled(self.scale).translated(self.offset)
+            kept = mesh.selected(self.staying(labels)).scaled(self.scale).translated(self.offset)
             end = self.scale * self.pieces.ends[number] + float(self.offset[0])
             done = self.window.add(kept, end if number < last else np.inf)
             self._measure(done.vertices[::stride])
             yield done
+
+    def tips(self) -> np.ndarray:
+        """The outermost vertices of what stays, of each piece."""
+        kept = (mesh.vertices[mesh.triangles[self.staying(labels)]] for mesh, labels in self.pieces)
+        return np.concatenate([outermost(part.reshape(-1, 3)) for part in kept if len(part)])
+
+    def staying(self, labels: np.ndarray) -> np.ndarray:
+        """Which triangles with these labels stay, bool."""
+        found: np.ndarray = self.stays[self.whole.of_label[labels]]
+        return found
 
     def _measure(self, vertices: np.ndarray) -> None:
         from .volume.accuracy import surface_error

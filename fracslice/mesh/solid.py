@@ -40,9 +40,9 @@ def to_manifold(mesh: Mesh) -> Manifold:
     return solid
 
 
-def place_on_bed(mesh: Mesh) -> Mesh:
-    """Move the mesh to stand on z = 0 with the middle of its bounds over the origin."""
+def place_on_bed(mesh: Mesh, middle: tuple[float, float]) -> Mesh:
+    """Move the mesh to stand on z = 0 with a point (x, y) over the origin."""
     low, high = mesh.bounds
-    placed = mesh.translated((-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]))
+    placed = mesh.translated((-middle[0], -middle[1], -low[2]))
     placed.vertices[placed.vertices[:, 2] < FLAT * (high - low).max(), 2] = 0
     return placed

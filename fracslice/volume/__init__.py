@@ -12,7 +12,7 @@ from ..kernel.devices import compile_for
 from ..store import Arrays, stored
 from ..work import Work
 from .bricks import Bricks, SignBricks
-from .extent import Extent, extent
+from .extent import Extent, extent, reached
 from .lattice import Lattice
 from .sampler import sample, sample_signs
 
@@ -24,6 +24,7 @@ __all__ = [
     "SignBricks",
     "extent",
     "plan",
+    "reached",
     "resolve_depths",
     "sample",
     "sample_scene",

@@ -41,6 +41,10 @@ EXACT = 2.5e-7
 
 STEPS = 256
 
+OUTWARDS = np.array([[-1], [1]])
+BENEATH = np.array([0.0, 1e-3, 0.01, 0.1, 0.5])
+"""Voxels beneath a vertex: the first of them that is inside is where its body is entered."""
+
 
 @dataclass(frozen=True, eq=False)
 class Extent:
@@ -69,9 +73,7 @@ def extent(root: Node | Compilable, resolution: float, work: Work | None = None)
     if not box.finite:
         axes = [a for a, s in zip("xyz", box.size, strict=True) if not np.isfinite(s)]
         raise VolumeError(f"the scene has no end along {' and '.join(axes)}; put <bounds> around it")
-    guard, work = root.guard(), work or Work()
-    facts = guard.facts
-    field = Field(compile_scene(root), compile_scene(guard), facts.lipschitz, not facts.weak, work)
+    field = _field(root, work or Work())
     for _ in range(TURNS):
         found = _search(field, box, resolution)
         if found and max(found.outer.size) > max(box.size) / 2:
@@ -82,11 +84,41 @@ def extent(root: Node | Compilable, resolution: float, work: Work | None = None)
     return found
 
 
+def reached(root: Node | Compilable, points: np.ndarray, voxel: float, work: Work | None = None) -> Box:
+    """The box of what is connected with points on or near an object's surface, as near as it was found.
+
+    points: float64 [3, n], scene units. From those that are inside, or from half a voxel beneath those that
+    are not, steps of less than a voxel go outwards.
+    """
+    field = _field(root, work or Work())
+    found = _box(np.stack([points.min(1), points.max(1)]))
+    exact = EXACT * max(found.size)
+    sides = _sides(field, found)
+    for side in sides:
+        beneath = np.zeros((3, len(BENEATH)))
+        beneath[side.axis] = -side.sign * voxel * BENEATH
+        near = (points[:, :, None] + beneath[:, None]).reshape(3, -1)
+        side.learn(near[:, field.inside(near)])
+    _climb(field, sides, voxel / 2, exact)
+    known = [s.known if np.isfinite(s.known) else s.above for s in sides]
+    return found | _box(OUTWARDS * np.reshape(known, (2, 3)))
+
+
+def _field(root: Node | Compilable, work: Work) -> Field:
+    guard = root.guard()
+    facts = guard.facts
+    return Field(compile_scene(root), compile_scene(guard), facts.lipschitz, not facts.weak, work)
+
+
+def _sides(field: Field, region: Box) -> list[Side]:
+    """In the order of an extent's tips."""
+    return [Side(field, region, axis, sign, UNKNOWN) for sign in (-1, 1) for axis in range(3)]
+
+
 def _search(field: Field, box: Box, resolution: float) -> Extent | None:
     """The object's extent, if it is in `box`; None if it goes on beyond it."""
     longest = max(box.size) or 1.0
-    region = box.grown(MARGIN * longest)
-    sides = [Side(field, region, axis, sign, UNKNOWN) for sign in (-1, 1) for axis in range(3)]
+    sides = _sides(field, box.grown(MARGIN * longest))
     cells = (np.indices((FIRST,) * 3).reshape(3, -1) + SHIFT) / FIRST
     points = np.array(box.lo)[:, None] + cells * np.array(box.size)[:, None]
     _learn(sides, points[:, field.inside(points)])
@@ -106,12 +138,12 @@ def _search(field: Field, box: Box, resolution: float) -> Extent | None:
             break
         step, aim, most = aim, max(aim / FINER, exact), LITTLE
     _climb(field, sides, aim, exact)
-    way, limits = np.array([[-1], [1]]), np.array([box.lo, box.hi])
-    reach = way * np.reshape([side.known for side in sides], (2, 3))
-    above = way * np.reshape([side.above for side in sides], (2, 3))
-    if (way * (reach - limits) > MARGIN / 2 * longest).any():
+    limits = np.array([box.lo, box.hi])
+    reach = OUTWARDS * np.reshape([side.known for side in sides], (2, 3))
+    above = OUTWARDS * np.reshape([side.above for side in sides], (2, 3))
+    if (OUTWARDS * (reach - limits) > MARGIN / 2 * longest).any():
         return None
-    found = _box(np.where(np.abs(reach - limits) <= 2 * exact, limits, reach + way * exact / 2))
+    found = _box(np.where(np.abs(reach - limits) <= 2 * exact, limits, reach + OUTWARDS * exact / 2))
     outer = _box(above) | found.grown(exact)
     return Extent(found, outer.about(found.centre), np.stack([side.tip for side in sides], 1))
 

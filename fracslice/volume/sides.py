@@ -28,7 +28,7 @@ FRONT = 1 << 13
 """Columns that are looked at together, about."""
 
 DEPTHS = 2.0, 8.0
-STARTS = 8
+STARTS = 4
 UNKNOWN = np.full((3, STARTS), np.nan)
 
 PROBES = 64
@@ -58,18 +58,17 @@ class Field:
 
     def free(self, points: np.ndarray) -> np.ndarray:
         """The radius of a ball around each that nothing is in; at most zero if there may be none."""
-        f = np.nan_to_num(values_at(self.guard, points, self.work), nan=0.0)
-        rounding: float = ROUNDING * np.abs(points).max(initial=0.0)
-        radii: np.ndarray = f.astype(np.float64) / self.lipschitz - rounding
-        return radii
+        f = values_at(self.guard, points, self.work).astype(np.float64)
+        rounding = ROUNDING * np.abs(points).max(initial=0.0)
+        return np.where(f > 0, f / self.lipschitz - rounding, 0.0)
 
 
 @dataclass(eq=False)
 class Side:
     """One side of what is in `region`; heights are along `axis`, outwards by `sign`.
 
-    best: the highest inside points known, [3, n], the highest first. above: the height that nothing is above.
-    spent: how many columns were looked at.
+    best: inside points [3, n], the highest first. known: the height of the first. above: the height that
+    nothing is above. spent: how many columns were looked at.
     """
 
     field: Field
@@ -81,6 +80,7 @@ class Side:
 
     def __post_init__(self) -> None:
         lo, hi = np.array(self.region.lo), np.array(self.region.hi)
+        self.learn(self.best)
         self.across = [(self.axis + 1) % 3, (self.axis + 2) % 3]
         self.floor, self.above = sorted((self.sign * lo[self.axis], self.sign * hi[self.axis]))
         self.longest = float((hi - lo).max())
@@ -95,11 +95,8 @@ class Side:
         found = np.hstack([self.best, points])
         order = np.argsort(-self.sign * found[self.axis], kind="stable")  # what is not known comes last
         self.best = found[:, order[:STARTS]]
-
-    @property
-    def known(self) -> float:
-        """The height of `tip`."""
-        return float(np.nan_to_num(self.sign * self.tip[self.axis], nan=-np.inf))
+        height = self.sign * float(self.tip[self.axis])
+        self.known = -np.inf if np.isnan(height) else height
 
     @property
     def tip(self) -> np.ndarray:
@@ -158,12 +155,13 @@ class Side:
         """Looks for inside points a little below ceilings, and on the way up from the highest of them."""
         for depth in DEPTHS:
             deep = columns[3] - depth * radius
-            inside = np.flatnonzero((deep > self.known) & self.field.inside(self.points(columns, deep)))
-            self.learn(self.points(columns[:, inside], deep[inside]))
-            inside = inside[np.argsort(-columns[3, inside], kind="stable")[:PROBES]]
-            heights = columns[3, inside] - depth * radius[inside] * HEIGHTS
-            way = self.points(np.tile(columns[:, inside], len(HEIGHTS)), heights.reshape(-1))
-            self.learn(way[:, self.field.inside(way)])
+            inside = np.flatnonzero(self.field.inside(self.points(columns, deep)) & (deep > self.known))
+            if len(inside):
+                self.learn(self.points(columns[:, inside], deep[inside]))
+                inside = inside[np.argsort(-columns[3, inside], kind="stable")[:PROBES]]
+                heights = columns[3, inside] - depth * radius[inside] * HEIGHTS
+                way = self.points(np.tile(columns[:, inside], len(HEIGHTS)), heights.reshape(-1))
+                self.learn(way[:, self.field.inside(way)])
 
     def points(self, columns: np.ndarray, heights: np.ndarray) -> np.ndarray:
         """Places in the middle of columns, [3, n]."""
