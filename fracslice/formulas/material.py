@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .box import Box
 from .parameters import Number, Vector
 from .registry import Node, warp
 
@@ -34,6 +35,11 @@ def material(child, x, y, z):  # type: ignore[no-untyped-def]
     It is not in the field: L = the element's.
     """
     return child(x, y, z)
+
+
+@material.bounds
+def _(node: Node) -> Box:
+    return node.children[0].facts.box
 
 
 @material.identity

@@ -22,6 +22,11 @@ from .parameters import REQUIRED, Parameter
 
 Kind = Literal["shape", "blend", "warp"]
 
+DEEPEST = 100
+"""How deep elements may be nested: far above any use, far below Python's limit on recursion."""
+
+TOO_DEEP = f"is nested too deeply: expected at most {DEEPEST} elements inside each other"
+
 
 @dataclass(frozen=True)
 class Fixed:
@@ -44,12 +49,14 @@ class Facts:
     steepening: of a weak field, the highest power n in it. Along circles of latitude the derivative changes
     n times within 2/n of the poles; so level sets other than the surface are steeper: how much is measured
     (`docs/accuracy.md`).
+    boxless: the names of the formulas in it that state no box.
     """
 
     box: Box
     lipschitz: float
     weak: bool
     steepening: float = 0.0
+    boxless: tuple[str, ...] = ()
 
 
 Hook = Callable[..., Any]
@@ -75,6 +82,8 @@ class Formula:
             raise SceneError(f"<{self.name}> has no attribute {unknown[0]!r}")
         checked = {name: self._value(name, values.get(name)) for name in self.parameters}
         node = Node(self, MappingProxyType(checked), self._grouped(children), place)
+        if node.depth > DEEPEST:
+            raise node.fail(TOO_DEEP)
         self.hooks.get("check", lambda _: None)(node)
         return node
 
@@ -105,7 +114,7 @@ class Formula:
 
     # The hooks, set by decorating a function with them.
     def bounds(self, hook: Callable[[Node], Box]) -> Callable[[Node], Box]:
-        """The box that encloses the inside."""
+        """The box that encloses the inside; without one nothing is known of it, and it has no end."""
         return self._hook("bounds", hook)
 
     def slope(self, hook: Callable[[Node], float]) -> Callable[[Node], float]:
@@ -152,7 +161,7 @@ class Formula:
 @dataclass(frozen=True)
 class Node:
     """A formula with its parameters and children: one element of a scene. `place` is "file:line"; `guarded`
-    is told by `guard`.
+    is told by `guard`; `depth` is how many elements are inside each other, this one included.
     """
 
     formula: Formula
@@ -160,6 +169,10 @@ class Node:
     children: tuple[Node, ...] = ()
     place: str | None = field(default=None, compare=False)
     guarded: bool = False
+    depth: int = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "depth", 1 + max((child.depth for child in self.children), default=0))
 
     def __getitem__(self, parameter: str) -> Any:
         return self.values[parameter]
@@ -173,9 +186,11 @@ class Node:
 
     def walk(self) -> Iterator[Node]:
         """This node and all below it, parents first."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
+        left = [self]
+        while left:
+            node = left.pop()
+            yield node
+            left += reversed(node.children)
 
     def changed(self, children: tuple[Node, ...] | None = None, **values: Any) -> Node:
         """A copy with other values or children."""
@@ -197,7 +212,7 @@ class Node:
     def facts(self) -> Facts:
         """Box, Lipschitz bound and weakness of this field."""
         hooks, below = self.formula.hooks, [child.facts for child in self.children]
-        box = hooks["bounds"](self) if "bounds" in hooks else below[0].box
+        box = hooks["bounds"](self) if "bounds" in hooks else Box.everywhere()
         slope = (
             hooks["slope"](self)
             if "slope" in hooks
@@ -208,7 +223,9 @@ class Node:
             if "steepening" in hooks
             else max((b.steepening for b in below), default=0.0)
         )
-        return Facts(box, slope, self.formula.weak or any(b.weak for b in below), steepening)
+        names = [*(n for b in below for n in b.boxless), *([] if "bounds" in hooks else [self.formula.name])]
+        weak = self.formula.weak or any(b.weak for b in below)
+        return Facts(box, slope, weak, steepening, tuple(dict.fromkeys(names)))
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -268,12 +285,21 @@ def _register(
     def decorate(function: Callable[..., Any]) -> Formula:
         name = function.__name__.rstrip("_")
         formula = Formula(name, kind, function, MappingProxyType(parameters), children, **known)
-        if name in _REGISTRY:
-            raise ValueError(f"two formulas are called {name!r}")
+        if name in _REGISTRY and not _is_run_again(_REGISTRY[name].function, function):
+            code = function.__code__
+            raise SceneError(
+                f"{code.co_filename}:{code.co_firstlineno}: formula {name!r}: expected another name, "
+                f"there is one of this name already"
+            )
         _REGISTRY[name] = formula
         return formula
 
     return decorate
+
+
+def _is_run_again(old: Callable[..., Any], new: Callable[..., Any]) -> bool:
+    """Whether it is a cell of a notebook, edited and run once more."""
+    return new.__module__ == old.__module__ == "__main__"
 
 
 def get(name: str) -> Formula:

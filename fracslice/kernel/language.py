@@ -12,6 +12,7 @@ import ast
 import builtins
 import inspect
 import math
+import re
 import textwrap
 from collections.abc import Callable, Iterator
 from functools import lru_cache
@@ -25,6 +26,8 @@ from .seen import seen
 
 CHILD = "child"
 """What a warp calls its element."""
+
+_OF_THE_KERNEL = re.compile(r"[NT]\d+|P0?")
 
 _PLAIN = ("range", "int")
 _PYTHON = {"abs": "absolute", "min": "minimum", "max": "maximum", "fabs": "absolute", "pow": "pow"}
@@ -230,12 +233,14 @@ class _Language(ast.NodeTransformer):
         return self.known(node, value, node.attr)
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
+        if isinstance(node.ctx, ast.Store) and _OF_THE_KERNEL.fullmatch(node.id):
+            self.refuse(node, "another name: this is one of the kernel's own")
         if isinstance(node.ctx, ast.Store) or node.id in self.local:
             return node
         return self.known(node, self.scope.get(node.id), node.id)
 
     def known(self, node: ast.expr, value: Any, name: str) -> ast.AST:
-        meant = word(value)
+        meant = word(value) or (name if value is None and name in vocabulary.NAMES else None)
         if meant:
             return ast.Name(meant, ast.Load())
         if isinstance(value, (int, float)) and isinstance(node, ast.Attribute):

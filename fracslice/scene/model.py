@@ -16,11 +16,6 @@ from .lengths import parse_length
 from .printing import Print
 from .view import View
 
-DEEPEST = 100
-"""How deep elements may be nested: far above any use, far below Python's limit on recursion."""
-
-TOO_DEEP = f"is nested too deeply: expected at most {DEEPEST} elements inside each other"
-
 
 @dataclass(frozen=True)
 class Scene:
@@ -39,7 +34,6 @@ class Scene:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size_mm", parse_length(self.size_mm, "size"))
-        _refuse_too_deep(self.root)
         _refuse_impossible(self.root)
 
     @cached_property
@@ -78,15 +72,6 @@ def scene(
         raise SceneError("a scene needs at least one element")
     root = elements[0] if len(elements) == 1 else get("union")(*elements)
     return Scene(root, parse_length(size, "size"), name, view or View(), printing or Print())
-
-
-def _refuse_too_deep(root: Node) -> None:
-    level = [root]
-    for _ in range(DEEPEST):
-        level = [child for node in level for child in node.children]
-        if not level:
-            return
-    raise level[0].fail(TOO_DEEP)
 
 
 def _refuse_impossible(root: Node) -> None:

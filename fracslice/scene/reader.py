@@ -16,8 +16,9 @@ from xml.parsers import expat
 from ..errors import SceneError
 from ..formulas import Node
 from ..formulas.parameters import REQUIRED
+from ..formulas.registry import DEEPEST, TOO_DEEP
 from .layout import SCENE, SECTIONS, SOLID, Element, Section, formulas
-from .model import DEEPEST, TOO_DEEP, Scene, computing, scene
+from .model import Scene, computing, scene
 from .nearest import hint
 from .printing import Print
 from .view import Part, View

@@ -71,8 +71,10 @@ def extent(root: Node | Compilable, resolution: float, work: Work | None = None)
     if box.empty:
         raise VolumeError("the scene is empty: its elements have no point in common")
     if not box.finite:
-        axes = [a for a, s in zip("xyz", box.size, strict=True) if not np.isfinite(s)]
-        raise VolumeError(f"the scene has no end along {' and '.join(axes)}; put <bounds> around it")
+        *axes, last = (a for a, s in zip("xyz", box.size, strict=True) if not np.isfinite(s))
+        along = f"{', '.join(axes)} and {last}" if axes else last
+        state = "".join(f", or state the box of {n} with @{n}.bounds" for n in root.facts.boxless[:1])
+        raise VolumeError(f"the scene has no end along {along}; put <bounds> around it{state}")
     field = _field(root, work or Work())
     for _ in range(TURNS):
         found = _search(field, box, resolution)
