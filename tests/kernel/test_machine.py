@@ -1,6 +1,4 @@
-"""Machine code and the arrays that it reads live as long as anything can run it, and threads share nothing
-that is made on the way.
-"""
+"""Machine code and the arrays that it reads live as long as anything can run it."""
 
 from __future__ import annotations
 
@@ -16,24 +14,10 @@ import pytest
 import fracslice
 from fracslice._native import RootLoops
 from fracslice._slices import Compiled
-from fracslice.formulas import box, julia, sphere
+from fracslice.formulas import box, sphere
 from fracslice.kernel import CpuKernel, link
 from fracslice.kernel.loops import BRICKS, POINTS
 from fracslice.volume.roots import Roots
-from tests.threads import together
-
-
-def test_all_threads_that_start_a_kernel_get_its_samples() -> None:
-    """What a kernel needs is there before the first call: each thread made it, and one freed another's."""
-    linked, corners = link(julia(iterations=4)), np.array([(0, 0, 0), (8, 0, 16)], np.int32)
-
-    def sampled(kernel: CpuKernel) -> bytes:
-        out = np.empty((2, 512), np.float32)
-        kernel.bricks(corners, (-1.5, -1.25, -1.375), 0.125, out)
-        return out.tobytes()
-
-    found = {result for _ in range(200) for result in together(16, sampled, CpuKernel(linked))}
-    assert found == {sampled(CpuKernel(linked))}
 
 
 def test_arrays_of_another_kind_are_refused() -> None:
