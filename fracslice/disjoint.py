@@ -6,10 +6,11 @@ Importing this module imports Numba.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .compiled import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def find(parent, i):  # type: ignore[no-untyped-def]
     """The root of i."""
     while parent[i] != i:
@@ -18,7 +19,7 @@ def find(parent, i):  # type: ignore[no-untyped-def]
     return i
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def unite(parent, a, b):  # type: ignore[no-untyped-def]
     """One set from two; the smaller root stays."""
     a, b = find(parent, a), find(parent, b)
@@ -28,7 +29,7 @@ def unite(parent, a, b):  # type: ignore[no-untyped-def]
         parent[a] = b
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def roots(parent):  # type: ignore[no-untyped-def]
     """The root of each."""
     root = np.empty_like(parent)

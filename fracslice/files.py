@@ -62,7 +62,18 @@ class Kept:
             with _private_folder(self.folder) as here, opened(name, "rb", folder=here) as file:
                 return read(file)
         except NotPrivateError as error:
-            warn(f"{error}: what is kept in {self.folder} is not used")
+            self._distrust(error)
+        except OSError:
+            pass
+        return None
+
+    def place(self) -> Path | None:
+        """The folder itself, for what has to be given a path; None if there is none to be trusted."""
+        try:
+            with _private_folder(self.folder):
+                return Path(os.path.realpath(self.folder))
+        except NotPrivateError as error:
+            self._distrust(error)
         except OSError:
             pass
         return None
@@ -72,6 +83,9 @@ class Kept:
         target = Path(os.path.realpath(self.folder), name)
         with suppress(NotPrivateError), _private_folder(self.folder), replacing(target) as file:
             write(file)
+
+    def _distrust(self, error: NotPrivateError) -> None:
+        warn(f"{error}: what is kept in {self.folder} is not used")
 
 
 @contextmanager

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..volume.bricks import INSIDE, OUTSIDE
 from .parts import Connected
 from .samples import Samples
@@ -30,7 +30,7 @@ def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
     return Samples(replace(solid, values=half * np.float32(solid.voxel), index=index))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
     """From each sample to the nearest seed along edges of the grid, at most `FAR`: breadth first."""
     steps = np.full(seeds.shape, FAR, np.uint8)
@@ -59,7 +59,7 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
     return steps
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _beside(index, ijk, row, axis, way):  # type: ignore[no-untyped-def]
     """The row of the next brick along an axis, negative for none."""
     x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3

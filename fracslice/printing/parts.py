@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..disjoint import find, roots, unite
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
@@ -96,7 +96,7 @@ def parts_of(bricks: Bricks) -> Parts:
     return Parts(number.astype(np.int32)[labels], found, inside[names], count)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _label(values, labels, first):  # type: ignore[no-untyped-def]
     """The parts of each brick alone, numbered from 0, and how many there are before each brick."""
     parent = np.empty(512, np.int64)
@@ -117,7 +117,7 @@ def _label(values, labels, first):  # type: ignore[no-untyped-def]
         first[row + 1] = first[row] + count
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _unite_faces(index, labels, tiles, inside, parent):  # type: ignore[no-untyped-def]
     nx, ny, nz = index.shape
     for x in range(nx):
@@ -140,7 +140,7 @@ def _unite_faces(index, labels, tiles, inside, parent):  # type: ignore[no-untyp
                         _unite_face(axis, -1, here, 0, 0, labels, inside, parent)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _unite_face(axis, here, there, own, other, labels, inside, parent):  # type: ignore[no-untyped-def]
     """The last layer of one brick along an axis with the first layer of the next; either may be a tile."""
     step, p, q = ((64, 8, 1), (8, 64, 1), (1, 64, 8))[axis]

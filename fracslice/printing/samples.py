@@ -6,8 +6,8 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..formulas.box import Box
 from ..formulas.registry import Facts
 from ..keys import key
@@ -74,13 +74,13 @@ def _bounds(bricks: Bricks) -> np.ndarray:
     return np.asarray(np.where(bricks.index == INSIDE, -far, far), np.float32)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _interpolate(xs, ys, zs, x0, y0, z0, voxel, index, bounds, values, out):  # type: ignore[no-untyped-def]
     for n in range(len(xs)):
         out[n] = interpolated(xs[n], ys[n], zs[n], x0, y0, z0, voxel, index, bounds, values)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def interpolated(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ignore[no-untyped-def]
     """The value at one point."""
     u, v, w = (x - x0) / voxel, (y - y0) / voxel, (z - z0) / voxel
@@ -104,7 +104,7 @@ def interpolated(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ig
     return total
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def sample_at(index, bounds, values, voxel, i, j, k):  # type: ignore[no-untyped-def]
     """The sample of a grid point, or a bound; beyond the bricks, from how far beyond it is."""
     bi, bj, bk = i >> 3, j >> 3, k >> 3

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..errors import VolumeError
 from ..formulas import Node
 from ..kernel import Compilable, Kernel, compile_scene
@@ -242,7 +242,7 @@ def all_walls(
     return found.chosen(found.width < limit)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _points(start, ways, which, s):  # type: ignore[no-untyped-def]
     """So far along some rays, [3, n]."""
     points = np.empty((3, len(s)))

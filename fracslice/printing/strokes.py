@@ -7,8 +7,8 @@ distance transform: Danielsson 1980); then the strokes beside that one are looke
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..volume import Bricks
 from ..volume.bricks import OUTSIDE
 from .samples import Samples
@@ -59,7 +59,7 @@ def _along(lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return lines[of, :3] + share[:, None] * lines[of, 3:6], of
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _mark(points, reach, index):  # type: ignore[no-untyped-def]
     for n in range(len(points)):
         x, y, z = points[n]
@@ -69,7 +69,7 @@ def _mark(points, reach, index):  # type: ignore[no-untyped-def]
                     index[i, j, k] = 0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _foot(lines, n, x, y, z):  # type: ignore[no-untyped-def]
     """From the nearest point of a stroke's middle line to a point."""
     u, v, w = x - lines[n, 0], y - lines[n, 1], z - lines[n, 2]
@@ -78,18 +78,18 @@ def _foot(lines, n, x, y, z):  # type: ignore[no-untyped-def]
     return u - t * a, v - t * b, w - t * c
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _square(lines, n, x, y, z):  # type: ignore[no-untyped-def]
     u, v, w = _foot(lines, n, x, y, z)
     return np.float32(u * u + v * v + w * w)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _offset(x, y, z):  # type: ignore[no-untyped-def]
     return ((x & 7) << 6) + ((y & 7) << 3) + (z & 7)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _spread(lines, points, of, index, ijk, squares, nearest):  # type: ignore[no-untyped-def]
     """Waves from the corners of the cells that the points are in. fresh: in which wave, of two that take
     turns, a sample has to tell its neighbours.
@@ -125,7 +125,7 @@ def _spread(lines, points, of, index, ijk, squares, nearest):  # type: ignore[no
         now, later = later, now
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _settle(lines, points, of, index, ijk, squares, nearest, low, high):  # type: ignore[no-untyped-def]
     """Of samples at edges of the grid that the surface may cross, also the strokes with points in the cells
     beside where the nearest one is nearest.

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..rows import Rows
 from ..work import Work, chunks
 from .samples import Samples, interpolated, sample_at
@@ -114,7 +114,7 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
     return points, normals, b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _edges(ijk, voxel, index, bounds, own, values, lower, axis):  # type: ignore[no-untyped-def]
     n = 0
     for row in range(len(ijk)):
@@ -138,7 +138,7 @@ def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
     return unit
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, bounds, values, width):  # type: ignore[no-untyped-def]
     """How far it is to the other side; twice the limit where that is farther."""
     for n in range(len(points)):

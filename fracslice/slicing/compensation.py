@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from ..compiled import compiled
 
 
 def compensated(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.ndarray:
@@ -23,7 +24,7 @@ def compensated(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.
     return grown if by > 0 else 255 - grown
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _dilate(image, cone, out):  # type: ignore[no-untyped-def]
     ny, nx = image.shape
     reach = cone.shape[0] // 2

@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..disjoint import find, unite
 from .runs import Parts, overlaps
 
@@ -140,7 +140,7 @@ def _united(edges: np.ndarray, count: int) -> np.ndarray:
     return parent
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _unite_all(parent, edges):  # type: ignore[no-untyped-def]
     for a, b in edges:
         unite(parent, a, b)
@@ -148,7 +148,7 @@ def _unite_all(parent, edges):  # type: ignore[no-untyped-def]
         parent[i] = find(parent, i)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _shut(edges, later, layer, free):  # type: ignore[no-untyped-def]
     """Adds the edges layer by layer; a node is judged when its layer is complete."""
     count = len(layer)

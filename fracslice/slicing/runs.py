@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..disjoint import find, unite
 
 THRESHOLD = 128
@@ -62,7 +62,7 @@ def _labelled(rows: np.ndarray, begin: np.ndarray, end: np.ndarray, nx: int, rea
     return Parts(rows, begin, end, part, area, np.stack([x, y], 1) / np.maximum(area, 1)[:, None], opened)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _solid_runs(image, rows, begin, end):  # type: ignore[no-untyped-def]
     n = 0
     for y in range(image.shape[0]):
@@ -84,7 +84,7 @@ def _solid_runs(image, rows, begin, end):  # type: ignore[no-untyped-def]
     return n
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _gaps(rows, begin, end, nx, gaps, gap_begin, gap_end):  # type: ignore[no-untyped-def]
     n = 0
     for y in range(len(rows) - 1):
@@ -101,7 +101,7 @@ def _gaps(rows, begin, end, nx, gaps, gap_begin, gap_end):  # type: ignore[no-un
     return n
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _label(rows, begin, end, reach, part):  # type: ignore[no-untyped-def]
     parent = np.arange(len(begin))
     for y in range(1, len(rows) - 1):
@@ -132,7 +132,7 @@ def overlaps(below: Parts, above: Parts) -> np.ndarray:
     return np.unique(pairs[:count], axis=0)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _overlaps(rows_a, begin_a, end_a, part_a, rows_b, begin_b, end_b, part_b, pairs):  # type: ignore[no-untyped-def]
     n = 0
     for y in range(len(rows_a) - 1):
@@ -155,7 +155,7 @@ def unsupported(below: Parts, above: Parts, reach: float, width: int) -> int:
     )
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _unsupported(rows_a, begin_a, end_a, rows_b, begin_b, end_b, reach, width):  # type: ignore[no-untyped-def]
     held = np.zeros(width + 1, np.int32)
     total, far = 0, int(np.floor(reach))
