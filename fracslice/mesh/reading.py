@@ -27,6 +27,10 @@ MILLIMETRES = {
     "foot": 304.8,
     "meter": 1000.0,
 }
+DEEPEST, LARGEST = 32, 1 << 28
+"""Of a 3MF file: how deep components may be nested, how many triangles and parts it may build. A few lines
+can ask for any number.
+"""
 MODEL_RELATION = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 
 
@@ -87,7 +91,7 @@ def _read_3mf(path: Path) -> Mesh:
             return package.laid_out()
     except (zipfile.BadZipFile, EOFError, KeyError, zlib.error) as error:
         raise MeshError(f"not a whole 3MF file: {str(error).strip(chr(34))}") from error
-    except (expat.ExpatError, ValueError) as error:
+    except (expat.ExpatError, ValueError, OverflowError) as error:
         raise MeshError(f"not a valid 3MF file: {error}") from error
 
 
@@ -150,12 +154,26 @@ class _Package:
             raise MeshError(f"not a valid 3MF file: no such unit: {self.unit}")
         if not self.build:
             raise MeshError("the 3MF file asks to build nothing")
+        known: dict[str, int] = {}
+        if sum(self.size(name, known) for name, _ in self.build) > LARGEST:
+            raise MeshError(f"not a valid 3MF file: it builds more than {LARGEST} triangles and parts")
         return joined([self.placed(*item) for item in self.build]).scaled(MILLIMETRES[self.unit])
+
+    def size(self, name: str, known: dict[str, int], depth: int = 0) -> int:
+        """How many triangles and parts an object comes to, its components and theirs laid out."""
+        self.check(name, depth)
+        if name not in known:
+            inner = sum(self.size(part, known, depth + 1) for part, _ in self.parts[name])
+            known[name] = 1 + len(self.meshes[name].triangles) + inner
+        return known[name]
+
+    def check(self, name: str, depth: int) -> None:
+        if name not in self.meshes or depth > DEEPEST:
+            raise MeshError(f"not a valid 3MF file: no such object: {name}")
 
     def placed(self, name: str, matrix: NDArray[np.float64], depth: int = 0) -> Mesh:
         """An object and its components in the frame of the build."""
-        if name not in self.meshes or depth > 32:
-            raise MeshError(f"not a valid 3MF file: no such object: {name}")
+        self.check(name, depth)
         inner = [self.placed(part, at, depth + 1) for part, at in self.parts[name]]
         whole = joined([self.meshes[name], *inner])
         order = -1 if np.linalg.det(matrix[:3]) < 0 else 1
@@ -166,12 +184,17 @@ def _matrix(text: str | None) -> NDArray[np.float64]:
     """A 3MF transform: four rows of three numbers, applied to row vectors. Raises ValueError."""
     if text is None:
         return np.vstack([np.eye(3), np.zeros(3)])
-    return np.array(text.split(), dtype=np.float64).reshape(4, 3)
+    matrix = np.array(text.split(), dtype=np.float64).reshape(4, 3)
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"a transform that is not of finite numbers: {text[:60]}")
+    return matrix
 
 
 def _indexed(vertices: array[float], triangles: array[int]) -> Mesh:
     corners = np.array(vertices, dtype=np.float64).reshape(-1, 3)
     indices = np.array(triangles, dtype=np.int64).reshape(-1, 3)
+    if not np.isfinite(corners).all():
+        raise MeshError("not a valid 3MF file: a coordinate is not a finite number")
     if len(indices) and not 0 <= indices.min() <= indices.max() < len(corners):
         raise MeshError("not a valid 3MF file: a triangle names a vertex that does not exist")
     if (indices == np.roll(indices, 1, axis=1)).any():

@@ -77,6 +77,13 @@ TWICE = (
 )
 
 
+INNER = '<object id="{}"><components>{}</components></object>'
+TENFOLD, CHAIN = (
+    "".join(INNER.format(k, times * f'<component objectid="{k - 1}"/>') for k in range(2, 99))
+    for times in (10, 1)
+)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -88,6 +95,14 @@ TWICE = (
         (second(NO_VERTICES), "does not exist"),
         (second(TWICE), "names a vertex twice"),
         (second(NO_NUMBER), "not a valid 3MF"),
+        (second(TWICE.replace('v3="1"', f'v3="{10**20}"')), "not a valid 3MF"),
+        (second(TWICE.replace('y="3"', 'y="1e999"')), "coordinate is not a finite number"),
+        ({"build": '<item objectid="1" transform="nan 0 0 0 1 0 0 0 1 0 0 0"/>'}, "not of finite numbers"),
+        ({"more": TENFOLD, "build": '<item objectid="11"/>'}, "more than 268435456 triangles and parts"),
+        (
+            {"more": CHAIN, "build": "".join(f'<item objectid="{k}"/>' for k in range(1, 99))},
+            "no such object",
+        ),
         ({"more": "<object>"}, "not a .*3MF"),
         ({"head": '<!DOCTYPE m [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]>'}, "document type"),
     ],
