@@ -10,6 +10,7 @@ from ..formulas.parameters import AUTO
 from ..formulas.registry import Node
 from ..formulas.transforms import affine
 from .cpu import compile_scene
+from .identity import Known
 
 DEEPEST = 60
 PROBES = 4000
@@ -56,7 +57,7 @@ def _within(node: Node, voxel: float) -> float:
 
 def _depth(node: Node, voxel: float) -> int:
     for depth in range(1, DEEPEST):
-        step = _step(node, depth)
+        step = _step(*(Known(node.changed(iterations=d)) for d in (depth, depth + 1)))
         if step is None:
             return max(depth - 1, 1)
         if step < voxel / 2:
@@ -65,12 +66,12 @@ def _depth(node: Node, voxel: float) -> int:
 
 
 @lru_cache(maxsize=256)
-def _step(node: Node, depth: int) -> float | None:
+def _step(before: Known, after: Known) -> float | None:
     """How far one more step moves nine tenths of the surface at most, scene units; None if there is none."""
-    surface = _surface_points(node.changed(iterations=depth))
+    surface = _surface_points(before.node)
     if surface.shape[1] == 0:
         return None
-    moved = compile_scene(node.changed(iterations=depth + 1), "float64").points(*surface)
+    moved = compile_scene(after.node, "float64").points(*surface)
     return float(np.quantile(moved, 0.9))
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fracslice import MeshJob, make_mesh
-from fracslice.formulas import Node, menger, sphere, transform, union
-from fracslice.kernel.depth import visible
+from fracslice.formulas import Box, Node, mandelbulb, menger, sphere, transform, union
+from fracslice.kernel.depth import resolve_depths, visible
 from fracslice.scene import scene
 
 
@@ -38,3 +38,12 @@ def test_a_deep_sponge_is_the_solid_that_the_voxel_shows():
     assert result.mesh.volume == pytest.approx(8 * (20 / 27) ** 3, rel=1e-6)
     assert result.report.mesh.components == 1
     assert result.report.notes == ("menger: level 3 of 9; finer parts are thinner than a voxel",)
+
+
+def test_depths_follow_a_formula_that_was_edited(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = resolve_depths(mandelbulb(), 0.02)
+    assert before["iterations"] > 1
+    monkeypatch.setitem(mandelbulb.hooks, "bounds", lambda _: Box((5, 5, 5), (6, 6, 6)))
+    assert resolve_depths(mandelbulb(), 0.02)["iterations"] == 1
+    monkeypatch.undo()
+    assert resolve_depths(mandelbulb(), 0.02) == before
