@@ -1,24 +1,24 @@
-"""From a linked scene to machine code, by Numba and LLVM. Imported only when a kernel is not in the cache."""
+"""From a linked scene to machine code, by LLVM. Imported only when a kernel is not in the cache."""
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import FunctionType
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba import cfunc, njit, types
-from numba.core.errors import NumbaError
+from llvmlite import ir
 
-from ..errors import KernelError
-from ..formulas.vocabulary import NAMES
-from . import lanes, lanes_math
+from . import lanes_math
+from .emitter import Emitter
 from .linker import CALLED, Linked
 from .loops import Loop
+from .values import DOUBLE, FLOAT, WHOLE, Lanes
 
-SOURCE = "<linked scene>"
+PART = ["x", "y", "z", "P", "P0"]
+"""The arguments of a part's function."""
 
 
 @dataclass(frozen=True)
@@ -35,56 +35,51 @@ class Target:
 def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> bytes:
     """An object file with one C function per loop over the scene's field. Raises `KernelError`."""
     lanes_math.HOST_FEATURES = frozenset(f[1:] for f in target.features.split(",") if f.startswith("+"))
-    kind = lanes.Lanes(target.bits, target.width, target.registers)
-    scope: dict[str, Any] = {name: getattr(lanes, name) for name in NAMES}
-    scope |= {"load": lanes.loader(kind), "store": lanes.store, "WIDTH": target.width}
-    options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    inlined = njit(forceinline=True, error_model="numpy", **options)
-    scope[CALLED] = njit(error_model="numpy", **options)
-    exec(compile(linked.source, SOURCE, "exec"), scope)
-    for name, value in list(scope.items()):
-        if isinstance(value, FunctionType) and value.__code__.co_filename == SOURCE:
-            scope[name] = inlined(value)
-    letters = {
-        "r": types.CPointer(types.float32 if target.bits == 32 else types.float64),
-        "i": types.CPointer(types.int32),
-        "n": types.intp,
-    }
-    whole = llvm.parse_assembly("")
-    for loop in loops:
-        exec(loop.source, scope)
-        signature = types.void(*[letters[a] for a in loop.arguments])
-        try:
-            text = _exported(scope[loop.name], signature, loop.name)
-        except NumbaError as error:
-            raise KernelError(
-                f"a formula cannot be compiled: {str(error).strip().splitlines()[0]}"
-            ) from error
-        whole.link_in(llvm.parse_assembly(text))
-    return bytes(_machine(target).emit_object(whole))
+    module = llvm.parse_assembly(_text(linked, target, loops))
+    _optimise(module, _target_machine(target))
+    return bytes(_machine(target).emit_object(module))
 
 
-def _exported(function: Any, signature: object, name: str) -> str:
-    """Optimised LLVM assembly of one C function, under its own name.
+def _text(linked: Linked, target: Target, loops: Sequence[Loop]) -> str:
+    """The loops in LLVM's language, and the functions of the scene that they call.
 
-    Its stack is aligned to whole registers: those that are kept there would lie across two cache lines else.
+    Their stack is aligned to whole registers: those that are kept there would lie across two cache lines
+    else.
     """
-    compiled: Any = cfunc(signature, error_model="numpy")(function)
-    text = re.sub(r"(?m)^attributes #\d+ = {", r'\g<0> "stackrealign"', compiled._library.get_llvm_str())
-    module = llvm.parse_assembly(text)
-    for f in module.functions:
-        if f.name == compiled._wrapper_name:
-            f.name = name
-        elif not f.is_declaration:
-            f.linkage = "internal"
-    for variable in module.global_variables:
-        if not variable.is_declaration:
-            variable.linkage = "internal"
-    return str(module)
+    source = "\n".join([linked.source, *(loop.source for loop in loops)])
+    trees = [tree for tree in ast.parse(source).body if isinstance(tree, ast.FunctionDef)]
+    called = frozenset(tree.name for tree in trees if CALLED in map(ast.unparse, tree.decorator_list))
+    lanes = Lanes(target.bits, target.width, target.registers)
+    emitter = Emitter(lanes, {tree.name: tree for tree in trees}, called)
+    real = FLOAT if target.bits == 32 else DOUBLE
+    kinds = {"r": real.as_pointer(), "i": ir.IntType(32).as_pointer(), "n": WHOLE}
+    for tree in trees:  # those of the innermost elements stand first, so that nothing is as deep as the scene
+        if [a.arg for a in tree.args.args] == PART:
+            emitter.function(tree.name, ("lanes", "lanes", "lanes", kinds["r"], WHOLE))
+    for loop in loops:
+        emitter.entry(loop.name, tuple(kinds[letter] for letter in loop.arguments))
+    emitter.module.triple = llvm.get_process_triple()
+    return re.sub(r"(?m)^define .*$", r'\g<0> "stackrealign"', str(emitter.module))
 
 
-def _machine(target: Target) -> llvm.TargetMachine:
+def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    module.data_layout = str(machine.target_data)
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization, options.slp_vectorization = True, False
+    builder = llvm.create_pass_builder(machine, options)
+    for _ in range(2):
+        builder.getModulePassManager().run(module, builder)
+
+
+def _target_machine(target: Target) -> llvm.TargetMachine:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
     triple = llvm.Target.from_triple(llvm.get_process_triple())
     return triple.create_target_machine(
         cpu=target.cpu, features=target.features, opt=3, reloc="pic", codemodel="jitdefault", jit=True
     )
+
+
+def _machine(target: Target) -> Any:
+    """What emits the object file."""
+    return _target_machine(target)

@@ -1,7 +1,6 @@
 """The CPU back end: a scene's field as machine code.
 
-Loading it needs llvmlite but not Numba, and takes milliseconds; its functions (`machine`) are called with the
-interpreter unlocked, so plain threads scale.
+Loading it takes milliseconds; its functions (`machine`) are called with the interpreter unlocked, so plain threads scale.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Loops around a field: what a compiled kernel does with it, as source text beside the scene's.
 
 A loop is a Python function in the words of the formulas, which may also call ``field(x, y, z, P)``,
-``load(array, i)`` and ``store(array, i, lanes)``. WIDTH is the number of lanes. Numba compiles it to a C
-function.
+``load(array, i)`` and ``store(array, i, lanes)``. WIDTH is the number of lanes. It becomes a C function.
 """
 
 from __future__ import annotations

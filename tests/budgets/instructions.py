@@ -1,21 +1,19 @@
 """How many instructions the kernels are, compiled for one CPU whatever CPU compiles them; none is run.
 
-`python -m tests.budgets.instructions` prints them as JSON. The CPU is told to Numba before it is imported, so
-others call `instructions`, which runs that command.
+`python -m tests.budgets.instructions` prints them as JSON.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Sequence
 
 from fracslice.kernel.host import REGISTERS
 from fracslice.kernel.linker import Linked, link
 from fracslice.kernel.loops import POINTS, Loop
+
+from .workloads import WORKLOADS
 
 CPU, FEATURES = "skylake-avx512", "+avx512f,+avx512bw,+avx512cd,+avx512dq,+avx512vl,+avx2,+fma,+bmi,+bmi2"
 LANES = {32: 32, 64: 16}
@@ -26,15 +24,12 @@ _JUMP = re.compile(r"^\tj\w+\t(\.\w+)")
 
 def instructions() -> dict[str, int]:
     """By workload and float width: instructions of the kernel's hot loop and of all of it."""
-    given = {**os.environ, "NUMBA_CPU_NAME": CPU, "NUMBA_CPU_FEATURES": FEATURES}
-    run = subprocess.run(
-        [sys.executable, "-m", "tests.budgets.instructions"],
-        env=given,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    found: dict[str, int] = json.loads(run.stdout)
+    found = {}
+    for name, root in WORKLOADS.items():
+        for bits in LANES:
+            hot, whole = sizes(assembly(link(root), bits))
+            found[f"{name}: instructions of the hot loop, float{bits}"] = hot
+            found[f"{name}: instructions of the kernel, float{bits}"] = whole
     return found
 
 
@@ -83,17 +78,5 @@ def _count(lines: list[str]) -> int:
     return sum(line.startswith("\t") for line in lines)
 
 
-def main() -> None:
-    from .workloads import WORKLOADS
-
-    found = {}
-    for name, root in WORKLOADS.items():
-        for bits in LANES:
-            hot, whole = sizes(assembly(link(root), bits))
-            found[f"{name}: instructions of the hot loop, float{bits}"] = hot
-            found[f"{name}: instructions of the kernel, float{bits}"] = whole
-    print(json.dumps(found))
-
-
 if __name__ == "__main__":
-    main()
+    print(json.dumps(instructions()))

@@ -93,11 +93,12 @@ def test_second_process_compiles_nothing(tmp_path, monkeypatch) -> None:  # type
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path))
     script = (
         "import sys; from fracslice.formulas import julia; from fracslice.kernel import compile_scene;"
-        "compile_scene(julia(iterations=5)).points([0.1], [0.2], [0.3]); print('numba' in sys.modules)"
+        "compile_scene(julia(iterations=5)).points([0.1], [0.2], [0.3]);"
+        "print('fracslice.kernel.compiler' in sys.modules, 'numba' in sys.modules)"
     )
     runs = [
         subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
         for _ in range(2)
     ]
-    assert [r.strip() for r in runs] == ["True", "False"]
+    assert [r.strip() for r in runs] == ["True False", "False False"]
     assert len(list(tmp_path.iterdir())) == 1

@@ -1,4 +1,4 @@
-"""What a formula may say: Python's words for those of the vocabulary, and one line for all that is outside."""
+"""What a formula may say: Python's own words, those of the vocabulary, and one line for all the rest."""
 
 from __future__ import annotations
 

@@ -1,0 +1,302 @@
+"""From the text of a linked scene to LLVM's language, function by function, in one pass over its syntax.
+
+The text is structured: names are assigned, branches and loops end where they began. So every name has one
+value at every place, and what differs where two ways meet becomes a phi there (Braun et al. 2013, "Simple and
+Efficient Construction of Static Single Assignment Form", has the general case). A function is made once for
+each kind of arguments.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import Any
+
+from llvmlite import ir
+
+from ..errors import KernelError
+from .expressions import Expressions
+from .values import (
+    WHOLE,
+    Kind,
+    Lanes,
+    MismatchError,
+    Value,
+    as_kind,
+    joined,
+    kind_of,
+    made_of,
+    number,
+    parts_of,
+    types_of,
+)
+
+Names = dict[str, Value]
+
+
+@dataclass
+class Emitter:
+    """A module that is being written. functions: those of the text. called: which are not inlined."""
+
+    lanes: Lanes
+    functions: Mapping[str, ast.FunctionDef]
+    called: frozenset[str]
+    module: ir.Module = field(default_factory=ir.Module)
+    made: dict[tuple[str, str], tuple[ir.Function, Kind]] = field(default_factory=dict)
+
+    def function(self, name: str, kinds: tuple[Kind, ...]) -> tuple[ir.Function, Kind]:
+        """A function of the text for arguments of these kinds, and what it returns."""
+        key = name, repr(kinds)
+        if key not in self.made:
+            body = Body(self, name)
+            function = body.written(kinds, f"{name}.{len(self.made)}")
+            function.linkage = "internal"
+            function.attributes.add("noinline" if name in self.called else "alwaysinline")
+            self.made[key] = function, body.returned
+        return self.made[key]
+
+    def entry(self, name: str, kinds: tuple[Kind, ...]) -> None:
+        """A function that is called from outside, under its own name."""
+        Body(self, name).written(kinds, name)
+
+
+@dataclass
+class _Loop:
+    """A loop that is being written: the ways out of it, each a block and the names there."""
+
+    left: list[tuple[Any, Names]] = field(default_factory=list)
+
+
+class _WiderError(Exception):
+    """At the end of a loop names turned out to be of other kinds than at its beginning: these."""
+
+    def __init__(self, kinds: dict[str, Kind]) -> None:
+        self.kinds = kinds
+
+
+class Body(Expressions):
+    """One function for one kind of arguments."""
+
+    def __init__(self, emitter: Emitter, name: str) -> None:
+        self.emitter, self.lanes = emitter, emitter.lanes
+        self.name, self.tree = name, emitter.functions[name]
+        self.returned: Kind = ()
+        self.returns: list[tuple[Any, Value]] = []
+        self.loops: list[_Loop] = []
+        self.blocks: dict[str, Any] = {}
+
+    def written(self, kinds: Sequence[Kind], name: str) -> ir.Function:
+        """The function, under a name in the module."""
+        types = [t for kind in kinds for t in types_of(kind, self.lanes)]
+        function = ir.Function(self.emitter.module, ir.FunctionType(ir.VoidType(), types), name)
+        function.attributes.add("nounwind")
+        self.builder = ir.IRBuilder(function.append_basic_block())
+        given = made_of(tuple(kinds), function.args, self.lanes, self.builder)
+        width = {"WIDTH": ir.Constant(WHOLE, self.lanes.width)}
+        self.names: Names = width | dict(zip((a.arg for a in self.tree.args.args), given, strict=True))
+        if self.statements(self.tree.body):
+            self.builder.ret_void()
+            if self.returns:
+                raise self.fail(self.tree.body[-1], "not every way through the function returns a value")
+        elif self.returns:
+            self.finish(function, types)
+        return function
+
+    def finish(self, function: ir.Function, types: list[ir.Type]) -> None:
+        """Writes the returns, now that what they return is known, and types the function after it."""
+        self.returned = reduce(joined, (kind_of(value) for _, value in self.returns))
+        result = ir.LiteralStructType(types_of(self.returned, self.lanes))
+        for block, value in self.returns:
+            self.builder.position_at_end(block)
+            whole = ir.Constant(result, ir.Undefined)
+            for k, part in enumerate(parts_of(as_kind(value, self.returned, self.lanes, self.builder))):
+                whole = self.builder.insert_value(whole, part, k)
+            self.builder.ret(whole)
+        function.ftype = ir.FunctionType(result, types)
+        function.type = function.ftype.as_pointer()
+        function.return_value.type = result
+
+    def fail(self, node: ast.AST, message: str) -> KernelError:
+        line = ast.unparse(node).splitlines()[0]
+        name = self.name.removeprefix("f_")
+        return KernelError(f"formula {name}: {line!r} cannot be compiled: {message}")
+
+    # --- statements: each says whether what follows it is reached ---
+    def statements(self, body: Sequence[ast.stmt]) -> bool:
+        for statement in body:
+            try:
+                reached = self.statement(statement)
+            except MismatchError as error:
+                raise self.fail(statement, str(error)) from None
+            if not reached:
+                return False
+        return True
+
+    def statement(self, node: ast.stmt) -> bool:
+        match node:
+            case ast.Assign([target], value):
+                self.assign(target, self.value(value))
+            case ast.AugAssign(target, op, value):
+                before = self.value(ast.parse(ast.unparse(target), mode="eval").body)
+                self.assign(target, self.binary(op, before, self.value(value)))
+            case ast.Expr(value):
+                self.value(value)
+            case ast.Return(value):
+                given = self.value(value) if value else ()
+                self.returns.append((self.builder.block, given))
+                return False
+            case ast.Break():
+                self.loops[-1].left.append((self.builder.block, dict(self.names)))
+                return False
+            case ast.If(test, body, orelse):
+                return self.branch(self.condition(test), body, orelse)
+            case ast.While(test, body):
+                return self.loop(node, (), lambda: None if _always(test) else self.condition(test))
+            case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), limits), body):
+                return self.counted(
+                    node, counter, [number(self.builder, self.value(v), WHOLE) for v in limits]
+                )
+            case ast.Pass():
+                pass
+            case _:
+                raise MismatchError("it is not in the language")
+        return True
+
+    def assign(self, target: ast.expr, value: Value) -> None:
+        match target:
+            case ast.Name(name):
+                self.names[name], self.blocks[name] = value, self.builder.block
+            case ast.Tuple(parts):
+                if not isinstance(value, tuple) or len(value) != len(parts):
+                    raise MismatchError(f"{len(parts)} values are expected")
+                for part, one in zip(parts, value, strict=True):
+                    self.assign(part, one)
+            case ast.Subscript(place, index):
+                address = self.address(self.value(place), self.value(index))
+                self.builder.store(number(self.builder, value, address.type.pointee), address)
+            case _:
+                raise MismatchError("a name is expected to assign to")
+
+    def branch(self, test: Any, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> bool:
+        names, ends = dict(self.names), []
+        blocks = [self.builder.append_basic_block() for _ in range(2)]
+        self.builder.cbranch(test, *blocks)
+        for block, part in zip(blocks, (body, orelse), strict=True):
+            self.builder.position_at_end(block)
+            self.names = dict(names)
+            if self.statements(part):
+                ends.append((self.builder.block, self.names))
+        return self.joined(ends)
+
+    def joined(self, ends: Sequence[tuple[Any, Names]]) -> bool:
+        """Goes on where several blocks lead, with the names that all of them have."""
+        if not ends:
+            return False
+        first, *others = (names for _, names in ends)
+        common = [name for name in first if all(name in names for names in others)]
+        same = {name: first[name] for name in common if all(n[name] is first[name] for n in others)}
+        differ = [name for name in common if name not in same]
+        kinds = {name: reduce(joined, (kind_of(names[name]) for _, names in ends)) for name in differ}
+        into, rows = self.builder.append_basic_block(), []
+        for block, names in ends:
+            self.builder.position_at_end(block)
+            parts = {n: parts_of(as_kind(names[n], kinds[n], self.lanes, self.builder)) for n in differ}
+            rows.append((block, parts))
+            self.builder.branch(into)
+        self.builder.position_at_end(into)
+        merged = {n: self.phis(kinds[n], [(block, parts[n]) for block, parts in rows]) for n in differ}
+        self.names = same | merged
+        return True
+
+    def counted(self, node: ast.For, counter: str, limits: Sequence[Any]) -> bool:
+        """A loop over a range, whose step is above zero. When it is through, its counter has no value."""
+        zero, one = ir.Constant(WHOLE, 0), ir.Constant(WHOLE, 1)
+        first, end, step = [zero, *limits, one] if len(limits) == 1 else [*limits, one][:3]
+        place = f"{counter} of {node.lineno}"
+        self.names[place] = first
+
+        def test() -> Any:
+            here = self.names[counter] = self.names[place]
+            inside = self.builder.icmp_signed("<", here, end)
+            self.names[place] = self.builder.add(here, step)
+            return inside
+
+        return self.loop(node, (place, counter), test)
+
+    def loop(self, node: ast.For | ast.While, own: tuple[str, ...], test: Callable[[], Any]) -> bool:
+        """A loop, written again where names turn out to be of wider kinds than they had when it was begun."""
+        function, start = self.builder.function, self.builder.block
+        names, blocks, size = dict(self.names), len(function.blocks), len(start.instructions)
+        returns, depth = len(self.returns), len(self.loops)
+        changed = _assigned(node.body) | set(own)
+        kinds: dict[str, Kind] = {}
+        while True:
+            try:
+                return self.looped(node.body, test, sorted(changed & names.keys()), own, kinds)
+            except _WiderError as wider:
+                kinds = wider.kinds
+            del (
+                function.blocks[blocks:],
+                start.instructions[size:],
+                self.returns[returns:],
+                self.loops[depth:],
+            )
+            start.terminator = None
+            self.builder.position_at_end(start)
+            self.names = dict(names)
+
+    def looped(
+        self,
+        body: Sequence[ast.stmt],
+        test: Callable[[], Any],
+        changed: Sequence[str],
+        own: tuple[str, ...],
+        kinds: dict[str, Kind],
+    ) -> bool:
+        for name, kind in kinds.items():
+            self.names[name] = as_kind(self.names[name], kind, self.lanes, self.builder)
+        start, head = self.builder.block, self.builder.append_basic_block()
+        before = {name: self.names[name] for name in changed}
+        self.builder.branch(head)
+        self.builder.position_at_end(head)
+        rows = {n: [(start, parts_of(value))] for n, value in before.items()}
+        phis = {n: [self.builder.phi(p.type) for p in rows[n][0][1]] for n in changed}
+        for name in changed:
+            self.names[name] = made_of(kind_of(before[name]), phis[name], self.lanes, self.builder)
+        self.loops.append(_Loop())
+        inside, more = self.builder.append_basic_block(), test()
+        if more is None:
+            self.builder.branch(inside)
+        else:
+            out = self.builder.append_basic_block()
+            self.loops[-1].left.append((out, {n: v for n, v in self.names.items() if n not in own}))
+            self.builder.cbranch(more, inside, out)
+        self.builder.position_at_end(inside)
+        if self.statements(body):
+            after = {n: joined(kind_of(before[n]), kind_of(self.names[n])) for n in changed}
+            wider = {n: kind for n, kind in after.items() if kind != kind_of(before[n])}
+            if wider:
+                raise _WiderError(kinds | wider)
+            for name in changed:
+                value = as_kind(self.names[name], after[name], self.lanes, self.builder)
+                rows[name].append((self.builder.block, parts_of(value)))
+            self.builder.branch(head)
+        for name in changed:
+            for block, parts in rows[name]:
+                for phi, part in zip(phis[name], parts, strict=True):
+                    phi.add_incoming(part, block)
+        return self.joined(self.loops.pop().left)
+
+
+def _always(test: ast.expr) -> bool:
+    return isinstance(test, ast.Constant) and bool(test.value)
+
+
+def _assigned(body: Sequence[ast.stmt]) -> set[str]:
+    """The names that statements give values to."""
+    names = (n for statement in body for n in ast.walk(statement) if isinstance(n, ast.Name))
+    loops = [n for statement in body for n in ast.walk(statement) if isinstance(n, ast.For)]
+    counters = {f"{ast.unparse(loop.target)} of {loop.lineno}" for loop in loops}
+    return counters | {n.id for n in names if isinstance(n.ctx, ast.Store)}

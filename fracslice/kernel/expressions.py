@@ -1,0 +1,264 @@
+"""Expressions of a linked scene's text in LLVM's language: what each kind of syntax means on lanes and on
+numbers.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import reduce
+from typing import TYPE_CHECKING, Any
+
+from llvmlite import ir
+
+from . import lanes_math
+from .registers import Vec
+from .values import (
+    BOOL,
+    DOUBLE,
+    WHOLE,
+    Kind,
+    Lanes,
+    MismatchError,
+    Value,
+    as_kind,
+    common,
+    compare,
+    is_mask,
+    joined,
+    kind_of,
+    made_of,
+    number,
+    operate,
+    parts_of,
+    truth,
+    types_of,
+    widened,
+)
+
+if TYPE_CHECKING:
+    from .emitter import Emitter
+
+_ON_LANES: dict[type, Callable[[Vec, Vec], Vec]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq,
+}  # fmt: skip
+_WORDS = {
+    name: (getattr(lanes_math, name), count)
+    for count, names in (
+        (1, ("sqrt", "rsqrt", "log", "exp", "sin", "cos", "floor", "absolute")),
+        (2, ("ratio", "atan2", "minimum", "maximum")),
+    )
+    for name in names
+}
+_EXTREMES = {"min": ast.Lt(), "max": ast.Gt()}
+
+
+class Expressions:
+    """What a function's expressions are, written at the place where its builder is."""
+
+    emitter: Emitter
+    lanes: Lanes
+    builder: Any
+    names: dict[str, Value]
+    blocks: dict[str, Any]
+
+    def value(self, node: ast.expr) -> Value:
+        """The value of an expression."""
+        match node:
+            case ast.Constant(value):
+                return self.constant(value)
+            case ast.Name(name):
+                return self.named(name)
+            case ast.Tuple(parts):
+                return tuple(map(self.value, parts))
+            case ast.UnaryOp(op, operand):
+                return self.unary(op, self.value(operand))
+            case ast.BinOp(left, op, right):
+                return self.binary(op, self.value(left), self.value(right))
+            case ast.Compare(left, [op], [right]):
+                return self.comparison(op, self.value(left), self.value(right))
+            case ast.BoolOp(op, [first, *others]):
+                return reduce(
+                    lambda a, b: self.short(op, a, b), others, truth(self.builder, self.value(first))
+                )
+            case ast.IfExp(test, yes, no):
+                return self.chosen(self.condition(test), lambda: self.value(yes), lambda: self.value(no))
+            case ast.Subscript(place, index):
+                return self.element(self.value(place), self.value(index))
+            case ast.Call(ast.Name(name), arguments):
+                return self.call(name, [self.value(a) for a in arguments])
+        raise MismatchError("it is not in the language")
+
+    def constant(self, value: object) -> Value:
+        if isinstance(value, bool):
+            return ir.Constant(BOOL, int(value))
+        if isinstance(value, (int, float)):
+            return ir.Constant(WHOLE if isinstance(value, int) else DOUBLE, value)
+        raise MismatchError("a number is expected")
+
+    def named(self, name: str) -> Value:
+        """What a name stands for. A product is fused with what is added to it in the same stretch of code."""
+        if name not in self.names:
+            raise MismatchError(f"{name!r} has no value here")
+        value = self.names[name]
+        if isinstance(value, Vec) and value.factors and self.blocks.get(name) is not self.builder.block:
+            return replace(value, factors=None)
+        return value
+
+    def condition(self, node: ast.expr) -> Any:
+        return truth(self.builder, self.value(node))
+
+    def unary(self, op: ast.unaryop, value: Value) -> Value:
+        if isinstance(op, ast.Not):
+            return self.builder.not_(truth(self.builder, value))
+        if isinstance(value, Vec):
+            return -self.lanes.vec(self.builder, value)
+        if isinstance(value.type, ir.IntType):
+            return self.builder.neg(number(self.builder, value, WHOLE))
+        return self.builder.fneg(value)
+
+    def binary(self, op: ast.operator, a: Value, b: Value) -> Value:
+        if isinstance(op, (ast.BitAnd, ast.BitOr)) and (is_mask(a) or is_mask(b)):
+            a, b = (self.lanes.condition(self.builder, v) for v in (a, b))
+            return a.each(self.builder.and_ if isinstance(op, ast.BitAnd) else self.builder.or_, b)
+        return self.on_lanes(op, a, b) or operate(self.builder, op, a, b)
+
+    def comparison(self, op: ast.cmpop, a: Value, b: Value) -> Value:
+        return self.on_lanes(op, a, b) or compare(self.builder, op, a, b)
+
+    def on_lanes(self, op: ast.AST, a: Value, b: Value) -> Vec | None:
+        """An operator where lanes are involved."""
+        if not any(isinstance(v, (Vec, tuple)) for v in (a, b)):
+            return None
+        if type(op) not in _ON_LANES:
+            raise MismatchError("this is for numbers that are the same everywhere")
+        return _ON_LANES[type(op)](self.lanes.vec(self.builder, a), self.lanes.vec(self.builder, b))
+
+    def short(self, op: ast.boolop, a: Any, node: ast.expr) -> Any:
+        """``and`` and ``or``, which look at the second only if the first leaves it open."""
+
+        def second() -> Value:
+            return truth(self.builder, self.value(node))
+
+        if isinstance(op, ast.And):
+            return self.chosen(a, second, lambda: ir.Constant(BOOL, 0))
+        return self.chosen(a, lambda: ir.Constant(BOOL, 1), second)
+
+    def chosen(self, test: Any, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
+        """One of two values, of which only that one is computed."""
+        ends = []
+        blocks = [self.builder.append_basic_block() for _ in range(2)]
+        self.builder.cbranch(test, *blocks)
+        for block, way in zip(blocks, (yes, no), strict=True):
+            self.builder.position_at_end(block)
+            value = way()
+            ends.append((self.builder.block, value))
+        return self.merged(ends)
+
+    def merged(self, ends: Sequence[tuple[Any, Value]], into: Any = None) -> Value:
+        """The value of a place to which several blocks lead, each with its own; the builder goes there."""
+        kind = reduce(joined, (kind_of(value) for _, value in ends))
+        into = into or self.builder.append_basic_block()
+        rows = []
+        for block, value in ends:
+            self.builder.position_at_end(block)
+            rows.append((block, parts_of(as_kind(value, kind, self.lanes, self.builder))))
+            self.builder.branch(into)
+        self.builder.position_at_end(into)
+        return self.phis(kind, rows)
+
+    def phis(self, kind: Kind, rows: Sequence[tuple[Any, Sequence[Any]]]) -> Value:
+        """A value of a kind that is in each block made of these parts."""
+        phis = [self.builder.phi(t) for t in types_of(kind, self.lanes)]
+        for block, parts in rows:
+            for phi, part in zip(phis, parts, strict=True):
+                phi.add_incoming(part, block)
+        return made_of(kind, phis, self.lanes, self.builder)
+
+    def address(self, place: Any, index: Value) -> Any:
+        return self.builder.gep(place, [number(self.builder, index, WHOLE)])
+
+    def element(self, place: Value, index: Value) -> Value:
+        """An element of an array in memory, or of a tuple."""
+        if not isinstance(place, tuple):
+            loaded = self.builder.load(self.address(place, index))
+            return widened(self.builder, loaded, WHOLE) if isinstance(loaded.type, ir.IntType) else loaded
+        if isinstance(index, ir.Constant):
+            return place[index.constant]
+        kind = reduce(joined, map(kind_of, place))
+        found, *others = (as_kind(v, kind, self.lanes, self.builder) for v in place)
+        for k, other in enumerate(others, 1):
+            here = self.builder.icmp_signed("==", index, ir.Constant(WHOLE, k))
+            parts = [
+                self.builder.select(here, a, b) for a, b in zip(parts_of(other), parts_of(found), strict=True)
+            ]
+            found = made_of(kind, parts, self.lanes, self.builder)
+        return found
+
+    def call(self, name: str, given: list[Value]) -> Value:
+        if name in self.emitter.functions:
+            return self.called(name, given)
+        if name in _WORDS:
+            emit, count = _WORDS[name]
+            if len(given) != count:
+                raise MismatchError(f"{name} takes {count} values, found {len(given)}")
+            return emit(*(self.lanes.vec(self.builder, v) for v in given))
+        found: Value = getattr(self, f"word_{name}")(*given)
+        return found
+
+    def called(self, name: str, given: Sequence[Value]) -> Value:
+        function, kind = self.emitter.function(name, tuple(map(kind_of, given)))
+        result = self.builder.call(function, [part for value in given for part in parts_of(value)])
+        count = len(types_of(kind, self.lanes))
+        parts = [self.builder.extract_value(result, k) for k in range(count)]
+        return made_of(kind, parts, self.lanes, self.builder)
+
+    # --- the words that are no function of lanes alone ---
+    def word_where(self, mask: Value, yes: Value, no: Value) -> Vec:
+        yes, no = (self.lanes.vec(self.builder, v) for v in (yes, no))
+        return self.lanes.condition(self.builder, mask).choose(yes, no)
+
+    def word_any_of(self, mask: Value) -> Any:
+        if not isinstance(mask, Vec):
+            return truth(self.builder, mask)
+        parts = self.lanes.condition(self.builder, mask).parts
+        word = ir.IntType(parts[0].type.count)
+        bits = reduce(self.builder.or_, [self.builder.bitcast(part, word) for part in parts])
+        return self.builder.icmp_unsigned("!=", bits, word(0))
+
+    def word_int(self, value: Value) -> Any:
+        return number(self.builder, value, WHOLE)
+
+    def word_min(self, *values: Value) -> Any:
+        return reduce(lambda a, b: self.extreme("min", a, b), values)
+
+    def word_max(self, *values: Value) -> Any:
+        return reduce(lambda a, b: self.extreme("max", a, b), values)
+
+    def extreme(self, which: str, a: Any, b: Any) -> Any:
+        kind = common(a.type, b.type)
+        a, b = number(self.builder, a, kind), number(self.builder, b, kind)
+        return self.builder.select(compare(self.builder, _EXTREMES[which], b, a), b, a)
+
+    def word_load(self, place: Any, index: Value) -> Vec:
+        """Lanes from memory."""
+        align = self.lanes.bits // 8
+        return Vec(
+            self.builder,
+            tuple(self.builder.load(a, align=align) for a in self.registers(place, index)),
+        )
+
+    def word_store(self, place: Any, index: Value, value: Value) -> None:
+        """Lanes to memory."""
+        parts = self.lanes.vec(self.builder, value).parts
+        for address, part in zip(self.registers(place, index), parts, strict=True):
+            self.builder.store(part, address, align=self.lanes.bits // 8)
+
+    def registers(self, place: Any, index: Value) -> list[Any]:
+        """Where each register of lanes lies, from an element of an array on."""
+        first, kind = self.address(place, index), self.lanes.register
+        steps = (ir.Constant(WHOLE, k * kind.count) for k in range(self.lanes.registers))
+        return [self.builder.bitcast(self.builder.gep(first, [step]), kind.as_pointer()) for step in steps]
