@@ -1,6 +1,7 @@
 """The CPU back end: a scene's field as machine code.
 
-Loading it takes milliseconds; its functions (`machine`) are called with the interpreter unlocked, so plain threads scale.
+Loading it takes milliseconds; its functions (`machine`) are called with the interpreter unlocked, so plain
+threads scale.
 """
 
 from __future__ import annotations

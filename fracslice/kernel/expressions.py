@@ -53,6 +53,9 @@ _WORDS = {
     )
     for name in names
 }
+_OWN = {"where": 3, "any_of": 1, "int": 1, "min": 2, "max": 2, "load": 2, "store": 3}
+"""The words with a method of their own, and how many values they take."""
+
 _EXTREMES = {"min": ast.Lt(), "max": ast.Gt()}
 
 
@@ -200,12 +203,17 @@ class Expressions:
 
     def call(self, name: str, given: list[Value]) -> Value:
         if name in self.emitter.functions:
+            count = len(self.emitter.functions[name].args.args)
+        elif name in _WORDS or name in _OWN:
+            count = _WORDS[name][1] if name in _WORDS else _OWN[name]
+        else:
+            raise MismatchError(f"{name!r} is no function")
+        if len(given) != count:
+            raise MismatchError(f"{name} takes {count} values, found {len(given)}")
+        if name in self.emitter.functions:
             return self.called(name, given)
         if name in _WORDS:
-            emit, count = _WORDS[name]
-            if len(given) != count:
-                raise MismatchError(f"{name} takes {count} values, found {len(given)}")
-            return emit(*(self.lanes.vec(self.builder, v) for v in given))
+            return _WORDS[name][0](*(self.lanes.vec(self.builder, v) for v in given))
         found: Value = getattr(self, f"word_{name}")(*given)
         return found
 
@@ -232,13 +240,15 @@ class Expressions:
     def word_int(self, value: Value) -> Any:
         return number(self.builder, value, WHOLE)
 
-    def word_min(self, *values: Value) -> Any:
-        return reduce(lambda a, b: self.extreme("min", a, b), values)
+    def word_min(self, a: Value, b: Value) -> Any:
+        return self.extreme("min", a, b)
 
-    def word_max(self, *values: Value) -> Any:
-        return reduce(lambda a, b: self.extreme("max", a, b), values)
+    def word_max(self, a: Value, b: Value) -> Any:
+        return self.extreme("max", a, b)
 
     def extreme(self, which: str, a: Any, b: Any) -> Any:
+        if any(isinstance(v, (Vec, tuple)) for v in (a, b)):
+            raise MismatchError("this is for numbers that are the same everywhere")
         kind = common(a.type, b.type)
         a, b = number(self.builder, a, kind), number(self.builder, b, kind)
         return self.builder.select(compare(self.builder, _EXTREMES[which], b, a), b, a)
