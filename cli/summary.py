@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 def summary(path: str, report: Report) -> str:
     """What was made, in a line or two."""
-    error, fewer = report.surface_error_mm, ""
+    error, back, fewer = report.surface_error_mm, report.surface_to_mesh_mm, ""
     if report.simplified is not None:
         done = report.simplified
         off = max(done.bound_mm, done.back_mm)
@@ -20,6 +20,7 @@ def summary(path: str, report: Report) -> str:
     return (
         f"{path}: {found(report.mesh)}\n{notes}"
         f"{fewer}vertices {error.mean * 1000:.2g} um from the surface (99 %: {error.p99 * 1000:.2g} um), "
+        f"the surface {back.mean:.2g} mm from the mesh (at most {back.max:.2g} mm), "
         f"voxel {report.voxel_mm:.3g} mm, {report.seconds['total']:.1f} s, {report.peak_rss_mb:.0f} MB"
     )
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import SceneError, TooLargeError
+from .errors import SceneError, TooLargeError, VolumeError
 from .formulas import Box
 from .memory import available_bytes, peak_rss_mb
-from .report import Report, SurfaceError, version
+from .report import Report, SurfaceError, SurfaceToMesh, version
 from .scene import Print, Scene, parse_length
 from .work import Clock, Work
 
@@ -141,9 +140,11 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     what, work = what or MeshJob(), work or Work()
     voxels, clock = what.voxels(scene), Clock(work)
     from .mesh.check import check
+    from .mesh.missed import surface_to_mesh
     from .mesh.refine import refine
     from .mesh.simplify import simplify
     from .volume import plan
+    from .volume.accuracy import surface_error
 
     how = what.how(scene)
     with clock("planning"):
@@ -171,7 +172,9 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
             mesh, simplified = simplify(mesh, what.simplify_mm, work)
     with clock("checking"):
         checked = check(mesh, threads=work.threads)
-        error = _surface_error(planned, mesh, place, work)
+        points = (mesh.vertices - np.array(place.offset)) / place.scale
+        off = place.scale * surface_error(planned.root, points, planned.voxel, work)
+        back = surface_to_mesh(planned, lambda: [raw], place.scale, work)
     report = Report(
         scene=scene.name,
         scene_hash=scene.hash,
@@ -180,7 +183,8 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         voxel_mm=bricks.voxel * place.scale,
         mesh=checked,
         removed=removed,
-        surface_error_mm=error,
+        surface_error_mm=SurfaceError.of(off),
+        surface_to_mesh_mm=SurfaceToMesh.of(back),
         evaluations=bricks.evaluations,
         bricks=len(bricks),
         seconds=clock.seconds,
@@ -222,14 +226,10 @@ def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Wor
     The number of bricks grows like a power of the resolution, about the surface's dimension; two coarse
     samplings show it. Coarse jobs are not looked at: they always fit.
     """
-    from .volume import plan, sample_scene
-
     if voxels <= ALWAYS_FITS:
         return
-    few, many = (
-        len(sample_scene(plan(scene.root, n, work), work)) for n in (ALWAYS_FITS / 4, ALWAYS_FITS / 2)
-    )
-    dimension = min(max(math.log2(many / few), 2.0), 3.0)
+    few, many = (_bricks(scene, n, work) for n in (ALWAYS_FITS / 4, ALWAYS_FITS / 2))
+    dimension = min(max(math.log2(max(many, 1) / max(few, 1)), 2.0), 3.0)
     needed = many * (2 * voxels / ALWAYS_FITS) ** dimension * BYTES_A_BRICK
     free = available_bytes()
     if needed > free:
@@ -238,6 +238,17 @@ def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Wor
             f"a voxel of {size / voxels:.3g}mm needs about {needed / 1e9:.1f} GB of memory, "
             f"and {free / 1e9:.1f} GB are free; a voxel of {fits * 1.02:.3g}mm fits"
         )
+
+
+def _bricks(scene: Scene, resolution: float, work: Work) -> int:
+    """How many bricks a scene has at a coarse resolution: none where all of it falls between samples."""
+    from .volume import plan, sample_scene
+
+    planned = plan(scene.root, resolution, work)
+    try:
+        return len(sample_scene(planned, work))
+    except VolumeError:
+        return 0
 
 
 def _thinner(pieces: str, voxel: float) -> tuple[str, ...]:
@@ -264,30 +275,6 @@ def _finished(
     return clean(placed), removed, Placement(exact, (x, y, z))
 
 
-def box_of_the_rest(
-    planned: Plan, whole: np.ndarray, rest: np.ndarray, tips: Callable[[], np.ndarray], work: Work
-) -> Box:
-    """The box of the bodies that stay, scene units: the field's, for a mesh does not have all of its tips.
-
-    whole, rest: bounds of the mesh [2, 3] with all bodies, and with those. tips: the outermost vertices that
-    stay, [n, 3], scene units, from which a side is looked for where bodies that were removed reach farther.
-    """
-    from .volume import reached
-
-    if (rest == whole).all():
-        return planned.box
-    found = reached(planned.root, tips().T, planned.voxel, work)
-    own = np.array([planned.box.lo, planned.box.hi])
-    lo, hi = np.where(rest == whole, own, [found.lo, found.hi]).tolist()
-    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
-
-
-def outermost(vertices: np.ndarray) -> np.ndarray:
-    """Those of [n, 3] that are farthest out along each axis, [6, 3]."""
-    found: np.ndarray = vertices[[*vertices.argmin(0), *vertices.argmax(0)]]
-    return found
-
-
 def _kept(mesh: Mesh, what: MeshJob, how: Print) -> tuple[Mesh, Removed]:
     """The bodies of a mesh in mm that are wanted."""
     from .mesh.components import select
@@ -311,14 +298,7 @@ def _box_of_mesh(planned: Plan, what: MeshJob, how: Print, size: float, work: Wo
 
 def _box_of_kept(planned: Plan, raw: Mesh, kept: Mesh, scale: float, work: Work) -> Box:
     """kept: of `raw`, `scale` times as large."""
+    from .volume.rest import box_of_the_rest, outermost
+
     tips = partial(outermost, kept.vertices / scale)
     return box_of_the_rest(planned, scale * raw.bounds, kept.bounds, tips, work)
-
-
-def _surface_error(planned: Plan, mesh: Mesh, place: Placement, work: Work) -> SurfaceError:
-    """Measured at the vertices of the finished mesh."""
-    from .volume.accuracy import surface_error
-
-    points = (mesh.vertices - np.array(place.offset)) / place.scale
-    mm = place.scale * surface_error(planned.root, points, planned.voxel, work)
-    return SurfaceError(float(mm.mean()), float(np.quantile(mm, 0.99)), float(mm.max()))

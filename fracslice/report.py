@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 if TYPE_CHECKING:
     from .mesh.check import MeshReport
     from .mesh.components import Removed
@@ -18,6 +21,25 @@ class SurfaceError:
     mean: float
     p99: float
     max: float
+
+    @classmethod
+    def of(cls, mm: NDArray[np.float64]) -> SurfaceError:
+        """Of the distances that were measured."""
+        return cls(float(mm.mean()), float(np.quantile(mm, 0.99)), float(mm.max()))
+
+
+@dataclass(frozen=True)
+class SurfaceToMesh:
+    """How far points of the true surface, found without the mesh, are from the mesh, in mm."""
+
+    mean: float
+    max: float
+    points: int
+
+    @classmethod
+    def of(cls, mm: NDArray[np.float64]) -> SurfaceToMesh:
+        """Of the distances that were measured."""
+        return cls(float(mm.mean()), float(mm.max()), len(mm))
 
 
 @dataclass(frozen=True)
@@ -34,6 +56,7 @@ class Report:
     mesh: MeshReport
     removed: Removed
     surface_error_mm: SurfaceError
+    surface_to_mesh_mm: SurfaceToMesh
     evaluations: int
     bricks: int
     seconds: dict[str, float]

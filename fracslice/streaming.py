@@ -17,9 +17,9 @@ import numpy as np
 from .errors import SceneError
 from .export.files import check_target, replacing
 from .export.stl import write_pieces
-from .job import MeshJob, box_of_the_rest, outermost
+from .job import MeshJob
 from .memory import peak_rss_mb
-from .report import Report, SurfaceError, version
+from .report import Report, SurfaceError, SurfaceToMesh, version
 from .scene import Print, Scene
 from .work import Clock, Work
 
@@ -59,6 +59,7 @@ def stream_mesh(
             raise SceneError(f"{name} {length:g}mm: needs the whole mesh, which does not fit in memory")
     from .export import application
     from .mesh.extract import contour_pieces
+    from .mesh.missed import surface_to_mesh
     from .mesh.survey import Survey
     from .volume import plan, sample_scene_signs
 
@@ -78,6 +79,7 @@ def stream_mesh(
                 planned, pieces, survey.shells(), replace(what, printing=how), what.size(scene), work
             )
             known = {"Application": application()} | dict(metadata or {})
+            back = surface_to_mesh(planned, finish.surface, finish.scale, work)
             write_pieces(finish.meshes(MOST_ERRORS / (40 * len(signs))), file, known)
     return Report(
         scene=scene.name,
@@ -87,7 +89,8 @@ def stream_mesh(
         voxel_mm=finish.voxel,
         mesh=finish.checked(),
         removed=finish.removed,
-        surface_error_mm=finish.surface_error(),
+        surface_error_mm=SurfaceError.of(finish.scale * np.concatenate(finish.errors)),
+        surface_to_mesh_mm=SurfaceToMesh.of(back),
         evaluations=signs.evaluations,
         bricks=len(signs),
         seconds=clock.seconds,
@@ -124,6 +127,7 @@ class _Finish:
     ) -> None:
         from .mesh.components import choose
         from .mesh.window import Window
+        from .volume.rest import box_of_the_rest
 
         self.planned, self.pieces, self.whole, self.work = planned, pieces, whole, work
         unit = (size / max(planned.box.size)) ** 3
@@ -153,8 +157,14 @@ class _Finish:
             self._measure(done.vertices[::stride])
             yield done
 
+    def surface(self) -> Iterator[Mesh]:
+        """All of it, scene units."""
+        return (mesh for mesh, _ in self.pieces)
+
     def tips(self) -> np.ndarray:
         """The outermost vertices of what stays, of each piece."""
+        from .volume.rest import outermost
+
         kept = (mesh.vertices[mesh.triangles[self.staying(labels)]] for mesh, labels in self.pieces)
         return np.concatenate([outermost(part.reshape(-1, 3)) for part in kept if len(part)])
 
@@ -168,10 +178,6 @@ class _Finish:
 
         points = (vertices - self.offset) / self.scale
         self.errors.append(surface_error(self.planned.root, points, self.planned.voxel, self.work))
-
-    def surface_error(self) -> SurfaceError:
-        mm = self.scale * np.concatenate(self.errors)
-        return SurfaceError(float(mm.mean()), float(np.quantile(mm, 0.99)), float(mm.max()))
 
     def checked(self) -> MeshReport:
         hollow = self.whole.volumes < 0

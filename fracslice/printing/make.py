@@ -91,7 +91,7 @@ class _Run:
     def bound(self) -> None:
         """Finds how large the object is now."""
         found = extent(self.thing, max(self.planned.box.size) / self.planned.voxel, self.work)
-        self.planned = replace(self.planned, box=found.box, outer=found.outer)
+        self.planned = replace(self.planned, box=found.box, outer=found.outer, tips=found.tips)
 
     def weigh(self) -> None:
         """Its box is what is called its size."""

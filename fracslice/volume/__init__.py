@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..formulas.box import Box
 from ..formulas.registry import Facts, Node
 from ..kernel import Compilable, Kernel
@@ -33,14 +35,16 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """What is about to be sampled: the scene with all depths known, the object's box, a box that surely
-    encloses it, and the voxel, all in scene units. notes: what the voxel is too large for, in words."""
+    encloses it, its outermost points [3, 6], and the voxel, all in scene units. notes: what the voxel is too
+    large for, in words."""
 
     root: Node | Compilable
     box: Box
     outer: Box
+    tips: np.ndarray
     voxel: float
     notes: tuple[str, ...] = ()
 
@@ -60,7 +64,7 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
         size = max(found.box.size)
     voxel = max(found.box.size) / resolution
     shown, notes = visible(resolve_depths(root, voxel), voxel)
-    return Plan(shown, found.box, found.outer, voxel, notes)
+    return Plan(shown, found.box, found.outer, found.tips, voxel, notes)
 
 
 def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
