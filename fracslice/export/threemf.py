@@ -43,7 +43,7 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
 
 
 def _add(archive: zipfile.ZipFile, name: str, texts: Iterable[bytes], large: bool = False) -> None:
-    """Stream a member; opened by name it carries no time, unlike one that `writestr` makes."""
+    """Stream a member; opened by name it carries no time, unlike one of `zipfile.ZipFile.writestr`."""
     with archive.open(name, "w", force_zip64=large) as part:
         for text in texts:
             part.write(text)

@@ -14,8 +14,8 @@ from .model import Mesh
 
 
 class Survey:
-    """Adds up pieces, in turn. Labels are those of parts of pieces, numbered from the first piece on, until
-    `join` tells which of them are one shell.
+    """Adds up pieces, in turn. A label is the number of a connected part of one piece, counted from the first
+    piece on; `shells` tells which parts are one shell.
     """
 
     def __init__(self) -> None:
@@ -80,7 +80,11 @@ class Survey:
 
 @dataclass(frozen=True, eq=False)
 class WholeShells:
-    """of_label: int32, the shell of each label; volumes: float64 [s], signed; low, high: float64 [s, 3]."""
+    """The shells of all pieces together.
+
+    of_label: int32, the shell of each label. volumes: float64 [s], signed. low, high: float64 [s, 3], the
+    corners of their bounding boxes.
+    """
 
     of_label: NDArray[np.int32]
     volumes: NDArray[np.float64]

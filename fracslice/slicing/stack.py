@@ -1,4 +1,4 @@
-"""What is to be cut: the planned stack of layers, and the record of one layer."""
+"""What is to be cut: the job, and the stack of layers that is planned for it."""
 
 from __future__ import annotations
 
@@ -56,7 +56,8 @@ class Stack:
     position of the lattice point (0, 0) in scene units. pixel: mm (x, y). shape: pixels (ny, nx); there is
     one more lattice point along each. z: float64 [n], the heights at which the layers are cut, scene units.
     tops: float64 [n], the layers' upper faces in mm above the object's lowest point. size: the object's
-    size in mm. notes: what a pixel is too large for, in words.
+    size in mm. outer: a box that surely encloses it, scene units. notes: what a pixel is too large for, in
+    words.
     """
 
     root: Node | Compilable
