@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 from fracslice.formulas import (
     Node,
     bend,
@@ -75,6 +77,19 @@ EXAMPLES: dict[str, Node] = {
     "bend": bend(BAR, degrees=70),
     "bend y": bend(transform(BAR, rotate=(0, 1, 0, 90)), axis="y", degrees=-50),
     "material": material(torus(), colour=(0.9, 0.2, 0.1), reflect=0.3),
+    "many": difference(
+        box(size=(1.8, 1.6, 1.4)),
+        *(
+            transform(sphere(radius=0.1 + 0.02 * k), translate=(0.2 * k - 0.8, 0.1 * k, 0.7))
+            for k in range(7)
+        ),
+        *(transform(BAR, rotate=(1, k, 0, 20 * k), scale=0.5) for k in range(1, 6)),
+    ),
+    "deep": reduce(
+        lambda inner, k: bounds(inner, min=(-1.5 + 0.02 * k, -1.4, -1.3), max=(1.4, 1.3, 1.2 - 0.02 * k)),
+        range(16),
+        sphere(radius=1.2),
+    ),
     "example of the documentation": union(
         mandelbulb(power=8, iterations=4),
         transform(menger(level=3), translate=(0, 0, -1.1), rotate=(1, 0, 0, 90), scale=0.4),

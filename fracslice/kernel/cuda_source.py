@@ -147,7 +147,7 @@ class _Typed(ast.NodeTransformer):
         if called == "int":
             return _call("whole", *node.args)
         if called not in self.shifting:
-            places = _after_parameters(node)
+            places = after_parameters(node.args)
             node.args = [*(self.real(a) for a in node.args[: len(node.args) - len(places)]), *places]
         return node
 
@@ -174,10 +174,10 @@ def _listed(found: Any) -> list[ast.stmt]:
     return found if isinstance(found, list) else [found]
 
 
-def _after_parameters(call: ast.Call) -> list[ast.expr]:
-    """What a call says after P: from where in P on its numbers lie."""
-    names = [a.id if isinstance(a, ast.Name) else "" for a in call.args]
-    return call.args[names.index("P") + 1 :] if "P" in names[:-1] else []
+def after_parameters(arguments: list[ast.expr]) -> list[ast.expr]:
+    """What a call says after P: from where in P on its numbers lie, a whole number."""
+    names = [a.id if isinstance(a, ast.Name) else "" for a in arguments]
+    return arguments[names.index("P") + 1 :] if "P" in names[:-1] else []
 
 
 _SHIFTS = (ast.LShift, ast.RShift, ast.BitXor)

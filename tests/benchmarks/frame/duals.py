@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fracslice.formulas import Node, vocabulary
-from fracslice.kernel.linker import FIELD, link
+from fracslice.kernel.linker import CALLED, FIELD, link
 
 
 @dataclass(eq=False)
@@ -107,7 +107,7 @@ WORDS = {
 
 def gradients(root: Node) -> Callable[[np.ndarray], np.ndarray]:
     """The gradient of a scene's field at float64 points [n, 3]."""
-    linked, scope = link(root), dict(WORDS)
+    linked, scope = link(root), {**WORDS, CALLED: lambda function: function}
     exec(compile(linked.source, "<linked scene>", "exec"), scope)
     numbers = [float(p) for p in linked.parameters]
 

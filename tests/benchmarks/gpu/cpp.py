@@ -7,6 +7,8 @@ import ast
 from collections.abc import Sequence
 from typing import Any
 
+from fracslice.kernel.cuda_source import after_parameters
+
 WORDS = {
     "where": "({} ? {} : {})",
     "any_of": "{}",
@@ -169,6 +171,8 @@ def _expression(node: ast.expr) -> str:
         case ast.BinOp(left, op, right) | ast.Compare(left, [op], [right]):
             return f"({_expression(left)} {OPERATORS[type(op)]} {_expression(right)})"
         case ast.Call(ast.Name(name), arguments):
-            passed = [_expression(a) for a in arguments]
+            places = after_parameters(arguments)
+            passed = [_expression(a) for a in arguments[: len(arguments) - len(places)]]
+            passed += map(ast.unparse, places)
             return WORDS[name].format(*passed) if name in WORDS else f"{name}_({', '.join(passed)})"
     raise NotImplementedError(ast.unparse(node))

@@ -1,4 +1,4 @@
-"""What a scene that is deep or has many elements costs to compile, against a small one: CPU time, one process.
+"""What deep scenes and those of many elements cost to compile, against a small one: CPU time, one process.
 
 `python -m tests.benchmarks.kernel.compiling`: medians of five, float32, the kernel of samples alone.
 """

@@ -19,6 +19,7 @@ from numba import njit
 
 from fracslice.formulas import Node, julia, mandelbulb, menger
 from fracslice.kernel import compile_scene, link
+from fracslice.kernel.linker import CALLED
 
 from ..programs import told
 from ..tables import table
@@ -53,7 +54,7 @@ def scalar_words() -> dict[str, Callable[..., float]]:
 
 def scalar_kernel(root: Node) -> Callable[..., None]:
     """``run(P, x, y, z, out)``, the linked scene in a plain loop."""
-    scope: dict[str, object] = dict(scalar_words())
+    scope: dict[str, object] = {**scalar_words(), CALLED: lambda function: function}
     exec(compile(link(root).source, "<scalar>", "exec"), scope)
     for name, value in list(scope.items()):
         if isinstance(value, FunctionType):

@@ -14,7 +14,7 @@ import numpy as np
 
 from fracslice.formulas import Node, mandelbulb, material, sphere, transform, union
 from fracslice.kernel import compile_scene, link
-from fracslice.kernel.linker import FIELD, Linked
+from fracslice.kernel.linker import CALLED, FIELD, Linked
 from fracslice.render.linking import link_frame, optics
 from fracslice.render.waves import loops
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
@@ -57,6 +57,7 @@ def orbit_steps(root: Node, found: Bricks, most: int = 400) -> tuple[float, floa
 
     linked, alive = link(root), []
     scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
+    scope[CALLED] = lambda function: function
     scope["any_of"] = lambda mask: alive.append(mask) or bool(np.any(mask))
     exec(compile(linked.source, "<linked scene>", "exec"), scope)
     picked = found.ijk[:: max(1, len(found) // most)]
