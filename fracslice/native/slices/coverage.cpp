@@ -8,7 +8,7 @@ namespace fracslice {
 namespace {
 
 constexpr int kEnds = kTile + 1;  // samples along a row of cells
-constexpr float kLeast = 1e-15f, kMost = 1e15f;  // values, so that products of them are numbers
+constexpr float kLeast = 1e-15f, kMost = 1e12f;  // values, so that products of scaled ones are numbers
 
 // Four samples or cells side by side.
 using Four = float __attribute__((vector_size(16)));

@@ -7,6 +7,7 @@ namespace fracslice {
 namespace {
 
 constexpr size_t kFew = 128;
+constexpr float kSmallest = 1e6f;  // inside values that large bailouts make
 constexpr int32_t kOften = 8, kSeldom = 40, kEnough = 96;  // every so many tiles are looked at, and as many are enough
 
 }  // namespace
@@ -49,7 +50,7 @@ float Slab::inside_scale() {
     evaluate(some.x.size(), where, [&](size_t, float f) { before += f < 0; });
     auto chosen = some.quotients.begin() + std::min(before, ptrdiff_t(some.quotients.size()) - 1);
     std::nth_element(some.quotients.begin(), chosen, some.quotients.end());
-    return std::clamp(*chosen, 0.125f, 64.f);
+    return std::clamp(*chosen, 0.125f, kSmallest);
 }
 
 }  // namespace fracslice

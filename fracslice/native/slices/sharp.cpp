@@ -10,7 +10,8 @@ namespace {
 
 constexpr float kPrecise = 2e-3f;  // pixels that a last step may take a crossing
 constexpr double kTight = 1e-3;   // pixels within which a crossing is known
-constexpr int kRounds = 16;
+constexpr int kRounds = 24;
+constexpr float kNearer = 32;  // times that a value is nearer to zero after a step that need not be looked at again
 constexpr double kShort = 0.1;  // pixels: a shorter side tells no direction
 constexpr double kSine = 0.17;  // of the angle between two sides, at least: 10 degrees
 constexpr double kStraight = 0.005;  // of the angle beside an arc that is worth its while, at least
@@ -106,7 +107,7 @@ struct Turn {
 
 }  // namespace
 
-// Crossings on the zero set: false position with the Illinois rule (Dowell and Jarratt 1971), all edges at once. Straight
+// Crossings on the zero set: false position with the Illinois rule (Dowell and Jarratt 1971) or halving, all edges at once. Straight
 // lines between the values at both ends would miss it by up to half a pixel where other faces are nearer, as just below a
 // horizontal one.
 void Slab::settle(const std::vector<Edge>& edges) {
@@ -116,10 +117,14 @@ void Slab::settle(const std::vector<Edge>& edges) {
         int moved;
         void step(float f) {
             bool lower = (f < 0) == (below < 0);
+            const float old = std::fabs(lower ? below : above), from = share;
             if (lower && moved > 0) above /= 2;
             if (!lower && moved < 0) below /= 2;
             (lower ? low : high) = share, (lower ? below : above) = f, moved = lower ? 1 : -1;
             share = low + (high - low) * below / (below - above);
+            // A short step that came hardly nearer to zero: values inside a fractal are far smaller than outside, and a
+            // straight line between the two creeps along.
+            if (std::fabs(share - from) < kPrecise && kNearer * std::fabs(f) > old) share = (low + high) / 2;
         }
     };
     std::vector<Root> roots;
