@@ -11,9 +11,11 @@ import numpy as np
 
 from .errors import SceneError, TooLargeError, VolumeError
 from .formulas import Box
+from .formulas.parameters import Number, settle
 from .memory import available_bytes, peak_rss_mb
 from .report import Report, SurfaceError, SurfaceToMesh, version
-from .scene import Print, Scene, parse_length
+from .scene import Print, Scene
+from .scene.lengths import Length
 from .work import Clock, Work
 
 if TYPE_CHECKING:
@@ -37,7 +39,7 @@ DUST = 1e-5
 
 @dataclass(frozen=True)
 class MeshJob:
-    """What to make of a scene.
+    """What to make of a scene. Lengths are numbers of mm, or text such as "0.5mm"; the fields hold mm.
 
     size_mm: the longest side, if not what the scene says. voxel_mm or resolution (voxels along the longest
     side): how fine; 256 along the longest side if neither is given. dust_mm3: bodies with less material are
@@ -58,18 +60,7 @@ class MeshJob:
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:
             raise SceneError("voxel and resolution: expected one of them")
-        for name, length in (
-            ("size", self.size_mm),
-            ("voxel", self.voxel_mm),
-            ("chord", self.chord_mm),
-            ("simplify", self.simplify_mm),
-        ):
-            if length is not None:
-                parse_length(length, name)
-        if self.resolution is not None and not COARSEST <= self.resolution <= FINEST:
-            raise SceneError(f"resolution {self.resolution:g}: expected {COARSEST} to {FINEST}")
-        if not 0 <= (self.dust_mm3 or 0.0) < float("inf"):
-            raise SceneError(f"dust {self.dust_mm3:g}: expected a finite number >= 0")
+        settle(self, _KINDS, SceneError)
 
     def size(self, scene: Scene) -> float:
         """The longest side in mm."""
@@ -97,6 +88,13 @@ class MeshJob:
                 f"voxel {self.voxel_mm:g}mm: expected {low:.4g}mm to {high:.4g}mm for an object of {size:g}mm"
             )
         return size / self.voxel_mm
+
+
+_KINDS = {
+    **dict.fromkeys(("size_mm", "voxel_mm", "chord_mm", "simplify_mm"), Length(None, "a length")),
+    "resolution": Number(None, "voxels along the longest side", least=COARSEST, most=FINEST),
+    "dust_mm3": Number(None, "a volume", least=0),
+}
 
 
 @dataclass(frozen=True)

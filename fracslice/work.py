@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, TypeVar
 
-from .errors import Cancelled
+from .errors import Cancelled, SceneError
 
 if TYPE_CHECKING:
     from .kernel.devices import Device
@@ -31,13 +31,19 @@ class Work:
     """threads: how many to use (default: all cores). progress: called as ``progress(stage, fraction)`` from
     time to time. cancel: set it from anywhere and the work stops within a fraction of a second with
     `Cancelled`. store: where samples and surfaces are kept and looked for, if anywhere. device:
-    what samples bricks; a GPU's samples can differ from the CPU's in the last place."""
+    what samples bricks; a GPU's samples can differ from the CPU's in the last place. Raises `SceneError` for
+    a number of threads that cannot be."""
 
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
     progress: Callable[[str, float], None] = _silent
     cancel: threading.Event = field(default_factory=threading.Event)
     store: Store | None = None
     device: Device = "cpu"
+
+    def __post_init__(self) -> None:
+        from .formulas.parameters import Count, settle  # loads NumPy, which help does without
+
+        settle(self, {"threads": Count(1, "how many", least=1, most=1024)}, SceneError)
 
     def check(self) -> None:
         """Raises `Cancelled` once somebody asked to stop."""

@@ -123,11 +123,11 @@ def test_a_base_higher_than_the_object_is_refused():
     ("values", "message"),
     [
         ({"voxel_mm": 1, "resolution": 64}, "expected one of them"),
-        ({"resolution": 4}, "resolution 4: expected 8 to 16384"),
-        ({"resolution": math.nan}, "expected 8 to 16384"),
-        ({"voxel_mm": 0}, "voxel '0': expected a length above zero"),
-        ({"size_mm": -1}, "size '-1': expected a length"),
-        ({"dust_mm3": -1}, "dust -1: expected a finite number >= 0"),
+        ({"resolution": 4}, "resolution=4: expected a number >= 8 and <= 16384"),
+        ({"resolution": math.nan}, "resolution=nan: expected a number"),
+        ({"voxel_mm": 0}, "voxel_mm=0: expected a length above zero"),
+        ({"size_mm": -1}, "size_mm=-1: expected a length"),
+        ({"dust_mm3": -1}, "dust_mm3=-1: expected a number >= 0"),
         ({"voxel_mm": 30}, "voxel 30mm: expected 0.002441mm to 5mm for an object of 40mm"),
     ],
 )

@@ -18,6 +18,7 @@ from statistics import median
 from typing import Any
 
 from ..errors import BenchError, FracsliceError
+from ..formulas.parameters import Count, Number, settle, settled
 from ..work import Work
 from .methods import METHODS
 from .workloads import WORKLOADS
@@ -44,7 +45,10 @@ class Peer:
             raise BenchError(
                 f"peer {text!r}: expected NAME=COMMAND with {{workload}}, {{resolution}} and {{output}}"
             )
-        return cls(name, tuple(shlex.split(command)))
+        try:
+            return cls(name, tuple(shlex.split(command)))
+        except ValueError as error:
+            raise BenchError(f"peer {text!r}: {str(error).lower()}") from None
 
 
 @dataclass(frozen=True)
@@ -62,9 +66,16 @@ class Task:
         for name in self.workloads:
             if name not in WORKLOADS:
                 raise BenchError(f"workload {name!r}: expected one of {', '.join(WORKLOADS)}")
+        settle(self, _KINDS, BenchError)
         for n in self.resolutions:
-            if not 16 <= n <= 2048:
-                raise BenchError(f"resolution {n}: expected 16 to 2048")
+            settled("resolution", n, RESOLUTION, BenchError)
+
+
+RESOLUTION = Count(256, "voxels along the cube", least=16, most=2048)
+_KINDS = {
+    "repeats": Count(3, "runs of each", least=1, most=100),
+    "limit_s": Number(60.0, "seconds", above=0),
+}
 
 
 @dataclass(frozen=True)

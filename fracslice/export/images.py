@@ -37,6 +37,8 @@ def write_image(
     shown: float32 [height, width, 3], sRGB in [0, 1], for PNG of `bits` 8 or 16; text: keywords and what they
     say, in the file. light: float32 of the same shape, linear, for OpenEXR and TIFF. Raises ExportError.
     """
+    if bits not in (8, 16):
+        raise ExportError(f"{path}: {bits} bits: expected 8 or 16")
     said, ending = text or {}, check_image(path)
     data = png(shown, bits, said) if ending == ".png" else (exr if ending == ".exr" else tiff)(light, said)
     with replacing(path) as file:

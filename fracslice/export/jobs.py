@@ -13,8 +13,10 @@ from typing import BinaryIO
 
 from isal.isal_zlib import crc32
 
+from fracslice.errors import ExportError
 from fracslice.export.files import into_place
 from fracslice.export.resuming import remainder
+from fracslice.formulas.parameters import Vector, settle
 from fracslice.kernel import field_key
 from fracslice.kernel.objects import toolchain
 from fracslice.keys import key, program
@@ -22,12 +24,15 @@ from fracslice.slicing import Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 
+EXPOSURE = Vector((8.0, 35.0), "seconds of each layer, and of the first", sizes=(2,), above=0)
+
 
 @dataclass(frozen=True, eq=False)
 class SliceRun:
     """A planned stack, how its layers become pictures, and what files say about it.
 
-    exposure: seconds per layer, first layers. metadata: names and values, among them "scene_hash".
+    exposure: seconds per layer, first layers. metadata: names and values, among them "scene_hash". Raises
+    `ExportError` for seconds that cannot be.
     """
 
     stack: Stack
@@ -35,6 +40,9 @@ class SliceRun:
     work: Work = field(default_factory=Work)
     exposure: tuple[float, float] = (8.0, 35.0)
     metadata: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        settle(self, {"exposure": EXPOSURE}, ExportError)
 
     @property
     def slicer(self) -> Slicer:

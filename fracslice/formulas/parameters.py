@@ -2,14 +2,15 @@
 
 Each kind turns text from a scene file into a value (`read`), refuses what cannot be (`check`, a `ValueError`
 that says what is expected) and writes the value back (`text`). The schema and the documentation are made from
-the same objects.
+the same objects, and `settle` gives a record's fields the same care.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Integral, Real
 from typing import Any
 
 REQUIRED: Any = ...
@@ -38,7 +39,7 @@ class Number:
         return self.check(_number(text, self.expects))
 
     def check(self, value: Any) -> Any:
-        return float(_checked(value, self))
+        return _checked(value, self)
 
     def text(self, value: Any) -> str:
         return _shortest(value)
@@ -68,12 +69,12 @@ class Count:
             raise ValueError(self.expects) from None
 
     def check(self, value: Any) -> Any:
-        if self.auto and value == AUTO:
+        if self.auto and isinstance(value, str) and value == AUTO:
             return AUTO
-        whole = isinstance(value, int) and not isinstance(value, bool)
+        whole = isinstance(value, Integral) and not isinstance(value, bool)
         if not whole or not self.least <= value <= self.most:
             raise ValueError(self.expects)
-        return value
+        return int(value)
 
     def text(self, value: Any) -> str:
         return str(value)
@@ -103,12 +104,10 @@ class Vector:
         return self.check(tuple(_number(word, self.expects) for word in text.split()))
 
     def check(self, value: Any) -> Any:
-        items: Sequence[Any] = (
-            value if isinstance(value, Sequence) and not isinstance(value, str) else (value,)
-        )
+        items = _items(value)
         if len(items) not in self.sizes:
             raise ValueError(self.expects)
-        numbers = tuple(float(_checked(item, self)) for item in items)
+        numbers = tuple(_checked(item, self) for item in items)
         if self.nonzero and not any(abs(n) >= SMALLEST for n in numbers):
             raise ValueError(self.expects)
         if self.whole and any(n != int(n) for n in numbers):
@@ -131,7 +130,7 @@ class Axis:
         return self.check(text.strip())
 
     def check(self, value: Any) -> Any:
-        if value not in ("x", "y", "z"):
+        if not isinstance(value, str) or value not in ("x", "y", "z"):
             raise ValueError(self.expects)
         return value
 
@@ -155,7 +154,7 @@ class Choice:
         return self.check(text.strip())
 
     def check(self, value: Any) -> Any:
-        if value not in self.words:
+        if not isinstance(value, str) or value not in self.words:
             raise ValueError(self.expects)
         return value
 
@@ -164,6 +163,52 @@ class Choice:
 
 
 Parameter = Number | Count | Vector | Axis | Choice
+
+
+def settle(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exception]) -> None:
+    """Replaces fields of a frozen record by what their kinds make of them. None stays where it is the
+    default.
+
+    Raises what `fail` makes of "name=value: expected ...".
+    """
+    for name, kind in kinds.items():
+        value = getattr(record, name)
+        if value is not None or kind.default is not None:
+            object.__setattr__(record, name, settled(name, value, kind, fail))
+
+
+def settled(name: str, value: Any, kind: Any, fail: Callable[[str], Exception]) -> Any:
+    """What a kind makes of one value. Raises as `settle`."""
+    try:
+        return kind.check(value)
+    except ValueError as error:
+        raise fail(f"{name}={shown(value)}: expected {error}") from None
+
+
+def shown(value: Any) -> str:
+    """A value as one short line, whatever it is."""
+    try:
+        line = " ".join(repr(value).split())
+    except ValueError:  # a whole number with more digits than Python writes
+        line = f"a huge {type(value).__name__}"
+    return line if len(line) <= 60 else line[:57] + "..."
+
+
+def finite(value: Any) -> float | None:
+    """A real number, NumPy's included, as a float; None for what is none, or not finite."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def _items(value: Any) -> Sequence[Any]:
+    """What a sequence or an array holds; anything else is one item."""
+    plain = value.tolist() if hasattr(value, "tolist") else value
+    return plain if isinstance(plain, Sequence) and not isinstance(plain, (str, bytes)) else (plain,)
 
 
 def _number(text: str, expects: str) -> float:
@@ -180,15 +225,15 @@ def _plain(text: str) -> str:
     return text
 
 
-def _checked(value: Any, kind: Number | Vector) -> Any:
-    numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not numeric or not math.isfinite(value):
+def _checked(value: Any, kind: Number | Vector) -> float:
+    number = finite(value)
+    if number is None:
         raise ValueError(kind.expects)
-    if not (kind.above < value < kind.below and kind.least <= value <= kind.most):
+    if not (kind.above < number < kind.below and kind.least <= number <= kind.most):
         raise ValueError(kind.expects)
-    if abs(value) > LARGEST or (kind.above == 0 and value < SMALLEST):
+    if abs(number) > LARGEST or (kind.above == 0 and number < SMALLEST):
         raise ValueError(f"{kind.expects}, of a size from {SMALLEST:g} to {LARGEST:g}")
-    return value
+    return number
 
 
 def _range(kind: Number | Vector) -> str:

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from ..errors import SceneError
 from .box import Box
-from .parameters import REQUIRED, Parameter
+from .parameters import REQUIRED, Parameter, settled
 
 Kind = Literal["shape", "blend", "warp"]
 
@@ -91,12 +91,9 @@ class Formula:
         kind = self.parameters[name]
         if value is None:
             if kind.default is REQUIRED:
-                raise SceneError(f"<{self.name}> needs {name}: {kind.expects}")
+                raise SceneError(f"<{self.name}> needs {name}: expected {kind.expects}")
             return kind.default
-        try:
-            return kind.check(value)
-        except ValueError as error:
-            raise SceneError(f"<{self.name}> {name}={value!r}: expected {error}") from None
+        return settled(name, value, kind, lambda message: SceneError(f"<{self.name}> {message}"))
 
     def _grouped(self, children: tuple[Node, ...]) -> tuple[Node, ...]:
         least, most = self.children

@@ -5,15 +5,20 @@ from __future__ import annotations
 from typing import Literal
 
 from ..errors import DeviceError
+from ..formulas.parameters import Choice, settled
 from ..formulas.registry import Node
 from .cpu import Compilable, Kernel
 from .cpu import compile_scene as compile_for_cpu
 
 Device = Literal["cpu", "cuda"]
+DEVICES = Choice("auto", "what computes", ("cpu", "cuda", "auto"))
 
 
 def chosen(device: str) -> Device:
-    """The device to use; "auto" takes the GPU if there is one. Raises `DeviceError` if there is none."""
+    """The device to use: "cpu", "cuda", or "auto", which takes the GPU if there is one. Raises `DeviceError`
+    if there is none, or for another word.
+    """
+    settled("device", device, DEVICES, DeviceError)
     if device == "cpu":
         return "cpu"
     from .cuda import missing

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fracslice.errors import MeshError
+from fracslice.formulas.parameters import Number, settled
 from fracslice.mesh.model import Mesh
+from fracslice.scene import parse_length
 from fracslice.work import Work
 
 ROUNDS, PATIENT = 200, 40
@@ -28,7 +30,8 @@ class Simplified:
 
 
 def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Mesh, Simplified]:
-    """The mesh with fewer triangles, nowhere farther than `tolerance` (mm) from the original.
+    """The mesh with fewer triangles, nowhere farther than `tolerance` (mm, or such as "0.02mm") from the
+    original.
 
     mesh: a closed, oriented 2-manifold without crossings. The result is one too, of the same topology; its
     vertices are some of the original's, so that they stay on the surface and on sharp edges. What is done is
@@ -41,8 +44,9 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
     from fracslice.mesh.links import links
 
     work = work or Work()
-    if not 0 < tolerance < float("inf"):
-        raise MeshError(f"tolerance {tolerance:g}: expected a finite number above zero")
+    if isinstance(tolerance, str):
+        tolerance = parse_length(tolerance, "tolerance")
+    tolerance = settled("tolerance", tolerance, Number(None, "a length", above=0), MeshError)
     _, *defects = links(mesh.triangles, len(mesh.vertices))
     if any(defects) or not len(mesh.triangles):
         raise MeshError("only a closed, oriented manifold can be simplified")

@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import SceneError
 from ..formulas import Box, Node
+from ..formulas.parameters import Number, settle
 from ..kernel import Compilable
+from ..scene.lengths import Length
 from ..volume import Bricks
 from ..work import Work
 from .apart import resolved, shown
@@ -34,12 +37,14 @@ UP = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class Limits:
-    """What counts. speck: parts with less area (mm^2) in every layer, or less volume (mm^3), are dust that is
-    counted but no reason to stop. cup: the least area of a suction cup or a resin trap,
-    mm^2. deep: the least height of a suction cup, mm: any hole in the first layers is a shallow one. wall:
-    the thinnest wall, mm; in a layer it is judged by the thinnest hundredth. floor: the thinnest floor or
-    roof, mm, measured upwards. thin: walls and floors count from so much thin surface on, mm^2. density: of
-    the resin, g/cm^3.
+    """What counts. Lengths are numbers of mm, or text such as "0.4mm".
+
+    speck: parts with less area (mm^2) in every layer, or less volume (mm^3), are dust that is counted but no
+    reason to stop. cup: the least area of a suction cup or a resin trap, mm^2. deep: the least height of a
+    suction cup, mm: any hole in the first layers is a shallow one. wall: the thinnest wall, mm; in a layer it
+    is judged by the thinnest hundredth. floor: the thinnest floor or roof, mm, measured upwards. thin: walls
+    and floors count from so much thin surface on, mm^2. density: of the resin, g/cm^3. Raises `SceneError`
+    for a value that cannot be.
     """
 
     speck: float = 0.02
@@ -49,6 +54,17 @@ class Limits:
     floor: float = 0.1
     thin: float = 1.0
     density: float = 1.1
+
+    def __post_init__(self) -> None:
+        settle(self, _KINDS, SceneError)
+
+
+_KINDS = {
+    **dict.fromkeys(("speck", "cup", "thin"), Number(0.0, "an area", least=0)),
+    "deep": Length(0.5, "a height", zero=True),
+    **dict.fromkeys(("wall", "floor"), Length(0.1, "a thickness", zero=True)),
+    "density": Number(1.1, "of the resin", above=0),
+}
 
 
 @dataclass(frozen=True)

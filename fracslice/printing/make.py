@@ -52,9 +52,12 @@ def printable(
 
     size: mm, the longest side of what stays. measure: of an object, what box will be called its size, if not
     that of its field: a mesh has not all tips of a fractal. Samples with the voxel of `planned` are at the
-    same points before and after. Raises `VolumeError` where nothing would be left or a length is too small to
-    be measured, `Cancelled`.
+    same points before and after. Raises `VolumeError` where nothing would be left, or a length is too small
+    to be measured or larger than the object, `Cancelled`.
     """
+    for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
+        if (length := getattr(how, name)) > size and (name != "drain" or how.hollow):
+            raise VolumeError(f"{name} {length:g} mm: expected at most the object's size, {size:g} mm")
     run = _Run(planned, size, how, work or Work(), measure)
     for stage, change in run.changes():
         run.work.check()

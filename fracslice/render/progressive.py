@@ -13,6 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import RenderError
+from ..formulas.parameters import Number, Vector, settled
 from ..formulas.registry import Node
 from ..kernel.devices import chosen
 from ..keys import key, program
@@ -29,6 +30,9 @@ PREVIEWS = (1, 2, 4, 8)
 """How coarse the first pass from a moved camera may be."""
 TOLERANCE = 0.002
 """A pixel has converged when its brightness, as shown, is known to half a level of 256."""
+
+
+SIZE = Vector(None, "pixels across and down", sizes=(2,), least=1, most=32768, whole=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +87,7 @@ class Renderer:
     it was.
 
     root: the tree of formulas, depths may be "auto". size: pixels across and down; the film's if not given.
-    Raises `SceneError` for a view that cannot be rendered.
+    Raises `SceneError` for a view that cannot be rendered, `RenderError` for a size that cannot be.
     """
 
     def __init__(
@@ -94,7 +98,8 @@ class Renderer:
         work: Work | None = None,
         device: str = "auto",
     ) -> None:
-        self.width, self.height = size or (view.film.width, view.film.height)
+        pixels = (view.film.width, view.film.height) if size is None else size
+        self.width, self.height = settled("size", pixels, SIZE, RenderError)
         self.work = work or Work()
         self.device = chosen(device)
         self.setting = settle(root, view, (self.width, self.height))
@@ -150,9 +155,12 @@ class Renderer:
         tolerance.
 
         The first pass has one sample in 16 pixels, the second one in all others; which pixels later ones are
-        about, `Accumulator.wanted` says. Raises `Cancelled`; what was complete before stays valid.
+        about, `Accumulator.wanted` says. Raises `RenderError` for numbers that cannot be, and `Cancelled`;
+        what was complete before stays valid.
         """
         most = self.setting.view.film.samples if samples is None else samples
+        most = settled("samples", most, Film.kinds()["samples"], RenderError)
+        tolerance = settled("tolerance", tolerance, Number(TOLERANCE, "an error", least=0), RenderError)
         while True:
             pixels, count = self.accumulator.wanted(most, tolerance)
             if not count:

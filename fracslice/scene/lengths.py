@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from typing import Any
 
 from ..errors import SceneError
+from ..formulas.parameters import finite, shown
 
 MILLIMETRES = {"um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
 SMALLEST, LARGEST = 1e-6, 1e6
@@ -23,14 +23,17 @@ def parse_length(value: str | float, what: str = "length") -> float:
     (25.0, 80.0)
     """
     try:
-        return Length(None, "").read(value) if isinstance(value, str) else Length(None, "").check(value)
+        return Length(None, "").check(value)
     except ValueError as error:
-        raise SceneError(f"{what} {str(value)!r}: expected {error}") from None
+        raise SceneError(f"{what} {shown(value)}: expected {error}") from None
 
 
 @dataclass(frozen=True)
 class Length:
-    """A parameter that is a length; its value is in mm. zero: whether it may be 0, for none."""
+    """A parameter that is a length: text with a unit, or a number of mm; its value is in mm.
+
+    zero: whether it may be 0, for none.
+    """
 
     default: Any
     doc: str
@@ -44,15 +47,42 @@ class Length:
         match = _LENGTH.fullmatch(text)
         if not match:
             raise ValueError(self.expects)
-        return self.check(float(match[1]) * MILLIMETRES[match[2] or "mm"])
+        return self._possible(float(match[1]) * MILLIMETRES[match[2] or "mm"])
 
     def check(self, value: Any) -> float:
-        numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if self.zero and numeric and value == 0:
-            return 0.0
-        if not numeric or not math.isfinite(value) or not SMALLEST <= value <= LARGEST:
-            raise ValueError(self.expects)
-        return float(value)
+        return self.read(value) if isinstance(value, str) else self._possible(value)
 
     def text(self, value: float) -> str:
         return f"{int(value) if value.is_integer() else value!r}mm"
+
+    def _possible(self, value: Any) -> float:
+        length = finite(value)
+        if length is None or not (SMALLEST <= length <= LARGEST or (self.zero and length == 0)):
+            raise ValueError(self.expects)
+        return length + 0.0  # -0 is 0
+
+
+@dataclass(frozen=True)
+class Shift(Length):
+    """A parameter that is a length in either direction, or 0; its value is in mm."""
+
+    expects = "0, or a length such as 0.05mm or -50um, up to 1000m"
+
+    def _possible(self, value: Any) -> float:
+        length = finite(value)
+        if length is None or not abs(length) <= LARGEST:
+            raise ValueError(self.expects)
+        return length
+
+
+@dataclass(frozen=True)
+class Pair(Length):
+    """A parameter that is two lengths, or one that stands for both; its values are in mm."""
+
+    expects = f"two lengths, or one for both, each {EXPECTS}"
+
+    def check(self, value: Any) -> Any:
+        pair = tuple(value) if isinstance(value, (tuple, list)) else (value, value)
+        if len(pair) != 2:
+            raise ValueError(self.expects)
+        return super().check(pair[0]), super().check(pair[1])

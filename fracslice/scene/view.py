@@ -13,10 +13,12 @@ from typing import Any, ClassVar
 
 from ..errors import SceneError
 from ..formulas.box import Box
-from ..formulas.parameters import Choice, Count, Number, Vector
+from ..formulas.parameters import Choice, Count, Number, Vector, settle, settled
 
 Triple = tuple[float, float, float]
 WHITE = (1.0, 1.0, 1.0)
+SHIFT = Vector((0.0, 0.0, 0.0), "so much forwards, to the right and up")
+TURN = Vector((0.0, 0.0), "degrees to the right and up", sizes=(2,))
 
 
 def described(kind: Any) -> Any:
@@ -33,14 +35,7 @@ class Part:
     place: str | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name, kind in self.kinds().items():
-            value = getattr(self, name)
-            if value is None and kind.default is None:
-                continue
-            try:
-                object.__setattr__(self, name, kind.check(value))
-            except ValueError as error:
-                raise self.fail(f"{name}={value!r}: expected {error}") from None
+        settle(self, self.kinds(), self.fail)
         self.validate()
 
     def validate(self) -> None:
@@ -104,15 +99,14 @@ class Camera(Part):
 
     def moved(self, forward: float = 0.0, right: float = 0.0, up: float = 0.0) -> Camera:
         """Flown by so much, in scene units, looking in the same direction."""
-        shift = tuple(
-            forward * f + right * r + up * u
-            for f, r, u in zip(self.forward, self.right, self.above, strict=True)
-        )
+        by = settled("moved", (forward, right, up), SHIFT, self.fail)
+        shift = tuple(_dot(by, axes) for axes in zip(self.forward, self.right, self.above, strict=True))
         return replace(self, eye=_plus(self.eye, shift), target=_plus(self.target, shift))
 
     def turned(self, yaw: float = 0.0, pitch: float = 0.0) -> Camera:
         """Looking elsewhere from the same place: so many degrees to the right, and up (never over the
         zenith)."""
+        yaw, pitch = settled("turned", (yaw, pitch), TURN, self.fail)
         ahead = math.asin(max(-1.0, min(1.0, _dot(self.forward, _unit(self.up)))))
         rise = max(-1.55, min(1.55, ahead + math.radians(pitch))) - ahead
         level = _turn(self.forward, self.right, rise)
@@ -121,6 +115,7 @@ class Camera(Part):
 
     def orbited(self, degrees: float) -> Camera:
         """Carried around the target, about the direction that is up."""
+        degrees = settled("degrees", degrees, Number(0.0, "an angle"), self.fail)
         arm = _turn(_minus(self.eye, self.target), _unit(self.up), math.radians(degrees))
         return replace(self, eye=_plus(self.target, arm))
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import SliceError
+from ..scene import parse_length
 from ..work import Work
 from .layers import Layer, Slicer
 from .stack import Stack
@@ -19,15 +20,16 @@ SHARE = 0.9
 
 
 def adapted(stack: Stack, most: float, work: Work | None = None) -> Stack:
-    """The stack with layers put together, up to `most` mm high, where the surface is steep.
+    """The stack with layers put together, up to `most` high (mm, or such as "0.2mm"), where the surface is
+    steep.
 
     Dolenc and Maekelae 1994, "Slicing procedures for layered manufacturing techniques": a layer of height t
     leaves steps whose cusps stand t |n| from the surface, n the vertical part of its unit normal. Layers grow
     while that is at most the height of one planned layer. The same for any number of threads. Raises
     `SliceError` if `most` is below the planned height.
     """
-    least = float(stack.heights[0])
-    if not least <= most < float("inf"):
+    least, most = float(stack.heights[0]), parse_length(most, "layer")
+    if most < least:
         raise SliceError(
             f"layers of {least:g} to {most:g} mm: expected a range from the lowest to the highest"
         )

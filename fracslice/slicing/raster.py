@@ -9,6 +9,8 @@ import numpy as np
 
 from .._slices import deflated
 from ..errors import SliceError
+from ..formulas.parameters import Number, settle
+from ..scene.lengths import Shift
 from .layers import Layer, View
 from .printers import Printer
 from .stack import Stack
@@ -18,9 +20,10 @@ from .stack import Stack
 class Screen:
     """How layers become pictures.
 
-    printer: whose screen; None shows the object alone. compensation: mm by which every outline moves
-    outwards (negative: inwards), for resin that cures beyond its pixels or shrinks. gamma: of the grey
-    levels. mirror: overrides the printer's.
+    printer: whose screen; None shows the object alone. compensation: a length, in mm or such as "50um", by
+    which every outline moves outwards (negative: inwards), for resin that cures beyond its pixels or shrinks.
+    gamma: of the grey levels. mirror: overrides the printer's. Raises `SliceError` for a value that cannot be
+    or an object that the printer has no room for.
     """
 
     stack: Stack
@@ -30,8 +33,7 @@ class Screen:
     mirror: bool | None = None
 
     def __post_init__(self) -> None:
-        if not 0 < self.gamma <= 10:
-            raise SliceError(f"gamma {self.gamma:g}: expected more than 0, at most 10")
+        settle(self, _KINDS, SliceError)
         if not abs(self.compensation) <= 1:
             raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
         if self.printer:
@@ -101,6 +103,12 @@ class Screen:
         if self._portrait:
             return image[::-1].T if self._mirrored else image[::-1, ::-1].T
         return image[::-1, ::-1] if self._mirrored else image[::-1]
+
+
+_KINDS = {
+    "compensation": Shift(0.0, "how far outlines move"),
+    "gamma": Number(1.0, "of the grey levels", above=0, most=10),
+}
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import SliceError
+from ..errors import SceneError, SliceError
 from ..formulas import transform
 from ..formulas.box import Box
+from ..formulas.parameters import REQUIRED, Vector, settle
 from ..formulas.registry import Node
 from ..kernel import Compilable
 from ..printing import printable
 from ..scene import Print
+from ..scene.lengths import Length, Pair
 from ..volume import plan
 from ..work import Work
 
@@ -23,11 +25,12 @@ MOST_PIXELS = 65_536
 
 @dataclass(frozen=True)
 class SliceJob:
-    """What to cut, lengths in mm.
+    """What to cut. Lengths are numbers of mm, or text such as "0.05mm"; the fields hold mm.
 
     size: the object's longest side, before anything is cut off or added. layer: layer height. pixel: width
-    and height of a pixel. up: the direction of the scene that is up in the print. printing: what makes it
-    printable. Raises `SliceError` for values that cannot be.
+    and height of a pixel, or one length for both. up: the direction of the scene that is up in the print.
+    printing: what makes it printable. Raises `SceneError` for a value that cannot be, `SliceError` for layers
+    or pixels as large as the object.
     """
 
     size: float
@@ -37,15 +40,19 @@ class SliceJob:
     printing: Print = field(default_factory=Print)
 
     def __post_init__(self) -> None:
-        for name, value in (("size", self.size), ("layer", self.layer), ("pixel", min(self.pixel))):
-            if not (math.isfinite(value) and value > 0):
-                raise SliceError(f"{name} {value:g} mm: expected a length > 0")
+        settle(self, _KINDS, SceneError)
         if self.layer >= self.size:
             raise SliceError(f"a layer of {self.layer:g} mm is as high as the object: {self.size:g} mm")
         if max(self.pixel) >= self.size:
             raise SliceError(f"a pixel of {max(self.pixel):g} mm is as large as the object: {self.size:g} mm")
-        if not np.linalg.norm(self.up) > 0:
-            raise SliceError("up: expected a direction other than 0 0 0")
+
+
+_KINDS = {
+    "size": Length(REQUIRED, "the longest side"),
+    "layer": Length(0.05, "the layer height"),
+    "pixel": Pair((0.05, 0.05), "width and height"),
+    "up": Vector((0.0, 0.0, 1.0), "a direction", nonzero=True),
+}
 
 
 @dataclass(frozen=True, eq=False)

@@ -176,7 +176,7 @@ def test_the_result_is_the_same_at_every_scale_and_progress_goes_on():
 
 @pytest.mark.parametrize("tolerance", [0, -1, float("nan"), float("inf")])
 def test_a_tolerance_that_cannot_be(tolerance):
-    with pytest.raises(MeshError, match="expected a finite number above zero"):
+    with pytest.raises(MeshError, match=r"tolerance=.*: expected a number > 0"):
         simplify(shapes.cube(), tolerance)
 
 

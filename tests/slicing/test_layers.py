@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fracslice import MeshJob, make_mesh
-from fracslice.errors import Cancelled, SliceError
+from fracslice.errors import Cancelled, SceneError, SliceError
 from fracslice.formulas import (
     Node,
     box,
@@ -315,16 +315,16 @@ def test_any_direction_can_be_up() -> None:
 @pytest.mark.parametrize(
     ("job", "message"),
     [
-        ({"layer": 0.0}, "layer 0 mm"),
+        ({"layer": 0.0}, "layer=0.0: expected a length"),
         ({"layer": 50.0}, "as high as the object"),
         ({"pixel": (50.0, 0.1)}, "as large as the object"),
-        ({"pixel": (0.0, 0.1)}, "pixel 0 mm"),
-        ({"size": math.inf}, "size inf"),
-        ({"up": (0, 0, 0)}, "up:"),
+        ({"pixel": (0.0, 0.1)}, r"pixel=\(0.0, 0.1\): expected two lengths"),
+        ({"size": math.inf}, "size=inf: expected"),
+        ({"up": (0, 0, 0)}, r"up=\(0, 0, 0\): expected 3 numbers, not all zero"),
     ],
 )
 def test_impossible_jobs(job: dict[str, Any], message: str) -> None:
-    with pytest.raises(SliceError, match=message):
+    with pytest.raises((SceneError, SliceError), match=message):
         SliceJob(**{"size": 20.0, **job})
 
 
