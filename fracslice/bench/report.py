@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import BenchError
 from ..export import replacing
+from ..extras import lacking
 from ..report import version
 from .runs import Measurement
 
@@ -36,10 +37,8 @@ LABELS = {
 
 def require_plots() -> None:
     """Raises `BenchError` where matplotlib is missing."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise BenchError("plots need matplotlib: pip install 'fracslice[bench]'") from None
+    if reason := lacking("matplotlib", "plots need"):
+        raise BenchError(reason)
 
 
 def write_report(found: list[Measurement], folder: Path) -> list[Path]:

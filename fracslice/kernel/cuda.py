@@ -26,6 +26,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import KernelError
+from ..extras import lacking
 from ..files import Kept
 from ..formulas.registry import Node
 from ..keys import key, texts
@@ -48,8 +49,8 @@ NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
 
 def missing() -> str | None:
     """What keeps this process from using CUDA, in one line; None if nothing does."""
-    if importlib.util.find_spec("numba_cuda") is None:
-        return 'CUDA needs numba-cuda, which is not installed: pip install "fracslice[cuda]"'
+    if reason := lacking("numba_cuda", "CUDA needs", "numba-cuda[cu13]"):
+        return reason
     if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1" and not _driver():
         return NO_GPU
     try:

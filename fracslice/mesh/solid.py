@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fracslice.errors import MeshError
+from fracslice.extras import lacking
 from fracslice.mesh.model import Mesh
 
 if TYPE_CHECKING:
@@ -26,8 +27,10 @@ _REASONS = {
 def to_manifold(mesh: Mesh) -> Manifold:
     """The mesh as a manifold3d solid, taken as it is, in double precision.
 
-    Raises MeshError in plain words when manifold3d refuses it or it has no triangles.
+    Raises MeshError in plain words when manifold3d is not installed or refuses it, or it has no triangles.
     """
+    if reason := lacking("manifold3d", "solids need"):
+        raise MeshError(reason)
     import manifold3d
 
     if not len(mesh.triangles):

@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import tempfile
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
@@ -14,11 +13,14 @@ import numpy as np
 
 from fracslice.errors import RenderError
 from fracslice.export import replacing
+from fracslice.extras import lacking
+from fracslice.formulas.parameters import Choice, Vector, settled
 from fracslice.mesh.model import Mesh
 from fracslice.viewer import stage
 
 SOFTWARE = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow"}
 SECONDS = 600
+SIZE = Vector(None, "pixels across and down", sizes=(2,), least=1, most=16384, whole=True)
 
 
 def picture(
@@ -30,21 +32,26 @@ def picture(
     """Draw the mesh in matte clay from a three-quarter view into a PNG of `size` pixels; returns the path.
 
     Needs no screen, but OpenGL in software or hardware (Debian: libegl1 with libgl1-mesa-dri, or libosmesa6).
-    Raises RenderError when pyvista is not installed, the machine cannot draw or the mesh is empty,
-    ExportError when the file cannot be written.
+    Raises RenderError for a size that cannot be, when pyvista is not installed, the machine cannot draw or
+    the mesh is empty, ExportError when the file cannot be written.
     """
-    if background not in stage.BACKGROUNDS or not all(1 <= pixels <= 16384 for pixels in size):
-        raise ValueError(f"no such picture: size={size}, background={background!r}")
+    size = settled("size", size, SIZE, RenderError)
+    settled("background", background, Choice("light", "", tuple(stage.BACKGROUNDS)), RenderError)
     if not len(mesh.triangles):
         raise RenderError("the mesh has no triangles to draw")
-    if find_spec("pyvista") is None:
-        raise RenderError("pictures of meshes need pyvista: pip install 'fracslice[view]'")
+    need_pyvista()
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, replacing(path) as file:
         source, target = os.path.join(folder, "mesh.npz"), os.path.join(folder, "picture.png")
         np.savez(source, vertices=mesh.vertices, triangles=mesh.triangles)
         _draw([source, target, *map(str, size), background])
         file.write(Path(target).read_bytes())
     return Path(path)
+
+
+def need_pyvista() -> None:
+    """Raises RenderError where pyvista is not installed."""
+    if reason := lacking("pyvista", "pictures of meshes need"):
+        raise RenderError(reason)
 
 
 def _draw(arguments: list[str]) -> None:

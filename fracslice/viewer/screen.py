@@ -5,15 +5,15 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import sys
-from importlib.util import find_spec
 
 from fracslice.errors import RenderError
+from fracslice.extras import lacking
 
 
 def need_screen() -> None:
     """Raises `RenderError` when there is no pyvista or no screen."""
-    if find_spec("pyvista") is None:
-        raise RenderError("the window needs pyvista: pip install 'fracslice[view]'")
+    if reason := lacking("pyvista", "windows need"):
+        raise RenderError(reason)
     if not has_screen():
         raise RenderError("there is no screen to open a window on; a picture can be made without one")
 

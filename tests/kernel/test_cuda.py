@@ -90,7 +90,7 @@ def test_without_a_gpu_one_line_says_so() -> None:
 def test_without_numba_cuda_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     assert not cuda.available()
-    with pytest.raises(KernelError, match=r'pip install "fracslice\[cuda\]"'):
+    with pytest.raises(KernelError, match=r'pip install "numba-cuda\[cu13\]"'):
         cuda.compile_scene(sphere())
 
 
