@@ -6,32 +6,55 @@ from pathlib import Path
 
 import click
 
-from .options import quiet_option, threads_option
+from .inputs import check_folder
+from .options import NAME, Positive, Whole, quiet_option, threads_option
 from .working import working
 
 
 @click.command(short_help="Measure run time against error, beside other programs.")
-@click.option("-o", "--output", default="bench", metavar="DIR", help="Where to; the folder bench by default.")
-@click.option("--workload", "workloads", multiple=True, metavar="NAME", help="Only this one; repeatable.")
 @click.option(
-    "--resolution", "resolutions", type=int, multiple=True, metavar="N", help="64, 128 and 256 by default."
+    "-o",
+    "--output",
+    type=NAME,
+    default="bench",
+    metavar="DIR",
+    help="The report's folder; bench by default.",
+)
+@click.option(
+    "--workload",
+    "workloads",
+    multiple=True,
+    metavar="NAME",
+    help="What to mesh, all of them by default; may be given again.",
+)
+@click.option(
+    "--resolution",
+    "resolutions",
+    type=Whole(16, 2048),
+    multiple=True,
+    metavar="N",
+    help="Voxels along the cube; 64, 128 and 256 by default; may be given again.",
 )
 @click.option(
     "--peer",
     "peers",
     multiple=True,
     metavar="NAME=COMMAND",
-    help="Another program; {workload}, {resolution} and {output} (a .ply file) are filled in.",
+    help="Another program to run beside; {workload}, {resolution} and {output} (a .ply file) are filled in.",
 )
 @click.option(
-    "--repeat", type=click.IntRange(1, 100), default=3, metavar="N", help="Medians of 3 by default."
+    "--repeat",
+    type=Whole(1, 100),
+    default=3,
+    metavar="N",
+    help="Runs of each, of which the median is told; 3 by default.",
 )
 @click.option(
     "--limit",
-    type=click.FloatRange(0, min_open=True),
+    type=Positive(),
     default=60.0,
     metavar="SECONDS",
-    help="60 by default; what takes longer is not tried at finer resolutions.",
+    help="What takes longer is not tried at finer resolutions; 60 by default.",
 )
 @threads_option
 @quiet_option
@@ -49,7 +72,7 @@ def bench(
 
     Workloads: sphere, torus, menger3, menger4, mandelbulb, julia. A peer writes its mesh in scene units; its
     time is that of the whole command, unless the last line it prints is a JSON object with "wall_s" and
-    "cpu_s". Needs matplotlib, and scikit-image for its column: pip install 'fracslice[bench]'.
+    "cpu_s". Needs matplotlib; what scikit-image makes is left out without it.
     """
     from fracslice.bench.report import require_plots, write_report
     from fracslice.bench.runs import Peer, Task, measure
@@ -70,12 +93,3 @@ def bench(
             if one.failed:
                 click.echo(f"{one.workload} {one.resolution}, {one.method}: {one.failed}", err=True)
     return 1 if any(one.failed for one in found) else 0
-
-
-def check_folder(folder: Path) -> None:
-    """Refuses a folder that could not be made or written to before any work is done."""
-    from fracslice.export import check_target
-
-    check_target(folder / "report.md" if folder.is_dir() else folder)
-    if folder.exists() and not folder.is_dir():
-        raise click.UsageError(f"{folder}: expected a folder")

@@ -8,23 +8,51 @@ from typing import Any
 
 import click
 
-from .inputs import is_model, load_model, load_scene
-from .options import job_of, job_options, length, print_options, quiet_option, set_option, threads_option
+from .inputs import is_model, load_model, load_scene, refuse_options, refuse_scene_options
+from .options import (
+    NAME,
+    job_of,
+    job_options,
+    length,
+    print_options,
+    quiet_option,
+    set_option,
+    source_argument,
+    threads_option,
+)
 from .slice import check_print, heights, limits_of, printer_option, verdict
 from .summary import found, summary
 from .working import working
 
+OF_LAYERS = {"pixel", "machine", "picture"}
+OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
+
 
 @click.command(short_help="Say whether a model, or a scene's mesh or layers, would print.")
-@click.argument("source", metavar="MODEL|SCENE")
+@source_argument("MODEL|SCENE")
 @click.option("--json", "as_json", is_flag=True, help="All numbers, as JSON.")
-@click.option("--layer", callback=heights, metavar="LENGTH[..LENGTH]", help="Check layers, so high.")
-@click.option("--pixel", callback=length, metavar="LENGTH", help="With --layer; the printer's, or 0.05mm.")
-@printer_option('With --layer: whose bed it has to fit; "list" shows them.')
-@click.option("--picture", metavar="FILE.png", help="With --layer: draw the worst layers.")
-@click.option("--wall", callback=length, default="0.1mm", metavar="LENGTH", help="The thinnest wall; 0.1mm.")
+@click.option("--layer", callback=heights, metavar="LENGTH[..LENGTH]", help="Check layers of this height.")
 @click.option(
-    "--floor", callback=length, default="0.1mm", metavar="LENGTH", help="The thinnest floor; 0.1mm."
+    "--pixel",
+    callback=length,
+    metavar="LENGTH",
+    help="With --layer: pixel size; the printer's by default, or 0.05mm.",
+)
+@printer_option('With --layer: the printer it has to fit; "list" shows all.')
+@click.option("--picture", type=NAME, metavar="FILE.png", help="With --layer: draw the worst layers.")
+@click.option(
+    "--wall",
+    callback=length,
+    default="0.1mm",
+    metavar="LENGTH",
+    help="Thinner walls would not print; 0.1mm by default.",
+)
+@click.option(
+    "--floor",
+    callback=length,
+    default="0.1mm",
+    metavar="LENGTH",
+    help="Thinner floors and roofs would not print; 0.1mm by default.",
 )
 @print_options
 @job_options
@@ -44,12 +72,13 @@ def check(
 ) -> int:
     """Say whether a model file, or the mesh or the layers of a scene, would print as it is.
 
-    The options after --json are for scenes. Exits with 1 if it would not print.
+    The options between --json and --threads are for scenes. Exit status: 1 if it would not print.
     """
     from fracslice.job import make_mesh
     from fracslice.mesh.check import check as examined
 
     if options["layer"] is not None and not is_model(source):
+        refuse_options(context, OF_MESHES, "only for meshes, and --layer checks layers")
         return check_print(source, settings, as_json, threads, quiet, **options)
     if is_model(source):
         refuse_scene_options(context)
@@ -57,6 +86,7 @@ def check(
         numbers, line, problems = checked.as_dict(), f"{source}: {found(checked)}", checked.problems
         line += "" if problems else ", would print"
     else:
+        refuse_options(context, OF_LAYERS, "only with --layer")
         from fracslice.printing.checks import check_solid  # it needs Numba, and a model does not
 
         scene = load_scene(source, settings)
@@ -69,12 +99,3 @@ def check(
         line += "" if problems else "; --layer looks at islands, cups and traps, too"
     click.echo(json.dumps(numbers, indent=2) if as_json else line)
     return 1 if problems else 0
-
-
-def refuse_scene_options(context: click.Context) -> None:
-    """Options that would say something about a scene say nothing about a model."""
-    for option in context.command.params:
-        name = str(option.name)
-        given = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
-        if given and name not in ("source", "as_json", "threads", "quiet"):
-            raise click.UsageError(f"{option.opts[0]}: only for scenes, and a model was given")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import click
 
 from .inputs import scene_path
-from .options import device_option, quiet_option, set_option, threads_option
+from .options import device_option, quiet_option, set_option, source_argument, threads_option
 from .render import pixels
 from .working import working
 
 
 @click.command()
-@click.argument("source", metavar="SCENE")
+@source_argument("SCENE")
 @click.option(
     "--size",
     callback=pixels,
@@ -28,8 +28,8 @@ def fly(
 ) -> None:
     """Open a window to fly through SCENE while its picture sharpens.
 
-    The file is read again whenever it is saved: edit it and look. When the window is closed the last view is
-    said as a <camera> element, for the file.
+    The file is read again whenever it is saved: edit it and look. When the window is closed, the last view is
+    printed as a <camera> element, to put into the file.
     """
     from fracslice import viewer
     from fracslice.scene.writer import part_to_xml

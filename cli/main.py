@@ -47,9 +47,10 @@ FAILED, USAGE, INTERRUPTED = 1, 2, 130
 @click.version_option(package_name="fracslice", message="%(prog)s %(version)s")
 @click.pass_context
 def commands(context: click.Context) -> None:
-    """Fractals as signed distance fields, made into printable meshes.
+    """Fractals as signed distance fields, made into printable meshes, slices and pictures.
 
-    SCENE is a scene file, or the name of a scene that ships with fracslice.
+    SCENE is an .xml file, or the name of a scene that ships with fracslice (see fracslice scenes). MODEL is
+    an .stl, .3mf, .ply, .obj or .glb file. A LENGTH is in mm, or has a unit: mm, cm, m, in or um.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
@@ -87,6 +88,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush at exit
         return FAILED
+    except OSError as error:
+        return say(f"{error.filename or 'error'}: {error.strerror or error}", FAILED)
 
 
 def told(

@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .inputs import load_scene
-from .options import job_of, job_options, print_options, quiet_option, set_option, threads_option
+from .inputs import check_folder, check_targets, load_scene, refuse_options
+from .options import (
+    NAME,
+    job_of,
+    job_options,
+    print_options,
+    quiet_option,
+    set_option,
+    source_argument,
+    threads_option,
+)
 from .summary import summary
 from .working import working
 
@@ -26,17 +35,23 @@ GRID, STL = ".vdb", ".stl"
 
 
 @click.command()
-@click.argument("source", metavar="SCENE")
+@source_argument("SCENE")
 @click.option(
-    "-o", "--output", required=True, metavar="FILE", help="An .stl, .3mf, .ply, .obj, .glb or .vdb file."
+    "-o",
+    "--output",
+    type=NAME,
+    required=True,
+    metavar="FILE",
+    help="An .stl, .3mf, .ply, .obj or .glb file; or .vdb, for the samples of the field.",
 )
 @print_options
 @job_options
 @set_option
-@click.option("--report", metavar="FILE.json", help="Write the numbers that prove what was made.")
-@click.option("--picture", metavar="FILE.png", help="Write a shaded picture of the mesh.")
+@click.option("--report", type=NAME, metavar="FILE.json", help="Write the numbers that prove what was made.")
+@click.option("--picture", type=NAME, metavar="FILE.png", help="Write a shaded picture of the mesh.")
 @click.option(
     "--cache",
+    type=NAME,
     metavar="FOLDER",
     help="Keep samples and surface there, and use those of the same scene and voxel, whatever else differs.",
 )
@@ -44,11 +59,14 @@ GRID, STL = ".vdb", ".stl"
     "--device",
     type=click.Choice(["cpu", "cuda", "auto"]),
     default="cpu",
-    help="What samples the field; auto: the GPU, if there is one.",
+    help="What samples the field, cpu by default; auto: the GPU, if there is one.",
 )
 @threads_option
 @quiet_option
+@click.pass_context
 def mesh(
+    context: click.Context,
+    /,
     source: str,
     output: str,
     settings: tuple[str, ...],
@@ -69,7 +87,9 @@ def mesh(
     from fracslice.kernel.devices import chosen
     from fracslice.work import Work
 
-    check_outputs(output, report, picture)
+    check_outputs(source, output, report, picture)
+    if Path(output).suffix.lower() == GRID:
+        refuse_options(context, {"chord", "simplify"}, "only for meshes, and a .vdb file holds samples")
     scene = load_scene(source, settings)
     job = job_of(scene, **options)
     how = Work(threads, store=store_in(cache), device=chosen(device))
@@ -91,7 +111,11 @@ def store_in(folder: str | None) -> Store | None:
     """Where finished work is kept, if it is."""
     from fracslice.store import Store
 
-    return None if folder is None else Store(Path(folder))
+    if folder is None:
+        return None
+    if Path(folder).exists():
+        check_folder(Path(folder))
+    return Store(Path(folder))
 
 
 def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> Report:
@@ -120,18 +144,20 @@ def streamed(scene: Scene, job: MeshJob, output: str, work: Work) -> Report:
     return stream_mesh(scene, output, job, work, metadata(scene))
 
 
-def check_outputs(output: str, report: str | None, picture: str | None) -> None:
+def check_outputs(source: str, output: str, report: str | None, picture: str | None) -> None:
     """Refuses files that could not be written before any work is done."""
-    from fracslice.export import check_format, check_target
+    from fracslice.export import FORMATS
 
     for path, ending in ((report, ".json"), (picture, ".png")):
         if path is not None and Path(path).suffix.lower() != ending:
             raise click.UsageError(f"{path}: expected a file name that ends in {ending}")
-    if Path(output).suffix.lower() != GRID:
-        check_format(output)
-    for target in (output, report, picture):
-        if target is not None:
-            check_target(target)
+    if Path(output).suffix.lower() not in (*FORMATS, GRID):
+        raise click.UsageError(f"{output}: unknown kind of file; known are {', '.join([*FORMATS, GRID])}")
+    check_targets(source, output, report, picture)
+    if picture is not None:
+        from fracslice.viewer import need_pyvista
+
+        need_pyvista()
 
 
 def write_grid(result: Result, path: str, about: dict[str, str]) -> None:

@@ -17,6 +17,51 @@ if TYPE_CHECKING:
     from fracslice.scene import Print, Scene
 
 
+class Name(click.types.StringParamType):
+    """The name of a file or folder."""
+
+    name = "name"
+
+    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> Any:
+        return value if value else self.fail("expected the name of a file, found nothing", option, context)
+
+
+class Whole(click.IntRange):
+    """A whole number within a range."""
+
+    name = "whole number"
+
+
+class Finite(click.types.FloatParamType):
+    """A number that is neither infinite nor undefined."""
+
+    name = "number"
+
+    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> float:
+        number: float = super().convert(value, option, context)
+        return (
+            number
+            if math.isfinite(number)
+            else self.fail(f"{value}: expected a finite number", option, context)
+        )
+
+
+class Positive(Finite):
+    """A finite number above zero."""
+
+    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> float:
+        number = super().convert(value, option, context)
+        return number if number > 0 else self.fail(f"{value}: expected a number > 0", option, context)
+
+
+NAME, NUMBER, WHOLE = Name(), Finite(), Whole()
+
+
+def source_argument(metavar: str) -> Callable[..., Any]:
+    """What the command is pointed at."""
+    return click.argument("source", type=NAME, metavar=metavar)
+
+
 def length(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
     """A length with a unit, in mm."""
     from fracslice.scene import parse_length
@@ -28,9 +73,9 @@ def length(_: click.Context, __: click.Parameter, value: str | None) -> float | 
 
 
 def amount(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
-    """A finite number of at least zero."""
-    if value is not None and not 0 <= value < math.inf:
-        raise click.BadParameter(f"{value:g}: expected a finite number >= 0")
+    """A number of at least zero."""
+    if value is not None and value < 0:
+        raise click.BadParameter(f"{value:g}: expected a number >= 0")
     return value
 
 
@@ -43,21 +88,24 @@ def job_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 _JOB = [
     click.option(
-        "--size", callback=length, metavar="LENGTH", help="The longest side, such as 80mm, 8cm or 3.1in."
+        "--size",
+        callback=length,
+        metavar="LENGTH",
+        help="The longest side, such as 80mm, 8cm or 3.1in; the scene's by default.",
     ),
-    click.option("--voxel", callback=length, metavar="LENGTH", help="How fine, such as 0.25mm."),
+    click.option("--voxel", callback=length, metavar="LENGTH", help="Voxel size, such as 0.25mm."),
     click.option(
         "--resolution",
-        type=int,
+        type=WHOLE,
         metavar="N",
-        help="How fine, as voxels along the longest side; 256 if neither is given.",
+        help="Or voxels along the longest side, 8 to 16384; 256 by default.",
     ),
     click.option(
         "--dust",
-        type=float,
+        type=NUMBER,
         callback=amount,
         metavar="MM3",
-        help="Drop bodies with less; 1e-5 of the whole by default.",
+        help="Drop bodies of less volume, in mm3; 1e-5 of the whole by default.",
     ),
     click.option(
         "--chord",
@@ -92,13 +140,13 @@ def print_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 _PRINT = [
-    ("cavities", "keep|fill", "Sealed hollows stay or are filled."),
-    ("keep", "all|largest", "All bodies, or one."),
+    ("cavities", "keep|fill", "Keep sealed hollows, or fill them; keep by default."),
+    ("keep", "all|largest", "Keep all bodies, or the largest alone; all by default."),
     ("bridge", "LENGTH", "Join loose bodies by struts this thick."),
     ("gap", "LENGTH", "Close gaps up to this width."),
-    ("thickness", "LENGTH", "Thicken what is thinner."),
-    ("hollow", "LENGTH", "Hollow it out; walls of this thickness."),
-    ("drain", "LENGTH", "Drain holes of a hollow, 3mm by default; 0: none."),
+    ("thickness", "LENGTH", "Thicken what is thinner than this."),
+    ("hollow", "LENGTH", "Hollow it out, leaving walls this thick."),
+    ("drain", "LENGTH", "Diameter of a hollow's drain holes, 3mm by default; 0: none."),
     ("base", "LENGTH", "Cut off this much at the bottom, to stand flat."),
     ("raft", "LENGTH", "Stand it on a plate of this height."),
 ]
@@ -116,17 +164,20 @@ set_option = click.option(
     "settings",
     multiple=True,
     metavar="NAME.ATTRIBUTE=VALUE",
-    help="Change a value, as mandelbulb.power=6.",
+    help="Change a value of the scene, as mandelbulb.power=6; may be given again.",
 )
 threads_option = click.option(
     "--threads",
-    type=click.IntRange(1, 1024),
+    type=Whole(1, 1024),
     default=os.cpu_count() or 1,
     metavar="N",
-    help="All cores by default.",
+    help="How many threads to use; one for each core by default.",
 )
 device_option = click.option(
-    "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", help="What computes it."
+    "--device",
+    type=click.Choice(["cpu", "cuda", "auto"]),
+    default="auto",
+    help="What computes it; auto, by default: the GPU, if there is one.",
 )
 quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress, no summary.")
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .inputs import load_scene
-from .options import device_option, quiet_option, set_option, threads_option
+from .inputs import check_folder, check_targets, load_scene
+from .options import NAME, Whole, device_option, quiet_option, set_option, source_argument, threads_option
 from .working import working
 
 if TYPE_CHECKING:
@@ -44,22 +44,40 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 
 
 @click.command(short_help="Render a picture of SCENE.")
-@click.argument("source", metavar="SCENE")
+@source_argument("SCENE")
 @click.option(
-    "-o", "--output", required=True, metavar="FILE", help="A .png file, or .exr or .tif for linear floats."
+    "-o",
+    "--output",
+    type=NAME,
+    required=True,
+    metavar="FILE",
+    help="A .png file, or .exr or .tif for linear floats.",
 )
 @click.option(
-    "--samples", type=click.IntRange(1, 1_000_000), metavar="N", help="The most samples of a pixel."
+    "--samples",
+    type=Whole(1, 1_000_000),
+    metavar="N",
+    help="The most samples of a pixel; the scene's by default, or 64.",
 )
-@click.option("--size", callback=pixels, metavar="WxH", help="Pixels across and down, such as 1280x720.")
+@click.option(
+    "--size",
+    callback=pixels,
+    metavar="WxH",
+    help="Pixels across and down; the scene's by default, or 1280x720.",
+)
 @device_option
-@click.option("--time", "limit", callback=duration, metavar="TIME", help="Stop after 10s, 2min or 1h.")
-@click.option("--bits", type=click.Choice(["8", "16"]), default="8", help="Of a PNG file, per colour.")
 @click.option(
-    "--pass-images", type=click.Path(file_okay=False), metavar="DIR", help="Keep the picture of every pass."
+    "--time", "limit", callback=duration, metavar="TIME", help="Stop after so long, such as 10s, 2min or 1h."
 )
 @click.option(
-    "--state", type=click.Path(dir_okay=False), metavar="FILE.npz", help="Go on from it, and save to it."
+    "--bits", type=click.Choice(["8", "16"]), default="8", help="Bits per colour of a PNG file; 8 by default."
+)
+@click.option("--pass-images", type=NAME, metavar="DIR", help="Keep the picture of every pass in a folder.")
+@click.option(
+    "--state",
+    type=NAME,
+    metavar="FILE.npz",
+    help="Go on from this file, if it is there, and save to it after every pass.",
 )
 @set_option
 @threads_option
@@ -79,12 +97,13 @@ def render(
     quiet: bool,
 ) -> None:
     """Render a picture of SCENE, as its camera, lights and materials say."""
-    from fracslice.export import check_target
     from fracslice.export.images import check_image
     from fracslice.render import Renderer
 
     check_image(output)
-    check_target(output)
+    check_targets(source, output, state)
+    if pass_images:
+        check_folder(Path(pass_images))
     scene, start = load_scene(source, settings), time.monotonic()
     with working(threads, quiet) as work:
         renderer = Renderer(scene.root, scene.view, size, work, device)
@@ -96,7 +115,7 @@ def render(
                 f"{reached(last)}, {last.rate / 1e6:.2f} M samples/s", fraction(last, renderer, samples)
             )
             if pass_images:
-                Path(pass_images).mkdir(parents=True, exist_ok=True)
+                Path(pass_images).mkdir(exist_ok=True)
                 save(Path(pass_images) / f"pass{last.number:04}.png", last, scene, "8")
             if state:
                 save_state(renderer, state)

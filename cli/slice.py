@@ -10,8 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .inputs import load_scene
-from .options import length, print_options, printing_of, quiet_option, set_option, threads_option
+from .inputs import check_targets, load_scene
+from .options import (
+    NAME,
+    NUMBER,
+    length,
+    print_options,
+    printing_of,
+    quiet_option,
+    set_option,
+    source_argument,
+    threads_option,
+)
 from .working import working
 
 if TYPE_CHECKING:
@@ -25,13 +35,14 @@ if TYPE_CHECKING:
 LAYER, PIXEL_MM = "0.05mm", 0.05
 
 
-def signed_length(context: click.Context, option: click.Parameter, text: str) -> float:
-    """The option's value in mm; it may be negative, or 0."""
-    if text.strip() == "0":
-        return 0.0
-    size = length(context, option, text.strip().removeprefix("-"))
-    assert size is not None
-    return -size if text.strip().startswith("-") else size
+def shift(_: click.Context, __: click.Parameter, text: str) -> float:
+    """A length in mm that may be negative, or 0."""
+    from fracslice.scene.lengths import Shift
+
+    try:
+        return Shift(0.0, "").read(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: expected {error}") from None
 
 
 def heights(
@@ -64,12 +75,27 @@ def printer_option(text: str) -> Callable[..., Any]:
 
 
 @click.command("slice")
-@click.argument("source", metavar="SCENE")
+@source_argument("SCENE")
 @click.option(
-    "-o", "--output", required=True, metavar="OUT", help="A file or folder; its ending names the format."
+    "-o",
+    "--output",
+    type=NAME,
+    required=True,
+    metavar="OUT",
+    help="An .sl1, .3mf, .svg, .cli or .json file, or a folder of PNG pictures.",
 )
-@click.option("--format", "form", metavar="NAME", help="png, sl1, 3mf, svg, slic3r, cli, cli-binary or json.")
-@click.option("--size", callback=length, metavar="LENGTH", help="The longest side, such as 80mm.")
+@click.option(
+    "--format",
+    "form",
+    metavar="NAME",
+    help="png, sl1, 3mf, svg, slic3r, cli, cli-binary or json; by default, what the ending of OUT says.",
+)
+@click.option(
+    "--size",
+    callback=length,
+    metavar="LENGTH",
+    help="The longest side, such as 80mm; the scene's by default.",
+)
 @click.option(
     "--layer",
     callback=heights,
@@ -77,27 +103,37 @@ def printer_option(text: str) -> Callable[..., Any]:
     metavar="LENGTH[..LENGTH]",
     help="Layer height, 0.05mm by default; or a range, 0.05mm..0.2mm: thick where the surface is steep.",
 )
-@click.option("--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's, or 0.05mm.")
-@printer_option('Whose screen the layers are for; "list" shows them.')
 @click.option(
-    "--up", nargs=3, type=float, metavar="X Y Z", help="The scene's direction that is up; 0 0 1 by default."
+    "--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's by default, or 0.05mm."
+)
+@printer_option('The printer whose screen the layers are for; "list" shows all.')
+@click.option(
+    "--up", nargs=3, type=NUMBER, metavar="X Y Z", help="The scene's direction that is up; 0 0 1 by default."
 )
 @click.option(
     "--compensation",
-    callback=signed_length,
+    callback=shift,
     default="0",
     metavar="LENGTH",
-    help="Move all outlines outwards.",
+    help="Move all outlines outwards by this, or inwards if it is negative; at most 1mm, 0 by default.",
 )
-@click.option("--gamma", type=float, default=1.0, help="Of the grey levels.")
+@click.option("--gamma", type=NUMBER, default=1.0, metavar="N", help="Of the grey levels; 1 by default.")
 @click.option(
     "--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default."
 )
 @click.option(
-    "--exposure", nargs=2, type=float, default=(8.0, 35.0), metavar="S S", help="Seconds: each, the first."
+    "--exposure",
+    nargs=2,
+    type=NUMBER,
+    default=(8.0, 35.0),
+    metavar="S S",
+    help="Of an .sl1 file: seconds of each layer and of the first; 8 35 by default.",
 )
 @click.option(
-    "--preview", metavar="FILE", help="A contact sheet (.png) or an animation (.webp) of the layers."
+    "--preview",
+    type=NAME,
+    metavar="FILE",
+    help="Write a contact sheet (.png) or an animation (.webp) of the layers.",
 )
 @print_options
 @set_option
@@ -116,7 +152,6 @@ def slice_(
 
     An interrupted job goes on when it is started again.
     """
-    from fracslice.export import check_target
     from fracslice.export.jobs import SliceRun
     from fracslice.export.slices import slice_format, write_slices
     from fracslice.slicing.raster import Screen
@@ -124,10 +159,9 @@ def slice_(
     if slice_format(output, form) == "sl1":
         refuse_what_no_sl1_says(output, options)
     preview = options["preview"]
-    if preview:
-        if Path(preview).suffix.lower() not in (".png", ".webp"):
-            raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
-        check_target(preview)
+    if preview and Path(preview).suffix.lower() not in (".png", ".webp"):
+        raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
+    check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
     with working(threads, quiet) as work:
         stack = stack_of(scene, options, work)
@@ -188,12 +222,13 @@ def check_print(
     source: str, settings: tuple[str, ...], as_json: bool, threads: int, quiet: bool, **options: Any
 ) -> int:
     """Says whether the layers of a scene would print; the exit status."""
-    from fracslice.export import check_target, replacing
+    from fracslice.export import replacing
     from fracslice.slicing.checks import check_layers
     from fracslice.slicing.preview import worst_layers
 
-    if options["picture"]:
-        check_target(options["picture"])
+    if options["picture"] and Path(options["picture"]).suffix.lower() != ".png":
+        raise click.UsageError(f"{options['picture']}: expected a file name that ends in .png")
+    check_targets(source, options["picture"])
     scene = load_scene(source, settings)
     with working(threads, quiet) as work:
         stack = stack_of(scene, options, work)

@@ -45,6 +45,8 @@ def read_mesh(path: str | Path) -> Mesh:
     if reader is None:
         raise MeshError(f"{path}: not a model file that can be read; known are {', '.join(sorted(READERS))}")
     try:
+        if path.is_file() and not path.stat().st_size:
+            raise MeshError("the file is empty")
         mesh = rounded(reader(path))
     except FileNotFoundError:
         raise MeshError(f"{path}: no such file") from None
@@ -65,15 +67,23 @@ def _read_stl(path: Path) -> Mesh:
     elif len(data) < 84:
         raise MeshError("not an STL file: shorter than its header")
     else:
-        there = (len(data) - 84) / STL_TRIANGLE.itemsize
-        raise MeshError(f"not a whole STL file: it announces {count} triangles and holds {there:.1f}")
+        raise MeshError(_wrong_length(count, len(data) - 84))
     return Mesh(corners.astype(np.float64), np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+
+
+def _wrong_length(count: int, size: int) -> str:
+    """Why so many triangles do not have so many bytes."""
+    there = size // STL_TRIANGLE.itemsize
+    if there >= count:
+        extra = size - count * STL_TRIANGLE.itemsize
+        return f"not an STL file: {extra} bytes after the {count} triangles that it announces"
+    return f"not a whole STL file: {there} of {count} triangles; the file is cut short, or of another kind"
 
 
 def _ascii_corners(data: bytes) -> NDArray[np.float32]:
     words = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
     if b"endsolid" not in data[-1024:] or len(words) != 3 * data.count(b"endfacet"):
-        raise MeshError("not a whole STL file: the text ends in the middle")
+        raise MeshError("not a whole STL file: the text has no end; the file is cut short")
     try:
         return np.array(words, dtype=np.bytes_).astype(np.float32).reshape(-1, 3)
     except ValueError:
@@ -90,7 +100,7 @@ def _read_3mf(path: Path) -> Mesh:
                 _parse(part, package.start, package.end)
             return package.laid_out()
     except (zipfile.BadZipFile, EOFError, KeyError, zlib.error) as error:
-        raise MeshError(f"not a whole 3MF file: {str(error).strip(chr(34))}") from error
+        raise MeshError("not a whole 3MF file: it is cut short, or of another kind") from error
     except (expat.ExpatError, ValueError, OverflowError) as error:
         raise MeshError(f"not a valid 3MF file: {error}") from error
 
@@ -222,9 +232,8 @@ def _read_by_trimesh(path: Path) -> Mesh:
             triangles = np.asarray(mesh.faces, dtype=np.int32).reshape(-1, 3)
             model = Mesh(np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3), triangles)
         except Exception as error:
-            raise MeshError(
-                f"not a valid model file: {type(error).__name__}: {error}".splitlines()[0]
-            ) from error
+            kind = path.suffix[1:].upper()
+            raise MeshError(f"not a whole {kind} file: it is cut short, broken or of another kind") from error
     return model
 
 

@@ -24,6 +24,8 @@ from .printing import Print
 from .view import Part, View
 
 LARGEST_FILE = 16 << 20
+BEFORE = b"\0\xff\xfe\xef\xbb\xbf \t\r\n"
+"""What may stand before the first tag, or within it, as UTF-16 has it: marks of byte order, white space."""
 
 
 def read(path: str | os.PathLike[str]) -> Scene:
@@ -47,6 +49,8 @@ def _scene(data: bytes, source: str, name: str) -> Scene:
         raise SceneError(f"{source}: expected a scene file of at most {LARGEST_FILE >> 20} MB")
     if not data.strip():
         raise SceneError(f"{source}: expected a scene, the file is empty")
+    if not data[:64].translate(None, BEFORE).startswith(b"<"):
+        raise SceneError(f'{source}: not a scene: expected XML that begins with <scene version="1">')
     builder = _Builder(source)
     solid = builder.sections(data)[SOLID.name]
     printing = next((part for part in builder.parts if isinstance(part, Print)), Print())

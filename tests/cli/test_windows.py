@@ -14,6 +14,7 @@ from fracslice.scene.view import Camera
 def test_show_opens_on_the_mesh_of_a_scene(ball: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     meshes: list[Mesh] = []
     monkeypatch.setattr("fracslice.viewer.show", meshes.append)
+    monkeypatch.setattr("fracslice.viewer.need_screen", lambda: None)
     words = ["--set", "solid.size=4cm", "--size", "2cm", "--resolution", "24", "--base", "5mm", "--quiet"]
     assert run(["show", str(ball), *words]) == 0
     assert meshes[0].size == pytest.approx((20, 20, 15), abs=0.1)
@@ -33,6 +34,15 @@ def test_fly_says_where_it_ended(
     path, settings, size, work, device = asked[0]
     assert (path, settings, size, device) == (ball, ("sphere.radius=2",), (80, 60), "cpu")
     assert capsys.readouterr().out == '<camera eye="1.5 0 2" fov="30"/>\n'
+
+
+def test_no_mesh_is_made_where_no_window_can_be(
+    ball: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("fracslice.viewer.screen.has_screen", lambda: False)
+    monkeypatch.setattr("fracslice.job.make_mesh", None)
+    assert run(["show", str(ball)]) == 2
+    assert "there is no screen" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", ["show", "fly"])

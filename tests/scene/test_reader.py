@@ -110,8 +110,8 @@ def test_wrong_sizes(size):
     [
         ("", "f.xml: expected a scene, the file is empty"),
         (" \n ", "f.xml: expected a scene, the file is empty"),
-        ("solid ascii\nfacet", "f.xml:1: not well-formed XML"),
-        (b"\x00\x01\xff", "f.xml:1: not well-formed XML"),
+        ("solid ascii\nfacet", "f.xml: not a scene: expected XML that begins with"),
+        (b"\x00\x01\xff", "f.xml: not a scene: expected XML that begins with"),
         ("<scne version='1'/>", "f.xml:1: <scne> is not a known element; did you mean <scene>?"),
         ("<solid size='1'><box/></solid>", "f.xml:1: <solid> cannot stand here; expected <scene>"),
         (
