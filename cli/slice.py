@@ -164,7 +164,7 @@ def slice_(
     check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
     with working(threads, quiet) as work:
-        stack = stack_of(scene, options, work)
+        stack = as_high_as_wanted(stack_of(scene, options, work), options, work)
         how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
         screen = Screen(stack, *how)
         about = {"Title": scene.name, "scene_hash": scene.hash}
@@ -202,10 +202,16 @@ def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
 
 
 def stack_of(scene: Scene, options: dict[str, Any], work: Work) -> Stack:
-    """The layers that are wanted, of the object made printable."""
-    from fracslice.slicing import adapted, plan_stack
+    """Layers of one height, of the object made printable."""
+    from fracslice.slicing import plan_stack
 
-    stack = plan_stack(scene.root, job(scene, options), work)
+    return plan_stack(scene.root, job(scene, options), work)
+
+
+def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:
+    """Layers that are as high as the slope allows, if a range of heights is given."""
+    from fracslice.slicing import adapted
+
     most = options["layer"][1]
     return stack if most is None else adapted(stack, most, work)
 
@@ -223,7 +229,7 @@ def check_print(
 ) -> int:
     """Says whether the layers of a scene would print; the exit status."""
     from fracslice.export import replacing
-    from fracslice.slicing.checks import check_layers
+    from fracslice.slicing.checks import check_layers, misfit
     from fracslice.slicing.preview import worst_layers
 
     if options["picture"] and Path(options["picture"]).suffix.lower() != ".png":
@@ -231,8 +237,13 @@ def check_print(
     check_targets(source, options["picture"])
     scene = load_scene(source, settings)
     with working(threads, quiet) as work:
-        stack = stack_of(scene, options, work)
-        report = check_layers(stack, limits_of(options), options["machine"], work)
+        stack, machine = stack_of(scene, options, work), options["machine"]
+        if machine and (unfit := misfit(stack, machine)):
+            early = {"size": stack.size, "fits": False, "problems": [unfit]}
+            click.echo(json.dumps(early, indent=2) if as_json else f"{source}: would not print: {unfit}")
+            return 1
+        stack = as_high_as_wanted(stack, options, work)
+        report = check_layers(stack, limits_of(options), machine, work)
         if options["picture"]:
             with replacing(options["picture"]) as file:
                 worst_layers(stack, report.worst, file, work)

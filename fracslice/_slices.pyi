@@ -88,6 +88,13 @@ class Slab:
         cuts.
         """
 
+    def runs(self, layer: int, shape: tuple[int, int]) -> tuple[NDArray[int32], NDArray[int32], float, int]:
+        """A layer's solid pixels, those of which at least half is inside, in time linear in its tiles.
+
+        Row y has the runs ``rows[y]:rows[y + 1]``, rows int32 [ny + 1]; each is its first pixel and the one
+        after its last, int32 [n, 2]. And what `paint` returns.
+        """
+
     def picture(
         self,
         layer: int,

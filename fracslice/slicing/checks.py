@@ -81,9 +81,9 @@ def check_layers(
     chosen = set(np.linspace(0, len(stack.z) - 1, THICKNESS_LAYERS).astype(int).tolist())
 
     def make(layer: Layer) -> _Told:
-        image = layer.coverage
-        measured = widths(image, stack.pixel) if layer.index in chosen else (None, None)
-        return _Told(*parts_of(image), layer.area, *measured)
+        runs = layer.runs
+        measured = widths(runs, stack.pixel) if layer.index in chosen else (None, None)
+        return _Told(*parts_of(runs), layer.area, *measured)
 
     limits, work = limits or Limits(), work or Work()
     solid = check_object(stack.root, stack.outer, stack.scale, limits, work)
@@ -100,7 +100,7 @@ class _Collector:
     def report(self, told: Iterator[_Told]) -> PrintReport:
         stack, solid, empty = self.stack, Graph(), Graph()
         square = stack.pixel[0] * stack.pixel[1]
-        volume, overhangs, walls, gaps = 0.0, [], [np.empty(0)], [np.empty(0)]
+        volume, overhangs, walls, gaps = 0.0, [], [np.empty((0, 2))], [np.empty((0, 2))]
         for k, now in enumerate(told):
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
@@ -113,6 +113,7 @@ class _Collector:
             if now.walls is not None and now.gaps is not None:
                 walls.append(now.walls)
                 gaps.append(now.gaps)
+        unfit = misfit(self.stack, self.printer) if self.printer else ""
         parts, hollows, overhang = solid.nodes(), empty.nodes(), np.array(overhangs)
         islands = self.found(parts, parts.islands())
         bodies = self.bodies(parts)
@@ -124,7 +125,7 @@ class _Collector:
             layers=len(stack.z),
             pixels=stack.shape[::-1],
             size=stack.size,
-            fits=self.fits(),
+            fits=not unfit if self.printer else None,
             volume=volume,
             weight_g=volume * self.limits.density / 1000,
             bodies=kept,
@@ -135,12 +136,12 @@ class _Collector:
             cups=cups,
             traps=traps,
             cavities=[c for c in self.found(hollows, hollows.sealed()) if c.area >= self.limits.speck],
-            walls=widths_of(np.concatenate(walls)),
-            gaps=widths_of(np.concatenate(gaps)),
+            walls=widths_of(*np.concatenate(walls).T),
+            gaps=widths_of(*np.concatenate(gaps).T),
             worst=_worst(overhang, real),
             solid=self.solid,
         )
-        report.problems.extend(_problems(report, self.limits, self.printer))
+        report.problems.extend([unfit] * bool(unfit) + _problems(report, self.limits))
         return report
 
     def found(self, nodes: Nodes, chosen: np.ndarray) -> list[Found]:
@@ -158,14 +159,15 @@ class _Collector:
     def bodies(self, nodes: Nodes) -> list[Found]:
         return self.found(nodes, np.ones(len(nodes.layer), bool))
 
-    def fits(self) -> bool | None:
-        if not self.printer:
-            return None
-        try:
-            check_fits(self.stack, self.printer)
-        except SliceError:
-            return False
-        return True
+
+def misfit(stack: Stack, printer: Printer) -> str:
+    """Why a planned stack does not fit a printer, in words, or nothing: known before any layer is."""
+    try:
+        check_fits(stack, printer)
+    except SliceError:
+        mine, room = (" x ".join(f"{s:.4g}" for s in size) for size in (stack.size, printer.room))
+        return f"does not fit the {printer.title}: {mine} mm, and it has {room} mm"
+    return ""
 
 
 def _worst(overhang: np.ndarray, islands: list[Found]) -> list[int]:
@@ -175,11 +177,9 @@ def _worst(overhang: np.ndarray, islands: list[Found]) -> list[int]:
     return sorted(list(dict.fromkeys([*first, *most]))[:WORST])
 
 
-def _problems(r: PrintReport, limits: Limits, printer: Printer | None) -> list[str]:
+def _problems(r: PrintReport, limits: Limits) -> list[str]:
     """Why it would not print, one line each."""
     found = []
-    if r.fits is False and printer:
-        found.append(f"does not fit the {printer.title}: {' x '.join(f'{s:.4g}' for s in r.size)} mm")
     if len(r.bodies) > 1:
         found.append(f"{len(r.bodies)} loose bodies")
     if r.islands:

@@ -16,6 +16,7 @@ from .._slices import Slab
 from ..kernel import Kernel, compile_scene
 from ..work import Work
 from .contours import Contours, contours
+from .runs import Runs
 from .slab import Sampler
 from .stack import Stack
 
@@ -86,6 +87,14 @@ class Layer:
         image = np.zeros(self.stack.shape, np.uint8)
         self._painted = self.slab.paint(self.place, image)
         return image
+
+    @cached_property
+    def runs(self) -> Runs:
+        """Its solid pixels: those of which at least half is inside."""
+        rows, runs, area, cut = self.slab.runs(self.place, self.stack.shape)
+        self._painted = area, cut
+        begin, end = np.ascontiguousarray(runs.T)
+        return Runs(rows, begin, end, self.stack.shape[1])
 
     @cached_property
     def _painted(self) -> tuple[float, int]:

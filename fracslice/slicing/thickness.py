@@ -2,34 +2,141 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+from numba import njit
+
+from ..printing.widths import BINS
+from .runs import Runs
+
+WIDE = float(BINS[-1])
+"""mm: what is at least so wide is measured in coarser pixels where a layer has many."""
+
+COARSE, LAYER = 4, 512
+"""Coarse pixels across `WIDE`, and along the layer, at least."""
+
+WINDOW = 1024
+"""Pixels along the side of what is measured at a time, about, what is around it aside."""
+
+AROUND = 3
+"""Pixels, besides half of `WIDE`: more than the slope of a distance looks at."""
+
+Pair = tuple[float, float]
+Window = tuple[slice, slice]
 
 
-def widths(image: np.ndarray, pixel: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Widths of walls and of gaps along their middle lines, mm, float64 [n] and [m]; one for each pixel of
-    those lines.
+def widths(solid: Runs, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
+    """Walls and gaps along their middle lines, float64 [n, 2]: widths in mm, and how many pixels of those
+    lines have them.
 
     Twice the distance to the outline, where the distance has no slope (Blum 1967, "A transformation for
     extracting new descriptors of shape"): along the lines that run into right corners it has one of 0.7,
     and in a corner's last pixel it is lower than beside. The outline lies at half coverage, so a width is
-    right within a pixel.
+    right within a pixel. In large layers what is wider than `WIDE` is right within a coarse pixel: so time
+    and memory follow the outline, not the area.
     """
-    solid = image >= 128
-    rows, columns = np.flatnonzero(solid.any(1)), np.flatnonzero(solid.any(0))
-    if not len(rows):
-        return np.empty(0), np.empty(0)
-    cut = np.pad(solid[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], 2)
-    return _across(cut, pixel), _across(~cut, pixel)
+    if not len(solid.begin):
+        return np.empty((0, 2)), np.empty((0, 2))
+    times = max(int(min(WIDE / COARSE / max(pixel), max(solid.height, solid.width) / LAYER)), 1)
+    count = np.zeros((-(-solid.height // times), -(-solid.width // times)), np.int32)
+    _count(solid.rows, solid.begin, solid.end, times, count)
+    return _measured(solid, count, times, pixel, False), _measured(solid, count, times, pixel, True)
 
 
-def _across(region: np.ndarray, pixel: tuple[float, float]) -> np.ndarray:
+def _measured(solid: Runs, count: np.ndarray, times: int, pixel: Pair, gaps: bool) -> np.ndarray:
+    """Of walls or gaps. count: how many pixels of each coarse one, `times` across, are solid."""
+    coarse, narrow = (pixel[0] * times, pixel[1] * times), np.zeros(count.shape, np.bool_)
+    if times > 1:
+        # Through a wall of any tilt either a row or a column is not longer.
+        longest = np.ceil(2**0.5 * WIDE / np.array(pixel)).astype(np.int64)
+        _narrow(solid.rows, solid.begin, solid.end, solid.width, gaps, times, longest, narrow)
+    width, middle = _across((2 * np.pad(count, 2) >= times**2) != gaps, coarse)
+    far = width[2:-2, 2:-2][middle[2:-2, 2:-2] & ~narrow]
+    found = [np.column_stack([far, np.full(len(far), times)])]
+    halo = int(np.ceil(WIDE / 2 / min(pixel))) + AROUND
+    for rows, columns in _windows(narrow, max(WINDOW // times, 1)):
+        chosen = narrow[rows, columns].repeat(times, 0).repeat(times, 1)
+        image = np.zeros((chosen.shape[0] + 2 * halo, chosen.shape[1] + 2 * halo), np.bool_)
+        top, left = times * rows.start - halo, times * columns.start - halo
+        _paint(solid.rows, solid.begin, solid.end, top, left, image)
+        width, middle = _across(image != gaps, pixel)
+        near = width[halo:-halo, halo:-halo][middle[halo:-halo, halo:-halo] & chosen]
+        found.append(np.column_stack([near, np.ones(len(near))]))
+    return np.concatenate(found)
+
+
+def _windows(chosen: np.ndarray, side: int) -> Iterator[Window]:
+    """Parts of an image, at most so large, that hold all that is chosen."""
+    for y in range(0, chosen.shape[0], side):
+        for x in range(0, chosen.shape[1], side):
+            rows, columns = np.nonzero(chosen[y : y + side, x : x + side])
+            if len(rows):
+                low, high = (y + int(rows[0]), x + int(columns.min())), (int(rows[-1]), int(columns.max()))
+                yield slice(low[0], y + high[0] + 1), slice(low[1], x + high[1] + 1)
+
+
+def _across(region: np.ndarray, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
+    """How wide a region is at each pixel, if that lies on a middle line, and which ones do."""
     from scipy.ndimage import distance_transform_edt, maximum_filter
 
+    if region.all():
+        return np.zeros(region.shape), np.zeros(region.shape, bool)
     unit = min(pixel)
     # The nearest pixel's middle is half a pixel beyond the outline.
     distance = np.maximum(distance_transform_edt(region, sampling=pixel[::-1]) - unit / 2, 0)
-    slope = np.hypot(*np.gradient(distance, *pixel[::-1]))[1:-1, 1:-1]
-    beside = maximum_filter(distance, 3)[1:-1, 1:-1]
-    middle = (slope < 0.6) & region[1:-1, 1:-1] & (distance[1:-1, 1:-1] > beside - 0.4 * unit)
+    slope = np.hypot(*np.gradient(distance, *pixel[::-1]))
+    middle = (slope < 0.6) & region & (distance > maximum_filter(distance, 3) - 0.4 * unit)
     # Where two pixels are in the middle, the middle lies between them.
-    return np.asarray(2 * distance[1:-1, 1:-1][middle] + unit * (slope[middle] > 0.25))
+    return 2 * distance + unit * (slope > 0.25), middle
+
+
+@njit(cache=True, nogil=True)
+def _count(rows, begin, end, times, count):  # type: ignore[no-untyped-def]
+    """How many pixels of each coarse one are in runs."""
+    for y in range(len(rows) - 1):
+        line = count[y // times]
+        for r in range(rows[y], rows[y + 1]):
+            first, last = begin[r] // times, (end[r] - 1) // times
+            line[first : last + 1] += times
+            line[first] -= begin[r] - first * times
+            line[last] -= (last + 1) * times - end[r]
+
+
+@njit(cache=True, nogil=True)
+def _narrow(rows, begin, end, width, gaps, times, longest, narrow):  # type: ignore[no-untyped-def]
+    """Marks coarse pixels in which a row or a column is solid, or is not, for at most `longest` pixels."""
+    since = np.full(width, -longest[1] - 1)  # from which row on a column is as it is
+    for y in range(len(rows) - 1):
+        first, last = rows[y], rows[y + 1]
+        for r in range(first, last - gaps):
+            low, high = (end[r], begin[r + 1]) if gaps else (begin[r], end[r])
+            if high - low <= longest[0]:
+                narrow[y // times, low // times : (high - 1) // times + 1] = True
+        # Where solid begins or ends between the row below and this one: columns from turn to turn.
+        a, b, x, changed = rows[y - 1] if y else first, first, 0, False
+        at_a, at_b = False, False
+        while True:
+            to_a = width if a == first or y == 0 else (end[a] if at_a else begin[a])
+            to_b = width if b == last else (end[b] if at_b else begin[b])
+            to = min(to_a, to_b)
+            if changed:
+                for column in range(x, to):
+                    if at_b == gaps and y - since[column] <= longest[1]:
+                        narrow[since[column] // times : (y - 1) // times + 1, column // times] = True
+                    since[column] = y
+            if to == width:
+                break
+            if to_a == to:
+                a, at_a = a + at_a, not at_a
+            if to_b == to:
+                b, at_b = b + at_b, not at_b
+            x, changed = to, at_a != at_b
+
+
+@njit(cache=True, nogil=True)
+def _paint(rows, begin, end, top, left, image):  # type: ignore[no-untyped-def]
+    """The part of a layer that an image shows, from row `top` and column `left` on."""
+    for y in range(max(-top, 0), min(image.shape[0], len(rows) - 1 - top)):
+        for r in range(rows[top + y], rows[top + y + 1]):
+            image[y, max(begin[r] - left, 0) : max(end[r] - left, 0)] = True

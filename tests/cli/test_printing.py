@@ -87,3 +87,19 @@ def test_the_worst_layers_are_named(pair: str, flags: list[str], tmp_path: Path)
     with Image.open(sheet) as image:
         assert min(image.size) > 20
         assert (np.asarray(image.convert("L"))[-20:] < 64).any(), "a line says which layer it is"
+
+
+def test_what_does_not_fit_is_said_before_any_layer(
+    pair: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from fracslice.slicing import Slicer
+
+    monkeypatch.setattr(Slicer, "map", None)
+    layers = ["--layer", "1mm", "--printer", "sl1s", "--size", "300mm", "--bridge", "0", "-q"]
+    assert run(["check", pair, *layers]) == 1
+    said = capfd.readouterr().out.splitlines()
+    assert len(said) == 1
+    assert "would not print: does not fit the Original Prusa SL1S Speed: 300 x " in said[0]
+    assert run(["check", pair, *layers, "--json"]) == 1
+    told = json.loads(capfd.readouterr().out)
+    assert told["fits"] is False and len(told["problems"]) == 1

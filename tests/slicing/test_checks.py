@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
 
 from fracslice.formulas import Node, box, cylinder, difference, menger, sphere, transform, union
-from fracslice.slicing import SliceJob, plan_stack
+from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.checks import PrintReport, check_layers
 from fracslice.slicing.graph import Graph
 from fracslice.slicing.printers import PRINTERS
-from fracslice.slicing.runs import overlaps, parts_of, unsupported
+from fracslice.slicing.runs import Runs, overlaps, parts_of, unsupported
+from fracslice.slicing.thickness import widths
 
 
 def checked(root: Node, **options: object) -> PrintReport:
     return check_layers(plan_stack(root, SliceJob(size=10, layer=0.1)), **options)  # type: ignore[arg-type]
+
+
+def runs_of(image: np.ndarray) -> Runs:
+    """The pixels of an image that are not 0."""
+    turns = np.diff(image.astype(bool), axis=1, prepend=False, append=False)
+    rows, columns = np.nonzero(turns)
+    ends = np.searchsorted(rows[::2], np.arange(len(image) + 1)).astype(np.int32)
+    begin, end = (np.ascontiguousarray(columns[k::2], np.int32) for k in (0, 1))
+    return Runs(ends, begin, end, image.shape[1])
 
 
 def at(node: Node, x: float, y: float, z: float) -> Node:
@@ -137,16 +148,48 @@ def test_fit() -> None:
     assert check_layers(stack, printer=PRINTERS["saturn-4-ultra"]).fits is True
 
 
+@pytest.mark.parametrize(
+    "thin",
+    [
+        at(box(size=(0.5, 0.006, 1)), 0, 0.56, 0),
+        transform(box(size=(0.006, 0.3, 1)), rotate=(0, 0, 1, 40), translate=(0.7, 0, 0)),
+        at(cylinder(radius=0.003, height=1), 0.52, 0, 0),
+    ],
+    ids=["beside", "tilted", "pillar"],
+)
+def test_thin_walls_beside_thick_bodies(thin: Node) -> None:
+    """Large bodies are measured in coarse pixels, what is thin never is."""
+    stack = plan_stack(union(CUBE, thin), SliceJob(size=100, layer=10, pixel=(0.1, 0.1)))
+    runs = next(Slicer(stack).map(lambda layer: layer.runs, [5]))
+    walls, gaps = widths(runs, stack.pixel)
+    assert walls[:, 0].min() == pytest.approx(0.006 * stack.scale, abs=0.15)
+    assert len(gaps)
+
+
+def test_memory_follows_the_outline_not_the_area() -> None:
+    """Of 36 million solid pixels each would take dozens of bytes; the solid in space takes some 30 MB."""
+    stack = plan_stack(CUBE, SliceJob(size=60, layer=30, pixel=(0.01, 0.01)))
+    check_layers(plan_stack(CUBE, SliceJob(size=10, layer=5)))  # what is loaded once
+    tracemalloc.start()
+    try:
+        assert check_layers(stack).problems == []
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert stack.shape[0] * stack.shape[1] > 36e6
+    assert peak < 60e6
+
+
 def test_parts_by_hand() -> None:
     """Solid pixels that touch at a corner are one part; empty ones are not."""
     image = 255 * np.array(
         [[0, 0, 0, 0, 0], [0, 1, 1, 0, 0], [0, 1, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 0]], np.uint8
     )
-    solid, empty = parts_of(image)
+    solid, empty = parts_of(runs_of(image))
     assert solid.area.tolist() == [5]
     assert sorted(empty.area.tolist()) == [1, 19]
     assert empty.open[np.argsort(empty.area)].tolist() == [False, True]
-    other, _ = parts_of(np.roll(image, 1, 1))
+    other, _ = parts_of(runs_of(np.roll(image, 1, 1)))
     assert overlaps(solid, other).tolist() == [[0, 0]]
     assert unsupported(solid, other, 0.0, 5) == 5 - (image & np.roll(image, 1, 1) > 0).sum()
     assert unsupported(solid, other, 1.0, 5) == 0
@@ -164,7 +207,7 @@ def test_time_is_linear_in_the_holes() -> None:
         image[2:-2, 2:-2][(y % side < side // 2) & (x % side < side // 2)] = 0
         begin, graph = time.perf_counter(), Graph()
         for _ in range(3):
-            graph.add(parts_of(image)[1])
+            graph.add(parts_of(runs_of(image))[1])
         assert len(graph.nodes().grouped(~graph.nodes().open, np.ones(3), (1, 1), image.shape)) == holes**2
         return time.perf_counter() - begin
 

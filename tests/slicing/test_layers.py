@@ -146,6 +146,23 @@ def test_threads_and_the_choice_of_layers_do_not_matter(name: str) -> None:
     assert some == [first[k][1] for k in (3, 9, 11)]
 
 
+@pytest.mark.parametrize("name", FINITE)
+def test_runs_are_those_of_the_pixels(name: str) -> None:
+    stack = stack_of(EXAMPLES[name], 61)
+
+    def both(layer: Layer) -> tuple[list[tuple[int, int, int]], list[tuple[int, int, int]]]:
+        rows, columns = np.nonzero(np.diff(layer.coverage >= 128, axis=1, prepend=False, append=False))
+        runs, area = layer.runs, layer.area
+        assert area == pytest.approx(layer.coverage.sum() / 255 * 0.04, rel=1e-2, abs=0.05)
+        row = np.repeat(np.arange(runs.height), np.diff(runs.rows))
+        found = zip(row.tolist(), runs.begin.tolist(), runs.end.tolist(), strict=True)
+        ends = zip(rows[::2].tolist(), columns[::2].tolist(), columns[1::2].tolist(), strict=True)
+        return list(found), list(ends)
+
+    for found, expected in all_of(stack, both):
+        assert found == expected
+
+
 def disc(stack: Stack) -> np.ndarray:
     return math.pi * (1 - stack.z**2) * stack.scale**2
 

@@ -76,6 +76,18 @@ nb::tuple bind_paint(const Slab& slab, int layer, const Bytes& image) {
     return nb::make_tuple(painted.area, painted.partly);
 }
 
+nb::tuple bind_runs(const Slab& slab, int layer, std::array<int, 2> shape) {
+    held(slab, layer);
+    SolidRuns found;
+    {
+        nb::gil_scoped_release released;
+        found = solid_runs(slab, shape[0], shape[1]);
+    }
+    const size_t rows = found.rows.size(), n = found.runs.size();
+    return nb::make_tuple(owned<int32_t>(std::move(found.rows), {rows}), owned<int32_t>(std::move(found.runs), {n, 2}),
+                          found.painted.area, found.painted.partly);
+}
+
 nb::bytes bytes(const Rows<uint8_t>& data) { return nb::bytes(data.data(), data.size()); }
 
 nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_columns, bool transposed, bool backwards,
@@ -151,6 +163,7 @@ NB_MODULE(_slices, module) {
         .def("sample", &Slab::sample, "layer"_a, nb::call_guard<nb::gil_scoped_release>())
         .def_ro("evaluations", &Slab::evaluations)
         .def("paint", &bind_paint, "layer"_a, "image"_a)
+        .def("runs", &bind_runs, "layer"_a, "shape"_a)
         .def("picture", &bind_picture, "layer"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a)
         .def("crossings", &bind_crossings, "layer"_a)
         .def("signs", &bind_signs);

@@ -3,6 +3,9 @@
 // A pixel is the cell between four samples. Corners and edges are counted counter-clockwise from the lower left corner and the
 // lower edge; edge c lies between the corners c and c + 1.
 #pragma once
+#include <array>
+#include <vector>
+
 #include "slab.h"
 
 namespace fracslice {
@@ -21,6 +24,15 @@ struct Painted {
 
 // Writes how much of each pixel of a layer is inside, 255 wholly; pixels wholly outside are left as they are.
 Painted paint(const Slab& slab, const Canvas& canvas);
+
+// Pixels that are solid, from half of them inside on, as runs: row y has those from rows[y] to before rows[y + 1].
+struct SolidRuns {
+    std::vector<int32_t> rows;
+    std::vector<std::array<int32_t, 2>> runs;  // first pixel, and the one after the last
+    Painted painted;
+};
+
+SolidRuns solid_runs(const Slab& slab, int rows, int columns);
 
 // A crossed edge of the lattice.
 struct Crossing {
