@@ -1,8 +1,9 @@
-"""3MF with the slice extension 1.0: contours of every layer, and a box that stands for the mesh."""
+"""3MF with the slice extension 1.0: contours of every layer, and the mesh of the same field."""
 
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,12 @@ from fracslice.export.files import replacing
 from fracslice.export.jobs import SliceRun
 from fracslice.export.journal import journal
 from fracslice.export.text import rows
-from fracslice.export.threemf import RELATIONS, TYPES
+from fracslice.export.threemf import RELATIONS, TYPES, mesh_element
+from fracslice.mesh import Mesh
+from fracslice.mesh.clean import clean
+from fracslice.mesh.components import select
+from fracslice.mesh.extract import contour
+from fracslice.printing.apart import shown
 from fracslice.slicing import Layer
 
 LEVEL = 1
@@ -22,26 +28,17 @@ HEAD = (
     'xmlns:s="http://schemas.microsoft.com/3dmanufacturing/slice/2015/07">\n'
     '<metadata name="Application">fracslice</metadata>\n<resources>\n<s:slicestack id="1" zbottom="0">\n'
 )
-BOX = (
-    (0, 2, 1),
-    (0, 3, 2),
-    (4, 5, 6),
-    (4, 6, 7),
-    (0, 1, 5),
-    (0, 5, 4),
-    (1, 2, 6),
-    (1, 6, 5),
-    (2, 3, 7),
-    (2, 7, 6),
-    (3, 0, 4),
-    (3, 4, 7),
-)
+OBJECT = '</s:slicestack>\n<object id="2" type="model" s:slicestackid="1" s:meshresolution="fullres">'
+ALONG = 256
+"""Voxels along the longest side of the mesh, at most: as many as one that is made without slices has."""
+
+DUST = 1e-5
+"""The share of the whole below which a body is left out of it, as there."""
 
 
 def write_3mf(run: SliceRun, path: str | Path) -> Path:
-    """The slice stack of one object, streamed. The mesh has "low resolution": its box, which the extension
-    allows where the slices are what is printed.
-    """
+    """The slice stack of one object, streamed, and its mesh, for programs that do not read slices."""
+    mesh = _mesh(run)
     with journal(path, run.key("3mf")) as kept:
         for slice_ in run.slicer.map(lambda layer: _slice(run, layer), range(kept.count, run.layers)):
             kept.append(slice_)
@@ -55,7 +52,9 @@ def write_3mf(run: SliceRun, path: str | Path) -> Path:
             with archive.open("3D/3dmodel.model", "w", force_zip64=run.layers > 1000) as part:
                 part.write(HEAD.encode())
                 part.writelines(kept)
-                part.write(f"</s:slicestack>\n{_object(run)}".encode())
+                part.write(OBJECT.encode())
+                part.writelines(mesh_element(mesh))
+                part.write(b'</object>\n</resources>\n<build><item objectid="2"/></build>\n</model>\n')
     return Path(path)
 
 
@@ -83,13 +82,15 @@ def _middle(run: SliceRun) -> np.ndarray:
     return np.array(run.stack.shape[::-1]) * run.stack.pixel / 2
 
 
-def _object(run: SliceRun) -> str:
-    (x, y), z = 2 * _middle(run), run.stack.tops[-1]
-    corners = [(a, b, c) for c in (0, z) for a, b in ((0, 0), (x, 0), (x, y), (0, y))]
-    vertices = "".join(f'<vertex x="{a:.5f}" y="{b:.5f}" z="{c:.6f}"/>' for a, b, c in corners)
-    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in BOX)
-    return (
-        '<object id="2" type="model" s:slicestackid="1" s:meshresolution="lowres"><mesh>'
-        f"<vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>\n"
-        '</resources>\n<build><item objectid="2"/></build>\n</model>\n'
-    )
+def _mesh(run: SliceRun) -> Mesh:
+    """The object's mesh in mm, where its slices are."""
+    stack, longest = run.stack, max(run.stack.size)
+    finest = max(*stack.pixel, float(stack.heights.max()))
+    samples = min(longest / finest, ALONG)
+    bricks = shown(stack.root, stack.outer, longest / stack.scale, samples, run.work)
+    run.work.progress("meshing", 0.0)
+    found = contour(stack.root, bricks, run.work)
+    bottom = float(stack.z[0]) - float(stack.heights[0]) / stack.scale / 2
+    placed = replace(found, vertices=(found.vertices - (*stack.corner, bottom)) * stack.scale)
+    whole, _ = select(placed, keep="all", dust_mm3=DUST * placed.volume, cavities="keep")
+    return clean(whole)

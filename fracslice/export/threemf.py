@@ -59,8 +59,15 @@ def _model(mesh: Mesh, metadata: Mapping[str, str]) -> Iterator[bytes]:
     for key, value in metadata.items():
         name = key if key in CORE_NAMES else f"fracslice:{key}"
         yield f"<metadata name={quoteattr(name)}>{escape(value)}</metadata>\n".encode()
-    yield b'<resources><object id="1" type="model"><mesh>\n<vertices>\n'
+    yield b'<resources><object id="1" type="model">'
+    yield from mesh_element(mesh)
+    yield b'</object></resources>\n<build><item objectid="1"/></build>\n</model>\n'
+
+
+def mesh_element(mesh: Mesh) -> Iterator[bytes]:
+    """A mesh in mm as the element of an object, piece after piece."""
+    yield b"<mesh>\n<vertices>\n"
     yield from rows('<vertex x="%.9g" y="%.9g" z="%.9g"/>\n', mesh.vertices.astype(np.float32))
     yield b"</vertices>\n<triangles>\n"
     yield from rows('<triangle v1="%d" v2="%d" v3="%d"/>\n', mesh.triangles)
-    yield b'</triangles>\n</mesh></object></resources>\n<build><item objectid="1"/></build>\n</model>\n'
+    yield b"</triangles>\n</mesh>"

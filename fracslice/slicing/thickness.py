@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..printing.widths import BINS
 from .runs import Runs
 
@@ -91,7 +91,7 @@ def _across(region: np.ndarray, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
     return 2 * distance + unit * (slope > 0.25), middle
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _count(rows, begin, end, times, count):  # type: ignore[no-untyped-def]
     """How many pixels of each coarse one are in runs."""
     for y in range(len(rows) - 1):
@@ -103,7 +103,7 @@ def _count(rows, begin, end, times, count):  # type: ignore[no-untyped-def]
             line[last] -= (last + 1) * times - end[r]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _narrow(rows, begin, end, width, gaps, times, longest, narrow):  # type: ignore[no-untyped-def]
     """Marks coarse pixels in which a row or a column is solid, or is not, for at most `longest` pixels."""
     since = np.full(width, -longest[1] - 1)  # from which row on a column is as it is
@@ -134,7 +134,7 @@ def _narrow(rows, begin, end, width, gaps, times, longest, narrow):  # type: ign
             x, changed = to, at_a != at_b
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _paint(rows, begin, end, top, left, image):  # type: ignore[no-untyped-def]
     """The part of a layer that an image shows, from row `top` and column `left` on."""
     for y in range(max(-top, 0), min(image.shape[0], len(rows) - 1 - top)):

@@ -118,6 +118,31 @@ def test_3mf_by_lib3mf(tmp_path: Path, areas: np.ndarray) -> None:
     np.testing.assert_allclose(found, areas, rtol=1e-5)
 
 
+def test_3mf_holds_the_object_itself(tmp_path: Path, areas: np.ndarray) -> None:
+    """For programs that do not read slices: its mesh, of the same volume, where the slices are."""
+    with zipfile.ZipFile(write_slices(run(), tmp_path / "part.3mf")) as archive:
+        model = ET.fromstring(archive.read("3D/3dmodel.model"))
+    found = model.find(".//{*}object")
+    assert found is not None
+    assert (
+        found.attrib["{http://schemas.microsoft.com/3dmanufacturing/slice/2015/07}meshresolution"]
+        == "fullres"
+    )
+    points = np.array([[float(v.attrib[a]) for a in "xyz"] for v in found.iterfind(".//{*}vertex")])
+    corners = points[
+        [[int(t.attrib[v]) for v in ("v1", "v2", "v3")] for t in found.iterfind(".//{*}triangle")]
+    ]
+    volume = np.linalg.det(corners).sum() / 6
+    assert volume == pytest.approx(0.5 * areas.sum(), rel=0.01)
+    outlines = [
+        [float(v.attrib[a]) for a in "xy"] for v in model.iterfind(".//{*}slice/{*}vertices/{*}vertex")
+    ]
+    for low, high in ((points.min(0), np.min(outlines, 0)), (points.max(0), np.max(outlines, 0))):
+        np.testing.assert_allclose(low[:2], high, atol=0.02)
+    assert points[:, 2].min() == pytest.approx(0, abs=0.01)
+    assert points[:, 2].max() == pytest.approx(12, abs=0.01)
+
+
 def test_svg_by_layer(tmp_path: Path, areas: np.ndarray) -> None:
     folder = write_slices(run(), tmp_path / "svg", "svg")
     files = sorted(folder.iterdir())
@@ -200,7 +225,7 @@ def cancelled_after(layers: int) -> Work:
     work = Work(threads=1)
 
     def progress(stage: str, done: float) -> None:
-        if done * 24 >= layers:
+        if stage == "slicing" and done * 24 >= layers:
             work.cancel.set()
 
     object.__setattr__(work, "progress", progress)
