@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import json
 import os
 import re
 import warnings
@@ -19,6 +18,8 @@ from fracslice.seals import seal
 
 JOB = "job.json"
 """What an unfinished folder says of itself."""
+
+OURS = b'{"application": "fracslice", '
 
 LAYER = re.compile(r"\d{5,}\.(png|svg)")
 """The names of layers in a folder."""
@@ -39,7 +40,7 @@ def remainder(path: str | Path, job: str) -> Iterator[BinaryIO]:
         _remove_foreign(part)
         with files.opened(part, "r+b", os.O_CREAT) as file:
             _lock(file, path)
-            if not _says(said, job):
+            if _read(said) != _said(job):
                 if os.fstat(file.fileno()).st_size:
                     _tell(path)
                 said.unlink(missing_ok=True)
@@ -64,9 +65,10 @@ def resumable_folder(
     try:
         folder.mkdir(exist_ok=True)
         names = set(os.listdir(folder))
-        if names and (JOB not in names or not all(n == JOB or LAYER.fullmatch(n) for n in names)):
+        said = _read(folder / JOB)
+        if names and not (said.startswith(OURS) and all(n == JOB or LAYER.fullmatch(n) for n in names)):
             raise ExportError(f"{folder}: the folder is not empty, and what is in it is no interrupted job")
-        if not _says(folder / JOB, job):
+        if said != _said(job):
             if names:
                 _tell(folder)
             for layer in sorted(names - {JOB}):
@@ -81,13 +83,13 @@ def resumable_folder(
         raise ExportError(f"{folder}: {reason(error)}") from error
 
 
-def _says(said: Path, job: str) -> bool:
-    """Whether a file says, and only this user can have written it, that the same job was at work."""
+def _read(said: Path) -> bytes:
+    """What a file says of a job, if only this user can have written it; nothing otherwise."""
     try:
         with files.opened(said, "rb") as file:
-            return file.read() == _said(job)
+            return file.read()
     except OSError:
-        return False
+        return b""
 
 
 def _say(said: Path, job: str) -> None:
@@ -96,7 +98,7 @@ def _say(said: Path, job: str) -> None:
 
 
 def _said(job: str) -> bytes:
-    return json.dumps({"application": "fracslice", "job": seal(job)}).encode()
+    return OURS + f'"job": "{seal(job)}"}}'.encode()
 
 
 def _tell(path: str | Path) -> None:

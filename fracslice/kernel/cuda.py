@@ -33,7 +33,7 @@ from ..keys import key, texts
 from . import cuda_source
 from .cpu import Precision
 from .linker import Linked, link
-from .objects import cache_folder, numba_settings
+from .objects import cache_folder
 
 BLOCK = 128
 """Threads of a block."""
@@ -181,7 +181,15 @@ def _toolchain() -> str:
     """The key of everything beside the module's own text that the machine code depends on."""
     words = texts(Path(__file__).parent / "cuda_words.py")
     versions = (version(name) for name in ("numba-cuda", "numba", "llvmlite"))
-    return key(words, *versions, *numba_settings())
+    return key(words, *versions, *_numba_settings())
+
+
+def _numba_settings() -> list[str]:
+    """What Numba is told to do otherwise: its variables and its file in the current folder."""
+    told = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
+    with suppress(OSError):
+        told.append(repr(Path(".numba_config.yaml").read_bytes()))
+    return told
 
 
 def _imported(name: str, text: str) -> ModuleType:

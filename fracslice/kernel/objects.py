@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
@@ -48,17 +47,10 @@ def cache_folder() -> Path:
 @lru_cache(maxsize=1)
 def toolchain() -> str:
     """The key of everything beside the linked text that machine code depends on."""
+    from llvmlite.binding import llvm_version_info
+
     own = texts(*sorted(Path(__file__).parent.glob("*.py")), Path(vocabulary.__file__))
-    versions = [version(p) for p in ("numba", "llvmlite")]
-    return key(own, host(), sys.implementation.cache_tag, *versions, *numba_settings())
-
-
-def numba_settings() -> list[str]:
-    """What Numba is told to do otherwise: its variables and its file in the current folder."""
-    told = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
-    with suppress(OSError):
-        told.append(repr(Path(".numba_config.yaml").read_bytes()))
-    return told
+    return key(own, host(), version("llvmlite"), llvm_version_info)
 
 
 def _read(file: BinaryIO) -> bytes | None:

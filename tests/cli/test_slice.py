@@ -71,9 +71,10 @@ def test_what_an_archive_cannot_say_is_refused_before_the_object_is_changed(
 
 def test_a_folder_that_is_not_this_job(ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "layers").mkdir()
-    (tmp_path / "layers" / "job.json").write_text("{}")
+    (tmp_path / "layers" / "job.json").write_text('{"mine": 1}')
     assert sliced(ball, "-o", tmp_path / "layers", "--layer", "1mm") == 2
-    assert "is not this job interrupted" in capfd.readouterr().err
+    assert "what is in it is no interrupted job" in capfd.readouterr().err
+    assert (tmp_path / "layers" / "job.json").read_text() == '{"mine": 1}'
 
 
 def test_an_edited_scene_begins_afresh_and_says_so(
