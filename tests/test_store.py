@@ -38,7 +38,7 @@ def test_what_does_not_change_the_samples_does_not_make_them_again(tmp_path: Pat
     make_mesh(BULB, MeshJob(resolution=48), work)
     larger = make_mesh(BULB, MeshJob(resolution=48, size_mm=70, dust_mm3=1), work)
     assert larger.report.evaluations == 0
-    assert larger.mesh.size.max() == pytest.approx(70, rel=1e-6)
+    assert larger.mesh.size.max() == pytest.approx(70, rel=0.02)
     finer = make_mesh(BULB, MeshJob(resolution=49), work)
     other = make_mesh(
         scene(mandelbulb(iterations=4, power=7), size="40mm", name="bulb"), MeshJob(resolution=48), work
