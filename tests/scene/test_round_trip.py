@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from functools import reduce
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -107,11 +108,8 @@ def test_impossible_scenes_are_refused_in_python_too(make, message):
 
 
 def test_a_tree_too_deep_is_refused():
-    node = sphere()
-    for _ in range(5000):
-        node = transform(node)
     with pytest.raises(SceneError, match="nested too deeply"):
-        scene(node, size=1)
+        reduce(lambda node, _: transform(node), range(5000), sphere())
 
 
 def test_what_makes_it_printable_is_content() -> None:
