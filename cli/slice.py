@@ -154,6 +154,7 @@ def slice_(
     """
     from fracslice.export.jobs import SliceRun
     from fracslice.export.slices import slice_format, write_slices
+    from fracslice.shown import layers_amount
     from fracslice.slicing.raster import Screen
 
     if slice_format(output, form) == "sl1":
@@ -171,11 +172,12 @@ def slice_(
         write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about), output, form)
         if preview:
             write_preview(stack, preview, work)
+        _, off = layers_amount(stack, work)
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape
         click.echo(f"{output}: {len(stack.z)} layers of {columns} x {rows} pixels, {size} mm")
-        for note in stack.notes:
+        for note in stack.notes + off:
             click.echo(note)
     return 0
 

@@ -141,6 +141,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     from .mesh.missed import surface_to_mesh
     from .mesh.refine import refine
     from .mesh.simplify import simplify
+    from .shown import mesh_amount
     from .volume import plan
     from .volume.accuracy import surface_error
 
@@ -164,6 +165,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     with clock("finishing"):
         left = replace(left, keep="all") if pieces else left
         mesh, removed, place = _finished(planned, raw, what, left, what.size(scene), scale, work)
+        made = mesh.volume + removed.bodies_mm3 - removed.filled_mm3
     simplified = None
     if what.simplify_mm is not None:
         with clock("simplifying"):
@@ -171,8 +173,9 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     with clock("checking"):
         checked = check(mesh, threads=work.threads)
         points = (mesh.vertices - np.array(place.offset)) / place.scale
-        off = place.scale * surface_error(planned.root, points, planned.voxel, work)
+        error = place.scale * surface_error(planned.root, points, planned.voxel, work)
         back = surface_to_mesh(planned, lambda: [raw], place.scale, work)
+        amount, off = mesh_amount(planned, made, place.scale, work)
     report = Report(
         scene=scene.name,
         scene_hash=scene.hash,
@@ -181,14 +184,16 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         voxel_mm=bricks.voxel * place.scale,
         mesh=checked,
         removed=removed,
-        surface_error_mm=SurfaceError.of(off),
+        surface_error_mm=SurfaceError.of(error),
         surface_to_mesh_mm=SurfaceToMesh.of(back),
         evaluations=bricks.evaluations,
         bricks=len(bricks),
         seconds=clock.seconds,
         peak_rss_mb=peak_rss_mb(),
+        amount_mm3=amount,
         simplified=simplified,
-        notes=planned.notes + _thinner(pieces, bricks.voxel * place.scale),
+        notes=planned.notes + _thinner(pieces, bricks.voxel * place.scale) + off,
+        depths=planned.depths,
     )
     return Result(mesh, report, bricks, planned.root, place)
 

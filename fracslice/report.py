@@ -43,9 +43,22 @@ class SurfaceToMesh:
 
 
 @dataclass(frozen=True)
+class Amount:
+    """The volume of the object itself, by its field at random points, its standard error, and the volume that
+    was made of it, bodies that were dropped included: mm3. off: what was made more, or, negative, less, as a
+    share; 0 where that is not sure, or less than a hundredth.
+    """
+
+    object: float
+    error: float
+    made: float
+    off: float
+
+
+@dataclass(frozen=True)
 class Report:
-    """What was made, how good it is and what it took. seconds: of each stage, and in total. notes: what the
-    voxel was too large for, in words.
+    """What was made, how good it is and what it took. seconds: of each stage, and in total. amount_mm3:
+    whether that is all of it. notes: what the voxel was too large for, in words. depths: automatic ones.
     """
 
     scene: str
@@ -61,8 +74,10 @@ class Report:
     bricks: int
     seconds: dict[str, float]
     peak_rss_mb: float
+    amount_mm3: Amount | None = None
     simplified: Simplified | None = None
     notes: tuple[str, ...] = ()
+    depths: tuple[str, ...] = ()
 
     @property
     def problems(self) -> tuple[str, ...]:

@@ -61,6 +61,7 @@ def stream_mesh(
     from .mesh.extract import contour_pieces
     from .mesh.missed import surface_to_mesh
     from .mesh.survey import Survey
+    from .shown import mesh_amount
     from .volume import plan, sample_scene_signs
 
     folder, clock, survey = check_target(path).parent, Clock(work), Survey()
@@ -81,21 +82,26 @@ def stream_mesh(
             known = {"Application": application()} | dict(metadata or {})
             back = surface_to_mesh(planned, finish.surface, finish.scale, work)
             write_pieces(finish.meshes(MOST_ERRORS / (40 * len(signs))), file, known)
+        mesh, removed = finish.checked(), finish.removed
+        made = mesh.volume_mm3 + removed.bodies_mm3 - removed.filled_mm3
+        amount, off = mesh_amount(planned, made, finish.scale, work)
     return Report(
         scene=scene.name,
         scene_hash=scene.hash,
         version=version(),
         size_mm=what.size(scene),
         voxel_mm=finish.voxel,
-        mesh=finish.checked(),
-        removed=finish.removed,
+        mesh=mesh,
+        removed=removed,
         surface_error_mm=SurfaceError.of(finish.scale * np.concatenate(finish.errors)),
         surface_to_mesh_mm=SurfaceToMesh.of(back),
         evaluations=signs.evaluations,
         bricks=len(signs),
         seconds=clock.seconds,
         peak_rss_mb=peak_rss_mb(),
-        notes=planned.notes,
+        amount_mm3=amount,
+        notes=planned.notes + off,
+        depths=planned.depths,
     )
 
 

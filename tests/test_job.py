@@ -11,7 +11,18 @@ import pytest
 
 from fracslice import MeshJob, Work, make_mesh, memory
 from fracslice.errors import Cancelled, SceneError, VolumeError
-from fracslice.formulas import box, cone, difference, intersection, plane, sphere, torus, transform, union
+from fracslice.formulas import (
+    box,
+    cone,
+    difference,
+    intersection,
+    julia,
+    plane,
+    sphere,
+    torus,
+    transform,
+    union,
+)
 from fracslice.scene import Print, scene
 
 BALL = scene(sphere(radius=3), size="40mm", name="ball")
@@ -182,3 +193,19 @@ def test_the_result_does_not_depend_on_threads_or_run():
     one, two = (make_mesh(scene_, MeshJob(resolution=64), Work(threads=n)).mesh for n in (1, 3))
     assert (one.vertices == two.vertices).all()
     assert (one.triangles == two.triangles).all()
+
+
+def test_what_is_thinner_than_a_voxel_and_missing_is_told():
+    """Of the dust -99.97 % was in no line."""
+    dust = scene(julia(c=(-0.2703, 0.3049, 0.68, -0.5194), iterations=12), size="40mm")
+    report = make_mesh(dust, MeshJob(resolution=48)).report
+    amount = report.amount_mm3
+    assert amount.off < -0.2 and amount.made == pytest.approx((1 + amount.off) * amount.object)
+    assert report.notes[-1].startswith(f"{-amount.off:.1%} of the object's volume is finer than the samples")
+    assert json.loads(json.dumps(report.as_dict()))["amount_mm3"]["off"] == amount.off
+
+
+def test_what_is_all_there_is_not_told():
+    report = make_mesh(BALL, MeshJob(resolution=48)).report
+    assert report.amount_mm3.off == 0 and report.notes == report.depths == ()
+    assert report.amount_mm3.object == pytest.approx(4 / 3 * math.pi * 20**3, rel=0.01)

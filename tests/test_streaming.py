@@ -53,6 +53,7 @@ def test_streamed_is_what_would_have_been_made_in_memory(
     report, made = stream_mesh(SCENES[name], streamed, what), make_mesh(SCENES[name], what)
     write(made.mesh, whole)
     assert len(read_mesh(streamed).triangles) == report.mesh.triangles
+    assert report.amount_mm3.object == pytest.approx(made.report.amount_mm3.object, rel=1e-6)
     told, expected = report.mesh.as_dict(), made.report.mesh.as_dict()
     for key in ("volume_mm3", "area_mm2"):
         assert told.pop(key) == pytest.approx(expected.pop(key), rel=1e-6)

@@ -1,4 +1,4 @@
-"""How deep a fractal is for a voxel: ``iterations="auto"``, and levels that are too fine to be shown."""
+"""How deep a fractal is: ``iterations="auto"``, and levels that are too fine for a voxel to be shown."""
 
 from __future__ import annotations
 
@@ -9,26 +9,36 @@ import numpy as np
 from ..formulas.parameters import AUTO
 from ..formulas.registry import Node
 from ..formulas.transforms import affine
+from .cells import possible_cells
 from .cpu import compile_scene
 from .identity import Known
 
 DEEPEST = 60
-PROBES = 4000
+PROBES = 1 << 12, 1 << 15, 1 << 18
+"""Points that are tried, until `ENOUGH` of them are inside."""
+
+ENOUGH = 256
+CELLS = 1 << 13
 BISECTIONS = 24
 
 
-def resolve_depths(root: Node, voxel: float) -> Node:
-    """The scene with every automatic depth replaced by a number, for a voxel size in scene units.
+def resolve_depths(root: Node, detail: float) -> Node:
+    """The scene with every automatic depth replaced by a number, for a size of detail in scene units.
 
     For each fractal by itself: the smallest depth at which one more step would move nine tenths of its
-    surface by less than half a voxel (its own, where a transform scales it). Deeper detail is smaller than
-    the samples can show.
+    surface by less than half that size (its own, where a transform scales it).
     """
-    voxel = _within(root, voxel)
-    children = tuple(resolve_depths(child, voxel) for child in root.children)
+    detail = _within(root, detail)
+    children = tuple(resolve_depths(child, detail) for child in root.children)
     if AUTO in (v for v in root.values.values() if isinstance(v, str)):
-        return root.changed(iterations=_depth(root, voxel))
+        return root.changed(iterations=_depth(root, detail))
     return root if children == root.children else root.changed(children)
+
+
+def told_depths(root: Node, known: Node) -> tuple[str, ...]:
+    """The automatic depths of a scene by those of the same one with numbers, such as "mandelbulb 5"."""
+    pairs = zip(root.walk(), known.walk(), strict=True)
+    return tuple(f"{a.formula.name} {b['iterations']}" for a, b in pairs if a.values != b.values)
 
 
 def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
@@ -55,33 +65,52 @@ def _within(node: Node, voxel: float) -> float:
     return voxel / float(np.linalg.svd(affine(node)[0], compute_uv=False)[-1])
 
 
-def _depth(node: Node, voxel: float) -> int:
+def _depth(node: Node, detail: float) -> int:
+    """The smallest depth that is deep enough; the deepest at which there is something, if none is."""
     for depth in range(1, DEEPEST):
         step = _step(*(Known(node.changed(iterations=d)) for d in (depth, depth + 1)))
         if step is None:
             return max(depth - 1, 1)
-        if step < voxel / 2:
+        if step < detail / 2:
             return depth
     return DEEPEST
 
 
 @lru_cache(maxsize=256)
 def _step(before: Known, after: Known) -> float | None:
-    """How far one more step moves nine tenths of the surface at most, scene units; None if there is none."""
-    surface = _surface_points(before.node)
-    if surface.shape[1] == 0:
+    """How far one more step moves nine tenths of the surface at most, scene units; None if there is none.
+
+    Outside values tell how far: where a step takes away, of the deeper solid on the surface of the other,
+    where it adds, of the other on the surface of the deeper one.
+    """
+    surfaces = [_surface_points(solid) for solid in (before, after)]
+    if not surfaces[0].shape[1]:
         return None
-    moved = compile_scene(after.node, "float64").points(*surface)
-    return float(np.quantile(moved, 0.9))
+    moved = [
+        np.quantile(compile_scene(other.node, "float64").points(*surface), 0.9)
+        for surface, other in zip(surfaces, (after, before), strict=True)
+        if surface.shape[1]
+    ]
+    return float(max(*moved, 0.0))
 
 
-def _surface_points(node: Node) -> np.ndarray:
-    """Points [3, n] on the surface, always the same: bisected between random points inside and outside."""
-    kernel, box = compile_scene(node, "float64"), node.facts.box
+@lru_cache(maxsize=16)
+def _surface_points(solid: Known) -> np.ndarray:
+    """Points [3, n] on the surface, always the same: bisected between random points inside and outside, of
+    cells that may be inside; none where nothing is found.
+    """
+    kernel, facts = compile_scene(solid.node, "float64"), solid.node.facts
+    cells, _, step = possible_cells(lambda p: kernel.points(*p), facts.lipschitz, facts.box, CELLS)
+    if not cells.shape[1]:
+        return cells
     rng = np.random.default_rng(0)
-    points = rng.uniform(np.array(box.lo)[:, None], np.array(box.hi)[:, None], (3, PROBES))
-    inside = kernel.points(*points) < 0
-    count = min(inside.sum(), (~inside).sum())
+    for probes in PROBES:
+        chosen = rng.integers(cells.shape[1], size=probes)
+        points = cells[:, chosen] + step[:, None] * rng.uniform(-0.5, 0.5, (3, probes))
+        inside = kernel.points(*points) < 0
+        count = min(inside.sum(), (~inside).sum())
+        if count >= ENOUGH:
+            break
     a, b = points[:, inside][:, :count], points[:, ~inside][:, :count]
     for _ in range(BISECTIONS):
         middle = (a + b) / 2

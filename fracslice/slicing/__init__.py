@@ -2,7 +2,7 @@
 
 from .adaptive import adapted
 from .contours import Contours
-from .layers import Layer, Slicer
+from .layers import SLAB, Layer, Slicer
 from .stack import SliceJob, Stack, plan_stack
 
-__all__ = ["Contours", "Layer", "SliceJob", "Slicer", "Stack", "adapted", "plan_stack"]
+__all__ = ["SLAB", "Contours", "Layer", "SliceJob", "Slicer", "Stack", "adapted", "plan_stack"]

@@ -16,7 +16,7 @@ from ..kernel import Compilable
 from ..printing import printable
 from ..scene import Print
 from ..scene.lengths import Length, Pair
-from ..volume import plan
+from ..volume import DETAIL, plan, with_depths
 from ..work import Work
 
 MOST_LAYERS = 100_000
@@ -94,7 +94,7 @@ def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
 
     Raises `SliceError` if there would be too many, `VolumeError` for a scene without a solid.
     """
-    turned = _turned(root, job.up)
+    turned = _turned(root, job.up, work)
     planned = plan(turned, job.size / min(job.pixel), work)
     planned, scale = printable(planned, job.size, job.printing, work)
     found, outer = planned.box, planned.outer
@@ -121,8 +121,8 @@ def _tops(height: float, layer: float) -> np.ndarray:
     return layer * np.arange(1, count + 1)
 
 
-def _turned(root: Node, up: tuple[float, float, float]) -> Node:
-    """The scene turned so that `up` points along z, by the shortest way."""
+def _turned(root: Node, up: tuple[float, float, float], work: Work | None) -> Node:
+    """The scene turned so that `up` points along z, by the shortest way; as deep as it is unturned."""
     direction = np.asarray(up, float) / np.linalg.norm(up)
     axis = np.cross(direction, (0.0, 0.0, 1.0))
     angle = math.degrees(math.atan2(float(np.linalg.norm(axis)), float(direction[2])))
@@ -130,4 +130,4 @@ def _turned(root: Node, up: tuple[float, float, float]) -> Node:
         return root
     if not np.linalg.norm(axis) > 0:
         axis = np.array([1.0, 0.0, 0.0])
-    return transform(root, rotate=(*axis.tolist(), angle))
+    return transform(with_depths(root, DETAIL, work)[0], rotate=(*axis.tolist(), angle))

@@ -9,7 +9,7 @@ import numpy as np
 from ..formulas.box import Box
 from ..formulas.registry import Facts, Node
 from ..kernel import Compilable, Kernel
-from ..kernel.depth import resolve_depths, visible
+from ..kernel.depth import resolve_depths, told_depths, visible
 from ..kernel.devices import compile_for
 from ..store import Arrays, stored
 from ..work import Work
@@ -32,14 +32,20 @@ __all__ = [
     "sample_scene",
     "sample_scene_signs",
     "sample_signs",
+    "with_depths",
 ]
+
+
+DETAIL = 512
+"""The finest detail of automatic depths, along the object's longest side. Half of it, which the next step may
+move most of the surface by, is below a pixel of 0.05 mm in an object of 50 mm."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
     """What is about to be sampled: the scene with all depths known, the object's box, a box that surely
     encloses it, its outermost points [3, 6], and the voxel, all in scene units. notes: what the voxel is too
-    large for, in words."""
+    large for, in words. depths: those that were automatic, such as "mandelbulb 5"."""
 
     root: Node | Compilable
     box: Box
@@ -47,24 +53,36 @@ class Plan:
     tips: np.ndarray
     voxel: float
     notes: tuple[str, ...] = ()
+    depths: tuple[str, ...] = ()
 
 
 def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
-    """Finds the object's size and the depths that a resolution needs.
+    """Finds the object's size and depths, and leaves out what a resolution cannot show.
 
     resolution: voxels along the object's longest side (need not be whole). Raises `VolumeError`.
     """
-    size, finite = max(root.facts.box.size), root.facts.box.finite
-    while True:
-        rough = resolve_depths(root, size / resolution) if finite else root
-        found = extent(rough, resolution, work)
-        # A step more makes a solid of a large bailout much smaller, and then its depth was chosen too low.
-        if rough is root or max(found.box.size) > size / 4:
-            break
-        size = max(found.box.size)
+    known, found = with_depths(root, resolution, work)
     voxel = max(found.box.size) / resolution
-    shown, notes = visible(resolve_depths(root, voxel), voxel)
-    return Plan(shown, found.box, found.outer, found.tips, voxel, notes)
+    shown, notes = visible(known, voxel)
+    return Plan(shown, found.box, found.outer, found.tips, voxel, notes, told_depths(root, known))
+
+
+def with_depths(root: Node, resolution: float, work: Work | None = None) -> tuple[Node, Extent]:
+    """The scene with every automatic depth replaced by a number, and its extent for a resolution.
+
+    The depths follow from the object alone, whatever it is sampled for: a mesh, layers and what checks them
+    are of the same solid. Raises `VolumeError`.
+    """
+    size = max(root.facts.box.size)
+    known = resolve_depths(root, size / DETAIL) if root.facts.box.finite else root
+    while True:
+        found = extent(known, resolution, work)
+        # A deeper solid is smaller, so that finer detail counts, until no depth changes any more.
+        size = min(size, max(found.box.size))
+        deeper = resolve_depths(root, size / DETAIL)
+        if deeper == known:
+            return known, found
+        known = deeper
 
 
 def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:

@@ -1,0 +1,84 @@
+"""Whether what was made is all of the object: its volume against that of the field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .formulas import Box
+from .formulas.box import Triple
+from .report import Amount
+from .volume import Lattice, Plan
+from .volume.amount import FINER, amount, finer
+from .work import Work
+
+if TYPE_CHECKING:
+    from .formulas import Node
+    from .kernel import Compilable
+    from .slicing import Stack
+
+Grid = tuple[Triple, Triple, Callable[[float], str]]
+"""Origin and spacing of samples, scene units, and what to call those of a share of the spacing."""
+
+SLABS = 6
+"""How many of a stack are measured, evenly spread."""
+
+
+def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[Amount, tuple[str, ...]]:
+    """The volume of what a mesh was made of, and a line if that is another.
+
+    made: the mesh's volume, mm3, with what was dropped of it. scale: mm per scene unit. Raises `Cancelled`.
+    """
+    lattice = Lattice.around(planned.outer, planned.voxel)
+
+    def told(voxel: float) -> str:
+        return f"a voxel of {voxel * planned.voxel * scale:.2g} mm"
+
+    spacing = planned.voxel, planned.voxel, planned.voxel
+    return _compared(planned.root, [planned.outer], made, scale, (lattice.origin, spacing, told), work)
+
+
+def layers_amount(stack: Stack, work: Work) -> tuple[Amount, tuple[str, ...]]:
+    """As `mesh_amount`, of some of a stack's slabs. Raises `SliceError`, `Cancelled`."""
+    from .slicing import SLAB, Slicer
+
+    starts = np.arange(0, len(stack.z), SLAB)
+    chosen = [s.tolist() for s in np.split(np.arange(len(stack.z)), starts[1:])]
+    chosen = [chosen[k] for k in np.unique(np.linspace(0, len(starts) - 1, SLABS).round().astype(int))]
+    layers = [layer for slab in chosen for layer in slab]
+    areas = np.array(list(Slicer(stack, work).map(lambda layer: layer.area, layers)))
+    (x0, y0, dx, dy), height = stack.frame.tolist(), stack.heights / stack.scale
+    low, high = stack.z - height / 2, stack.z + height / 2
+    (left, front, _), (right, back, _) = stack.outer.lo, stack.outer.hi
+    boxes = [Box((left, front, low[s[0]]), (right, back, high[s[-1]])) for s in chosen]
+    least = float(stack.heights.min())
+
+    def told(share: float) -> str:
+        return f"pixels of {share * min(stack.pixel):.2g} mm and layers of {share * least:.2g} mm"
+
+    grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), told
+    return _compared(stack.root, boxes, float(areas @ stack.heights[layers]), stack.scale, grid, work)
+
+
+def _compared(
+    root: Node | Compilable,
+    boxes: list[Box],
+    made: float,
+    scale: float,
+    grid: Grid,
+    work: Work,
+) -> tuple[Amount, tuple[str, ...]]:
+    """What is in boxes against what was made of it, mm3."""
+    found = amount(root, boxes, work)
+    off, unit = found.off(made / scale**3), scale**3
+    told = Amount(found.volume * unit, found.error * unit, made, off)
+    if off > 0:
+        return told, (f"{off:.1%} more volume than the object has: the samples are too coarse for it",)
+    if off == 0:
+        return told, ()
+    origin, spacing, name = grid
+    times = finer(root, found, off, origin, spacing, work)
+    would = f"{name(1 / times)} would show it" if times else f"{name(1 / FINER[-1])} would not show it either"
+    return told, (f"{-off:.1%} of the object's volume is finer than the samples and missing: {would}",)
