@@ -11,7 +11,7 @@ import pytest
 from fracslice import MeshJob, Work, keys, make_mesh
 from fracslice.errors import FracsliceWarning, VolumeError
 from fracslice.formulas import Box, Node, mandelbulb, offset, sphere
-from fracslice.kernel import compile_scene, field_key
+from fracslice.kernel import Compilable, compile_scene, field_key
 from fracslice.printing.altered import Altered, Term
 from fracslice.printing.samples import Samples
 from fracslice.scene import scene
@@ -48,8 +48,12 @@ def test_what_does_not_change_the_samples_does_not_make_them_again(tmp_path: Pat
 
 def sampled(work: Work, *roots: Node) -> list[int]:
     """The evaluations that sampling each of them takes: none, if it was kept."""
-    plans = [Plan(root, BOX, BOX, 0.1) for root in roots]
-    return [sample_scene(planned, work).evaluations for planned in plans]
+    return [sample_scene(planned(root), work).evaluations for root in roots]
+
+
+def planned(root: Node | Compilable) -> Plan:
+    """To be sampled in the same places, whatever its bounds."""
+    return Plan(root=root, box=BOX, outer=BOX, tips=np.zeros((3, 6)), voxel=0.1)
 
 
 def test_samples_follow_from_what_is_known_of_a_field(
@@ -103,8 +107,7 @@ def test_what_is_altered_is_kept_and_known_by_all_its_parts(tmp_path: Path) -> N
     inner = [sample(compile_scene(s), s.facts, near) for s in (sphere(radius=0.5), sphere(radius=0.6))]
     roots = [Altered(sphere(), (Term(Samples(bricks), does),)) for bricks in inner for does in ("cut", "add")]
     assert len({field_key(root) for root in roots}) == len(roots)
-    planned = Plan(roots[0], BOX, BOX, 0.1)
-    found = [sample_scene(planned, work) for _ in range(2)]
+    found = [sample_scene(planned(roots[0]), work) for _ in range(2)]
     assert found[0].evaluations > 0 == found[1].evaluations
     assert found[0].values.tobytes() == found[1].values.tobytes()
 
