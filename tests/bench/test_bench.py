@@ -89,7 +89,7 @@ def test_a_peer_that_fails_is_told_and_the_rest_goes_on():
     ("arguments", "message"),
     [
         ("--workload cube", "workload 'cube': expected one of sphere, torus"),
-        ("--resolution 4", "resolution 4: expected 16 to 2048"),
+        ("--resolution 4", "4 is not in the range 16<=x<=2048"),
         ("--peer name=command", "peer 'name=command': expected NAME=COMMAND with {workload}"),
         ("--repeat 0", "0 is not in the range"),
         ("-o none/deep", "none/deep: the folder"),
