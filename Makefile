@@ -1,4 +1,5 @@
 # make demo: a shipped scene becomes a printable mesh. make test: tests and linters. make wheel: a wheel that needs no OpenVDB.
+# make nightly: 500 random scenes, an hour or two.
 # All of them set up what is missing first: Debian packages (as root or with sudo) and an own .venv. Debian 12, Ubuntu 24.04.
 # Another Python, in a venv of its own: make test PYTHON=python3.13 VENV=.venv-3.13
 PYTHON ?= python3
@@ -12,7 +13,7 @@ PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
 NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
 
-.PHONY: demo test suite lint wheel peers setup packages clean
+.PHONY: demo test suite nightly lint wheel peers setup packages clean
 
 demo: setup
 	mkdir -p out
@@ -24,6 +25,9 @@ test: lint suite
 
 suite: setup
 	$(BIN)/python -m pytest -n 2 $(SELECT)
+
+nightly: setup
+	$(BIN)/python -m tests.benchmarks.stability.random_scenes
 
 lint: setup
 	$(BIN)/ruff check .

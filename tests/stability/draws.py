@@ -56,15 +56,15 @@ def _value(kind: Any, value: Any, rng: np.random.Generator, spread: float) -> An
     if isinstance(kind, Count):
         return value if value == AUTO else int(rng.integers(kind.least, min(kind.most, DEEPEST) + 1))
     if isinstance(kind, Number):
-        return _number(kind, value, rng, spread)
+        return number(kind, value, rng, spread)
     if isinstance(kind, Vector):
         if kind.whole:
             return tuple(int(rng.integers(1, 5)) if v else 0 for v in value)
-        return tuple(_number(kind, v, rng, spread) for v in value)
+        return tuple(number(kind, v, rng, spread) for v in value)
     return value
 
 
-def _number(kind: Number | Vector, value: float, rng: np.random.Generator, spread: float) -> float:
+def number(kind: Number | Vector, value: float, rng: np.random.Generator, spread: float) -> float:
     low, high = max(kind.above, kind.least), min(kind.below, kind.most)
     if math.isfinite(low) and math.isfinite(high) and rng.uniform() < 0.5:
         if low > 0 and high > 100 * low:
