@@ -43,7 +43,8 @@ def test_the_longest_side_is_the_size_and_it_stands_on_the_bed():
 
 def test_the_job_may_ask_for_another_size():
     result = make_mesh(BALL, MeshJob(size_mm=10, resolution=32))
-    assert result.mesh.size.max() == 10
+    assert result.place.scale == 10 / 6  # the mesh itself lies within the ball
+    assert result.mesh.size.max() == pytest.approx(10, rel=1e-3)
     assert result.report.size_mm == 10
     assert result.report.scene_hash == BALL.hash
 
@@ -94,7 +95,7 @@ def test_all_bodies_are_kept_or_the_largest_which_then_has_the_size():
     assert both.report.mesh.components == 2
     assert largest.report.mesh.components == 1
     assert largest.report.removed.bodies == 1
-    assert largest.mesh.size.max() == pytest.approx(40)
+    assert largest.place.scale == pytest.approx(20, rel=1e-6)
 
 
 def test_dust_is_dropped():

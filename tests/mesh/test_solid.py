@@ -29,13 +29,13 @@ def test_manifold3d_refuses_in_plain_words(spoil) -> None:  # type: ignore[no-un
 
 
 def test_a_mesh_is_put_on_the_bed() -> None:
-    placed = place_on_bed(sphere(10, at=(5, 6, 7)))
+    placed = place_on_bed(sphere(10, at=(5, 6, 7)), (5, 6))
     low, high = placed.bounds
     assert low[2] == 0
-    assert low[:2] + high[:2] == pytest.approx((0, 0), abs=1e-9)
+    assert low[:2] + high[:2] == pytest.approx((0, 0), abs=1e-6)
     lifted = placed.vertices + [0, 0, 1e-6] * (np.arange(len(placed.vertices))[:, None] % 2)
     assert np.array_equal(
-        place_on_bed(Mesh(lifted, placed.triangles)).vertices[:, 2] == 0, lifted[:, 2] < 1e-5
+        place_on_bed(Mesh(lifted, placed.triangles), (0, 0)).vertices[:, 2] == 0, lifted[:, 2] < 1e-5
     )
 
 
