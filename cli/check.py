@@ -95,7 +95,7 @@ def check(
             solid = check_solid(result.root, result.bricks, result.place.scale, limits_of(options), work)
         numbers = result.report.as_dict() | {"solid": solid.as_dict()}
         problems = (*result.report.problems, *solid.thin)
-        line = f"{summary(source, result.report)}{os.linesep}{verdict(problems)}"
-        line += "" if problems else "; --layer looks at islands, cups and traps, too"
+        said = verdict(problems) + ("" if problems else "; --layer looks at islands, cups and traps, too")
+        line = os.linesep.join(filter(None, [summary(source, result.report), solid.unseen, said]))
     click.echo(json.dumps(numbers, indent=2) if as_json else line)
     return 1 if problems else 0

@@ -261,12 +261,13 @@ def limits_of(options: dict[str, Any]) -> Limits:
 
 
 def told(source: str, report: PrintReport) -> str:
-    """A line of numbers, then one for each reason not to print."""
+    """A line of numbers, then one for each reason not to print, and what layers may lose."""
     size = " x ".join(f"{s:.2f}" for s in report.size)
     first = (
         f"{source}: {report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
     )
-    return f"{first}, {verdict(report.problems)}"
+    said = f"{first}, {verdict(report.problems)}"
+    return os.linesep.join(filter(None, [said, report.solid.unseen]))
 
 
 def verdict(problems: Sequence[str]) -> str:

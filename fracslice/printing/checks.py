@@ -72,6 +72,7 @@ class SolidReport:
     """What the samples told, and the field of what is thinner. voxel: mm between samples: lengths are right
     within one. bodies, cavities: their volumes in mm^3, the largest first, without specks. walls, gaps,
     floors: thicknesses up to 2 mm. thin_walls, thin_floors: how much surface is under the limits, mm^2.
+    unseen: what walls a mesh or layers may lose, in words.
     """
 
     voxel: float
@@ -82,6 +83,7 @@ class SolidReport:
     floors: Widths | None
     thin_walls: float
     thin_floors: float
+    unseen: str
     problems: list[str]
 
     @property
@@ -95,17 +97,22 @@ class SolidReport:
 
 
 def check_object(
-    root: Node | Compilable, outer: Box, scale: float, limits: Limits | None = None, work: Work | None = None
+    root: Node | Compilable,
+    outer: Box,
+    scale: float,
+    limits: Limits | None = None,
+    work: Work | None = None,
+    finest: float | None = None,
 ) -> SolidReport:
-    """Checks an object, all depths of its tree known, within the box `outer`. scale: mm per scene unit.
-    Raises as `check_solid`.
+    """Checks an object, all depths of its tree known, within the box `outer`. scale: mm per scene unit. The
+    rest, and what it raises, is that of `check_solid`.
     """
     limits, work = limits or Limits(), work or Work()
     longest = max(outer.size)
     wanted = ACROSS * longest * scale / max(min(limits.wall, limits.floor), 1e-6)
     samples = min(max(wanted, COARSE), FINE)
     bricks = shown(root, outer, longest, samples, work)
-    return check_solid(root, bricks, scale, limits, work)
+    return check_solid(root, bricks, scale, limits, work, finest)
 
 
 def check_solid(
@@ -114,9 +121,11 @@ def check_solid(
     scale: float,
     limits: Limits | None = None,
     work: Work | None = None,
+    finest: float | None = None,
 ) -> SolidReport:
     """Checks a sampled solid: loose bodies, sealed cavities, thin walls and floors. root: what the bricks are
-    samples of. scale: mm per scene unit.
+    samples of. scale: mm per scene unit. finest: mm, what is thinner a mesh or layers may lose; if not given,
+    a voxel.
 
     Raises `VolumeError`, `Cancelled`.
     """
@@ -153,8 +162,23 @@ def check_solid(
     if bare >= limits.thin:
         problems.append(f"{bare:.3g} mm2 of floors are thinner than {limits.floor:g} mm")
     told = [widths_of(w.width * scale, w.area * scale**2) for w in (thick, between, floors)]
+    unseen = _unseen(thick, finest or bricks.voxel * scale, limits.thin, scale)
     return SolidReport(
-        bricks.voxel * scale, bodies, cavities, told[0], told[1], told[2], narrow, bare, problems
+        bricks.voxel * scale, bodies, cavities, told[0], told[1], told[2], narrow, bare, unseen, problems
+    )
+
+
+def _unseen(found: Walls, finest: float, least: float, scale: float) -> str:
+    """Walls thinner than `finest` mm, if there are `least` mm2 of them: how thin, and where in the scene."""
+    lost = found.chosen(found.width * scale < finest)
+    area = float(lost.area.sum()) * scale**2
+    if area < least:
+        return ""
+    first = int(lost.width.argmin())
+    x, y, z = lost.middle[first].tolist()
+    return (
+        f"{area:.3g} mm2 of walls are thinner than {finest:.3g} mm and may be lost; "
+        f"the thinnest, {lost.width[first] * scale:.2g} mm, at {x:.3g} {y:.3g} {z:.3g} in the scene"
     )
 
 

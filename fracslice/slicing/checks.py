@@ -86,7 +86,7 @@ def check_layers(
         return _Told(*parts_of(runs), layer.area, *measured)
 
     limits, work = limits or Limits(), work or Work()
-    solid = check_object(stack.root, stack.outer, stack.scale, limits, work)
+    solid = check_object(stack.root, stack.outer, stack.scale, limits, work, max(stack.pixel))
     return _Collector(stack, limits, printer, solid).report(Slicer(stack, work).map(make))
 
 

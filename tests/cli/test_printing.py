@@ -103,3 +103,25 @@ def test_what_does_not_fit_is_said_before_any_layer(
     assert run(["check", pair, *layers, "--json"]) == 1
     told = json.loads(capfd.readouterr().out)
     assert told["fits"] is False and len(told["problems"]) == 1
+
+
+def test_check_says_what_a_voxel_or_a_pixel_may_lose(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A plate of 0.15 mm on a block of 10 mm: no limit forbids it, and it is thinner than what shows it."""
+    (tmp_path / "plate.xml").write_text(
+        """<scene version="1"><solid size="20mm"><union><box size="1 1 1"/>
+        <transform translate="1 0 0"><box size="1.0 0.8 0.015"/></transform></union></solid></scene>"""
+    )
+
+    def told(*how: str) -> list[str]:
+        run(["check", str(tmp_path / "plate.xml"), "-q", *how])
+        lines = capfd.readouterr().out.splitlines()
+        return [line for line in lines if "may be lost" in line]
+
+    (line,) = told("--layer", "1mm", "--pixel", "0.3mm")
+    assert "thinner than 0.3 mm" in line and "the thinnest, 0.15 mm" in line
+    x, _, z = map(float, line.split(" at ")[1].split()[:3])
+    assert 0.5 < x < 1.5 and abs(z) < 0.05
+    assert len(told("--resolution", "48")) == 1
+    assert told("--layer", "1mm", "--pixel", "0.1mm") == []
