@@ -158,10 +158,12 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         with clock("changing"):
             planned, scale, left = _changed(planned, what, how, what.size(scene), work)
         bricks, raw, pieces = _surface(planned, clock)
+    refined = None
     if what.chord_mm is not None:
         with clock("refining"):
             unit = 1 / (scale or what.size(scene) / max(planned.box.size))
-            raw = refine(planned.root, raw, what.chord_mm * unit, planned.voxel, work)
+            raw, done = refine(planned.root, raw, what.chord_mm * unit, planned.voxel, work)
+            refined = done.scaled(1 / unit)
     with clock("finishing"):
         left = replace(left, keep="all") if pieces else left
         mesh, removed, place = _finished(planned, raw, what, left, what.size(scene), scale, work)
@@ -191,8 +193,14 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         seconds=clock.seconds,
         peak_rss_mb=peak_rss_mb(),
         amount_mm3=amount,
+        refined=refined,
         simplified=simplified,
-        notes=planned.notes + _thinner(pieces, bricks.voxel * place.scale) + off,
+        notes=(
+            *planned.notes,
+            *_thinner(pieces, bricks.voxel * place.scale),
+            *(refined.notes if refined else ()),
+            *off,
+        ),
         depths=planned.depths,
     )
     return Result(mesh, report, bricks, planned.root, place)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from .mesh.check import MeshReport
     from .mesh.components import Removed
+    from .mesh.refine import Refined
     from .mesh.simplify import Simplified
 
 
@@ -75,6 +76,7 @@ class Report:
     seconds: dict[str, float]
     peak_rss_mb: float
     amount_mm3: Amount | None = None
+    refined: Refined | None = None
     simplified: Simplified | None = None
     notes: tuple[str, ...] = ()
     depths: tuple[str, ...] = ()

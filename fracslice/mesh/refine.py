@@ -1,6 +1,8 @@
-"""More triangles where a smooth surface bends away from them."""
+"""More triangles where the surface bends away from them, until none is farther off than a chord."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,106 +11,171 @@ from ..formulas.registry import Node
 from ..kernel import Compilable
 from ..volume.settling import anywhere, settle
 from ..work import Work
+from .creases import on_creases
+from .crossings import crossing_triangles
+from .fit import Fit, Fitted
+from .flips import flip
 from .model import Mesh
+from .subdivision import Edges, cut, edges_of, with_needles
 
-PASSES = 6
-SMOOTH = 0.03
-"""A middle moves by this share of its edge at most. Where the surface is farther off it is rough there, and
-more triangles of this size would not follow it.
-"""
+PASSES = 12
+AIM = 0.9
+"""The share of the chord that samples may have. A distance of second order that is zero at the corners is at
+most 1.07 times what `LATTICE` sees of it."""
+
+ROUGH = 0.12
+"""A middle that is off by more than this share of its edge, and less and less where edges are shorter than
+voxels, is at a rough place: more triangles would not follow it."""
+
+WORTH = 10
+"""As long as one edge is split for so many triangles that are too far off, it goes on."""
+
+UPRIGHT = np.cos(np.radians(29))
+"""No new triangle's normal is farther from the field's."""
+
+CREASED = 0.9
+"""The cosine between the field's normals on both sides of a sharp edge, at most."""
 
 
-def refine(root: Node | Compilable, mesh: Mesh, chord: float, voxel: float, work: Work | None = None) -> Mesh:
-    """Splits edges whose middle is more than `chord` from the surface, and moves the middles there.
+@dataclass(frozen=True)
+class Refined:
+    """What a refinement did. from_triangles: how many there were. off_mm: no sample of the triangles, a
+    quarter of a side apart, is farther from the surface. left: how many triangles have one that is farther
+    off than the chord allows; they are at rough places, or more triangles there would turn over or cross."""
 
-    mesh: closed, scene units, its vertices on the zero set of root's field; chord, voxel: scene units. Where
-    an edge is split, so are both triangles at it (red and green refinement; Bank, Sherman and Weiser 1983,
-    "Some refinement algorithms and data structures for regular local mesh refinement"): the surface stays
-    closed. Sharp edges and rough places stay as they are, and so does what would make it cross itself. Raises
-    `Cancelled`.
+    chord_mm: float
+    from_triangles: int
+    off_mm: float
+    left: int
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What did not succeed, in words."""
+        chord = f"the chord of {self.chord_mm:.3g} mm"
+        far = f"{self.left:,} triangles are farther off than {chord}, up to {self.off_mm:.2g} mm"
+        return (far,) if self.left else ()
+
+    def scaled(self, scale: float) -> Refined:
+        """In other units."""
+        return replace(self, chord_mm=scale * self.chord_mm, off_mm=scale * self.off_mm)
+
+
+def refine(
+    root: Node | Compilable, mesh: Mesh, chord: float, voxel: float, work: Work | None = None
+) -> tuple[Mesh, Refined]:
+    """Splits edges until no triangle is farther than `chord` from the surface.
+
+    mesh: closed, scene units, its vertices on the zero set of root's field; chord, voxel: scene units. New
+    vertices are on the surface, and on sharp edges where an edge is one. Then edges are flipped where that
+    makes triangles better, so that none has a normal that the field has not. The surface stays closed, and
+    does not cross itself: what would make it is not done. Old vertices stay where they are. Returns the mesh,
+    and what was done, in scene units. Raises `Cancelled`.
     """
-    work, kept = work or Work(), np.empty(0, np.int64)
-    for _ in range(PASSES):
-        edges, sides = _edges(mesh.triangles)
-        ends = mesh.vertices[edges]
-        middles = ends.mean(axis=1)
-        there = middles.copy()
-        moved, places = settle(root, middles, anywhere, voxel, work)
-        there[moved] = places
-        off = np.linalg.norm(there - middles, axis=1)
-        split = (off > chord) & (off < SMOOTH * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
-        split &= ~np.isin(_keys(edges), kept)
-        mesh, stuck = _split_apart(mesh, sides, split, there, work)
-        kept = np.concatenate([kept, _keys(edges[stuck])])
+    work, count = work or Work(), len(mesh.triangles)
+    state = Fitted.of(mesh, Fit(root, AIM * chord, voxel, work))
+    latest = refused = np.empty(0, np.int64)
+    for number in range(PASSES):
+        work.progress("refining", number / PASSES)
+        edges = edges_of(state.mesh.triangles)
+        free = ~np.isin(edges.keys, np.concatenate([latest, _repeated(refused)]))
+        split, there = _wanted(root, state, edges, free, voxel, work)
         if not split.any():
             break
-    return mesh
+        state, left = _split(state, edges, split, there, work)
+        latest = edges.keys[left]
+        refused = np.concatenate([refused, latest])
+        if (split.sum() - len(latest)) * WORTH < np.count_nonzero(state.off > state.fit.reach):
+            break
+    return state.mesh, Refined(chord, count, float(state.off.max()), int((state.off > state.fit.reach).sum()))
 
 
-def _split_apart(
-    mesh: Mesh, sides: NDArray[np.int64], split: NDArray[np.bool_], there: NDArray[np.float64], work: Work
-) -> tuple[Mesh, NDArray[np.int64]]:
-    """The mesh with edges split, and those, taken out of `split`, that were left for it not to cross."""
-    from .crossings import crossing_triangles
-
-    stuck = np.empty(0, np.int64)
-    while split.any():
-        work.check()
-        finer, parents = _split(mesh, sides, split, there)
-        crossed = np.unique(sides[parents[crossing_triangles(finer, threads=work.threads)]])
-        if not split[crossed].any():
-            return finer, stuck
-        stuck = np.concatenate([stuck, crossed])
-        split[crossed] = False
-    return mesh, stuck
+def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The numbers that come more than once."""
+    found, counts = np.unique(keys, return_counts=True)
+    return found[counts > 1]
 
 
-def _keys(edges: NDArray[np.int64]) -> NDArray[np.int64]:
-    return edges[:, 0] << 32 | edges[:, 1]
+def _wanted(
+    root: Node | Compilable, state: Fitted, edges: Edges, free: NDArray[np.bool_], voxel: float, work: Work
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """The edges to be split: those that are too far off, or the longest ones of triangles that are; and
+    where."""
+    sides, ends = edges.sides, state.mesh.vertices[edges.ends]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    off = np.zeros(len(free))
+    np.maximum.at(off, sides, state.sides)
+    far = np.flatnonzero(free & (off > state.fit.reach))
+    there = ends.mean(axis=1)
+    points, creased = _creased(state, edges, far)
+    there[far[creased]] = points[creased]
+    rough = ROUGH * lengths * np.minimum(1, np.sqrt(lengths / voxel))
+    rough[far[creased]] = np.inf
+    split = np.zeros(len(free), bool)
+    split[far] = off[far] < rough[far]
+    left = np.flatnonzero((state.off > state.fit.reach) & ~split[sides].any(axis=1))
+    longest = sides[left, np.where(free[sides[left]], lengths[sides[left]], 0).argmax(axis=1)]
+    split[longest[free[longest] & (state.off[left] < rough[longest])]] = True
+    split = np.asarray(with_needles(split, sides, lengths) & free)
+    chosen = there[split]
+    moved, places = settle(root, chosen, anywhere, voxel, work)
+    chosen[moved] = places
+    return split, chosen
 
 
-def _edges(triangles: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The edges, int64 [e, 2], and those of each triangle, [m, 3]: side k runs from corner k to the next."""
-    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).astype(np.int64)
-    ends.sort(axis=2)
-    count = int(triangles.max()) + 1
-    keys, sides = np.unique(ends[..., 0] * count + ends[..., 1], return_inverse=True)
-    return np.stack([keys // count, keys % count], axis=1), sides.reshape(-1, 3)
+def _creased(
+    state: Fitted, edges: Edges, which: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Points of sharp edges that some edges run across or along, [k, 3], and which do, [k]."""
+    ends = state.mesh.vertices[edges.ends[which]]
+    beside = edges.beside[which]
+    middles, along = ends.mean(axis=1), ends[:, 1] - ends[:, 0]
+    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+    inwards = state.mesh.corners[beside].mean(axis=2) - middles[:, None]
+    inwards -= (inwards * along[:, None]).sum(axis=2, keepdims=True) * along[:, None]
+    inwards /= np.maximum(np.linalg.norm(inwards, axis=2, keepdims=True), 1e-300)
+    near = np.array([[7, 1], [1, 7]]) / 8 @ ends
+    beyond = middles[:, None] + inwards * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None, None] / 8
+    normals = state.fit.planes(near.reshape(-1, 3))[:, :3].reshape(-1, 2, 3)
+    across = (normals[:, 0] * normals[:, 1]).sum(axis=1) < CREASED
+    normals = state.ways[beside]
+    creased = across | ((normals[:, 0] * normals[:, 1]).sum(axis=1) < CREASED)
+    starts = np.where(across[:, None, None], near, beyond)
+    points = np.empty_like(middles)
+    points[creased], creased[creased] = on_creases(state.fit, ends[creased], starts[creased])
+    return points, creased
 
 
 def _split(
-    mesh: Mesh, sides: NDArray[np.int64], split: NDArray[np.bool_], there: NDArray[np.float64]
-) -> tuple[Mesh, NDArray[np.int64]]:
-    """The mesh with new vertices in split edges, and the triangle that each of its triangles came from."""
-    number = np.full(len(split), -1, np.int32)
-    number[split] = len(mesh.vertices) + np.arange(split.sum(), dtype=np.int32)
-    vertices = np.concatenate([mesh.vertices, there[split]])
-    cuts = split[sides].sum(axis=1)
-    parts, parents = [mesh.triangles[cuts == 0]], [np.flatnonzero(cuts == 0)]
-    for count in (1, 2, 3):
-        own = np.flatnonzero(cuts == count)
-        pieces = _cut(mesh.triangles[own], number[sides[own]], count, vertices)
-        parts += pieces
-        parents += [own] * len(pieces)
-    return Mesh(vertices, np.concatenate(parts)), np.concatenate(parents)
+    state: Fitted, edges: Edges, split: NDArray[np.bool_], there: NDArray[np.float64], work: Work
+) -> tuple[Fitted, NDArray[np.int64]]:
+    """The mesh with edges split and others flipped; and edges that are left, for a triangle would turn away
+    from the surface, or cross others. there: of all that shall be split."""
+    old, chosen = state.mesh, np.flatnonzero(split)
+    keep = np.ones(len(chosen), bool)
+    while keep.any():
+        work.check()
+        now = np.zeros(len(split), bool)
+        now[chosen[keep]] = True
+        mesh, parents = cut(old, edges.sides, now, there[keep])
+        cut_up = np.asarray(now[edges.sides]).any(axis=1)
+        fresh = np.take(cut_up, parents)
+        found, flipped = flip(state.become(mesh, parents, fresh), fresh)
+        blamed = _blamed(found, fresh | flipped, len(old.vertices), work)
+        if not blamed.any():
+            return found, chosen[~keep]
+        keep[np.flatnonzero(keep)[blamed]] = False
+    return state, chosen
 
 
-def _cut(
-    triangles: NDArray[np.int32], middles: NDArray[np.int32], count: int, vertices: NDArray[np.float64]
-) -> list[NDArray[np.int32]]:
-    """Triangles cut at the middles of `count` of their sides, int32 [m, 3], -1 where a side is whole."""
-    # Turned so that the cut side is the first, or the whole one the last.
-    first = np.argmax(middles >= 0, axis=1) if count == 1 else (np.argmin(middles, axis=1) + 1) % 3
-    turn = (first[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(triangles, turn, axis=1).T
-    p, q, r = np.take_along_axis(middles, turn, axis=1).T
-    if count == 1:
-        return [np.stack([a, p, c], 1), np.stack([p, b, c], 1)]
-    corner = np.stack([p, b, q], 1)
-    if count == 3:
-        return [corner, np.stack([a, p, r], 1), np.stack([r, q, c], 1), np.stack([p, q, r], 1)]
-    across = vertices[[a, p]] - vertices[[q, c]]
-    shorter = np.diff(np.linalg.norm(across, axis=2), axis=0)[0, :, None] > 0
-    one = np.where(shorter, np.stack([a, p, q], 1), np.stack([a, p, c], 1))
-    other = np.where(shorter, np.stack([a, q, c], 1), np.stack([p, q, c], 1))
-    return [corner, one, other]
+def _blamed(state: Fitted, fresh: NDArray[np.bool_], first: int, work: Work) -> NDArray[np.bool_]:
+    """Which of the vertices from `first` on are corners of triangles that turn away or cross, or next to
+    such."""
+    mesh = state.mesh
+    crossing = crossing_triangles(mesh, threads=work.threads, among=fresh)
+    away = fresh & (state.upright < UPRIGHT) & (mesh.triangles >= first).any(axis=1)
+    marked = np.zeros(len(mesh.vertices), bool)
+    marked[mesh.triangles[crossing]] = True
+    if crossing.any() and not marked[first:].any():
+        marked[mesh.triangles[marked[mesh.triangles].any(axis=1)]] = True
+    marked[mesh.triangles[away]] = True
+    return marked[first:]

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import SliceError
-from ..scene import parse_length
 from ..work import Work
 from .layers import Layer, Slicer
 from .stack import Stack
@@ -28,7 +27,7 @@ def adapted(stack: Stack, most: float, work: Work | None = None) -> Stack:
     while that is at most the height of one planned layer. The same for any number of threads. Raises
     `SliceError` if `most` is below the planned height.
     """
-    least, most = float(stack.heights[0]), parse_length(most, "layer")
+    least, most = float(stack.heights[0]), settled("layer", most, Length(None, ""), SliceError)
     if most < least:
         raise SliceError(
             f"layers of {least:g} to {most:g} mm: expected a range from the lowest to the highest"

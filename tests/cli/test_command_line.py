@@ -29,7 +29,7 @@ def test_mesh_writes_the_model_and_its_report(ball, tmp_path, capfd):
     assert fracslice("mesh", ball, "-o", model, "--resolution", 32, "--report", report) == 0
     told = json.loads(report.read_text())
     assert told["watertight"]
-    assert told["bbox_mm"][1][2] == 20
+    assert 20 - 0.05 < told["bbox_mm"][1][2] <= 20, "the ball's top lies between samples"
     assert model.stat().st_size == 84 + 50 * told["triangles"]
     out, err = capfd.readouterr()
     assert "watertight, manifold" in out
@@ -59,7 +59,7 @@ def test_size_set_and_base_change_what_is_made(ball, tmp_path, capfd):
     assert fracslice("check", model, "--json") == 0
     told = json.loads(capfd.readouterr().out.partition("\n{")[2].join(["{", ""]))
     low, high = told["bbox_mm"]
-    assert high[0] - low[0] == pytest.approx(30, rel=1e-3)
+    assert 30 - 0.1 < high[0] - low[0] <= 30
     assert high[2] == pytest.approx(27, abs=0.2)
 
 

@@ -71,7 +71,7 @@ def main() -> None:
         planned = plan(truth.root, truth.resolution)
         bricks = sample_scene(planned)
         exact = contour(planned.root, bricks)
-        bent = refine(planned.root, exact, CHORD * planned.voxel, planned.voxel)
+        bent, _ = refine(planned.root, exact, CHORD * planned.voxel, planned.voxel)
         for how, mesh in (("samples alone", extract(bricks)), ("exact", exact), ("exact, chord", bent)):
             print(f"{truth.name:24}{how:16}{errors(mesh, truth, planned.voxel)}")
 

@@ -1,0 +1,153 @@
+"""How well triangles fit the zero set that they stand for: how far they are from it, and how they turn
+away."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..formulas.registry import Node
+from ..kernel import Compilable, compile_scene
+from ..work import Work, chunks
+from .model import Mesh
+
+STEP = 1e-4
+"""Of central differences, in voxels."""
+
+_SIDES = [(2, 2, 0), (3, 1, 0), (1, 3, 0), (0, 2, 2), (0, 3, 1), (0, 1, 3), (2, 0, 2), (1, 0, 3), (3, 0, 1)]
+LATTICE = np.array([*_SIDES, (2, 1, 1), (1, 2, 1), (1, 1, 2)]) / 4
+"""Where triangles are looked at, barycentric: three places on each side, then three inside. The corners are
+on the surface."""
+
+
+AROUND = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if np.count_nonzero(way) % 2])
+AROUND /= np.linalg.norm(AROUND, axis=1)[:, None]
+"""Along the axes and the diagonals of space."""
+
+BEYOND = 1 + 1e-6
+
+UPRIGHT, OFF = 3, 7
+
+
+class Fit:
+    """Distances and normals of a scene's field. Lengths are scene units; reach: what counts as near."""
+
+    def __init__(self, root: Node | Compilable, reach: float, voxel: float, work: Work) -> None:
+        self._kernel = compile_scene(root, "float64")
+        self.reach, self._voxel, self._work = reach, voxel, work
+
+    def planes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """At each point, [n, 3], the unit gradient and the distance to the surface to first order, [n, 4]."""
+
+        def look(p: NDArray[np.float64], found: NDArray[np.float64]) -> None:
+            h = STEP * self._voxel
+            for axis, step in enumerate(h * np.eye(3)):
+                ends = (self._kernel.points(*(p + sign * step[:, None])) for sign in (1, -1))
+                found[:, axis] = np.subtract(*ends) / (2 * h)
+            slope = np.maximum(np.linalg.norm(found[:, :3], axis=1), 1e-30)
+            found[:, :3] /= slope[:, None]
+            found[:, 3] = self._kernel.points(*p) / slope
+
+        return self._each(look, points, 4)
+
+    def distances(self, points: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far points, [n, 3], are from the surface, [n]; ways: unit vectors across it.
+
+        A continuous field has a zero between two points of different signs. Where it changes its sign on the
+        way through a point, or else somewhere else in the ball around it, within the reach, the surface is
+        proved to be that near. Elsewhere the distance is one to first order, but no less than the reach.
+        """
+
+        def look(rows: NDArray[np.float64], found: NDArray[np.float64]) -> None:
+            p, step = rows[:3], self.reach * rows[3:]
+            up, down = self._kernel.points(*(p + step)), self._kernel.points(*(p - step))
+            passed = (up >= 0) & (down <= 0) & (up > down)
+            found[passed, 0] = self.reach * np.abs(up + down)[passed] / (up - down)[passed]
+            left = np.ascontiguousarray(p[:, ~passed])
+            f = self._kernel.points(*left)
+            around = np.array([self._kernel.points(*(left + self.reach * way[:, None])) for way in AROUND])
+            steep = np.abs(around - f).max(axis=0) / self.reach
+            far = np.minimum(np.abs(f) / np.maximum(steep, 1e-30), self._voxel)
+            near = np.ptp((around < 0).astype(np.int8), axis=0) > 0
+            found[~passed, 0] = np.where(
+                near, np.minimum(far, self.reach), np.maximum(far, BEYOND * self.reach)
+            )
+
+        return self._each(look, np.concatenate([points, ways], axis=1), 1)[:, 0]
+
+    def triangles(self, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The field's unit normals at the middles of triangles, corners [m, 3, 3]; the cosines between these
+        and their own; the greatest distances of their samples on each side and of all, [m, 8]."""
+        ways = self.planes(corners.mean(axis=1))[:, :3]
+        points = (LATTICE @ corners).reshape(-1, 3)
+        found = self.distances(points, np.repeat(ways, len(LATTICE), axis=0)).reshape(-1, len(LATTICE))
+        sides = found[:, :9].reshape(-1, 3, 3).max(axis=2)
+        return np.column_stack([ways, _cosines(corners, ways), sides, found.max(axis=1)])
+
+    def _each(
+        self,
+        look: Callable[[NDArray[np.float64], NDArray[np.float64]], None],
+        rows: NDArray[np.float64],
+        width: int,
+    ) -> NDArray[np.float64]:
+        found = np.empty((len(rows), width))
+
+        def task(part: slice) -> None:
+            look(np.ascontiguousarray(rows[part].T), found[part])
+
+        self._work.map(task, chunks(len(rows), 1 << 14))
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A mesh, and what `Fit.triangles` tells of each triangle."""
+
+    mesh: Mesh
+    fit: Fit
+    told: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, mesh: Mesh, fit: Fit) -> Fitted:
+        """What is known of a mesh."""
+        return cls(mesh, fit, fit.triangles(mesh.corners))
+
+    def become(self, mesh: Mesh, parents: NDArray[np.int64], fresh: NDArray[np.bool_]) -> Fitted:
+        """Another mesh whose triangles are these, by number, but for fresh ones."""
+        told = self.told[parents]
+        told[fresh] = self.fit.triangles(mesh.corners[fresh])
+        return Fitted(mesh, self.fit, told)
+
+    @property
+    def ways(self) -> NDArray[np.float64]:
+        """The field's unit normals at the triangles' middles, [m, 3]."""
+        return self.told[:, :3]
+
+    @property
+    def upright(self) -> NDArray[np.float64]:
+        """The cosines between these and the triangles' own, [m]."""
+        return self.told[:, UPRIGHT]
+
+    @property
+    def sides(self) -> NDArray[np.float64]:
+        """How far the samples of each side are from the surface, [m, 3]."""
+        return self.told[:, 4:7]
+
+    @property
+    def off(self) -> NDArray[np.float64]:
+        """How far those of the whole triangle are, [m]."""
+        return self.told[:, OFF]
+
+
+def _cosines(corners: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The cosine between triangles' normals and unit vectors, [m]; -1 for triangles without area."""
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(across, axis=1)
+    cosine: NDArray[np.float64] = np.where(
+        size > 0, (across * ways).sum(axis=1) / np.maximum(size, 1e-300), -1.0
+    )
+    return cosine

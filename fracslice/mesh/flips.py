@@ -1,0 +1,117 @@
+"""Edges flipped towards a Delaunay triangulation, as far as the field allows."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .fit import OFF, UPRIGHT, Fitted
+from .model import Mesh
+from .subdivision import edges_of
+
+ROUNDS = 12
+"""Of flips that do not touch each other."""
+
+FINE = np.cos(np.radians(10))
+"""Triangles whose normals are that near to the field's may turn."""
+
+STEEP, BETTER = np.cos(np.radians(29)), 0.02
+"""Triangles whose normals are farther off than that turn where it makes the cosine of the worse one greater
+by so much."""
+
+OBTUSE = 1e-6
+"""How negative the sine of two opposite angles' sum has to be."""
+
+
+class Flips(NamedTuple):
+    """Flips that could be done. old: int64 [k, 2], the two triangles at an edge. new: int32 [k, 2, 3], what
+    they would be. ends: int32 [k, 2], of the new edge."""
+
+    old: NDArray[np.int64]
+    new: NDArray[np.int32]
+    ends: NDArray[np.int32]
+
+    def some(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Flips:
+        """Some of them."""
+        return Flips(self.old[which], self.new[which], self.ends[which])
+
+
+def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool_]]:
+    """The mesh with edges flipped whose opposite angles sum up to more than a half turn, beginning at the
+    triangles that are due, bool [m]; and the triangles that are not as they were.
+
+    An edge stays if a triangle's normal would be farther off, as at a sharp edge, or the triangle from the
+    surface.
+    """
+    mesh, told = Mesh(state.mesh.vertices, state.mesh.triangles.copy()), state.told.copy()
+    changed = np.zeros(len(told), bool)
+    for _ in range(ROUNDS):
+        flips, worth = _candidates(mesh, due, told[:, UPRIGHT] < STEEP)
+        flips = flips.some(_apart(flips, worth, len(told)))
+        if not len(flips.old):
+            break
+        before = told[flips.old]
+        after = state.fit.triangles(mesh.vertices[flips.new].reshape(-1, 3, 3)).reshape(
+            -1, 2, before.shape[2]
+        )
+        was, now = before[..., UPRIGHT].min(axis=1), after[..., UPRIGHT].min(axis=1)
+        good = np.where(was < STEEP, now > was + BETTER, now >= np.minimum(was, FINE))
+        good &= after[..., OFF].max(axis=1) <= np.maximum(before[..., OFF].max(axis=1), state.fit.reach)
+        flips = flips.some(good)
+        mesh.triangles[flips.old], told[flips.old] = flips.new, after[good]
+        due = np.zeros(len(told), bool)
+        changed[flips.old] = due[flips.old] = True
+    return Fitted(mesh, state.fit, told), changed
+
+
+def _candidates(
+    mesh: Mesh, due: NDArray[np.bool_], steep: NDArray[np.bool_]
+) -> tuple[Flips, NDArray[np.float64]]:
+    """The edges at triangles that are due whose opposite angles are too large together, or that steep ones
+    have; those of the least worth come first."""
+    near = np.zeros(len(mesh.vertices), bool)
+    near[mesh.triangles[due]] = True
+    some = np.flatnonzero(near[mesh.triangles].any(axis=1))
+    edges = edges_of(mesh.triangles[some])
+    order = np.argsort(edges.sides.ravel(), kind="stable")
+    at = edges.sides.ravel()[order]
+    first = np.flatnonzero(at[1:] == at[:-1])
+    half = np.stack([order[first], order[first + 1]], axis=1)
+    old = some[half // 3]
+    half = half[due[old].any(axis=1)]
+    old, side = some[half // 3], half % 3
+    a, b, c = (mesh.triangles[old[:, 0], (side[:, 0] + k) % 3] for k in range(3))
+    d = mesh.triangles[old[:, 1], (side[:, 1] + 2) % 3]
+    worth = _sine_of_sum(mesh.vertices, a, b, c, d)
+    new = np.stack([np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)], axis=1)
+    ends = np.sort(np.stack([c, d], axis=1), axis=1)
+    worth = np.where(steep[old].any(axis=1), worth - 2, worth)
+    kept = np.flatnonzero((worth < -OBTUSE) & (c != d))
+    kept = kept[~np.isin(ends[kept].astype(np.int64) @ [1 << 32, 1], edges.keys)]
+    return Flips(old, new, ends).some(kept), worth[kept]
+
+
+def _sine_of_sum(p: NDArray[np.float64], a, b, c, d) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+    """The sine of the sum of the angles at c and d, opposite to an edge from a to b."""
+    parts = []
+    for tip in (c, d):
+        u, v = p[a] - p[tip], p[b] - p[tip]
+        size = np.maximum(np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1), 1e-300)
+        parts.append(((u * v).sum(axis=1) / size, np.linalg.norm(np.cross(u, v), axis=1) / size))
+    (cos_c, sin_c), (cos_d, sin_d) = parts
+    found: NDArray[np.float64] = sin_c * cos_d + cos_c * sin_d
+    return found
+
+
+def _apart(flips: Flips, worth: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+    """Flips of which no two have a triangle, or the new edge, in common: the worthiest of each triangle."""
+    order = np.argsort(worth, kind="stable")
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    best = np.full(count, len(order), np.int64)
+    np.minimum.at(best, flips.old.ravel(), np.repeat(rank, 2))
+    own = np.flatnonzero((best[flips.old] == rank[:, None]).all(axis=1))
+    _, first = np.unique(flips.ends[own].astype(np.int64) @ [1 << 32, 1], return_index=True)
+    return own[np.sort(first)]
