@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import Cancelled, MeshError
-from fracslice.formulas import mandelbulb, menger
+from fracslice.formulas import box, cylinder, difference, mandelbulb, menger, transform, union
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check
 from fracslice.mesh.collapse import Collapse
@@ -55,6 +55,18 @@ def test_a_cube_is_left_with_twelve_triangles():
     assert len(few.triangles) == 12
     assert few.volume == pytest.approx(1000, rel=1e-12)
     assert done.back_mm < 1e-12
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
+def test_flat_faces_come_to_few_triangles_however_small_the_tolerance(tolerance):
+    """A bracket: an angle with a round hole, whose rim alone has a vertex wherever the mesh has one."""
+    foot, back = box(size=(2, 1.2, 0.3)), transform(box(size=(0.3, 1.2, 1.2)), translate=(-0.85, 0, 0.5))
+    hole = transform(cylinder(radius=0.25, height=2), translate=(0.3, 0, 0))
+    bracket = fine(difference(union(foot, back), hole), 48)
+    few, done = simplify(bracket, tolerance)
+    assert len(bracket.triangles) > 10000 and len(few.triangles) < 700
+    assert max(done.bound_mm, done.back_mm) <= tolerance
+    assert check(few).printable
 
 
 def test_a_menger_sponge_keeps_its_edges_and_its_closed_forms():

@@ -9,8 +9,8 @@
 namespace fracslice {
 
 // How often a triangle is cut before nothing is said of it, and how often before the nearest triangle is looked for again
-// though that of a neighbour is near.
-constexpr int kDepth = 32, kTrusting = 12;
+// though that of a neighbour is near, or what lies over a triangle is taken from what does not.
+constexpr int kDepth = 32, kTrusting = 12, kPatient = 8;
 
 // What is nearest to a point, beginning with a guess.
 struct Found {
@@ -27,6 +27,7 @@ class Bound {
     // The square of a bound on the distance; infinite if some point is farther than the tolerance, or that could not be
     // excluded. near: of each corner one of the others that may be near it, and then one that is.
     double operator()(const std::array<const double*, 3>& corners, size_t* near) {
+        pieces_.resize(1);
         Piece& whole = pieces_[0];
         double most = 0;
         whole.depth = 0;
@@ -40,15 +41,18 @@ class Bound {
             whole.near[k] = near[k] = found.triangle;
             most = std::max(most, found.square);
         }
-        for (int height = 1; height > 0;) {
-            Piece& piece = pieces_[--height];
+        while (!pieces_.empty()) {
+            Piece piece = pieces_.back(), other;
+            pieces_.pop_back();
             double bound = of(piece);
+            if (bound > limit_) bound = laid(piece);
             if (bound <= limit_) {
                 most = std::max(most, bound);
-            } else if (piece.depth == kDepth || !cut(piece, pieces_[height + 1])) {
+            } else if (piece.depth == kDepth || !cut(piece, other)) {
                 return kInfinity;
             } else {
-                height += 2;
+                pieces_.push_back(piece);
+                pieces_.push_back(other);
             }
         }
         return most;
@@ -58,7 +62,6 @@ class Bound {
     const std::vector<size_t>& beyond() const { return beyond_; }
 
   private:
-    using Point = std::array<double, 3>;
     // A part of the triangle.
     struct Piece {
         Point corner[3];
@@ -85,6 +88,42 @@ class Bound {
             bound = std::min(bound, worst);
         }
         return bound;
+    }
+
+    // A piece that is within the tolerance of the plane of the triangle nearest to its middle: what lies over that triangle is
+    // near it, and what lies beside it is left. Returns a bound on the distance of the former; infinite if there is none.
+    double laid(const Piece& piece) {
+        if (piece.depth < kPatient || piece.depth == kDepth || !flat(piece, others_.distance(piece.near[0]).planes()[0])) return kInfinity;
+        Point middle;
+        for (size_t x = 0; x < 3; ++x) middle[x] = (piece.corner[0][x] + piece.corner[1][x] + piece.corner[2][x]) / 3;
+        size_t nearest = search(middle.data(), piece.near[0]).triangle;
+        auto planes = others_.distance(nearest).planes();
+        if (!flat(piece, planes[0])) return kInfinity;
+        Polygon over(piece.corner, piece.corner + 3), beside[3];
+        for (size_t side = 0; side < 3; ++side) beside[side] = taken_above(planes[side + 1], over);
+        if (over.empty()) return kInfinity;
+        for (const Polygon& polygon : beside) {
+            for (size_t i = 2; i < polygon.size(); ++i) {
+                Piece part{{polygon[0], polygon[i - 1], polygon[i]}, {}, piece.depth + 1};
+                for (size_t k = 0; k < 3; ++k) {
+                    Found found = search(part.corner[k].data(), nearest);
+                    if (found.square > limit_) return kInfinity;
+                    part.near[k] = found.triangle;
+                }
+                pieces_.push_back(part);
+            }
+        }
+        double most = 0;
+        for (const Point& p : over) most = std::max(most, others_.distance(nearest).square(p.data()));
+        return most;
+    }
+
+    // Whether a piece is within the tolerance of a plane.
+    bool flat(const Piece& piece, const Plane& plane) const {
+        return std::all_of(piece.corner, piece.corner + 3, [&](const Point& p) {
+            double d = plane.above(p);
+            return d * d <= limit_;
+        });
     }
 
     // Cuts a piece in two. The longest edge between corners that are near different triangles is cut where both are equally
@@ -126,7 +165,7 @@ class Bound {
     double limit_;
     std::array<size_t, 3> hints_{};
     std::vector<size_t> beyond_;
-    Piece pieces_[kDepth + 2];
+    std::vector<Piece> pieces_;
 };
 
 }  // namespace fracslice
