@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import SliceError
+from ..formulas.parameters import settled
+from ..scene.lengths import Length
 from ..work import Work
 from .layers import Layer, Slicer
 from .stack import Stack

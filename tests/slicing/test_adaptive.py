@@ -54,5 +54,5 @@ def test_the_same_for_any_number_of_threads() -> None:
 
 @pytest.mark.parametrize("most", [0.01, math.nan, math.inf])
 def test_impossible_ranges(most: float) -> None:
-    with pytest.raises(SliceError, match="expected a (range|length)"):
+    with pytest.raises(SliceError, match=r"expected a (range|length)"):
         adapted(planned(sphere()), most)
