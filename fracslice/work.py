@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import TYPE_CHECKING, TypeVar
 
 from .errors import Cancelled, SceneError
@@ -20,6 +19,10 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+
+_POOL = ThreadPoolExecutor(256, "fracslice")
+"""Threads that help, started when first needed and kept: starting one takes longer than many a task."""
 
 
 def _silent(stage: str, done: float) -> None:
@@ -85,7 +88,7 @@ class Work:
                 queue = iter(())
                 raise
 
-        helpers = [_pool().submit(drain) for _ in range(min(self.threads, len(items)) - 1)]
+        helpers = [_POOL.submit(drain) for _ in range(min(self.threads, len(items)) - 1)]
         try:
             drain()
         except KeyboardInterrupt:
@@ -97,12 +100,6 @@ class Work:
         for helper in begun:
             helper.result()
         self.check()
-
-
-@lru_cache(maxsize=1)
-def _pool() -> ThreadPoolExecutor:
-    """Threads that help, started when first needed and kept: starting one takes longer than many a task."""
-    return ThreadPoolExecutor(256, "fracslice")
 
 
 def chunks(count: int, size: int) -> list[slice]:

@@ -214,12 +214,15 @@ def _small(stored: NpzFile, name: str, most: int = 0) -> np.ndarray:
 @lru_cache(maxsize=4)
 def first_passes(width: int, height: int, coarse: int) -> tuple[np.ndarray, ...]:
     """The pixels of the passes until each has a sample, as `ordered` has them: a grid, and the others if
-    there are any."""
+    there are any. Read-only."""
     order = ordered(width, height)
     if coarse == 1:
         return (order,)
     first = ((order >> 16) % coarse == 0) & ((order & 65535) % coarse == 0)
-    return order[first], order[~first]
+    parts = order[first], order[~first]
+    for pixels in parts:
+        pixels.setflags(write=False)
+    return parts
 
 
 def around(values: np.ndarray) -> np.ndarray:

@@ -20,9 +20,6 @@ pixels instead, and parts smaller than that which touch no probe are not found.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 
 from .._slices import BorderError, Bounds, Called, Compiled, Field, Memory, Slab
@@ -37,7 +34,6 @@ STOP = 2, 4
 """Pixels, outside and inside."""
 
 
-@dataclass(frozen=True, eq=False)
 class Sampler:
     """Samples slabs of a stack; may be used from many threads.
 
@@ -45,11 +41,19 @@ class Sampler:
     shape: lattice points (ny, nx).
     """
 
-    kernel: Kernel
-    root: Node | Compilable
-    facts: Facts
-    frame: np.ndarray
-    shape: tuple[int, int]
+    def __init__(
+        self,
+        kernel: Kernel,
+        root: Node | Compilable,
+        facts: Facts,
+        frame: np.ndarray,
+        shape: tuple[int, int],
+    ) -> None:
+        self.frame, self.shape = frame, shape
+        self._memory, self._bounds = Memory(), _bounds(root, facts)
+        self._field: Field = (
+            Compiled(kernel.entry) if isinstance(kernel, CpuKernel) else Called(kernel.points)
+        )
 
     def slab(self, z: np.ndarray) -> Slab:
         """Neighbouring layers at heights `z` (scene units), none of them sampled."""
@@ -63,24 +67,14 @@ class Sampler:
         except BorderError as error:
             raise SliceError(f"{error}; give it finite <bounds>") from None
 
-    @cached_property
-    def _memory(self) -> Memory:
-        return Memory()
 
-    @cached_property
-    def _field(self) -> Field:
-        return (
-            Compiled(self.kernel.entry) if isinstance(self.kernel, CpuKernel) else Called(self.kernel.points)
-        )
-
-    @cached_property
-    def _bounds(self) -> Bounds:
-        bound, weak = self.facts.lipschitz, self.facts.weak
-        even = weak and is_fractal(self.root)
-        if even:
-            return Bounds(bound, bound * LIKELY[0], bound * LIKELY[1], 1, 1, True)
-        stop = STOP if weak else (1, 1)
-        return Bounds(bound, bound, bound, *stop, False)
+def _bounds(root: Node | Compilable, facts: Facts) -> Bounds:
+    bound, weak = facts.lipschitz, facts.weak
+    even = weak and is_fractal(root)
+    if even:
+        return Bounds(bound, bound * LIKELY[0], bound * LIKELY[1], 1, 1, True)
+    stop = STOP if weak else (1, 1)
+    return Bounds(bound, bound, bound, *stop, False)
 
 
 def is_fractal(root: Node | Compilable) -> bool:
