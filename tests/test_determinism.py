@@ -20,8 +20,10 @@ import pytest
 from fracslice.formulas import difference, julia, sphere
 from fracslice.kernel import CpuKernel, compile_scene, cpu
 from fracslice.mesh.extract import contour
+from fracslice.printing.walls import Walls
 from fracslice.render import Renderer
 from fracslice.render import cpu as tiles
+from fracslice.render.film import reinhard
 from fracslice.scene.view import View
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.volume import Lattice, roots, sample
@@ -100,3 +102,27 @@ def made_often(name: str, times: int) -> None:
         patch.setattr(CpuKernel, "batch", 512 * 4)
         patch.setattr(tiles, "TILE", 64)
         print(json.dumps(sorted({made(name, 8) for _ in range(times)})))
+
+
+def test_no_bit_depends_on_the_processor_s_algebra() -> None:
+    """A library of linear algebra sums in the order that suits a processor; sums over points are not its."""
+    program = "from tests.test_determinism import summed; summed()"
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "OPENBLAS_CORETYPE": core},
+            cwd=Path(__file__).parents[1],
+            capture_output=True,
+            check=True,
+        ).stdout
+        for core in ("Nehalem", "Haswell")
+    }
+    assert len(found) == 1
+
+
+def summed() -> None:
+    """Prints the hashes of sums over the coordinates or colours of many points."""
+    rng = np.random.default_rng(0)
+    light, ends = rng.random((64, 64, 3), np.float32), rng.random((2, 1000, 3))
+    sums = reinhard(light), Walls(*ends, *rng.random((2, 1000))).along((0.48, 0.6, 0.64)).width
+    print([hashlib.sha256(np.ascontiguousarray(found).tobytes()).hexdigest() for found in sums])

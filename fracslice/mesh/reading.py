@@ -187,7 +187,8 @@ class _Package:
         inner = [self.placed(part, at, depth + 1) for part, at in self.parts[name]]
         whole = joined([self.meshes[name], *inner])
         order = -1 if np.linalg.det(matrix[:3]) < 0 else 1
-        return Mesh(whole.vertices @ matrix[:3] + matrix[3], whole.triangles[:, ::order])
+        turned = sum(whole.vertices[:, k, None] * matrix[k] for k in range(3))
+        return Mesh(turned + matrix[3], whole.triangles[:, ::order])
 
 
 def _matrix(text: str | None) -> NDArray[np.float64]:

@@ -71,6 +71,6 @@ def _times(bricks: Bricks, thin: Walls, least: float) -> float:
 
 def _thinnest(found: Walls) -> float:
     """The width that a hundredth of the surface is under."""
-    order = np.argsort(found.width)
+    order = np.argsort(found.width, kind="stable")
     upto = np.cumsum(found.area[order])
     return float(found.width[order][np.searchsorted(upto, 0.01 * upto[-1])])

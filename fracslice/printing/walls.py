@@ -55,7 +55,7 @@ class Walls(Rows):
     def along(self, direction: Direction) -> Walls:
         """Those whose faces look along a direction or against it, measured along it."""
         way = self.end - self.start
-        share = way @ np.array(direction) / np.linalg.norm(way, axis=1)
+        share = (way * direction).sum(1) / np.linalg.norm(way, axis=1)
         width = self.width / np.maximum(np.abs(share), 1e-9)
         end = self.start + np.copysign(width, share)[:, None] * np.array(direction)
         return Walls(self.start, end, width, self.area).chosen(np.abs(share) > -OPPOSITE)
@@ -80,7 +80,7 @@ def walls(
         points, normals, area = crossed(solid, rows)
         ways = -towards * normals
         if direction is not None:
-            ways = np.copysign(1, ways @ np.array(direction))[:, None] * np.array(direction)
+            ways = np.copysign(1, (ways * direction).sum(1))[:, None] * np.array(direction)
         width = np.empty(len(points))
         _through(points, ways, limit, towards, *b.origin, b.voxel, b.index, solid.bounds, b.values, width)
         thin = (width < limit) & (np.abs((normals * ways).sum(1)) > -OPPOSITE)

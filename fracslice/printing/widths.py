@@ -28,7 +28,7 @@ def widths_of(values: np.ndarray, weights: np.ndarray | None = None) -> Widths |
     if not len(values):
         return None
     weight = np.ones(len(values)) if weights is None else weights
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     upto = np.cumsum(weight[order])
     at = np.searchsorted(upto, np.array([0, 0.01, 0.5]) * upto[-1])
     low, hundredth, middle = values[order][np.minimum(at, len(values) - 1)].tolist()

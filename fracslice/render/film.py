@@ -45,7 +45,7 @@ def filmic(light: np.ndarray) -> np.ndarray:
 
 def reinhard(light: np.ndarray) -> np.ndarray:
     """Reinhard et al. 2002, with white at 4: bright colours keep their hue."""
-    y = light @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+    y = (light * np.array([0.2126, 0.7152, 0.0722], np.float32)).sum(-1)
     return np.asarray(light * ((1 + y / 16) / (1 + y))[..., None], np.float32)
 
 
