@@ -308,17 +308,24 @@ def test_time_is_linear_in_the_holes() -> None:
 
 @pytest.mark.parametrize("root", [sphere(), julia(iterations=7)], ids=["sphere", "julia"])
 def test_a_millimetre_is_a_millimetre(root: Node) -> None:
-    """What is cut off or stands below is exact, and the size before that, of a mesh that lacks tips."""
+    """What is cut off or stands below is exact, and so is the scale: they are the field's."""
 
-    def size(**printing: float) -> np.ndarray:
+    def made(**printing: float) -> tuple[np.ndarray, float]:
         how = Print(**printing)  # type: ignore[arg-type]
-        return make_mesh(scene(root, size="80mm", printing=how), MeshJob(resolution=64)).mesh.size
+        result = make_mesh(scene(root, size="80mm", printing=how), MeshJob(resolution=64))
+        return result.mesh.size, result.place.scale
 
-    plain = size()
-    assert 80 - 80 / 64 < plain.max() <= 80
-    np.testing.assert_allclose(size(base=1), plain - np.array([0, 0, 1]), atol=1e-3)
-    np.testing.assert_allclose(size(base=1, raft=1.5), plain + np.array([16, 16, -0.25]), atol=1e-3)
-    np.testing.assert_allclose(size(hollow=3, drain=0), plain, atol=1e-3)
+    (plain, scale), (cut, _), (raft, same), (hollow, _) = (
+        made(**how) for how in ({}, {"base": 1}, {"base": 1, "raft": 1.5}, {"hollow": 3, "drain": 0})
+    )
+    own = np.array(plan(root, 64).box.size) * scale
+    assert own.max() == pytest.approx(80, abs=1e-3) and same == pytest.approx(scale, rel=1e-6)
+    assert ((own - 1.25 < plain) & (plain <= own + 1e-3)).all()
+    np.testing.assert_allclose(raft[:2], own[:2] + 16, atol=1e-3)
+    lost = (own - plain)[2]  # at the top and at the bottom; what is cut off or added has no tip
+    assert (plain[2] - 1e-3 <= cut[2] + 1 <= plain[2] + lost + 1e-3).all()
+    assert raft[2] - cut[2] == pytest.approx(0.75, abs=1e-3)
+    np.testing.assert_allclose(hollow, plain, atol=1e-3)
 
 
 def holes(root: Node) -> tuple[Callable[..., bool], float]:

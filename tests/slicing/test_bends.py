@@ -72,7 +72,7 @@ def test_small_layers_of_a_ball(pixels: int, layer: float) -> None:
 
 def test_straight_sides_get_nothing_but_corners() -> None:
     """Between crossings of rows and columns of samples: as many as corners."""
-    contours, _ = middle(stack_of(transform(box(), rotate=(0, 0, 1, 31)), 60, 1.0))
+    contours, _ = middle(stack_of(transform(box(), rotate=(0, 0, 1, 31)), 60.3, 1.0))
     lattice = contours.points / PIXEL
     beside = np.abs(lattice - np.round(lattice)).min(1) > 1e-6
     assert beside.sum() == 4
