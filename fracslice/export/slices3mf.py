@@ -17,7 +17,6 @@ from fracslice.mesh import Mesh
 from fracslice.mesh.clean import clean
 from fracslice.mesh.components import select
 from fracslice.mesh.extract import contour
-from fracslice.printing.apart import shown
 from fracslice.slicing import Layer
 
 LEVEL = 1
@@ -84,6 +83,8 @@ def _middle(run: SliceRun) -> np.ndarray:
 
 def _mesh(run: SliceRun) -> Mesh:
     """The object's mesh in mm, where its slices are."""
+    from fracslice.printing.apart import shown  # it needs Numba, and other formats do not
+
     stack, longest = run.stack, max(run.stack.size)
     finest = max(*stack.pixel, float(stack.heights.max()))
     samples = min(longest / finest, ALONG)

@@ -8,7 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from .._slices import Slab
 from ..kernel import Kernel, compile_scene
 from ..work import Work
 from .contours import Contours, contours
-from .runs import Runs
 from .slab import Sampler
 from .stack import Stack
+
+if TYPE_CHECKING:
+    from .runs import Runs
 
 SLAB = 8
 """Layers that are computed together."""
@@ -91,6 +93,8 @@ class Layer:
     @cached_property
     def runs(self) -> Runs:
         """Its solid pixels: those of which at least half is inside."""
+        from .runs import Runs  # it needs Numba, and a job does not
+
         rows, runs, area, cut = self.slab.runs(self.place, self.stack.shape)
         self._painted = area, cut
         begin, end = np.ascontiguousarray(runs.T)
