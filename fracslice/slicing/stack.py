@@ -16,7 +16,7 @@ from ..kernel import Compilable
 from ..printing import printable
 from ..scene import Print
 from ..scene.lengths import Length, Pair
-from ..volume import DETAIL, plan, with_depths
+from ..volume import plan, with_depths
 from ..work import Work
 
 MOST_LAYERS = 100_000
@@ -130,4 +130,4 @@ def _turned(root: Node, up: tuple[float, float, float], work: Work | None) -> No
         return root
     if not np.linalg.norm(axis) > 0:
         axis = np.array([1.0, 0.0, 0.0])
-    return transform(with_depths(root, DETAIL, work)[0], rotate=(*axis.tolist(), angle))
+    return transform(with_depths(root, work), rotate=(*axis.tolist(), angle))

@@ -41,6 +41,10 @@ DETAIL = 512
 move most of the surface by, is below a pixel of 0.05 mm in an object of 50 mm."""
 
 
+COARSE = 64
+"""Voxels along the longest side that its length is known to a quarter of, for depths to follow from it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """What is about to be sampled: the scene with all depths known, the object's box, a box that surely
@@ -61,28 +65,31 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
 
     resolution: voxels along the object's longest side (need not be whole). Raises `VolumeError`.
     """
-    known, found = with_depths(root, resolution, work)
+    known = with_depths(root, work)
+    found = extent(known, resolution, work)
     voxel = max(found.box.size) / resolution
     shown, notes = visible(known, voxel)
     return Plan(shown, found.box, found.outer, found.tips, voxel, notes, told_depths(root, known))
 
 
-def with_depths(root: Node, resolution: float, work: Work | None = None) -> tuple[Node, Extent]:
-    """The scene with every automatic depth replaced by a number, and its extent for a resolution.
+def with_depths(root: Node, work: Work | None = None) -> Node:
+    """The scene with every automatic depth replaced by a number.
 
     The depths follow from the object alone, whatever it is sampled for: a mesh, layers and what checks them
     are of the same solid. Raises `VolumeError`.
     """
+    if not root.facts.box.finite:
+        return root
     size = max(root.facts.box.size)
-    known = resolve_depths(root, size / DETAIL) if root.facts.box.finite else root
-    while True:
-        found = extent(known, resolution, work)
-        # A deeper solid is smaller, so that finer detail counts, until no depth changes any more.
-        size = min(size, max(found.box.size))
+    known = resolve_depths(root, size / DETAIL)
+    # A deeper solid is smaller, so that finer detail counts, until no depth changes any more.
+    while known is not root:
+        size = min(size, max(extent(known, COARSE, work).box.size))
         deeper = resolve_depths(root, size / DETAIL)
         if deeper == known:
-            return known, found
+            break
         known = deeper
+    return known
 
 
 def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:

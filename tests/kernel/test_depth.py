@@ -67,10 +67,10 @@ def depths(root: Node) -> list[int]:
 @pytest.mark.parametrize("root", [mandelbulb(), union(julia(), transform(mandelbulb(power=3), scale=0.3))])
 def test_an_automatic_depth_is_the_objects_own_whatever_it_is_made_for(root):
     """Meshes of 48 and 512 voxels, and layers, were of other solids: 2.32 and 2.22 cm3."""
-    known = depths(with_depths(root, 48)[0])
+    known = depths(with_depths(root))
     job = SliceJob(20, 0.1, (0.05, 0.05))
     stacks = [plan_stack(root, replace(job, up=up)).root for up in ((0, 0, 1), (1, 1, 1))]
-    assert all(depths(plan(root, n).root) == known for n in (48, 512))
+    assert all(depths(plan(root, n).root) == known for n in (9, 48, 512))
     assert all(depths(stack) == known for stack in stacks)
     assert [int(told.split()[1]) for told in plan(root, 48).depths] == known
     assert known > depths(resolve_depths(root, 0.05))

@@ -7,7 +7,6 @@ import math
 import pytest
 
 from fracslice.formulas import Box, Node, box, difference, julia, menger, sphere, transform, union
-from fracslice.kernel import compile_scene
 from fracslice.volume import extent
 from fracslice.volume.amount import Amount, amount, finer
 
@@ -16,7 +15,7 @@ PLATE = transform(box(size=(2, 2, 0.02)), translate=(0, 0, 0.0123), rotate=(1, 0
 
 
 def of(root: Node) -> Amount:
-    return amount(root, [extent(compile_scene(root), root.facts).outer])
+    return amount(root, [extent(root, 64).outer])
 
 
 @pytest.mark.parametrize(
