@@ -59,6 +59,11 @@ class Plan:
     notes: tuple[str, ...] = ()
     depths: tuple[str, ...] = ()
 
+    @property
+    def lattice(self) -> Lattice:
+        """The grid that it is sampled on."""
+        return Lattice.around(self.outer, self.voxel, self.box)
+
 
 def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
     """Finds the object's size and depths, and leaves out what a resolution cannot show.
@@ -98,7 +103,7 @@ def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
     Raises `VolumeError`, `Cancelled`.
     """
     work = work or Work()
-    lattice = Lattice.around(planned.outer, planned.voxel)
+    lattice = planned.lattice
 
     fresh: list[Bricks] = []
 
@@ -117,7 +122,7 @@ def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
 def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
     """As `sample_scene`, of each sample only its sign."""
     work = work or Work()
-    lattice = Lattice.around(planned.outer, planned.voxel)
+    lattice = planned.lattice
     kernel, facts, guard = _fields(planned, work)
     return sample_signs(kernel, facts, lattice, work, guard)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from fracslice._native import Cells, Contouring
 from fracslice.errors import MeshError
@@ -16,6 +17,7 @@ from fracslice.formulas import (
     Node,
     box,
     difference,
+    intersection,
     julia,
     mandelbulb,
     menger,
@@ -85,6 +87,19 @@ def test_known_volumes_and_areas(root: Node, volume: float, area: float) -> None
     mesh = made(root, 128)
     assert mesh.volume == pytest.approx(volume, rel=1e-3)
     assert mesh.area == pytest.approx(area, rel=1e-3)
+    assert_solid(mesh)
+
+
+def test_a_slab_cut_by_faces_in_planes_of_grid_points() -> None:
+    """An odd number of voxels along a box: its edges with a slanted slab are not seen a voxel away only."""
+    slab = transform(box(size=(6, 6, 0.4)), rotate=(1, 2, 0.5, 50))
+    mesh = made(intersection(box(size=(2, 2, 2)), slab), 41)
+    axis = np.array([1, 2, 0.5]) / np.linalg.norm([1, 2, 0.5])
+    normal = Rotation.from_rotvec(np.radians(50) * axis).apply([0, 0, 1])
+    normals = mesh.normals / np.linalg.norm(mesh.normals, axis=1)[:, None]
+    faces = np.abs(normals @ np.vstack([np.eye(3), normal]).T).max(axis=1)
+    area = np.linalg.norm(mesh.normals, axis=1) / 2
+    assert area[faces < np.cos(np.radians(5))].sum() < 0.01 * mesh.area
     assert_solid(mesh)
 
 

@@ -121,9 +121,7 @@ def test_plates_however_near_stay_two(thick: float, gap: float) -> None:
 def test_what_is_thick_is_not_looked_at_again() -> None:
     for root, loose in ((box(), True), (mandelbulb(iterations=4), False)):
         planned = plan(root, 48)
-        bricks = sample(
-            compile_scene(planned.root), planned.root.facts, Lattice.around(planned.outer, planned.voxel)
-        )
+        bricks = sample(compile_scene(planned.root), planned.root.facts, planned.lattice)
         assert resolved(planned.root, bricks, 1e-3, loose, Work()) is bricks
 
 

@@ -70,7 +70,7 @@ def test_closed_and_equal_to_dense_sampling(name: str) -> None:
     bricks = sample_scene(planned)
     assert open_edges(bricks) == 0
     inside, sampled = unfolded(bricks)
-    truth = dense(planned.root, Lattice.around(planned.outer, planned.voxel)) < 0
+    truth = dense(planned.root, planned.lattice) < 0
     # What differs can only be pockets sealed in the inside of an escape-time fractal, which are filled.
     differing = inside != truth
     assert not (differing & ~inside).any()
