@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .formulas import Box
+from .formulas.algebra import dot
 from .formulas.box import Triple
 from .report import Amount
 from .volume import Lattice, Plan
@@ -59,7 +60,7 @@ def layers_amount(stack: Stack, work: Work) -> tuple[Amount, tuple[str, ...]]:
         return f"pixels of {share * min(stack.pixel):.2g} mm and layers of {share * least:.2g} mm"
 
     grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), told
-    return _compared(stack.root, boxes, float(areas @ stack.heights[layers]), stack.scale, grid, work)
+    return _compared(stack.root, boxes, dot(areas, stack.heights[layers]), stack.scale, grid, work)
 
 
 def _compared(

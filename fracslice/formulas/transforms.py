@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .algebra import inverse, length, product, stretches
 from .box import Box
 from .parameters import REQUIRED, SMALLEST, Axis, Vector
 from .registry import Fixed, Node, warp
@@ -21,13 +22,13 @@ from .vocabulary import absolute
     scale=Vector((1.0,), "one factor, or one per axis, first", sizes=(1, 3)),
     matrix=Vector(None, "3 x 4 or 4 x 4 numbers row by row, applied before the other three", sizes=(12, 16)),
 )
-def transform(child, x, y, z, inverse, shrink):  # type: ignore[no-untyped-def]
+def transform(child, x, y, z, back, shrink):  # type: ignore[no-untyped-def]
     """Scaled, then rotated, then moved.
 
     The child's field is multiplied by the smallest stretch of the map, its smallest singular value: f never
     grows faster than the child's (L = the child's), and is a distance where the scale is uniform.
     """
-    a, b, c, d, e, f, g, h, i, tx, ty, tz = inverse
+    a, b, c, d, e, f, g, h, i, tx, ty, tz = back
     return shrink * child(
         a * x + b * y + c * z + tx,
         d * x + e * y + f * z + ty,
@@ -42,10 +43,10 @@ def moved(child, x, y, z, offset):  # type: ignore[no-untyped-def]
 
 def _rotation(rotate: Sequence[float]) -> np.ndarray:
     """Rodrigues' formula."""
-    axis = np.array(rotate[:3]) / np.linalg.norm(rotate[:3])
+    axis = np.array(rotate[:3]) / length(np.array(rotate[:3]))
     angle = math.radians(rotate[3])
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    turn: np.ndarray = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    turn: np.ndarray = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * product(cross, cross)
     return turn
 
 
@@ -53,12 +54,12 @@ def affine(node: Node) -> tuple[np.ndarray, np.ndarray]:
     """The 3 x 3 matrix and the translation of a transform node."""
     linear = np.diag(np.broadcast_to(np.array(node["scale"]), 3))
     if node["rotate"]:
-        linear = _rotation(node["rotate"]) @ linear
+        linear = product(_rotation(node["rotate"]), linear)
     offset = np.array(node["translate"])
     if node["matrix"]:
         given = np.array(node["matrix"][:12]).reshape(3, 4)
-        offset = offset + linear @ given[:, 3]
-        linear = linear @ given[:, :3]
+        offset = offset + product(linear, given[:, 3])
+        linear = product(linear, given[:, :3])
     return linear, offset
 
 
@@ -68,7 +69,7 @@ def _(node: Node) -> None:
         raise node.fail("rotate: expected an axis that is not zero, then degrees")
     if node["matrix"] and len(node["matrix"]) == 16 and node["matrix"][12:] != (0, 0, 0, 1):
         raise node.fail("matrix: expected the last row 0 0 0 1")
-    stretch = np.linalg.svd(affine(node)[0], compute_uv=False)
+    stretch = stretches(affine(node)[0])
     if not stretch[-1] > max(1e-9 * stretch[0], SMALLEST / 2):
         raise node.fail("scale or matrix: expected a map that does not flatten space")
 
@@ -89,9 +90,9 @@ def _(node: Node) -> dict[str, object]:
     linear, offset = affine(node)
     if node.function is moved:
         return {"offset": tuple(offset.tolist())}
-    inverse = np.linalg.inv(linear)
-    flat = [*inverse.ravel().tolist(), *(-inverse @ offset).tolist()]
-    return {"inverse": tuple(flat), "shrink": float(np.linalg.svd(linear, compute_uv=False)[-1])}
+    undone = inverse(linear)
+    flat = [*undone.ravel().tolist(), *(-product(undone, offset)).tolist()]
+    return {"back": tuple(flat), "shrink": float(stretches(linear)[-1])}
 
 
 @transform.bounds

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..formulas.algebra import length
 from ..formulas.box import Box
 
 FIRST = 8
@@ -29,7 +30,7 @@ def possible_cells(
     eighths = np.indices((2, 2, 2)).reshape(3, 1, 8) / 2 - 0.25
     for level in range(LEVELS):
         values = field(centres)
-        kept = ~(values > lipschitz * np.linalg.norm(step) / 2)
+        kept = ~(values > lipschitz * length(step) / 2)
         centres, values = centres[:, kept], values[kept]
         if 8 * centres.shape[1] > most or level == LEVELS - 1:
             break

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..formulas.algebra import stretches
 from ..formulas.parameters import AUTO
 from ..formulas.registry import Node
 from ..formulas.transforms import affine
@@ -62,7 +63,7 @@ def _within(node: Node, voxel: float) -> float:
     """A voxel in the units of a node's children: the largest, where a transform stretches."""
     if node.formula.name != "transform":
         return voxel
-    return voxel / float(np.linalg.svd(affine(node)[0], compute_uv=False)[-1])
+    return voxel / float(stretches(affine(node)[0])[-1])
 
 
 def _depth(node: Node, detail: float) -> int:

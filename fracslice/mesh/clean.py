@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice.formulas.algebra import dot, length
 from fracslice.mesh.model import Mesh
 from fracslice.mesh.rounding import float32_points, rounded
 
@@ -84,7 +85,7 @@ class _Surface:
         any(self.collapse(*edge) or self.collapse(*edge[::-1]) for edge in by_length)
 
     def length(self, a: int, b: int) -> float:
-        return float(np.linalg.norm(self.points[a] - self.points[b]))
+        return length(self.points[a] - self.points[b])
 
     def flip(self, triangle: int, a: int, c: int) -> bool:
         """Replace the triangle a b c and its neighbour over the edge a c, with d, by two that share b d."""
@@ -99,7 +100,7 @@ class _Surface:
         old = self.normal(self.triangles[other])
         first = _with(self.triangles[other], c, b)  # a, b, d the way round the neighbour runs
         second = _with(self.triangles[other], a, b)
-        if min(self.normal(first) @ old, self.normal(second) @ old) <= 0:
+        if min(dot(self.normal(first), old), dot(self.normal(second), old)) <= 0:
             return False
         self.triangles[triangle], self.triangles[other] = first, second
         self.bad -= {triangle, other}
@@ -122,7 +123,7 @@ class _Surface:
         opened = set()
         for triangle, corners in new.items():
             normal, old = self.normal(corners), self.normal(self.triangles[triangle])
-            if old.any() and normal @ old <= 0:
+            if old.any() and dot(normal, old) <= 0:
                 return False
             if normal.any() and not old.any():
                 opened.add(triangle)

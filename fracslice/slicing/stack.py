@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import SceneError, SliceError
 from ..formulas import transform
+from ..formulas.algebra import length
 from ..formulas.box import Box
 from ..formulas.parameters import REQUIRED, Vector, settle
 from ..formulas.registry import Node
@@ -123,11 +124,11 @@ def _tops(height: float, layer: float) -> np.ndarray:
 
 def _turned(root: Node, up: tuple[float, float, float], work: Work | None) -> Node:
     """The scene turned so that `up` points along z, by the shortest way; as deep as it is unturned."""
-    direction = np.asarray(up, float) / np.linalg.norm(up)
+    direction = np.asarray(up, float) / length(np.asarray(up, float))
     axis = np.cross(direction, (0.0, 0.0, 1.0))
-    angle = math.degrees(math.atan2(float(np.linalg.norm(axis)), float(direction[2])))
+    angle = math.degrees(math.atan2(length(axis), float(direction[2])))
     if angle == 0:
         return root
-    if not np.linalg.norm(axis) > 0:
+    if not length(axis) > 0:
         axis = np.array([1.0, 0.0, 0.0])
     return transform(with_depths(root, work), rotate=(*axis.tolist(), angle))

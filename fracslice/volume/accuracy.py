@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 
+from ..formulas.algebra import length
 from ..formulas.box import Box
 from ..formulas.registry import Node
 from ..kernel import Compilable, compile_scene
@@ -76,7 +77,7 @@ def surface_error(
         flat = np.flatnonzero(np.abs(f) > FLAT * voxel * steep)
         if len(flat):
             for way in DIAGONALS:
-                step = h / np.linalg.norm(way) * way
+                step = h / length(way) * way
                 there = kernel.points(*(p[:, flat] + step[:, None]))
                 steep[flat] = np.maximum(steep[flat], np.abs(there - f[flat]) / h)
         error[part] = np.minimum(np.abs(f) / np.maximum(steep, 1e-30), voxel)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..formulas import Box
+from ..formulas.algebra import length
 from ..formulas.registry import Facts, Node
 from ..kernel import Compilable, Kernel, compile_scene
 from ..kernel.cells import possible_cells
@@ -73,7 +74,7 @@ def _part(kernel: Kernel, guard: Kernel, facts: Facts, box: Box, boxes: int, wor
     cells, values, step = possible_cells(
         lambda p: values_at(guard, p, work), facts.lipschitz, box, CELLS // boxes
     )
-    full = (values < -facts.lipschitz * np.linalg.norm(step) / 2) & (not facts.weak)
+    full = (values < -facts.lipschitz * length(step) / 2) & (not facts.weak)
     cells, whole = cells[:, ~full], int(full.sum())
     each = min(max(POINTS // boxes // max(cells.shape[1], 1), 2), MOST_EACH)
     rng = np.random.default_rng(0)

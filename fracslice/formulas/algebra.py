@@ -1,0 +1,74 @@
+"""Linear algebra in three dimensions that rounds alike everywhere.
+
+Libraries of linear algebra choose the order of their sums, and what they fuse, by the processor; a scene that
+is turned would have other parameters, and another mesh in its last bits, on another machine.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+SWEEPS = 60
+SMALL = 2.0**-52
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The product of a matrix [n, k] and a matrix [k, m] or a vector [k]."""
+    terms = [np.multiply.outer(a[:, k], b[k]) for k in range(a.shape[1])]
+    total: np.ndarray = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> float:
+    """The inner product of two vectors."""
+    total = 0.0
+    for x, y in zip(a.tolist(), b.tolist(), strict=True):
+        total += x * y
+    return total
+
+
+def length(vector: np.ndarray) -> float:
+    """The Euclidean norm of a vector."""
+    return math.sqrt(dot(vector, vector))
+
+
+def inverse(matrix: np.ndarray) -> np.ndarray:
+    """The inverse of a matrix [3, 3], by Gauss and Jordan's elimination with partial pivoting."""
+    rows = np.hstack([np.asarray(matrix, float), np.eye(3)])
+    for k in range(3):
+        pivot = k + int(np.abs(rows[k:, k]).argmax())
+        rows[[k, pivot]] = rows[[pivot, k]]
+        rows[k] = rows[k] / rows[k, k]
+        for other in {0, 1, 2} - {k}:
+            rows[other] = rows[other] - rows[other, k] * rows[k]
+    return rows[:, 3:]
+
+
+def stretches(matrix: np.ndarray) -> np.ndarray:
+    """The singular values of a matrix [3, 3], the largest first.
+
+    One-sided Jacobi rotations make its columns orthogonal (Hestenes 1958, "Inversion of matrices by
+    biorthogonalization and related results").
+    """
+    columns = np.array(matrix, float).T.copy()
+    for _ in range(SWEEPS):
+        turned = False
+        for p, q in ((0, 1), (0, 2), (1, 2)):
+            a, b = dot(columns[p], columns[p]), dot(columns[q], columns[q])
+            both = dot(columns[p], columns[q])
+            if abs(both) <= SMALL * math.sqrt(a * b):
+                continue
+            half = (b - a) / (2 * both)
+            tangent = math.copysign(1 / (abs(half) + math.sqrt(1 + half * half)), half)
+            cosine = 1 / math.sqrt(1 + tangent * tangent)
+            sine = cosine * tangent
+            one, other = columns[p], columns[q]
+            columns[p], columns[q] = cosine * one - sine * other, sine * one + cosine * other
+            turned = True
+        if not turned:
+            break
+    return np.sort([length(column) for column in columns])[::-1]
