@@ -26,7 +26,10 @@ ESCAPED = 256.0
         most=4,
     ),
     iterations=Count(
-        AUTO, 'steps of the orbit; "auto": until one more moves most by a thousandth', least=1, auto=True
+        AUTO,
+        'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
+        least=1,
+        auto=True,
     ),
     bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
 )

@@ -41,7 +41,10 @@ evaluations, but makes the levels steeper that seams lie on.
         8.0, "the exponent; whole numbers need no trigonometry and are several times faster", least=2, most=32
     ),
     iterations=Count(
-        AUTO, 'steps of the orbit; "auto": until one more moves most by a thousandth', least=1, auto=True
+        AUTO,
+        'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
+        least=1,
+        auto=True,
     ),
     bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
     julia=Vector(

@@ -36,10 +36,9 @@ __all__ = [
 ]
 
 
-DETAIL = 512
-"""The finest detail of automatic depths, along the object's longest side. Half of it, which the next step may
-move most of the surface by, is below a pixel of 0.05 mm in an object of 50 mm."""
-
+DETAIL = 256
+"""The finest detail of automatic depths, along the object's longest side: a mesh shows it if nothing else is
+asked for. The next step would move most of the surface by less than half of it."""
 
 COARSE = 64
 """Voxels along the longest side that its length is known to a quarter of, for depths to follow from it."""

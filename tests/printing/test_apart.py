@@ -149,7 +149,7 @@ def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest() -> None:
     assert whole.report.mesh.components == kept.report.mesh.components + 1 > 100
     assert kept.mesh.size == pytest.approx([20] * 3, rel=0.03)
     for result, size in ((whole, 20 / 48), (kept, 20 / 48 * 2.4 / 2)):
-        (note,) = result.report.notes
+        note = result.report.notes[0]
         assert note.startswith("walls thinner than a voxel fell to pieces: ")
         assert float(note.split()[-2]) == pytest.approx(2 * size, rel=0.05)
 
@@ -168,6 +168,8 @@ def test_a_fractal_in_pieces_is_kept_and_thickened() -> None:
     report = make_mesh(scene(julias, size="40mm"), MeshJob(resolution=48, printing=how)).report
     low, high = np.array(report.mesh.bbox_mm)
     assert (high - low).max() == pytest.approx(41.7, abs=0.5)
-    assert (report.mesh.components, report.notes) == (1, ())
+    assert report.mesh.components == 1
+    reports = [report]
     for fractal in (mandelbulb(), shell(mandelbulb(iterations=6), thickness=0.02)):
-        assert make_mesh(scene(fractal, size="40mm"), MeshJob(resolution=48)).report.notes == ()
+        reports.append(make_mesh(scene(fractal, size="40mm"), MeshJob(resolution=48)).report)
+    assert not any("fell to pieces" in note for report in reports for note in report.notes)
