@@ -51,7 +51,7 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
             for way in (-1, 1):
                 there, to = row, s + (way << shift)
                 if not 0 <= at + way < 8:
-                    there, to = _beside(index, ijk, row, axis, way), to - (way << (shift + 3))
+                    there, to = beside(index, ijk, row, axis, way), to - (way << (shift + 3))
                 if there >= 0 and steps[there, to] == FAR and steps[row, s] + 1 < FAR:
                     steps[there, to] = steps[row, s] + 1
                     queue[last] = 512 * there + to
@@ -60,7 +60,7 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _beside(index, ijk, row, axis, way):  # type: ignore[no-untyped-def]
+def beside(index, ijk, row, axis, way):  # type: ignore[no-untyped-def]
     """The row of the next brick along an axis, negative for none."""
     x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
     x, y, z = x + way * (axis == 0), y + way * (axis == 1), z + way * (axis == 2)

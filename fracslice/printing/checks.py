@@ -131,9 +131,9 @@ def check_solid(
     """
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
-    solid = lengths(bricks, root.facts)
-    work.check()
     most = float(BINS[-1]) / scale
+    solid = lengths(bricks, root.facts, most)
+    work.check()
     thin, tight = slender(root, solid, work)
 
     def seen(**how: Any) -> Walls:

@@ -158,7 +158,7 @@ class _Run:
         """The same, as distances by which walls and gaps are measured."""
         from .samples import lengths
 
-        return lengths(self.sampled(length), self.thing.facts)
+        return lengths(self.sampled(length), self.thing.facts, length / self.scale)
 
     def filled(self) -> Node | Compilable:
         """The space that nothing reaches becomes solid."""

@@ -13,7 +13,6 @@ from ..formulas.registry import Facts
 from ..keys import key
 from ..volume import Bricks
 from ..volume.bricks import INSIDE
-from ..volume.grid import from_grid, to_grid
 from ..volume.lattice import BRICK
 
 NEAR = 1.5
@@ -56,12 +55,15 @@ class Samples:
         return out
 
 
-def lengths(bricks: Bricks, facts: Facts) -> Samples:
-    """Samples of a field as distances that none is larger than: its own values, or where those are far from
-    distances, as of escape-time fractals, swept ones (Zhao 2004).
+def lengths(bricks: Bricks, facts: Facts, limit: float) -> Samples:
+    """Samples of a field as distances that none is larger than, for walls and gaps up to `limit` scene units:
+    its own values, or where those are far from distances, as of escape-time fractals, measured ones.
     """
+    from .distances import distances
+
     if facts.weak:
-        return Samples(from_grid(to_grid(bricks).redistance()))
+        reach = limit / 2 + bricks.voxel
+        return Samples(distances(bricks, reach, reach))
     return Samples(replace(bricks, values=bricks.values / np.float32(facts.lipschitz)))
 
 

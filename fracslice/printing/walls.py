@@ -102,40 +102,70 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
     normals there, [n, 3], and how much of it each crossing stands for, [n], scene units.
     """
     b = solid.bricks
-    frame = (b.ijk[rows], b.voxel, b.index, solid.bounds, b.values[rows], b.values)
-    lower = np.empty((_edges(*frame, np.empty((0, 3), np.int64), np.empty(0, np.int64)), 3), np.int64)
-    axis = np.empty(len(lower), np.int64)
-    _edges(*frame, lower, axis)
-    here = np.asarray(b.origin) + b.voxel * lower
-    beyond = here + (b.voxel * np.eye(3))[axis]
-    f, g = solid.points(*here.T), solid.points(*beyond.T)
-    points = here + (f / np.where(f == g, 1, f - g))[:, None] * (beyond - here)
-    normals = normals_at(solid, points)
-    return points, normals, b.voxel**2 * np.abs(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
-
-
-@compiled
-def _edges(ijk, voxel, index, bounds, own, values, lower, axis):  # type: ignore[no-untyped-def]
-    n = 0
-    for row in range(len(ijk)):
-        for s in range(512):
-            x, y, z = ijk[row, 0] + (s >> 6), ijk[row, 1] + ((s >> 3) & 7), ijk[row, 2] + (s & 7)
-            inside = own[row, s] < 0
-            for a in range(3):
-                u, v, w = x + (a == 0), y + (a == 1), z + (a == 2)
-                if (sample_at(index, bounds, values, voxel, u, v, w) < 0) != inside:
-                    if n < len(axis):
-                        lower[n, 0], lower[n, 1], lower[n, 2], axis[n] = x, y, z, a
-                    n += 1
-    return n
+    own = b.values[rows]
+    points, normals = np.empty((2, 3 * own.size, 3))
+    area = np.empty(3 * own.size)
+    n = _cross(b.ijk[rows], own, *b.origin, b.voxel, b.index, solid.bounds, b.values, points, normals, area)
+    return points[:n].copy(), normals[:n].copy(), area[:n].copy()
 
 
 def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
     """Unit normals by central differences over a voxel, [n, 3]."""
-    half = solid.bricks.voxel / 2 * np.eye(3)
-    slope = np.stack([solid.points(*(points + s).T) - solid.points(*(points - s).T) for s in half], 1)
-    unit: np.ndarray = slope / np.maximum(np.linalg.norm(slope, axis=1), 1e-30)[:, None]
-    return unit
+    b, normals = solid.bricks, np.empty(points.shape)
+    _normals(points, *b.origin, b.voxel, b.index, solid.bounds, b.values, normals)
+    return normals
+
+
+@compiled
+def _cross(ijk, own, x0, y0, z0, voxel, index, bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
+    """Writes what `crossed` returns, and how many there are."""
+    n = 0
+    for row in range(len(ijk)):
+        for s in range(512):
+            f = float(own[row, s])
+            for axis in range(3):
+                shift = 6 - 3 * axis
+                u, v, w = _place(ijk, row, s)
+                if (s >> shift) & 7 < 7:
+                    g = float(own[row, s + (1 << shift)])
+                else:
+                    there = u + (axis == 0), v + (axis == 1), w + (axis == 2)
+                    g = sample_at(index, bounds, values, voxel, *there)
+                if (f < 0) == (g < 0):
+                    continue
+                points[n] = x0 + voxel * u, y0 + voxel * v, z0 + voxel * w
+                points[n, axis] += voxel * f / (f - g)
+                x, y, z = points[n]
+                normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, bounds, values)
+                area[n] = voxel * voxel * abs(normals[n, axis])
+                n += 1
+    return n
+
+
+@compiled
+def _place(ijk, row, s):  # type: ignore[no-untyped-def]
+    """The grid index of a sample."""
+    return ijk[row, 0] + (s >> 6), ijk[row, 1] + ((s >> 3) & 7), ijk[row, 2] + (s & 7)
+
+
+@compiled
+def _normals(points, x0, y0, z0, voxel, index, bounds, values, normals):  # type: ignore[no-untyped-def]
+    for n in range(len(points)):
+        x, y, z = points[n]
+        normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, bounds, values)
+
+
+@compiled
+def _normal(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ignore[no-untyped-def]
+    h = voxel / 2
+    u = interpolated(x + h, y, z, x0, y0, z0, voxel, index, bounds, values)
+    u -= interpolated(x - h, y, z, x0, y0, z0, voxel, index, bounds, values)
+    v = interpolated(x, y + h, z, x0, y0, z0, voxel, index, bounds, values)
+    v -= interpolated(x, y - h, z, x0, y0, z0, voxel, index, bounds, values)
+    w = interpolated(x, y, z + h, x0, y0, z0, voxel, index, bounds, values)
+    w -= interpolated(x, y, z - h, x0, y0, z0, voxel, index, bounds, values)
+    length = max(np.sqrt(u * u + v * v + w * w), 1e-30)
+    return u / length, v / length, w / length
 
 
 @compiled
