@@ -33,7 +33,7 @@ SHARP = 6
 """Samples across what is to be thickened, closed or left standing, if the finest grid has as many."""
 
 DUST = 1e-5
-"""The share of the whole below which a body is dust that no strut is built to."""
+"""The share of the whole below which a body is dust: no strut is built to it, it is dropped."""
 
 POCKET = 0.1
 """The share of the largest part of a hollow below which another one is not worth two holes."""
@@ -173,20 +173,24 @@ class _Run:
 
     def largest(self) -> Node | Compilable:
         """Only the largest body stays."""
+        return self.only(self.connected().parts.bodies[:1])
+
+    def only(self, bodies: np.ndarray) -> Node | Compilable:
+        """Only these bodies stay."""
         from .border import nearer
 
         found = self.connected()
-        bodies = found.parts.bodies
-        if len(bodies) == 1:
-            return self.thing
-        return altered(self.thing, "keep", nearer(found, bodies[:1], bodies[1:]))
+        others = np.setdiff1d(found.parts.bodies, bodies)
+        return altered(self.thing, "keep", nearer(found, bodies, others)) if len(others) else self.thing
 
     def bridged(self) -> Node | Compilable:
-        """Struts between bodies, as few and as short as can be."""
+        """Struts between bodies, as few and as short as can be, and no dust."""
         from .bridges import struts
 
         found = self.connected()
-        ends = struts(found.solid, found.parts, _large(found.parts))
+        large = _large(found.parts)
+        ends = struts(found.solid, found.parts, large)
+        self.put(self.only(large))
         return self.added(*ends, self.how.bridge / self.scale / 2, self.sampled())
 
     def closed(self) -> Node | Compilable:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -123,6 +124,17 @@ def test_loose_bodies_are_joined_by_struts_across_the_middle() -> None:
     assert np.median(after) == pytest.approx(1.5, abs=0.2)
     solid, _ = made(union(TWO, at(sphere(radius=0.1), 0, 0, 0.8)), bridge=1.5)
     assert len(parts_of(solid.bricks).bodies) == 1
+
+
+def test_dust_is_dropped_where_one_body_is_asked_for() -> None:
+    """From layers too: none of their tools drops what it finds."""
+    dusty = union(TWO, at(sphere(radius=0.0115), 0, 0, 0.8))
+    thing, _ = printable(plan(dusty, 100), SIZE, Print(bridge=1.5))
+    before, after = (
+        parts_of(sample_scene(plan(dusty, 200))),
+        parts_of(sample_scene(replace(thing, voxel=0.005))),
+    )
+    assert (len(before.bodies), len(after.bodies)) == (3, 1)
 
 
 def test_cavities_are_filled_and_bodies_dropped() -> None:
