@@ -110,11 +110,12 @@ class Contouring:
         from `first` on, [n]; normals: unit, outward, [3, n], each row contiguous: all of these layers and of
         the layer `end`, or ValueError is raised."""
 
-    def finish(self) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8]]:
+    def finish(self) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8], NDArray[float32]]:
         """Vertices and triangles as `marching_cubes`, how many vertices are crossings (the first: those of
         the layers `first` to `last`), and for each of the others, in faces and cells, the case of its cell,
-        of the upper one at a face: bit dx + 2 dy + 4 dz set for an inside grid point. Raises ValueError while
-        layers are left."""
+        of the upper one at a face: bit dx + 2 dy + 4 dz set for an inside grid point; and the way from it to
+        the mean of the crossings around it, [3] in voxels, zero where the axes' planes meet in it. Raises
+        ValueError while layers are left."""
 
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:
     """How many grid edges with a sign change touch a point without a sample: 0 if the surface is closed."""

@@ -97,9 +97,9 @@ def contour_pieces(
         for begin, end in _batches(cells, first - 1, last + 1, work.threads << 16):
             known = refiner.between(*map(cells.crossings_before, (min(begin, last - 1), end + 1)))
             _called(surface.advance, end, known.first, known.t, known.normals)
-        vertices, triangles, count, cases = surface.finish()
+        vertices, triangles, count, cases, to_means = surface.finish()
         features = vertices[count:]
-        rooms = partial(_rooms, features, cases, signs)
+        rooms = partial(_rooms, features, cases, to_means, signs)
         moved, places = settle(root, features, rooms, signs.voxel, work)
         features[moved] = places
         mesh, used = Mesh(vertices, triangles), np.ones(count, bool)
@@ -136,10 +136,15 @@ def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
 
 
 def _rooms(
-    features: np.ndarray, cases: np.ndarray, bricks: SignBricks, which: np.ndarray, inside: np.ndarray
+    features: np.ndarray,
+    cases: np.ndarray,
+    to_means: np.ndarray,
+    bricks: SignBricks,
+    which: np.ndarray,
+    inside: np.ndarray,
 ) -> Rooms:
     """How far vertices within cells, or within cells' faces, may move: strictly inside these; or towards the
-    corner of theirs with the other sign.
+    corner of theirs with the other sign. The surface around them is known by its crossings.
     """
     origin, voxel, margin = np.array(bricks.origin)[:, None], bricks.voxel, clamp(bricks)
     there = np.ascontiguousarray(features[which].T)
@@ -150,10 +155,13 @@ def _rooms(
     octant = ((grid - cell > 0.5) << np.arange(3)[:, None]).sum(0)
     face = np.where(flat.any(0), flat.argmax(0), 3)
     corner = _nearest_corners()[face, cases[which], octant, ~inside * 1]
+    low = np.where(flat, there, origin + voxel * (cell + margin))
+    high = np.where(flat, there, origin + voxel * (cell + (1 - margin)))
     return Rooms(
-        np.where(flat, there, origin + voxel * (cell + margin)),
-        np.where(flat, there, origin + voxel * (cell + (1 - margin))),
+        low,
+        high,
         origin + voxel * (cell + (corner >> np.arange(3)[:, None] & 1)),
+        np.clip(there + voxel * to_means[which].T, low, high),
     )
 
 

@@ -3,6 +3,7 @@
 // counts give.
 #include "contour.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -54,7 +55,7 @@ size_t crossings_of(const CellGrid& cells, Layers layers) {
 // Room for at most so much. A crossing is in the loops of four cells. A loop has one tip, no more corners, each shared with
 // another loop, than crossings, and twice as many triangles; three crossings at least.
 Contour room(size_t crossings, size_t known) {
-    Contour room{{crossings + known * 10 / 3, 3}, {8 * known, 3}, {known * 10 / 3, 1}, crossings};
+    Contour room{{crossings + known * 10 / 3, 3}, {8 * known, 3}, {known * 10 / 3, 3}, {known * 10 / 3, 1}, crossings};
     room.triangles.rows = room.cases.rows = 0;
     return room;
 }
@@ -131,8 +132,10 @@ void Contouring::put(size_t vertex, const Vec3& point) {
 }
 
 void Contouring::put(size_t vertex, const Feature& feature) {
+    size_t row = vertex - result_.crossings;
     put(vertex, feature.point);
-    result_.cases.data[vertex - result_.crossings] = feature.number;
+    std::copy(feature.to_mean.begin(), feature.to_mean.end(), &result_.to_means.data[3 * row]);
+    result_.cases.data[row] = feature.number;
 }
 
 void Contouring::write_vertices(size_t i, const Hermite& data) {

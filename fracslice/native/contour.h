@@ -8,6 +8,7 @@ namespace fracslice {
 struct Contour {
     Array<double> vertices;    // [crossings + features, 3], origin + voxel * (grid position)
     Array<int32_t> triangles;  // [m, 3], counter-clockwise seen from outside
+    Array<float> to_means;     // [features, 3], from each to the mean of the crossings around it, in voxels
     Array<uint8_t> cases;      // [features], of their cells, or of the upper cells at their faces: bits dx + 2 dy + 4 dz
     size_t crossings;
 };

@@ -34,9 +34,11 @@ struct Hermite {
     }
 };
 
-// A vertex that is no crossing, and the case of its cell; where it lies in a face, of the upper cell there.
+// A vertex that is no crossing; the way from it to the mean of the crossings around it, zero where their planes are the axes';
+// and the case of its cell, or where it lies in a face, of the upper cell there.
 struct Feature {
     Vec3 point;
+    std::array<float, 3> to_mean;
     uint8_t number;
 };
 

@@ -59,12 +59,12 @@ class Finder {
             }
             own.loops += type.loop_length;
             own.cells[cell.x] |= cell.bit();
-            own.add(3, {cell.lower + tip, cell.number});
+            own.add(3, {cell.lower + tip, to_mean(tip, 0, length_), cell.number});
             for (int axis = 0; axis < 3; ++axis) {
                 Vec3 corner;
                 if (!corner_in(cell, axis, corner)) continue;
                 own.corners[axis][cell.x] |= cell.bit();
-                own.add(size_t(axis), {cell.lower + corner, cell.number});
+                own.add(size_t(axis), {cell.lower + corner, to_mean(corner, kFaces[cell.number].lower[axis], 2), cell.number});
             }
         });
     }
@@ -90,13 +90,14 @@ class Finder {
     // Where the planes of a cell's crossings meet, if they do.
     bool meet(const Cell& cell, Vec3& tip) {
         const Case& type = kCases[cell.number];
-        for (int k = 0; k < type.loop_length; ++k) {
+        length_ = type.loop_length;
+        for (int k = 0; k < length_; ++k) {
             const Datum& from = datum(cell, k);
             const Way& way = kWays[type.loop[k]];
             loop_[k].point = way.start + from.t * way.along;
             for (int j = 0; j < 3; ++j) loop_[k].normal[j] = from.normal[j];
         }
-        return feature_point(loop_.data(), type.loop_length, margin_, tip);
+        return feature_point(loop_.data(), length_, margin_, tip);
     }
 
     // The corner of the trace in a cell's lower face along `axis`, if there is one. A face that the loop passes twice has
@@ -104,14 +105,23 @@ class Finder {
     bool corner_in(const Cell& cell, int axis, Vec3& corner) const {
         int k = kFaces[cell.number].lower[axis];
         if (k < 0) return false;
-        const Crossing &a = loop_[k], &b = loop_[k + 1 < kCases[cell.number].loop_length ? k + 1 : 0];
+        const Crossing &a = loop_[k], &b = loop_[k + 1 < length_ ? k + 1 : 0];
         return sharp(a, b) && face_corner(a, b, axis, margin_, corner);
+    }
+
+    // The way from a point to the mean of `count` crossings of the loop from number `first` on.
+    std::array<float, 3> to_mean(const Vec3& point, int first, int count) const {
+        Vec3 sum{};
+        for (int k = first; k < first + count; ++k) sum = sum + loop_[k < length_ ? k : 0].point;
+        Vec3 way = (1.0 / count) * sum - point;
+        return {float(way[0]), float(way[1]), float(way[2])};
     }
 
     const Seen& seen_;
     double margin_;
     std::array<Datum, std::tuple_size<Numbers>::value> data_;
     std::array<Crossing, sizeof(Case::loop)> loop_;
+    int length_ = 0;  // of that
 };
 
 // What the loop of a case is, where each crossing's plane is across its edge.
@@ -173,13 +183,13 @@ bool find_across(const Seen& seen, Features& own) {
             int k = planes.by_axis[axis];
             tip[axis] = cell.lower[axis] + (k < 0 ? planes.middle[axis] : t[k]);
         }
-        own.add(3, {tip, cell.number});
+        own.add(3, {tip, {}, cell.number});
         for (size_t axis = 0; axis < 3; ++axis) {
             if (!planes.corner[axis]) continue;
             corner = tip;
             corner[axis] = cell.lower[axis];
             own.corners[axis][cell.x] |= cell.bit();
-            own.add(axis, {corner, cell.number});
+            own.add(axis, {corner, {}, cell.number});
         }
     };
     for (int x = 0; x < kSide; ++x) {

@@ -88,7 +88,8 @@ class Surfacing {
         Contour surface = made_.finish();
         size_t n = surface.vertices.rows, m = surface.triangles.rows, k = surface.cases.rows;
         return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
-                              surface.crossings, to_numpy(std::move(surface.cases), {k}));
+                              surface.crossings, to_numpy(std::move(surface.cases), {k}),
+                              to_numpy(std::move(surface.to_means), {k, 3}));
     }
 
   private:

@@ -135,9 +135,9 @@ voxels.
 
 LEAD = Loop(
     "lead",
-    "rrrrrrrrrrrrrrrrrn",
+    "rrrrrrrrrrrrrrrrrrrrn",
     """
-def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, DX, DY, DZ, n):
+def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, DY, DZ, n):
     e = FRAME[3]
     tight = FRAME[4]
     for i in range(0, n, WIDTH):
@@ -147,6 +147,9 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, DX, DY, DZ, n):
         gx = 0.0 * x
         gy = gx
         gz = gx
+        bx = gx
+        by = gx
+        bz = gx
         f = gx
         for k in range(7):
             ex = (k == 0) - 1.0 * (k == 1)
@@ -156,6 +159,13 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, DX, DY, DZ, n):
             gx = gx + ex * f
             gy = gy + ey * f
             gz = gz + ez * f
+            bx = bx + absolute(ex) * f
+            by = by + absolute(ey) * f
+            bz = bz + absolute(ez) * f
+        bx = bx - 2.0 * f
+        by = by - 2.0 * f
+        bz = bz - 2.0 * f
+        smooth = bx * bx + by * by + bz * bz < 0.05 * (gx * gx + gy * gy + gz * gz)
         sign = where(f < 0.0, 1.0 + 0.0 * x, -1.0)
         lx = where(sign * gx > 0.0, load(HX, i), load(LX, i))
         ly = where(sign * gy > 0.0, load(HY, i), load(LY, i))
@@ -177,9 +187,16 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, DX, DY, DZ, n):
         ox = load(OX, i)
         away = (sign * there < 0.0) & (absolute(there) > 2e-5 * absolute(f))
         away = away & (ox == ox)
-        store(DX, i, where(away, ox, gx))
-        store(DY, i, where(away, load(OY, i), gy))
-        store(DZ, i, where(away, load(OZ, i), gz))
+        gx = where(away, ox, gx)
+        gy = where(away, load(OY, i), gy)
+        gz = where(away, load(OZ, i), gz)
+        mx = load(MX, i)
+        my = load(MY, i)
+        mz = load(MZ, i)
+        between = smooth & (mx == mx) & (sign * field(x + mx, y + my, z + mz, P) > 0.0)
+        store(DX, i, where(between, mx, gx))
+        store(DY, i, where(between, my, gy))
+        store(DZ, i, where(between, mz, gz))
 """,
 )
 """Where to look for the surface from n points: the way to go, D. Along the gradient, by central differences
@@ -187,4 +204,9 @@ so that at an edge neither side is preferred, four of Newton's steps or as far a
 above each point, allow; where that does not lead to the surface (within rounding) or beyond it, O, if that is
 no NaN. A coordinate without room is kept; slopes below 0.1 are taken for it, so that no step is longer than
 ten times |f|.
+
+Where the slopes on both sides of a point differ little (by less than 25 degrees: their difference is then
+2 tan(12.5 deg) of their mean, its square 0.05 of theirs) the field is smooth there, and no edge is near: the
+planes that met in the point are of a bend that is rounder, or folded finer, than they say. The way is then M,
+to the middle of what is known of the surface, if it leads through it.
 """

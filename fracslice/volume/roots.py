@@ -23,7 +23,7 @@ from ..kernel.loops import Loop
 from ..kernel.machine import Function, constant
 from .root_loops import AIM, FIND, LEAD, POLISH
 
-FRAMES = {"float32": (1e-6, 1e-5, 1e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-5, 1e-6, 1e-7)}
+FRAMES = {"float32": (1e-6, 1e-5, 5e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-5, 1e-6, 1e-7)}
 """FRAME but for its first number, the lengths in voxels."""
 
 QUICK, MOST = 8, 48
@@ -86,8 +86,8 @@ class Roots:
         return out[0], out[1]
 
     def lead(self, rooms: np.ndarray) -> np.ndarray:
-        """The ways, [3, n], from points to the surface. rooms: [12, n]: the points, the room below and above
-        them, and the ways to somewhere of the other sign, NaN if there is none."""
+        """The ways, [3, n], from points to the surface. rooms: [15, n]: the points, the room below and above
+        them, and the ways to somewhere of the other sign and to the middle, NaN if there is none."""
         ways = np.empty((3, rooms.shape[1]), self.dtype)
         self._functions["lead"](self._frame, rooms, ways)
         return ways

@@ -20,12 +20,14 @@ one that is brought there shall have |f| below the other."""
 @dataclass(frozen=True, eq=False)
 class Rooms:
     """Where some points may go: low, high: corners of boxes, float64 [3, n], scene units; a box may be flat.
-    other: points in the boxes or on their borders where the field has the other sign, or None.
+    other: points in the boxes or on their borders where the field has the other sign, or None. middle:
+    points in the boxes amid the surface there, as far as it is known, or None.
     """
 
     low: np.ndarray
     high: np.ndarray
     other: np.ndarray | None = None
+    middle: np.ndarray | None = None
 
 
 def settle(
@@ -39,7 +41,8 @@ def settle(
 
     points: float64 [n, 3], scene units. rooms: the rooms of those with these numbers, which are inside where
     the second argument says so. A point moves along the gradient if the field changes its sign there within
-    four of Newton's steps and the box, else straight towards its room's point of the other sign. One that
+    four of Newton's steps and the box, else straight towards its room's point of the other sign. Where the
+    field is smooth close up it moves straight towards the middle if the surface lies between. One that
     comes no nearer stays, and so does what lies on the surface already, such as an exact corner. Returns the
     numbers of those that did not, int64 [k], and where they are now, float64 [k, 3].
     """
@@ -80,7 +83,8 @@ def anywhere(which: np.ndarray, inside: np.ndarray) -> Rooms:
 
 def _relative(p: np.ndarray, room: Rooms) -> np.ndarray:
     """What `Roots.lead` takes: float32 holds distances better than places."""
-    rows = np.empty((12, p.shape[1]), np.float32)
+    rows = np.empty((15, p.shape[1]), np.float32)
     rows[:3], rows[3:6], rows[6:9] = p, p - room.low, room.high - p
-    rows[9:] = np.nan if room.other is None else room.other - p
+    rows[9:12] = np.nan if room.other is None else room.other - p
+    rows[12:] = np.nan if room.middle is None else room.middle - p
     return rows

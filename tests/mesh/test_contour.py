@@ -22,6 +22,7 @@ from fracslice.formulas import (
     mandelbulb,
     menger,
     octahedron,
+    offset,
     sphere,
     torus,
     transform,
@@ -100,6 +101,26 @@ def test_a_slab_cut_by_faces_in_planes_of_grid_points() -> None:
     faces = np.abs(normals @ np.vstack([np.eye(3), normal]).T).max(axis=1)
     area = np.linalg.norm(mesh.normals, axis=1) / 2
     assert area[faces < np.cos(np.radians(5))].sum() < 0.01 * mesh.area
+    assert_solid(mesh)
+
+
+@pytest.mark.parametrize(
+    ("root", "resolution", "most"),
+    [
+        (torus(radius=1, tube=0.06), 64, 0.0045),  # Planes alone: 0.0065; now 0.0030.
+        (offset(box(size=(1, 1.3, 0.8)), distance=0.01), 64, 0.024),  # 0.0278; 0.0202.
+        (julia(iterations=6), 64, 0.045),  # 0.0482; 0.0415.
+    ],
+)
+def test_round_ridges_have_no_nicks(root: Node, resolution: float, most: float) -> None:
+    """Ridges of 0.5 to 2 voxels: where the planes of a cell meet, there is no edge. `most`: of the mesh's
+    edges, those where it bends by more than 40 degrees."""
+    mesh = made(transform(root, rotate=(1, 2, 3, 37)), resolution)
+    sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    order = np.lexsort(np.sort(sides, axis=1).T)
+    normals = mesh.normals / np.linalg.norm(mesh.normals, axis=1)[:, None]
+    both = normals[order // 3].reshape(-1, 2, 3)
+    assert ((both[:, 0] * both[:, 1]).sum(1) < np.cos(np.radians(40))).mean() < most
     assert_solid(mesh)
 
 
@@ -207,8 +228,11 @@ def test_a_solid_for_any_crossings_and_normals(seed: int) -> None:
     normals = (normals / np.linalg.norm(normals, axis=0)).astype(np.float32)
     made = contouring(cells)
     made.advance(3, 0, t, normals)
-    vertices, triangles, crossings, cases = made.finish()
+    vertices, triangles, crossings, cases, to_means = made.finish()
     assert n == crossings and len(cases) > 0 and len(vertices) == crossings + len(cases)
+    cells = np.floor(vertices[crossings:])
+    means = vertices[crossings:] + to_means
+    assert (means >= cells - 1e-6).all() and (means <= cells + 1 + 1e-6).all()
     assert_solid(Mesh(vertices, triangles))
 
 

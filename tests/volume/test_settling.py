@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
 from fracslice.kernel import compile_scene
@@ -11,13 +12,18 @@ from fracslice.volume.settling import Rooms, settle
 
 
 def settled(
-    root: Node, points: np.ndarray, low: np.ndarray, high: np.ndarray, *ends: np.ndarray
+    root: Node,
+    points: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    *ends: np.ndarray,
+    middle: np.ndarray | None = None,
 ) -> np.ndarray:
     """ends: for each point one inside and one outside."""
 
     def rooms(which: np.ndarray, inside: np.ndarray) -> Rooms:
         other = np.where(inside, ends[1][which].T, ends[0][which].T) if ends else None
-        return Rooms(low[which].T, high[which].T, other)
+        return Rooms(low[which].T, high[which].T, other, None if middle is None else middle[which].T)
 
     moved = points.copy()
     which, there = settle(root, points, rooms, 0.1)
@@ -57,6 +63,23 @@ def test_where_no_gradient_leads_a_point_is_drawn_to_the_other_sign() -> None:
     there = settled(root, rng.uniform(low, high), low, high, inside, outside)
     assert len(there) > 500 and (there >= low).all() and (there <= high).all()
     assert np.abs(kernel.points(*there.T)).max() < 1e-6
+
+
+def test_where_the_field_is_smooth_a_point_moves_towards_the_middle() -> None:
+    """0.3 voxels beyond a sphere of ten; the middle is inside, or beyond too, where there is no root."""
+    points = np.full((2, 3), [1.03, 0, 0])
+    middle = np.array([[0.95, 0.04, 0], [1.03, 0.04, 0]])
+    there = settled(sphere(), points, points - 0.1, points + 0.1, middle=middle)
+    assert np.abs(np.linalg.norm(there, axis=1) - 1).max() < 1e-9
+    assert there[0, 1] == pytest.approx((1.03 - there[0, 0]) / 2, abs=1e-9)
+    assert np.allclose(there[1], [1, 0, 0], atol=1e-9)
+
+
+def test_beside_an_edge_a_point_does_not_slide_along_a_face() -> None:
+    """A hundredth of a voxel beyond it; the middle lies below one of the faces."""
+    points, middle = np.array([[0.501, 0.501, 0.1]]), np.array([[0.4, 0.499, 0.1]])
+    there = settled(box(), points, points - 0.1, points + 0.1, middle=middle)
+    assert np.abs(there - [0.5, 0.5, 0.1]).max() < 1e-6
 
 
 def test_what_lies_on_the_surface_stays() -> None:
