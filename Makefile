@@ -1,5 +1,6 @@
 # make demo: a shipped scene becomes a printable mesh. make test: tests and linters. make wheel: a wheel that needs no OpenVDB.
 # make nightly: 500 random scenes, an hour or two.
+# make sanitize: the native code under GCC's sanitizers, some minutes.
 # All of them set up what is missing first: Debian packages (as root or with sudo) and an own .venv. Debian 12, Ubuntu 24.04.
 # Another Python, in a venv of its own: make test PYTHON=python3.13 VENV=.venv-3.13
 PYTHON ?= python3
@@ -13,7 +14,7 @@ PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
 NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
 
-.PHONY: demo test suite nightly lint wheel peers setup packages clean
+.PHONY: demo test suite nightly sanitize lint wheel peers setup packages clean
 
 demo: setup
 	mkdir -p out
@@ -28,6 +29,11 @@ suite: setup
 
 nightly: setup
 	$(BIN)/python -m tests.benchmarks.stability.random_scenes
+
+# Memory and undefined behaviour, then races between threads.
+sanitize: setup
+	sh tests/sanitize/run.sh address $(BIN)/python
+	sh tests/sanitize/run.sh thread $(BIN)/python
 
 lint: setup
 	$(BIN)/ruff check .

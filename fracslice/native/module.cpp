@@ -61,7 +61,7 @@ class Cells {
     static std::vector<Signs> words(const IjkArray& ijk, const SignsArray& signs) {
         if (ijk.shape(0) != signs.shape(0)) throw nb::value_error("ijk and signs differ in length");
         std::vector<Signs> rows(signs.shape(0));
-        std::memcpy(rows.data(), signs.data(), rows.size() * sizeof(Signs));
+        std::copy_n(signs.data(), signs.size(), reinterpret_cast<uint8_t*>(rows.data()));
         return rows;
     }
 
@@ -102,7 +102,7 @@ nb::object bind_signs(const ValuesArray& values, int threads) {
     Bricks bricks{{nullptr, values.shape(0), nullptr, {}}, values.data()};
     std::vector<Signs> signs = unlocked(threads, [&] { return signs_of(bricks); });
     Array<uint8_t> bytes(signs.size(), sizeof(Signs));
-    std::memcpy(bytes.data.get(), signs.data(), signs.size() * sizeof(Signs));
+    std::copy_n(reinterpret_cast<const uint8_t*>(signs.data()), signs.size() * sizeof(Signs), bytes.data.get());
     return to_numpy(std::move(bytes), {signs.size(), kSide, kSide});
 }
 

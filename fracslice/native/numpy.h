@@ -4,7 +4,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 
-#include <cstring>
+#include <algorithm>
 #include <vector>
 
 #include "marching_cubes.h"
@@ -43,7 +43,7 @@ template <class T, class Row>
 nb::object to_numpy(const std::vector<Row>& rows) {
     constexpr size_t columns = sizeof(Row) / sizeof(T);
     Array<T> array(rows.size(), columns);
-    std::memcpy(array.data.get(), rows.data(), rows.size() * sizeof(Row));
+    std::copy_n(reinterpret_cast<const T*>(rows.data()), rows.size() * columns, array.data.get());
     return to_numpy(std::move(array), {rows.size(), columns});
 }
 

@@ -1,0 +1,37 @@
+#!/bin/sh
+# run.sh KIND PYTHON: builds the extensions with sanitizers of GCC's, KIND "address" (and undefined behaviour) or "thread", in a
+# folder of their own, and runs tests of what is native on them, with PYTHON's packages. Fails where a sanitizer finds something.
+set -eu
+kind=$1 python=$(realpath -s "$2")
+cd "$(dirname "$0")/../.."
+build=$PWD/build/sanitize-$kind
+library() { realpath "$(g++ -print-file-name="lib$1.so")"; }
+
+# Races are looked for in slicing alone: the rest waits by TBB, whose library is not built with the sanitizer, and would be all races.
+tests="slicing/test_bends.py slicing/test_layers.py::test_threads_and_the_choice_of_layers_do_not_matter"
+if [ "$kind" = thread ]; then
+    flags=-fsanitize=thread
+    loaded=$(library tsan)
+else
+    flags="-fsanitize=address,undefined -fno-sanitize-recover=all"
+    loaded="$(library asan) $(library ubsan)"
+    tests="$tests volume/test_grid.py mesh/test_check.py mesh/test_contour.py::test_threads_do_not_matter
+        mesh/test_simplify.py::test_the_result_is_the_same_for_any_number_of_threads"
+fi
+
+PATH=$(dirname "$python"):$PATH cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=None -DPython_EXECUTABLE="$python" \
+    -DCMAKE_CXX_FLAGS="-O1 -g -fno-omit-frame-pointer $flags"
+cmake --build "$build" -j 2
+rm -rf "$build/tree"
+mkdir "$build/tree"
+cp -r fracslice cli scenes tests pyproject.toml "$build/tree"
+cp "$build"/_*.so "$build/tree/fracslice"
+
+# Without `site` (-S) no editable install hides the copy. The C++ library is loaded first too: the sanitizers catch its exceptions.
+# Addresses are not random (setarch -R), for the thread sanitizer wants some of them for itself.
+packages=$("$python" -c 'import sys; print(*(p for p in sys.path if p.endswith("site-packages")), sep=":")')
+cd "$build/tree"
+export PYTHONPATH="$PWD:$packages" ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1
+export LD_PRELOAD="$loaded $(library stdc++)"
+# shellcheck disable=SC2046,SC2086
+exec setarch -R "$python" -S -m pytest -p no:cacheprovider --capture=sys $(printf 'tests/%s ' $tests)
