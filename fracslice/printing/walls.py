@@ -27,6 +27,9 @@ OPPOSITE = -0.5
 AT_ONCE = 512
 """Bricks whose surface is looked at by one thread at a time."""
 
+ROOM = 8
+"""Samples for each crossing that room is made for at first."""
+
 Direction = tuple[float, float, float]
 R = TypeVar("R", bound=Rows)
 
@@ -103,9 +106,14 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
     """
     b = solid.bricks
     own = b.values[rows]
-    points, normals = np.empty((2, 3 * own.size, 3))
-    area = np.empty(3 * own.size)
-    n = _cross(b.ijk[rows], own, *b.origin, b.voxel, b.index, solid.bounds, b.values, points, normals, area)
+    n, room = own.size // ROOM, -1
+    while n > room:
+        room = n
+        points, normals = np.empty((2, room, 3))
+        area = np.empty(room)
+        n = _cross(
+            b.ijk[rows], own, *b.origin, b.voxel, b.index, solid.bounds, b.values, points, normals, area
+        )
     return points[:n].copy(), normals[:n].copy(), area[:n].copy()
 
 
@@ -118,7 +126,7 @@ def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
 
 @compiled
 def _cross(ijk, own, x0, y0, z0, voxel, index, bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
-    """Writes what `crossed` returns, and how many there are."""
+    """Writes what `crossed` returns, as much as there is room for, and returns how much there is."""
     n = 0
     for row in range(len(ijk)):
         for s in range(512):
@@ -132,6 +140,9 @@ def _cross(ijk, own, x0, y0, z0, voxel, index, bounds, values, points, normals, 
                     there = u + (axis == 0), v + (axis == 1), w + (axis == 2)
                     g = sample_at(index, bounds, values, voxel, *there)
                 if (f < 0) == (g < 0):
+                    continue
+                if n >= len(area):
+                    n += 1
                     continue
                 points[n] = x0 + voxel * u, y0 + voxel * v, z0 + voxel * w
                 points[n, axis] += voxel * f / (f - g)
