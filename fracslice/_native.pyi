@@ -182,6 +182,9 @@ def turned(vertices: NDArray[float64], triangles: NDArray[int32], points: NDArra
     """The triangles, ascending, that are flat or turn by a right angle or more when the vertices move to
     `points`."""
 
+def pointed(vertices: NDArray[float64], triangles: NDArray[int32], sine: float) -> NDArray[int64]:
+    """The vertices, ascending, from which all edges fall off, at an angle of at least that sine."""
+
 def bounds(points: NDArray[float64]) -> tuple[Point, Point]:
     """Low and high corner of the box around points, float64 [n, 3]. Raises ValueError if there are none."""
 

@@ -210,12 +210,14 @@ def _surface(planned: Plan, clock: Clock) -> tuple[Bricks, Mesh, str]:
     """The samples of a planned scene, their mesh, in scene units, and what fell to pieces in it."""
     from .mesh.components import in_pieces
     from .mesh.extract import contour
+    from .mesh.tips import with_tips
     from .volume import sample_scene
 
     with clock("sampling"):
         bricks = sample_scene(planned, clock.work)
     with clock("meshing"):
         mesh = contour(planned.root, bricks, clock.work)
+        mesh = with_tips(planned.root, mesh, planned.voxel, clock.work)
         return bricks, mesh, in_pieces(mesh, planned.voxel)
 
 

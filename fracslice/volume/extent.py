@@ -11,6 +11,7 @@ from ..formulas.box import Box
 from ..formulas.registry import Node
 from ..kernel import Compilable, compile_scene
 from ..work import Work
+from .climbing import SLANTS, climb
 from .sides import UNKNOWN, Field, Side
 
 TURNS = 8
@@ -38,8 +39,6 @@ LITTLE, MOST = 1 << 14, 1 << 17
 
 EXACT = 2.5e-7
 """Of the longest side: the last step that tips are taken outwards."""
-
-STEPS = 256
 
 OUTWARDS = np.array([[-1], [1]])
 BENEATH = np.array([0.0, 1e-3, 0.01, 0.1, 0.5])
@@ -156,27 +155,9 @@ def _learn(sides: list[Side], points: np.ndarray) -> None:
 
 
 def _climb(field: Field, sides: list[Side], first: float, exact: float) -> None:
-    """Takes all sides' tips outwards as far as they go.
-
-    Steps outwards, straight or aslant, are taken as long as they end inside, `first` long at first, then
-    shorter ones down to `exact` (pattern search: Hooke and Jeeves 1961). All sides at once.
-    """
-    slants = 0.1 ** np.arange(0, 3.5, 0.5)
-    aslant = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), slants)).reshape(3, -1)
-    # [coordinate, side, start, way]
-    ways = np.stack([side.sign * np.roll(aslant, side.axis - 2, 0) for side in sides], 1)[:, :, None]
-    here, step = np.stack([side.best for side in sides], 1), np.full(len(sides), first)
-    for _ in range(STEPS):
-        tried = here[..., None] + step[:, None, None] * ways
-        inside = field.inside(tried.reshape(3, -1)).reshape(tried.shape[1:])
-        gain = np.where(inside, aslant[2], 0.0)
-        best = gain.argmax(2)
-        free = np.take_along_axis(inside, best[..., None], 2)[..., 0]
-        here = np.where(free, np.take_along_axis(tried, best[None, ..., None], 3)[..., 0], here)
-        stuck = ~free.any(1)
-        if (stuck & (step < exact)).all():
-            break
-        step[stuck & (step >= exact)] /= 2
+    """Takes all sides' tips outwards as far as they go."""
+    ways = np.stack([side.sign * np.roll(SLANTS, side.axis - 2, 0) for side in sides], 1)
+    here = climb(field.inside, np.stack([side.best for side in sides], 1), ways, first, exact)
     for side, points in zip(sides, here.swapaxes(0, 1), strict=True):
         side.learn(points)
 

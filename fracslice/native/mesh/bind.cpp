@@ -52,12 +52,19 @@ nb::tuple bind_measures(const Rows<double>& vertices, const Rows<int32_t>& trian
     return nb::make_tuple(found.area, found.volume, found.flat);
 }
 
-nb::object bind_turned(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<double>& points) {
-    if (points.shape(0) != vertices.shape(0)) throw nb::value_error("vertices and points differ in length");
-    std::vector<int64_t> found = unlocked(0, [&] { return turned(mesh_of(vertices, triangles), points.data()); });
+nb::object numbers(const std::vector<int64_t>& found) {
     Array<int64_t> rows(found.size(), 1);
     std::copy(found.begin(), found.end(), rows.data.get());
     return to_numpy(std::move(rows), {found.size()});
+}
+
+nb::object bind_turned(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<double>& points) {
+    if (points.shape(0) != vertices.shape(0)) throw nb::value_error("vertices and points differ in length");
+    return numbers(unlocked(0, [&] { return turned(mesh_of(vertices, triangles), points.data()); }));
+}
+
+nb::object bind_pointed(const Rows<double>& vertices, const Rows<int32_t>& triangles, double sine) {
+    return numbers(unlocked(0, [&] { return pointed(mesh_of(vertices, triangles), sine); }));
 }
 
 nb::tuple bind_bounds(const Rows<double>& points) {
@@ -119,6 +126,7 @@ void bind_mesh(nb::module_& module) {
     module.def("shell_volumes", &bind_volumes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a);
     module.def("measures", &bind_measures, "vertices"_a, "triangles"_a, "point"_a);
     module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "points"_a);
+    module.def("pointed", &bind_pointed, "vertices"_a, "triangles"_a, "sine"_a);
     module.def("bounds", &bind_bounds, "points"_a);
     module.def("weld", &bind_weld, "points"_a);
     module.def("tree", &bind_tree, "vertices"_a, "triangles"_a);

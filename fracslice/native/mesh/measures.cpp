@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "links.h"
+
 namespace fracslice {
 namespace {
 
@@ -25,6 +27,23 @@ std::vector<Part> in_blocks(size_t count, const Do& act) {
         parts[k] = act(k * kBlock, std::min(count, (k + 1) * kBlock));
     });
     return parts;
+}
+
+// What is found in blocks of `count` things, in order.
+template <class Do>
+std::vector<int64_t> chosen(size_t count, const Do& choose) {
+    using Found = std::vector<int64_t>;
+    Found all;
+    for (const Found& part : in_blocks<Found>(count, [&](size_t first, size_t last) {
+             Found found;
+             for (size_t i = first; i < last; ++i) {
+                 if (choose(i)) found.push_back(int64_t(i));
+             }
+             return found;
+         })) {
+        all.insert(all.end(), part.begin(), part.end());
+    }
+    return all;
 }
 
 }  // namespace
@@ -50,18 +69,24 @@ Measures measures(const MeshView& mesh, const Vec3& point) {
 std::vector<int64_t> turned(const MeshView& mesh, const double* points) {
     MeshView moved = mesh;
     moved.positions = points;
-    using Found = std::vector<int64_t>;
-    Found all;
-    for (const Found& part : in_blocks<Found>(mesh.count, [&](size_t first, size_t last) {
-             Found found;
-             for (size_t t = first; t < last; ++t) {
-                 if (!(dot(normal(mesh, t), normal(moved, t)) > 0)) found.push_back(int64_t(t));
-             }
-             return found;
-         })) {
-        all.insert(all.end(), part.begin(), part.end());
-    }
-    return all;
+    return chosen(mesh.count, [&](size_t t) { return !(dot(normal(mesh, t), normal(moved, t)) > 0); });
+}
+
+std::vector<int64_t> pointed(const MeshView& mesh, double sine) {
+    CornersByVertex around = corners_by_vertex(mesh);
+    const int64_t *start = around.start.data.get(), *corner = around.corner.data.get();
+    return chosen(mesh.vertices, [&](size_t v) {
+        Vec3 up{0, 0, 0};
+        for (int64_t i = start[v]; i < start[v + 1]; ++i) up = up + normal(mesh, size_t(corner[i] / 3));
+        double least = sine * std::sqrt(dot(up, up));
+        for (int64_t i = start[v]; i < start[v + 1]; ++i) {
+            size_t t = size_t(corner[i] / 3);
+            int k = int(corner[i] % 3);
+            Vec3 edge = at(mesh.corner(t, (k + 1) % 3)) - at(mesh.corner(t, k));
+            if (!(-dot(edge, up) > least * std::sqrt(dot(edge, edge)))) return false;
+        }
+        return start[v] < start[v + 1];
+    });
 }
 
 Bounds bounds(const double* points, size_t count) {

@@ -20,6 +20,9 @@ Measures measures(const MeshView& mesh, const Vec3& point);
 // The triangles, in order, that are flat or turn by a right angle or more when the vertices move to `points`.
 std::vector<int64_t> turned(const MeshView& mesh, const double* points);
 
+// The vertices, in order, from which all edges fall off, at an angle of at least that sine.
+std::vector<int64_t> pointed(const MeshView& mesh, double sine);
+
 // The box around some points; low above high if there are none.
 struct Bounds {
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
