@@ -110,7 +110,7 @@ def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
         raise SliceError(f"{shape[1]} x {shape[0]} pixels: at most {MOST_PIXELS} along a side")
     z = found.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
-    pixels, notes = (shape[0], shape[1]), planned.notes
+    pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounded(mm[2], float(tops[-1])))
     return Stack(planned.root, scale, at, job.pixel, pixels, z, tops, size, outer, notes)
 
 
@@ -120,6 +120,13 @@ def _tops(height: float, layer: float) -> np.ndarray:
     if count > MOST_LAYERS:
         raise SliceError(f"{count} layers: at most {MOST_LAYERS}")
     return layer * np.arange(1, count + 1)
+
+
+def _rounded(height: float, made: float) -> tuple[str, ...]:
+    """A line if whole layers make the object lower or higher by more than a hundredth, mm."""
+    if abs(made - height) <= height / 100:
+        return ()
+    return (f"whole layers are {made:.4g} mm high, the object {height:.4g} mm; expected lower layers",)
 
 
 def _turned(root: Node, up: tuple[float, float, float], work: Work | None) -> Node:

@@ -16,6 +16,7 @@ from fracslice.errors import Cancelled, SceneError, SliceError
 from fracslice.formulas import (
     Node,
     box,
+    cylinder,
     difference,
     julia,
     mandelbulb,
@@ -380,3 +381,11 @@ def test_a_large_bailout_takes_nothing_off_the_outline(bailout: float, mixed: bo
     truth = math.pi * ((radius * stack.scale) ** 2 - away**2).clip(0)
     areas = np.array(all_of(stack, lambda layer: layer.area))
     assert areas.sum() == pytest.approx(truth.sum(), rel=0.005)
+
+
+def test_whole_layers_of_another_height_are_told() -> None:
+    """A cylinder 17.4 layers high is cut into 17, and that is 2 % of it."""
+    of = cylinder(radius=0.75, height=0.5431)
+    low, fine = (plan_stack(of, SliceJob(50, layer, (0.5, 0.5))) for layer in (1.04, 0.01))
+    assert low.notes == ("whole layers are 17.68 mm high, the object 18.1 mm; expected lower layers",)
+    assert fine.notes == ()
