@@ -172,7 +172,7 @@ def slice_(
         write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about), output, form)
         if preview:
             write_preview(stack, preview, work)
-        _, off = layers_amount(stack, work)
+        off = () if quiet else layers_amount(stack, work)[1]
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape
