@@ -45,7 +45,8 @@ def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool
     An edge stays if a triangle's normal would be farther off, as at a sharp edge, or the triangle from the
     surface.
     """
-    mesh, told = Mesh(state.mesh.vertices, state.mesh.triangles.copy()), state.told.copy()
+    triangles, told = state.mesh.triangles.copy(), state.told.copy()
+    mesh = Mesh(state.mesh.vertices, triangles)
     changed = np.zeros(len(told), bool)
     for _ in range(ROUNDS):
         flips, worth = _candidates(mesh, due, told[:, UPRIGHT] < STEEP)
@@ -60,7 +61,7 @@ def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool
         good = np.where(was < STEEP, now > was + BETTER, now >= np.minimum(was, FINE))
         good &= after[..., OFF].max(axis=1) <= np.maximum(before[..., OFF].max(axis=1), state.fit.reach)
         flips = flips.some(good)
-        mesh.triangles[flips.old], told[flips.old] = flips.new, after[good]
+        triangles[flips.old], told[flips.old] = flips.new, after[good]
         due = np.zeros(len(told), bool)
         changed[flips.old] = due[flips.old] = True
     return Fitted(mesh, state.fit, told), changed
