@@ -50,10 +50,10 @@ class Mesh(Exchange):
     @property
     def is_watertight(self) -> bool:
         """Whether every edge joins exactly two triangles."""
-        from .links import links
+        from .topology import edge_topology
 
-        found = links(self.triangles, len(self.vertices))
-        return len(self.triangles) > 0 and not (found.open_edges or found.crowded_edges)
+        found = edge_topology(self.triangles, len(self.vertices))
+        return len(self.triangles) > 0 and not (found.open_edges or found.non_manifold_edges)
 
     @property
     def corners(self) -> NDArray[np.float64]:
