@@ -101,7 +101,7 @@ def _plain(value: Any) -> Any:
     """A record or a mapping as a dictionary."""
     if isinstance(value, Mapping):
         return dict(value)
-    return asdict(value) if is_dataclass(value) else value
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
 
 
 def version() -> str:

@@ -185,7 +185,8 @@ def as_polygons(contours: Contours) -> MultiPolygon:
     """The inside of contours: each outer one with the holes just within it."""
     from shapely import MultiPolygon, Polygon
 
-    depth, holes = [0] * len(contours), [[] for _ in range(len(contours))]  # type: list[int], list[list[Any]]
+    depth = [0] * len(contours)
+    holes: list[list[NDArray[np.float64]]] = [[] for _ in depth]
     for k, parent in enumerate(contours.parent.tolist()):
         if parent >= 0:
             depth[k] = depth[parent] + 1

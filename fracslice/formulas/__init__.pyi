@@ -11,11 +11,11 @@ from .parameters import Vector as Vector
 from .registry import Fixed as Fixed
 from .registry import Formula as Formula
 from .registry import Node as Node
-from .registry import blend as blend
+from .registry import csg_operator as csg_operator
+from .registry import domain_operator as domain_operator
 from .registry import get as get
 from .registry import names as names
 from .registry import shape as shape
-from .registry import warp as warp
 from .vocabulary import absolute as absolute
 from .vocabulary import any_of as any_of
 from .vocabulary import atan2 as atan2
@@ -310,7 +310,7 @@ def offset(*elements: Node, distance: float) -> Node:
 
     A field that underestimates distances would grow further than it should; it is cut off at the grown box.
     L = the element's, at least 1, the box'; more around an escape-time fractal, whose field is steeper away
-    from its surface (`Facts.steepening`; measured). What is shrunk lies in the element: where that is a
+    from its surface (`Bounds.steepening`; measured). What is shrunk lies in the element: where that is a
     fractal, whose inside bounds nothing, space is skipped by its own field.
 
     Parameters
@@ -455,7 +455,7 @@ def union(*elements: Node, smooth: float = 0.0) -> Node:
     quadratic).
 
     The seam weighs the gradients of the two with weights whose sum is 1, so L = max of theirs; a seam with an
-    escape-time fractal has 1.25 times that, one between several 3 times (measured; `guarded_union` does
+    escape-time fractal has 1.25 times that, one between several 3 times (measured; `conservative_union` does
     better).
 
     Parameters

@@ -33,17 +33,16 @@ class Operators:
 
     def __or__(self, other: Node) -> Node:
         """All that is in any of the two."""
-        return _folded("union", self, other)
+        return _folded("union", self, other) if isinstance(other, Operators) else NotImplemented
 
     def __and__(self, other: Node) -> Node:
         """What is in both."""
-        return _folded("intersection", self, other)
+        return _folded("intersection", self, other) if isinstance(other, Operators) else NotImplemented
 
     def __sub__(self, other: Node) -> Node:
         """The first without the second."""
-        if not isinstance(other, Operators):
-            return NotImplemented
-        return _made("difference", *_elements("difference", self), other)
+        pieces = _elements("difference", self)
+        return _made("difference", *pieces, other) if isinstance(other, Operators) else NotImplemented
 
     def __add__(self, offset: Sequence[float] | NDArray[Any]) -> Node:
         """The shape moved by an offset (x, y, z)."""
@@ -187,10 +186,8 @@ def _made(name: str, *elements: Operators, **values: Any) -> Node:
     return node
 
 
-def _folded(name: str, first: Operators, second: object) -> Node:
+def _folded(name: str, first: Operators, second: Operators) -> Node:
     """One operator over the elements of both: ``a | b | c`` is ``union(a, b, c)``, however many there are."""
-    if not isinstance(second, Operators):
-        return NotImplemented
     return _made(name, *_elements(name, first), *_elements(name, second))
 
 
