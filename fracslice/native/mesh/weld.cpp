@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 // How many points ahead their slots are asked for: without, most of the time goes into waiting for memory.
@@ -42,4 +42,4 @@ Welded weld(const uint32_t* bits, size_t count) {
     return found;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

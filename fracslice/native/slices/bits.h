@@ -2,7 +2,7 @@
 #pragma once
 #include <cstdint>
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr uint64_t kFirstColumn = 0x0101010101010101, kLastColumn = 0x8080808080808080;
 constexpr uint64_t kFirstRow = 0xFF, kLastRow = 0xFF00000000000000;
@@ -81,4 +81,4 @@ constexpr uint64_t block(int size) {
     return word;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstring>
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr int kEnd = 256, kCodes = 286, kMostBits = 15;
@@ -239,4 +239,4 @@ const Rows<uint8_t>& Runs::zlib(uint32_t checksum) {
     return data_;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -5,7 +5,7 @@
 
 #include "tiles.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr int kShortest = 3, kLongest = 258;  // bytes that a match repeats
 
@@ -88,4 +88,4 @@ class Runs {
     End end_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -5,7 +5,7 @@
 
 #include "slab.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr size_t kBatch = 2048;
 constexpr double kSurely = 0.99999;  // squared distances are rounded
@@ -59,4 +59,4 @@ void Slab::evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take) {
     }
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

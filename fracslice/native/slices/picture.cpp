@@ -7,7 +7,7 @@
 #include "band.h"
 #include "in_rows.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 // A tile of which some cells are cut, and where their levels go.
@@ -144,4 +144,4 @@ const Rows<uint8_t>& deflated(const Canvas& image) {
     return runs.zlib(sum.value(uint64_t(stride) * uint64_t(image.rows)));
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -1,9 +1,9 @@
 #include <algorithm>
 
 #include "coverage.h"
-#include "squares.h"
+#include "marching_squares.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr uint8_t kSolid = 128;  // the coverage from which a pixel is solid
@@ -68,4 +68,4 @@ SolidRuns solid_runs(const Slab& slab, int rows, int columns) {
     return found;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

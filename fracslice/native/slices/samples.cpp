@@ -3,9 +3,9 @@
 #include <cstdlib>
 
 #include "bits.h"
-#include "wide.h"
+#include "avx512.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 void gather_each(const Ask* asks, size_t n, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y) {
@@ -116,4 +116,4 @@ void scatter(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& t
     scatter_each(asks, n, f, rim, tiles, found);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

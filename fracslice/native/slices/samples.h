@@ -4,7 +4,7 @@
 
 #include "tiles.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // Samples of a tile.
 struct Ask {
@@ -33,4 +33,4 @@ void gather(const Ask* asks, size_t n, const Tiles& tiles, const float* x, const
 // The values `f` of the same samples, into the tiles. rim: null if none is beyond.
 void scatter(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& tiles, Found* found);
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -6,7 +6,7 @@
 
 #include "evaluate.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr int kCoarsest = 8;        // tiles along a block of the first level
@@ -146,7 +146,7 @@ std::vector<Slab::Block> Slab::coarse() {
 
 void Slab::fill(const Block& block) {
     const int last = std::min(block.y + block.size, ty_ - 1), n = std::min(block.size, tx_ - 1 - block.x);
-    for (int y = block.y; y < last; ++y) fracslice::fill(&where[size_t(y) * tx_ + block.x], n);
+    for (int y = block.y; y < last; ++y) slices::fill(&where[size_t(y) * tx_ + block.x], n);
 }
 
 // The places whose middle, halfway between two layers, leaves open what is around it in them and between.
@@ -233,4 +233,4 @@ void Slab::begin() {
     known.assign(count(), 0), sharp.assign(count(), 0);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

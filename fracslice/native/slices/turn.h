@@ -6,7 +6,7 @@
 #include "bits.h"
 #include "coverage.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // Turns tiles: their rows are rows of the picture, from above.
 class Turn {
@@ -49,4 +49,4 @@ class Turn {
     std::array<uint8_t, 256> shown_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices
