@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 
 namespace fracslice::mesh {
 namespace {
@@ -21,7 +22,7 @@ size_t find_crossings(const std::array<Corners, kSide + 1>& corners, Crossings& 
     for (int axis = 0; axis < 3; ++axis) {
         for (int x = 0; x < kSide; ++x) {
             found.rank[axis][x] = uint16_t(total);
-            total += size_t(popcount(found.bits[axis][x]));
+            total += size_t(std::popcount(found.bits[axis][x]));
         }
     }
     return total;
@@ -92,7 +93,7 @@ void CellGrid::lay(size_t begin, size_t end, const std::array<double, 3>& origin
             for (size_t x = 0; x < kSide; ++x) {
                 for (BitPlane bits = crossings_[row].bits[axis][x]; bits; bits &= bits - 1, ++number) {
                     if (number < begin || number >= end) continue;
-                    size_t bit = size_t(__builtin_ctzll(bits)), at[] = {x, bit / 8, bit % 8}, edge = number - begin;
+                    size_t bit = size_t(std::countr_zero(bits)), at[] = {x, bit / 8, bit % 8}, edge = number - begin;
                     for (size_t k = 0; k < 3; ++k) edges.starts[k][edge] = grid[k][at[k]];
                     uint32_t& leader = leading[at[axis]];
                     if (leader == kNobody) {

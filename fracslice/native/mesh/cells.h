@@ -1,5 +1,6 @@
 // The cells that the surface passes and the vertices on their edges, numbered.
 #pragma once
+#include <bit>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -15,8 +16,6 @@ using volume::constant, volume::corners_of, volume::kFirstY, volume::kFirstZ, vo
 using Place = std::array<int, 3>;  // of a brick, in bricks
 
 constexpr size_t kMostElements = size_t(std::numeric_limits<int32_t>::max());
-
-inline int popcount(BitPlane bits) { return __builtin_popcountll(bits); }
 
 struct Edge {
     uint8_t axis, dx, dy, dz;
@@ -112,7 +111,7 @@ struct Passed {
     int flat_count() const {
         BitPlane all = 0;
         for (const auto& both : flat) all |= both[0] | both[1];
-        return popcount(all);
+        return std::popcount(all);
     }
 };
 
@@ -123,10 +122,10 @@ constexpr uint8_t kFlat[3][2] = {{0x55, 0xaa}, {0x33, 0xcc}, {0x0f, 0xf0}};
 template <class Visit>
 inline void for_each_cell(const Corners& a, const Corners& b, int x, BitPlane cells, const Visit& visit) {
     while (cells) {
-        int y = __builtin_ctzll(cells) / 8;
+        int y = std::countr_zero(cells) / 8;
         BitPlane cases = cases_of_row(a, b, y);
         for (unsigned row = cells >> 8 * y & 0xff; row; row &= row - 1) {
-            int z = __builtin_ctz(row);
+            int z = std::countr_zero(row);
             visit(x, y, z, uint8_t(cases >> 8 * z));
         }
         cells &= y == 7 ? 0 : ~BitPlane(0) << 8 * (y + 1);
@@ -202,8 +201,8 @@ class CellGrid {
                     BitPlane all = owner.bits[axis][x], bits = all & seen;
                     bool whole = bits == all;
                     for (; bits; bits &= bits - 1) {
-                        int bit = __builtin_ctzll(bits);
-                        uint32_t vertex = whole ? next++ : first + uint32_t(popcount(all & ((BitPlane(1) << bit) - 1)));
+                        int bit = std::countr_zero(bits);
+                        uint32_t vertex = whole ? next++ : first + uint32_t(std::popcount(all & ((BitPlane(1) << bit) - 1)));
                         visit(place + size_t(bit / 8 * kReach + bit % 8), vertex);
                     }
                 }
@@ -241,7 +240,7 @@ class CellGrid {
         for (uint8_t axis = 0; axis < 3; ++axis) {
             for (int x = 0; x < kSide; ++x) {
                 for (BitPlane bits = own.bits[axis][x]; bits; bits &= bits - 1) {
-                    int bit = __builtin_ctzll(bits);
+                    int bit = std::countr_zero(bits);
                     const int32_t* p = layout_.ijk + 3 * i;
                     visit(CellEdge{vertex++, axis, {p[0] + x, p[1] + bit / 8, p[2] + bit % 8}});
                 }

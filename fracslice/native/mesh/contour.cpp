@@ -4,6 +4,7 @@
 #include "contour.h"
 
 #include <algorithm>
+#include <bit>
 #include <string>
 #include <utility>
 
@@ -40,7 +41,7 @@ int32_t* write_flat(const Near& near, int x, BitPlane cells, uint8_t number, int
     std::array<uint16_t, 6> places;
     for (int k = 0; k < 6; ++k) places[k] = kPlaces[kCases[number].corners[k]];
     for (; cells; cells &= cells - 1) {
-        int bit = __builtin_ctzll(cells);
+        int bit = std::countr_zero(cells);
         const uint32_t* numbers = &near.numbers[number_at(0, x, bit / 8, bit % 8)];
         for (int k = 0; k < 6; ++k) *out++ = int32_t(numbers[places[k]]);
     }

@@ -99,15 +99,16 @@ bool clipped(const Vec3& start, const Vec3& direction, double margin, Vec3& poin
 
 }  // namespace
 
-bool feature_point(const Crossing* crossings, int count, double margin, Vec3& point) {
+bool feature_point(std::span<const Crossing> crossings, double margin, Vec3& point) {
+    const int count = int(crossings.size());
     Vec3 mean{};
-    for (int i = 0; i < count; ++i) mean = mean + (1.0 / count) * crossings[i].point;
+    for (const Crossing& crossing : crossings) mean = mean + (1.0 / count) * crossing.point;
     Symmetric a;
     Vec3 b{};
     double miss = 0;
-    for (int i = 0; i < count; ++i) {
-        const Vec3& n = crossings[i].normal;
-        double d = dot(n, crossings[i].point - mean);
+    for (const Crossing& crossing : crossings) {
+        const Vec3& n = crossing.normal;
+        double d = dot(n, crossing.point - mean);
         miss += d * d;
         for (int k = 0; k < 3; ++k) {
             a.diagonal[k] += n[k] * n[k];
@@ -136,8 +137,8 @@ bool feature_point(const Crossing* crossings, int count, double margin, Vec3& po
     if (inside(point, margin)) return true;
     if (!clipped(mean + best, along, margin, point)) return false;
     miss = 0;
-    for (int i = 0; i < count; ++i) {
-        double d = dot(crossings[i].normal, point - crossings[i].point);
+    for (const Crossing& crossing : crossings) {
+        double d = dot(crossing.normal, point - crossing.point);
         miss += d * d;
     }
     return fits(miss, count);

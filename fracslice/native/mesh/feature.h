@@ -1,6 +1,7 @@
 // Where the planes through a cell's crossings meet.
 #pragma once
 #include <cmath>
+#include <span>
 
 #include "vec3.h"
 
@@ -31,7 +32,7 @@ inline bool sharp(const Crossing& a, const Crossing& b) { return dot(a.normal, b
 // than they ask for (Kobbelt, Botsch, Schwanecke and Seidel 2001, "Feature sensitive surface extraction"; the quadratic error
 // of Garland and Heckbert 1997). The point lies strictly inside the cell, `margin` from its faces. Returns false where the
 // planes do not meet in one point of the cell: then there is no feature but roughness.
-bool feature_point(const Crossing* crossings, int count, double margin, Vec3& point);
+bool feature_point(std::span<const Crossing> crossings, double margin, Vec3& point);
 
 // Where the surface's trace in the cell's lower face along `axis` has its corner: the two crossings' tangents in the face
 // intersected. Returns false where they do not meet within the face, `margin` from its edges.

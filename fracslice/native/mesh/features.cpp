@@ -2,6 +2,7 @@
 // then which of these are corners, for both cells must have features; then which cells have two that are enough.
 #include "features.h"
 
+#include <bit>
 #include <utility>
 
 #include "finder.h"
@@ -55,8 +56,8 @@ BitPlane straight_cells(const Features& own, const Around& around, int x, const 
     for (int face = 1; face < 6 && left; ++face) {
         for (int other = 0; other < face; ++other) {
             for (BitPlane cells = left & around.at(x, face) & around.at(x, other); cells; cells &= cells - 1) {
-                int bit = __builtin_ctzll(cells);
-                const Vec3& point = features[popcount(own.cells[x] & ((BitPlane(1) << bit) - 1))].point;
+                int bit = std::countr_zero(cells);
+                const Vec3& point = features[std::popcount(own.cells[x] & ((BitPlane(1) << bit) - 1))].point;
                 if (between(point, around.corner(x, face, bit).point(), around.corner(x, other, bit).point())) {
                     straight |= BitPlane(1) << bit;
                 }
@@ -112,10 +113,10 @@ void FeatureGrid::straighten(int layer) {
         Around around(*this, i);
         const Feature* features = own.found[3];
         for (int x = 0; x < kSide; ++x) {
-            for (int face = 0; face < 6; ++face) own.triangles += size_t(popcount(around.at(x, face)));
+            for (int face = 0; face < 6; ++face) own.triangles += size_t(std::popcount(around.at(x, face)));
             own.straight[x] = straight_cells(own, around, x, features);
-            own.tip_count += uint32_t(popcount(own.cells[x] & ~own.straight[x]));
-            features += popcount(own.cells[x]);
+            own.tip_count += uint32_t(std::popcount(own.cells[x] & ~own.straight[x]));
+            features += std::popcount(own.cells[x]);
         }
         own.triangles -= 2 * (own.counts[3] - own.tip_count);
     });

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "../array.h"
 #include "near.h"
@@ -160,7 +161,7 @@ class Around {
             if (leaves) owner = above_[axis];
         }
         BitPlane before = (BitPlane(1) << at % 64) - 1;
-        return {owner, size_t(axis), owner->rank[axis][at / 64] + size_t(popcount(owner->corners[axis][at / 64] & before))};
+        return {owner, size_t(axis), owner->rank[axis][at / 64] + size_t(std::popcount(owner->corners[axis][at / 64] & before))};
     }
 
   private:

@@ -97,7 +97,7 @@ class Finder {
             loop_[k].point = way.start + from.t * way.along;
             for (int j = 0; j < 3; ++j) loop_[k].normal[j] = from.normal[j];
         }
-        return feature_point(loop_.data(), length_, margin_, tip);
+        return feature_point({loop_.data(), size_t(length_)}, margin_, tip);
     }
 
     // The corner of the trace in a cell's lower face along `axis`, if there is one. A face that the loop passes twice has

@@ -6,6 +6,7 @@
 #include <tbb/parallel_for.h>
 
 #include <atomic>
+#include <bit>
 #include <vector>
 
 #include "boxes.h"
@@ -119,10 +120,10 @@ class Pairs::Search {
         const Leaf& theirs = leaf(other - tree_.leaves);
         unsigned near = theirs.boxes.meeting(box_of(tree_.low + 3 * node, tree_.high + 3 * node));
         for (; near; near &= near - 1) {
-            size_t j = size_t(__builtin_ctz(near));
+            size_t j = size_t(std::countr_zero(near));
             unsigned met = mine.boxes.meeting(theirs.boxes[j]);
             if (node == other) met &= (1u << j) - 1;
-            for (; met; met &= met - 1) mark_pair(mine, size_t(__builtin_ctz(met)), theirs, j);
+            for (; met; met &= met - 1) mark_pair(mine, size_t(std::countr_zero(met)), theirs, j);
         }
     }
 

@@ -1,6 +1,7 @@
 #include "marching_squares.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <memory>
 
@@ -65,7 +66,7 @@ Painted paint(const Slab& slab, const Canvas& canvas) {
             const uint64_t cut = empty || t < kTiles ? 0 : corners.mixed() | sharp;
             if (!cut) continue;
             coverage(tiles, corners, levels);
-            painted.partly += __builtin_popcountll(cut);
+            painted.partly += std::popcount(cut);
             each((cut | corners.whole()) & on(canvas, y0, x0), [&](int bit) {
                 canvas.data[(y0 + (bit >> 3)) * canvas.down + (x0 + (bit & 7)) * canvas.across] = levels[bit];
             });
@@ -102,7 +103,7 @@ Crossings crossings(const Slab& slab) {
             const Corners corners(slab, tiles);
             const Cells cells(slab, slab.scale, tiles);
             for (uint64_t mixed = corners.mixed(); mixed; mixed &= mixed - 1) {
-                int bit = lowest(mixed);
+                int bit = std::countr_zero(mixed);
                 int32_t right = (bit & 7) == 7 ? std::max(slab.at(y, x + 1), first) : t;
                 int32_t upper = bit >> 3 == 7 ? std::max(slab.at(y + 1, x), first) : t;
                 const int32_t e[4] = {id(t, bit), id(right, 64 + (bit & 56) + ((bit + 1) & 7)), id(upper, (bit + 8) & 63),

@@ -1,9 +1,11 @@
 #include "picture.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <utility>
 
+#include "../compiler.h"
 #include "band.h"
 #include "in_rows.h"
 
@@ -101,12 +103,12 @@ class Shown {
         const Corners corners(slab_, tiles);
         const uint64_t cut = corners.mixed() | slab_.sharp[tiles.own];
         if (!cut) {
-            painted_.area += __builtin_popcountll(corners.whole());
+            painted_.area += std::popcount(corners.whole());
             return false;
         }
         const float* values = slab_.values[tiles.own].data();
-        for (int k = 0; k < 64; k += 16) __builtin_prefetch(values + k);
-        painted_.partly += __builtin_popcountll(cut);
+        for (int k = 0; k < 64; k += 16) prefetch(values + k);
+        painted_.partly += std::popcount(cut);
         cut_.push_back({tiles, corners, &band_.cut(i, cut)});
         return true;
     }

@@ -21,7 +21,10 @@ constexpr double kMiddle = (kTile + 1) / 2.0;  // from the next tile's first sam
 constexpr uint64_t kQuarters[] = {block(4), block(4) << 4, block(4) << 32, block(4) << 36};
 
 // Places that are full: few, so that a call of `memset` would take longer.
-__attribute__((optimize("no-tree-loop-distribute-patterns"))) void fill(int32_t* place, int n) {
+#if defined(__GNUC__) && !defined(__clang__)
+__attribute__((optimize("no-tree-loop-distribute-patterns")))
+#endif
+void fill(int32_t* place, int n) {
     for (int i = 0; i < n; ++i) place[i] = kFull;
 }
 

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
+#include <bit>
 #include <functional>
 #include <stdexcept>
 #include <string>
@@ -30,14 +31,12 @@ BitPlane negative(const float* values) {
     return bits;
 }
 
-int64_t popcount(BitPlane bits) { return __builtin_popcountll(bits); }
-
 // Sign changes between a brick's samples and the one sign of a neighbour that has none.
 int64_t across(const Signs& s, int axis, bool high, BitPlane sign) {
-    if (axis == 0) return popcount(s[high ? 7 : 0] ^ sign);
+    if (axis == 0) return std::popcount(s[high ? 7 : 0] ^ sign);
     BitPlane face = axis == 1 ? (high ? kLastY : kFirstY) : (high ? kLastZ : kFirstZ);
     int64_t total = 0;
-    for (BitPlane slab : s) total += popcount((slab ^ sign) & face);
+    for (BitPlane slab : s) total += std::popcount((slab ^ sign) & face);
     return total;
 }
 
