@@ -51,7 +51,7 @@ class Likely {
           least_(float(bounds.outside)), most_(float(bounds.proven)) {}
     float operator()(const float* middle) const {
         const float x = across_ * most(middle, 1), y = along_ * most(middle, row_), steep = std::sqrt(x * x + y * y);
-        return (x > 0) & (y > 0) & (steep < most_) ? std::max(steep, least_) : most_;
+        return ((x > 0) & (y > 0) & (steep < most_)) ? std::max(steep, least_) : most_;
     }
 
  private:
