@@ -23,7 +23,7 @@ width, height = map(int, (sys.argv[3] if len(sys.argv) > 3 else "480x300").split
 # The camera starts where the whole object is in view. ``passes`` yields better and better pictures; the last is kept.
 
 scene = read(library.path("mandelbulb"))
-start = Camera.around(scene.root.facts.box)
+start = Camera.around(scene.root.bounds.box)
 for step in range(steps):
     view = replace(scene.view, camera=start.orbited(360 * step / steps))
     *_, picture = Renderer(scene.root, view, (width, height)).passes(samples=16)

@@ -13,8 +13,8 @@ from .nearest import hint
 
 _GROUPS = {
     "shape": ("Shapes", "Solids. They contain no elements."),
-    "blend": ("CSG operators", "One solid from the elements inside."),
-    "warp": (
+    "csg": ("CSG operators", "One solid from the elements inside."),
+    "domain": (
         "Domain operators",
         "The element inside, moved, copied or deformed. Several elements are a union.",
     ),
