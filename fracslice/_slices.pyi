@@ -18,7 +18,7 @@ class Field:
     """What is sampled."""
 
 class Compiled(Field):
-    """Machine code: `loops.POINTS` for float32 and its parameters, which it holds."""
+    """Machine code: `loops.points` for float32 and its parameters, which it holds."""
 
     def __init__(self, entry: tuple[Function, NDArray[float32]]) -> None: ...
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..formulas.registry import Facts, Node
 from .host import lane_count
 from .linker import Linked, link
-from .loops import BRICKS, POINTS, Loop
+from .loops import Loop, bricks, points
 from .machine import Function, constant, loaded
 from .objects import object_code
 
@@ -57,7 +57,7 @@ class Compilable(Protocol):
 class CpuKernel:
     """The compiled field of one scene. Safe to call from many threads at once.
 
-    entry: `loops.POINTS` as compiled, and its parameters, for native code.
+    entry: `loops.points` as compiled, and its parameters, for native code.
     """
 
     batch = 1 << 17
@@ -65,7 +65,7 @@ class CpuKernel:
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype: np.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
-        functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (POINTS, BRICKS))
+        functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
         self._parameters = constant(linked.parameters, self.dtype)
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)

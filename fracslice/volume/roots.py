@@ -6,14 +6,12 @@ for itself: what it finds does not depend on its neighbours, nor on how the segm
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
 
-from ..formulas import vocabulary
 from ..formulas.registry import Node
 from ..kernel import Compilable, compile_scene
 from ..kernel.cpu import Precision, load_functions
@@ -21,7 +19,7 @@ from ..kernel.host import lane_count
 from ..kernel.linker import Linked, link
 from ..kernel.loops import Loop
 from ..kernel.machine import Function, constant
-from .root_loops import AIM, FIND, LEAD, POLISH
+from .root_loops import aim, find, lead, polish
 
 FRAMES = {"float32": (1e-6, 1e-5, 5e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-5, 1e-6, 1e-7)}
 """FRAME but for its first number, the lengths in voxels."""
@@ -29,7 +27,7 @@ FRAMES = {"float32": (1e-6, 1e-5, 5e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-
 QUICK, MOST = 8, 48
 """Steps towards a root that all segments are given, and those that then are left."""
 
-LOOPS = {"float32": (FIND, LEAD), "float64": (FIND, POLISH, AIM)}
+LOOPS = {"float32": (find, lead), "float64": (find, polish, aim)}
 
 
 class Roots:
@@ -123,22 +121,13 @@ def _compiled(source: str, numbers: bytes, precision: Precision) -> tuple[int, d
 
 
 def _on_arrays(root: Compilable, precision: Precision) -> tuple[int, dict[str, Run]]:
-    """The same texts run by NumPy, for a field that is not linked: all segments are one vector."""
+    """The same loops run by NumPy, for a field that is not linked: all segments are one vector."""
     kernel = compile_scene(root, precision)
-    words = {
-        **vars(vocabulary),
-        "WIDTH": sys.maxsize,
-        "load": lambda row, _: row,
-        "store": lambda row, _, values: np.copyto(row, values),
-        "field": lambda x, y, z, _: kernel.points(x, y, z),
-    }
 
     def runs(loop: Loop) -> Run:
-        exec(loop.source, words)
-
         def run(frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
             with np.errstate(all="ignore"):
-                words[loop.name](None, frame, *rows, *out, *numbers, rows.shape[1])
+                loop.function(kernel.points, frame, *rows, *out, *numbers, rows.shape[1])
 
         return run
 

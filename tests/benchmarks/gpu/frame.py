@@ -16,7 +16,8 @@ from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
 from fracslice.render.cpu import BLOCK, CpuTracer, ordered
 from fracslice.render.cuda import CudaTracer
-from fracslice.render.linking import Frame, link_frame, optics
+from fracslice.render.linking import Frame, link_frame
+from fracslice.render.optics import optics
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 
