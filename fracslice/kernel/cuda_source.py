@@ -16,7 +16,7 @@ from .linker import CALLED, Linked
 from .loop_linker import link_loops
 from .loops import Loop
 
-WORDS = "fracslice.kernel.cuda_words"
+INTRINSICS = "fracslice.kernel.cuda_intrinsics"
 
 
 def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
@@ -35,7 +35,7 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
         "thread",
         "together",
     ]
-    header = f"from {WORDS} import {', '.join(words)}\n"
+    header = f"from {INTRINSICS} import {', '.join(words)}\n"
     trees = [function.tree for function in link_loops(tuple(loops)).values()]
     units = [ast.unparse(tree) for tree in trees if not tree.decorator_list]
     by_hand = [ast.unparse(tree) for tree in trees if tree.decorator_list]

@@ -1,6 +1,6 @@
 """The intrinsics of CUDA loops, as linters see them.
 
-`cuda_words` says what they mean on a GPU, and can be imported only where Numba's CUDA is.
+`cuda_intrinsics` says what they mean on a GPU, and can be imported only where Numba's CUDA is.
 
 One thread does the work of one lane. The numbers of a loop are typed by hand: ``real(0.5)``, ``whole(3)``.
 """

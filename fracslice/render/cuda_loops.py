@@ -9,8 +9,8 @@ from ..formulas.vocabulary import maximum, minimum
 from ..kernel.cuda_stubs import device, divide, kernel, real, thread, together, whole
 from ..kernel.loops import Loop
 from .linking import Frame
+from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
 from .units.random import centred, sample
-from .units.words import background, camera_ray, span_box, step_cone, step_ray, surface
 
 
 def loops(frame: Frame) -> tuple[Loop, ...]:

@@ -22,8 +22,8 @@ from .colours import Look, linear
 from .optics import Optics
 from .units import camera as cameras
 from .units import lights, march, shade
+from .units.intrinsics import GIVEN, background, surface
 from .units.normal import normal
-from .units.words import GIVEN, background, surface
 
 RELAX = 1.4
 """Measured on the Mandelbulb: 8.1 M evaluations a frame at 1.0, 6.0 at 1.4, 8.4 at 1.7."""
@@ -87,8 +87,8 @@ class _Frame:
         return Frame(linked, *samples, self.bounces, sharp, far, self.block)
 
     def marching(self) -> None:
-        seen, steepness = self.seen, 1 / self.root.facts.lipschitz
-        box = self.root.facts.box
+        seen, steepness = self.seen, 1 / self.root.bounds.lipschitz
+        box = self.root.bounds.box
         lo = tuple(max(a, e - seen.far) for a, e in zip(box.lo, self.camera.eye, strict=True))
         hi = tuple(min(a, e + seen.far) for a, e in zip(box.hi, self.camera.eye, strict=True))
         self.linker.bind("span_box", march.span, {"lo": lo, "hi": hi})
@@ -131,7 +131,7 @@ class _Frame:
         return names
 
     def surface(self, look: Look) -> str:
-        """The text of `units.words.surface`."""
+        """The text of `units.intrinsics.surface`."""
         mode = self.view.shading.mode
         lines = ["h = width_at(path + t, P)"]
         if mode in ("light", "normal"):
@@ -162,7 +162,7 @@ class _Frame:
             lines.append("ambient = ambient + glow")
         lines += ["r = ambient * cr", "g = ambient * cg", "b = ambient * cb"]
         if any(light.shadows == "yes" for light in self.view.lights):
-            steepness = 1 / self.root.facts.lipschitz
+            steepness = 1 / self.root.bounds.lipschitz
             self.linker.bind("visible_", march.visible, {"steepness": steepness, "patience": 200})
             lines += [f"s{a} = {a} + 3.0 * h * n{a}" for a in "xyz"]
         for k, light in enumerate(self.view.lights):
@@ -267,7 +267,7 @@ class _Frame:
         return ["air = clearness(t, P)", *lines, *(f"t{c} = air * t{c}" for c in "rgb" if self.bounces)]
 
     def background(self) -> str:
-        """The text of `units.words.background`."""
+        """The text of `units.intrinsics.background`."""
         view = self.view
         skies = [light for light in view.lights if light.kind == "sky"]
         if view.fog is None and skies and view.shading.mode == "light":

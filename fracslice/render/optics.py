@@ -22,7 +22,7 @@ class Optics:
 
 def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> Optics:
     """The optics of a picture of this many pixels."""
-    box = root.facts.box
+    box = root.bounds.box
     corners = [c for c in box.corners if all(map(math.isfinite, c))]
     far = max([math.dist(camera.eye, c) for c in corners] + [4 * math.dist(camera.eye, camera.target)])
     far = far if box.finite else 25 * far

@@ -14,8 +14,8 @@ from ..formulas.vocabulary import any_of, where
 from ..kernel.intrinsics import WIDTH, load, store
 from ..kernel.loops import Loop, loop
 from .linking import Frame
+from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
 from .units.random import centred, sample
-from .units.words import background, camera_ray, span_box, step_cone, step_ray, surface
 
 Row = IntEnum("Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb px py", start=0)
 """What is known of a ray. status: 1 hit, 2 missed, 3 out of steps. r, g, b: light gathered; tr, tg, tb: how

@@ -137,7 +137,7 @@ def test_roots_of_a_field_that_is_not_linked_move_as_the_compiled_ones_do() -> N
     kernel = CpuKernel(roots.link(root), "float64")
 
     class Field:
-        facts = root.facts
+        bounds = root.bounds
 
         def compiled(self, precision: str) -> CpuKernel:
             return kernel
