@@ -45,9 +45,9 @@ def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
     """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) set where < 0."""
 
 class RootLoops:
-    """The loops of `fracslice.volume.root_loops` that find crossings: FIND in float32 and in float64, and
-    POLISH. field: the same float64 field, `CpuKernel.entry` or a function of points [3, n] and of [1, n] for
-    their values. Holds all of them. lanes: segments and points come in multiples of it. batch: how many
+    """The loops of `fracslice.volume.root_loops` that find crossings: `find` in float32 and in float64, and
+    `polish`. field: the same float64 field, `CpuKernel.entry` or a function of points [3, n] and of [1, n]
+    for their values. Holds all of them. lanes: segments and points come in multiples of it. batch: how many
     segments are worth a call. steps: that all segments are given, and those that then are left. sure: a root
     is exact where it moved less."""
 

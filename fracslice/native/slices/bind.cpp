@@ -16,7 +16,7 @@ namespace nb = nanobind;
 namespace fracslice::slices {
 namespace {
 
-// Machine code of a scene, `fracslice.kernel.loops.POINTS` on float.
+// Machine code of a scene, `fracslice.kernel.loops.points` on float.
 class Compiled : public Field {
  public:
     explicit Compiled(const nb::tuple& entry)
