@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <string>
 #include <utility>
 
@@ -65,9 +66,8 @@ Contour room(size_t crossings, size_t known) {
 
 Contouring::Contouring(const CellGrid& cells, Layers layers, const Placement& placement)
     : cells_(cells), layers_(layers), placement_(placement), features_(cells, layers), next_(layers.first - 1),
-      first_vertex_(cells.crossings_before(layers.first)),
-      result_(room(crossings_of(cells, {layers.first, layers.last + 1}),
-                   crossings_of(cells, {layers.first - 1, layers.last + 2}))) {}
+      first_vertex_(cells.crossings_before(layers.first)), known_(crossings_of(cells, {layers.first - 1, layers.last + 2})),
+      result_(room(crossings_of(cells, {layers.first, layers.last + 1}), known_)) {}
 
 void Contouring::advance(int end, const Hermite& data) {
     size_t first = cells_.crossings_before(next_), last = cells_.crossings_before(end + 1);
@@ -109,6 +109,7 @@ void Contouring::number_tips(int layer) {
 
 size_t Contouring::numbered(size_t count) {
     size_t first = result_.crossings + result_.cases.rows;
+    assert(result_.cases.rows + count <= known_ * 10 / 3);
     if (first + count > kMostElements) throw std::length_error("the surface has more than 2^31 vertices");
     result_.cases.rows += count;
     return first;
@@ -122,6 +123,7 @@ void Contouring::write_layer(int layer) {
         size_t& count = features_.of(span.brick(k)).triangles;
         count = std::exchange(result_.triangles.rows, result_.triangles.rows + count);
     }
+    assert(result_.triangles.rows <= 8 * known_);
     if (result_.triangles.rows > kMostElements) throw std::length_error("the surface has more than 2^31 triangles");
     for_each_brick(span, [&](size_t i) { write_triangles(i); });
 }
@@ -134,6 +136,7 @@ void Contouring::put(size_t vertex, const Vec3& point) {
 
 void Contouring::put(size_t vertex, const Feature& feature) {
     size_t row = vertex - result_.crossings;
+    assert(row < result_.cases.rows);
     put(vertex, feature.point);
     std::copy(feature.to_mean.begin(), feature.to_mean.end(), &result_.to_means.data[3 * row]);
     result_.cases.data[row] = feature.number;
@@ -182,6 +185,7 @@ void Contouring::write_triangles(size_t i) {
         }
         near.for_each(x, left, write);
     }
+    assert(tip == own.tip_base + own.tip_count);  // as many as were counted, so that no brick writes into another's places
 }
 
 }  // namespace fracslice::mesh

@@ -148,6 +148,7 @@ class Slab : public Tiles {
     std::vector<Place> torn() const;
     void close();
     struct Differing;
+    bool is_closed() const;  // whether every edge that the contour crosses has two evaluated ends
     void ask(std::vector<int32_t>& active, std::vector<int32_t>& again);
     void enlarge(int32_t t, std::vector<int32_t>& active, std::vector<int32_t>& again);
     void corners();
