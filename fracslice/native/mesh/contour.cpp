@@ -37,8 +37,8 @@ int32_t* write_fan(const Around& around, const Cell& cell, int64_t tip, int32_t*
     return out;
 }
 
-// The two triangles of each of some flat cells of slab x.
-int32_t* write_flat(const Near& near, int x, BitPlane cells, uint8_t number, int32_t* out) {
+// The two triangles of each of some flat cells of plane x.
+int32_t* write_flat(const BrickCells& near, int x, BitPlane cells, uint8_t number, int32_t* out) {
     std::array<uint16_t, 6> places;
     for (int k = 0; k < 6; ++k) places[k] = kPlaces[kCases[number].corners[k]];
     for (; cells; cells &= cells - 1) {
@@ -79,7 +79,7 @@ void Contouring::advance(int end, const Hermite& data) {
         if (next_ < layers_.first) continue;
         features_.choose(next_);
         number_corners(next_);
-        for_each_brick(cells_.span({next_, next_ + 1}), [&](size_t i) { write_vertices(i, data); });
+        for_each_brick(cells_.bricks_of({next_, next_ + 1}), [&](size_t i) { write_vertices(i, data); });
         if (next_ > layers_.first) write_layer(next_ - 1);
     }
 }
@@ -92,17 +92,17 @@ Contour Contouring::finish() {
 
 // Gives features their places, brick by brick.
 void Contouring::number_corners(int layer) {
-    Span span = cells_.span({layer, layer + 1});
-    for (size_t k = 0; k < span.size(); ++k) {
-        Features& own = features_.of(span.brick(k));
+    LayerBricks bricks = cells_.bricks_of({layer, layer + 1});
+    for (size_t k = 0; k < bricks.size(); ++k) {
+        Features& own = features_.of(bricks.brick(k));
         for (size_t axis = 0; axis < 3; ++axis) own.corner_base[axis] = numbered(own.counts[axis]);
     }
 }
 
 void Contouring::number_tips(int layer) {
-    Span span = cells_.span({layer, layer + 1});
-    for (size_t k = 0; k < span.size(); ++k) {
-        Features& own = features_.of(span.brick(k));
+    LayerBricks bricks = cells_.bricks_of({layer, layer + 1});
+    for (size_t k = 0; k < bricks.size(); ++k) {
+        Features& own = features_.of(bricks.brick(k));
         own.tip_base = numbered(own.tip_count);
     }
 }
@@ -116,16 +116,16 @@ size_t Contouring::numbered(size_t count) {
 }
 
 void Contouring::write_layer(int layer) {
-    Span span = cells_.span({layer, layer + 1});
+    LayerBricks bricks = cells_.bricks_of({layer, layer + 1});
     features_.straighten(layer);
     number_tips(layer);
-    for (size_t k = 0; k < span.size(); ++k) {
-        size_t& count = features_.of(span.brick(k)).triangles;
+    for (size_t k = 0; k < bricks.size(); ++k) {
+        size_t& count = features_.of(bricks.brick(k)).triangles;
         count = std::exchange(result_.triangles.rows, result_.triangles.rows + count);
     }
     assert(result_.triangles.rows <= 8 * known_);
     if (result_.triangles.rows > kMostElements) throw std::length_error("the surface has more than 2^31 triangles");
-    for_each_brick(span, [&](size_t i) { write_triangles(i); });
+    for_each_brick(bricks, [&](size_t i) { write_triangles(i); });
 }
 
 void Contouring::put(size_t vertex, const Vec3& point) {
@@ -157,7 +157,7 @@ void Contouring::write_vertices(size_t i, const Hermite& data) {
 void Contouring::write_triangles(size_t i) {
     const Features& own = features_.of(i);
     int32_t* out = result_.triangles.data.get() + 3 * own.triangles;
-    Near near(cells_, i);
+    BrickCells near(cells_, i);
     cells_.for_each_near(near.octant,
                          [&](size_t at, uint32_t vertex) { near.numbers[at] = uint32_t(vertex - first_vertex_); });
     Around around(features_, i);

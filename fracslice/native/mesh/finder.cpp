@@ -9,7 +9,7 @@ namespace {
 
 // A brick's cells, their crossings numbered as they are seen; and these.
 struct Seen {
-    Near near;
+    BrickCells near;
     std::array<uint32_t, std::tuple_size<Numbers>::value> vertices;
     std::array<double, std::tuple_size<Numbers>::value> roots;
     uint32_t count = 0;

@@ -69,7 +69,7 @@ class Extraction {
     }
 
     double crossing(double a, double b) const {
-        double t = a / (a - b), low = placement_.clamp, high = 1 - low;
+        double t = a / (a - b), low = placement_.minimum_edge_parameter, high = 1 - low;
         return t > low ? (t < high ? t : high) : low;
     }
 
