@@ -24,14 +24,14 @@ def marching_cubes(
     index: NDArray[int32],
     origin: Point,
     voxel: float,
-    clamp: float,
+    minimum_edge_parameter: float,
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[int32]]:
     """The surface between the samples < 0 and the others: closed, an oriented 2-manifold, free of
     self-crossings.
 
-    clamp: how near a grid point a vertex may come, as a share of the edge. threads: 0 for all cores; the
-    result is the same for any number.
+    minimum_edge_parameter: how near a grid point a vertex may come, as a share of the edge. threads: 0 for
+    all cores; the result is the same for any number.
 
     Returns vertices float64 [n, 3] at origin + voxel * (grid position); triangles int32 [m, 3],
     counter-clockwise seen from outside. Marching cubes after Lorensen and Cline (1987), with a table that
@@ -103,7 +103,13 @@ class Contouring:
     """
 
     def __init__(
-        self, cells: Cells, first: int, last: int, origin: Point, voxel: float, clamp: float
+        self,
+        cells: Cells,
+        first: int,
+        last: int,
+        origin: Point,
+        voxel: float,
+        minimum_edge_parameter: float,
     ) -> None: ...
     def advance(self, end: int, first: int, t: NDArray[float64], normals: NDArray[float32]) -> None:
         """Goes on to the layer before `end`. t: where on its edge the surface crosses each of those numbered
