@@ -1,4 +1,4 @@
-"""Writes docs/reference/elements.md and fracslice/scene/scene.rng from the registry: run it after adding a formula."""
+"""Write docs/reference/elements.md and fracslice/scene/scene.rng from the registry of formulas."""
 
 from pathlib import Path
 

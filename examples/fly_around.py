@@ -20,7 +20,8 @@ steps = int(sys.argv[2]) if len(sys.argv) > 2 else 24
 width, height = map(int, (sys.argv[3] if len(sys.argv) > 3 else "480x300").split("x"))
 
 # %%
-# The camera starts where the whole object is in view. ``passes`` yields better and better pictures; the last is kept.
+# The camera starts where the whole object is in view. ``passes`` yields better and better pictures; the
+# last is kept.
 
 scene = read(library.path("mandelbulb"))
 start = Camera.around(scene.root.bounds.box)
