@@ -9,9 +9,18 @@ from pathlib import Path
 import fracslice._native
 
 with tempfile.TemporaryDirectory() as folder:
-    arguments = ["mesh", "menger-sponge", "-o", "sponge.stl", "--report", "sponge.json", "--quiet"]
-    subprocess.run([sys.executable, "-m", "fracslice.cli", *arguments, "--resolution", "48"], cwd=folder, check=True)
-    report = json.loads(Path(folder, "sponge.json").read_text())
+    program = [
+        sys.executable,
+        "-m",
+        "fracslice.cli",
+        "mesh",
+        "menger-sponge",
+        "--resolution",
+        "48",
+        "--quiet",
+    ]
+    subprocess.run([*program, "-o", "a.stl", "--report", "a.json"], cwd=folder, check=True)
+    report = json.loads(Path(folder, "a.json").read_text())
 assert report["watertight"] and report["manifold"] and report["triangles"] > 1000, report
 maps = Path("/proc/self/maps")
 lines = maps.read_text().splitlines() if maps.exists() else []
