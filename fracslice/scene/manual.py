@@ -8,8 +8,8 @@ from typing import Any
 
 from ..errors import SceneError
 from ..formulas.parameters import REQUIRED
+from ..nearest import hint
 from .layout import SCENE, SECTIONS, Element, formulas
-from .nearest import hint
 
 _GROUPS = {
     "shape": ("Shapes", "Solids. They contain no elements."),
