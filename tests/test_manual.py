@@ -99,7 +99,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
     for work in (
         "job.make_mesh",
         "slicing.plan_stack",
-        "render.Renderer",
+        "rendering.Renderer",
         "bench.runs.measure",
         "viewer.fly",
     ):

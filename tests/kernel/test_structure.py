@@ -25,7 +25,7 @@ from fracslice.formulas import (
 from fracslice.kernel import compile_scene, compiler, link, reference
 from fracslice.kernel.host import REGISTERS, host
 from fracslice.kernel.loops import POINTS
-from fracslice.render.linking import link_frame, optics
+from fracslice.rendering.linking import link_frame, optics
 from fracslice.scene.view import Camera, Light, View
 
 P = np.random.default_rng(2).uniform(-1.5, 1.5, (3, 500))

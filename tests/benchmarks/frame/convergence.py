@@ -19,9 +19,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
-from fracslice.render import Renderer, linking
-from fracslice.render.cpu import ordered
-from fracslice.render.units.random import hashed
+from fracslice.rendering import Renderer, linking
+from fracslice.rendering.cpu import ordered
+from fracslice.rendering.units.random import hashed
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fracslice.formulas import Node, box, get, mandelbulb, menger, plane, sphere, torus, transform, union
-from fracslice.render.cpu import BLOCK
-from fracslice.render.linking import Frame, link_frame, optics
+from fracslice.rendering.cpu import BLOCK
+from fracslice.rendering.linking import Frame, link_frame, optics
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
 
 WIDTH, HEIGHT = 17, 12

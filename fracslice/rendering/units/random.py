@@ -22,7 +22,7 @@ def hashed(a):  # type: ignore[no-untyped-def]
 
 def scrambled(a, seed):  # type: ignore[no-untyped-def]
     """Owen's scrambling of a number whose bits come reversed; they leave in order. See
-    `fracslice.render.sequence`."""
+    `fracslice.rendering.sequence`."""
     a = (a ^ (a * 0x3D20ADEA)) & 0xFFFFFFFF
     a = (a + seed) & 0xFFFFFFFF
     a = (a * ((seed >> 16) | 1)) & 0xFFFFFFFF

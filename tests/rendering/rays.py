@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from fracslice.formulas import Node
-from fracslice.render import Renderer
+from fracslice.rendering import Renderer
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 

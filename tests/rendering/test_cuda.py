@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from fracslice.kernel import Linked
-from fracslice.render import cuda_accumulator
-from fracslice.render.cpu import BLOCK
-from fracslice.render.cuda_loops import loops
+from fracslice.rendering import cuda_accumulator
+from fracslice.rendering.cpu import BLOCK
+from fracslice.rendering.cuda_loops import loops
 from tests.kernel.cuda_ptx import compiled
-from tests.render.cuda_cases import CASES, frame
+from tests.rendering.cuda_cases import CASES, frame
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not there"
@@ -49,6 +49,6 @@ def test_threads_go_on_together_after_the_march(tmp_path: Path) -> None:
 
 def test_pictures_are_those_of_the_lanes_on_the_simulator() -> None:
     environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1"}
-    command = [sys.executable, "-m", "tests.render.cuda_simulated"]
+    command = [sys.executable, "-m", "tests.rendering.cuda_simulated"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

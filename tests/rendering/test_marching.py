@@ -9,7 +9,7 @@ from fracslice.formulas import Node, menger, sphere, torus
 from fracslice.kernel import reference
 from fracslice.scene.view import Camera
 from tests.examples import EXAMPLES
-from tests.render.rays import directions, distances, hits_sphere, hits_sponge, hits_torus
+from tests.rendering.rays import directions, distances, hits_sphere, hits_sponge, hits_torus
 
 SIZE = (56, 40)
 CAMERA = Camera(eye=(1.9, -2.3, 1.2), target=(0.05, 0, 0), fov=50)

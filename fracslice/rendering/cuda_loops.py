@@ -1,6 +1,6 @@
 """The loops around the units on CUDA: one thread takes one ray from the film to the last bounce.
 
-They do what the lanes' loops in `fracslice.render.waves` do, in the same words.
+They do what the lanes' loops in `fracslice.rendering.waves` do, in the same words.
 """
 
 from __future__ import annotations

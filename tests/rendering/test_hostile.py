@@ -18,7 +18,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.render import Renderer, develop
+from fracslice.rendering import Renderer, develop
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
 

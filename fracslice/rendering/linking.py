@@ -2,7 +2,7 @@
 other.
 
 The text that is written here is straight-line code; every calculation is in a unit of
-`fracslice.render.units`, bound to its numbers under a name. A scene without an effect has no line of it.
+`fracslice.rendering.units`, bound to its numbers under a name. A scene without an effect has no line of it.
 """
 
 from __future__ import annotations

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from fracslice.kernel.cuda import require
-from fracslice.render.accumulator import HostAccumulator
-from fracslice.render.cpu import CpuTracer, ordered
-from fracslice.render.cuda import CudaTracer
-from fracslice.render.cuda_accumulator import CudaAccumulator
+from fracslice.rendering.accumulator import HostAccumulator
+from fracslice.rendering.cpu import CpuTracer, ordered
+from fracslice.rendering.cuda import CudaTracer
+from fracslice.rendering.cuda_accumulator import CudaAccumulator
 from fracslice.scene.view import Film
 from fracslice.work import Work
-from tests.render.cuda_cases import CASES, HEIGHT, WIDTH, frame
+from tests.rendering.cuda_cases import CASES, HEIGHT, WIDTH, frame
 
 SAMPLE, LIMIT = 65, 128
 SINGLE = np.dtype(np.float32)

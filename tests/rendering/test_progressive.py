@@ -12,7 +12,7 @@ import pytest
 
 from fracslice.errors import Cancelled, RenderError
 from fracslice.formulas import material, menger, sphere, union
-from fracslice.render import Renderer, progressive
+from fracslice.rendering import Renderer, progressive
 from fracslice.scene.view import Camera, Film, Light, View
 from fracslice.work import Work
 

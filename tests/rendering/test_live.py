@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
-from fracslice.render.live import CameraInput, Live
+from fracslice.rendering.live import CameraInput, Live
 from fracslice.scene.view import Camera
 from fracslice.work import Work
 
