@@ -18,7 +18,7 @@ from ..work import Work
 from .apart import resolved, shown
 from .faces import settled
 from .parts import parts_of
-from .samples import lengths
+from .samples import Samples
 from .slender import slender
 from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
@@ -132,7 +132,7 @@ def check_solid(
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
     most = float(BINS[-1]) / scale
-    solid = lengths(bricks, root.facts, most)
+    solid = Samples(bricks)
     work.check()
     thin, tight = slender(root, solid, work)
 

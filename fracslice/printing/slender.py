@@ -29,8 +29,8 @@ from .wrapped import Raised
 NEAR = 0.9
 """Voxels: more than from any point to the nearest sample, half the diagonal."""
 
-AWAY = 0.75
-"""Voxels from the surface that the samples know, at least, that make another surface."""
+BEFORE = 0.8
+"""Voxels from where a ray begins in which it enters nothing."""
 
 THIN = 3.0
 """Voxels: what is thicker is measured by samples, too."""
@@ -67,7 +67,7 @@ class Slender:
 def slender(root: Node | Compilable, seen: Samples, work: Work) -> tuple[Slender, Slender]:
     """The thin walls and gaps of an object, also those that its samples miss.
 
-    root: all depths known. seen: the distances that were sampled of it. The values of escape-time fractals
+    root: all depths known. seen: samples of it. The values of escape-time fractals
     are far from distances: there the samples are better, and only what they miss is looked for. A gap between
     walls that are themselves thin is found behind them.
     """
@@ -161,19 +161,23 @@ class _Look:
 
         def look(rows: slice) -> _Rays:
             start, normals, area = crossed(raised, rows)
-            rays = self.narrow(_Rays(start, -sign * normals, area, 0 * area, 0 * area), sign)
-            far, none = 2 * (reach + self.voxel), np.zeros(len(rays.start))
-            rays = replace(rays, enter=self.first(rays, none, none + far, sign))
-            rays = rays.chosen(rays.enter < far)
-            rays = self.missed(rays, rays.enter)
+            far = np.full(len(start), 2 * (reach + self.voxel))
+            rays = self.limited(_Rays(start, -sign * normals, area, 0 * area, far), sign)
+            enter = self.first(rays, np.full(len(rays.start), BEFORE * self.voxel), rays.leave, sign)
+            rays = replace(rays, enter=enter).chosen(enter < rays.leave)
             return self.stretch(rays, rays.enter, -sign)
 
         return gathered(look, len(raised.bricks), AT_ONCE, self.work)
 
-    def narrow(self, rays: _Rays, sign: float) -> _Rays:
-        """Those that may leave within `most` what they enter, `NEAR` voxels from where they begin at least:
-        most others are as far from any surface halfway.
+    def limited(self, rays: _Rays, sign: float) -> _Rays:
+        """Those that may enter something thin, up to where they leave. Of a field whose values tell distances
+        these are all that may leave within `most` what they enter, `NEAR` voxels from where they begin at
+        least: most others are as far from any surface halfway. Of a fractal they end where the samples know
+        of a surface.
         """
+        if self.root.facts.weak:
+            end = self.seen.free(rays.start, rays.ways, rays.leave)
+            return replace(rays, leave=end).chosen(end > BEFORE * self.voxel)
         half = self.most / 2
         middle = np.full(len(rays.start), (NEAR + SLACK) * self.voxel + half)
         f = sign * self.field(rays.points(middle))
@@ -183,8 +187,8 @@ class _Look:
         """Those that are to be looked at so far along: of a fractal, at what its samples miss."""
         if not self.root.facts.weak:
             return rays
-        known = np.abs(self.seen.points(*rays.points(s))) <= AWAY * self.voxel
-        return rays.chosen(~known)
+        begin = rays.points(s).T
+        return rays.chosen(self.seen.free(begin, rays.ways, np.full(len(begin), self.voxel)) > 0)
 
     def raised(self, by: float) -> Samples:
         """Samples of the field less `by`: the flatter it is, the farther its inside reaches from the box."""
