@@ -11,7 +11,7 @@ import numpy as np
 
 from .errors import SceneError, TooLargeError, VolumeError
 from .formulas import Box
-from .formulas.parameters import Number, settle
+from .formulas.parameters import Number, validate
 from .memory import available_bytes, peak_rss_mb
 from .report import Report, SurfaceError, SurfaceToMesh, version
 from .scene import Print, Scene
@@ -60,7 +60,7 @@ class MeshJob:
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:
             raise SceneError("voxel and resolution: expected one of them")
-        settle(self, _KINDS, SceneError)
+        validate(self, _KINDS, SceneError)
 
     def size(self, scene: Scene) -> float:
         """The longest side in mm."""
@@ -137,7 +137,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     """
     what, work = what or MeshJob(), work or Work()
     voxels, clock = what.voxels(scene), Clock(work)
-    from .mesh.check import check
+    from .mesh.check import check_mesh
     from .mesh.missed import surface_to_mesh
     from .mesh.refine import refine
     from .mesh.simplify import simplify
@@ -173,7 +173,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         with clock("simplifying"):
             mesh, simplified = simplify(mesh, what.simplify_mm, work)
     with clock("checking"):
-        checked = check(mesh, threads=work.threads)
+        checked = check_mesh(mesh, threads=work.threads)
         points = (mesh.vertices - np.array(place.offset)) / place.scale
         error = place.scale * surface_error(planned.root, points, planned.voxel, work)
         back = surface_to_mesh(planned, lambda: [raw], place.scale, work)
@@ -228,7 +228,7 @@ def _changed(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) 
     from .printing import printable
 
     # Of walls thinner than a voxel a mesh has crumbs only: bodies are chosen in the field where it tells.
-    left = how if planned.root.facts.weak else replace(how, keep="all")
+    left = how if planned.root.bounds.exterior_only else replace(how, keep="all")
     size_of = partial(_box_of_mesh, what=what, how=left, size=size, work=work)
     return *printable(planned, size, how, work, size_of), left
 

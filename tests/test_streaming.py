@@ -67,7 +67,7 @@ def test_streamed_is_what_would_have_been_made_in_memory(
 
 def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Triangles taken out of every piece: each open edge is counted once, wherever the pieces end."""
-    from fracslice.mesh.check import check
+    from fracslice.mesh.check import check_mesh
     from fracslice.mesh.extract import contour_pieces
     from fracslice.mesh.window import Window
     from fracslice.volume import plan, sample_scene_signs
@@ -83,7 +83,7 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
         keep = np.array([tuple(c) not in centres for c in piece.mesh.corners.mean(axis=1).tolist()])
         end = piece.end if number < len(pieces) - 1 else np.inf
         passed += len(window.add(piece.mesh.selected(keep), end).triangles)
-    truth, told = check(whole.selected(~lost)), window.report(1, 0, 0)
+    truth, told = check_mesh(whole.selected(~lost)), window.report(1, 0, 0)
     assert len(pieces) > 4 and passed == truth.triangles == told.triangles
     assert told.open_edges == truth.open_edges > 100
     assert (told.vertices, told.nonmanifold_vertices) == (truth.vertices, truth.nonmanifold_vertices)

@@ -52,9 +52,9 @@ class Shells:
 
 def shells(mesh: Mesh) -> Shells:
     """Find the shells of a closed, oriented mesh: triangles that share vertices, O(m log m)."""
-    from fracslice.mesh.links import parts, shell_volumes
+    from fracslice.mesh.topology import connected_components, shell_volumes
 
-    labels, count = parts(mesh.triangles, len(mesh.vertices))
+    labels, count = connected_components(mesh.triangles, len(mesh.vertices))
     volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
     hollow = volumes < 0
     parent = np.full(count, -1, dtype=np.int64)
@@ -73,11 +73,11 @@ def in_pieces(mesh: Mesh, voxel: float) -> str:
     Between samples such walls are missed: they have holes, or fall to pieces. A body counts if on average it
     is thinner than a voxel; the dust around a fractal is such, too, but less than `PIECES` of the material.
     """
-    from fracslice.mesh.links import parts, shell_volumes
+    from fracslice.mesh.topology import connected_components, shell_volumes
 
     if voxel * mesh.area < 2 * PIECES * mesh.volume:  # such bodies would have more surface
         return ""
-    labels, count = parts(mesh.triangles, len(mesh.vertices))
+    labels, count = connected_components(mesh.triangles, len(mesh.vertices))
     volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
     areas = np.bincount(labels, np.linalg.norm(mesh.normals, axis=1) / 2, minlength=count)
     thin, bodies = (volumes > 0) & (2 * volumes < voxel * areas), int((volumes > 0).sum())

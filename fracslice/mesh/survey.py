@@ -29,10 +29,10 @@ class Survey:
 
     def add(self, piece: Piece) -> NDArray[np.int64]:
         """Takes in a piece. Returns the label of each of its triangles, int64 [m]."""
-        from .links import parts
+        from .topology import connected_components
 
         mesh = piece.mesh
-        local, count = parts(mesh.triangles, len(mesh.vertices))
+        local, count = connected_components(mesh.triangles, len(mesh.vertices))
         labels = local.astype(np.int64) + self.count
         of_vertex = np.empty(len(mesh.vertices), np.int64)
         of_vertex[mesh.triangles] = labels[:, None]
@@ -67,7 +67,7 @@ class Survey:
 
     def _united(self) -> tuple[NDArray[np.int32], int]:
         """The shell of each label."""
-        from .links import unite
+        from .topology import unite
 
         parent: NDArray[np.int64] = np.arange(self.count)
         for a, b in np.concatenate(self.same).tolist():

@@ -14,11 +14,11 @@ from ..kernel import Compilable, compile_scene
 from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
 from ..work import Work
-from .crossings import crossing_triangles
 from .fit import OFF, UPRIGHT, Fit
-from .links import corners_by_vertex
 from .model import Mesh
-from .rounding import float32_points
+from .quantisation import float32_points
+from .self_intersections import self_intersecting_triangles
+from .topology import corners_by_vertex
 
 POINTED = 0.15
 """The sine of the angle by which all edges at a pointed vertex fall off, at least."""
@@ -85,7 +85,7 @@ def with_tips(root: Node | Compilable, mesh: Mesh, voxel: float, work: Work | No
         work.check()
         made, of_cap = _capped(mesh, caps)
         as_written = Mesh(float32_points(made).astype(np.float64), made.triangles)
-        wrong = of_cap[crossing_triangles(as_written, threads=work.threads, among=of_cap >= 0)]
+        wrong = of_cap[self_intersecting_triangles(as_written, threads=work.threads, among=of_cap >= 0)]
         if not (wrong >= 0).any():
             return made
         caps = [cap for number, cap in enumerate(caps) if number not in wrong]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .clean import mended
 from .model import Mesh
-from .rounding import rounded
+from .quantisation import quantised
 
 if TYPE_CHECKING:
     from .check import MeshReport
@@ -60,7 +60,7 @@ class Window:
         before, self.end = self.end, end
         whole = _joined(self.waiting, piece, before, self.voxel / 2)
         whole = mended(whole, before - MENDS * self.voxel, end - MENDS * self.voxel)
-        final = rounded(whole)
+        final = quantised(whole)
         x = final.vertices[:, 0]
         done = x[final.triangles].max(axis=1, initial=-np.inf) < end - WAITS * self.voxel
         counted = (x >= before - COUNTS * self.voxel) & (x < end - COUNTS * self.voxel)
@@ -70,21 +70,21 @@ class Window:
 
     def _count(self, mesh: Mesh, done: NDArray[np.bool_], counted: NDArray[np.bool_]) -> None:
         from .check import duplicates
-        from .crossings import crossing_triangles
-        from .links import edge_ends
+        from .self_intersections import self_intersecting_triangles
+        from .topology import edge_ends
 
         a, b, c = mesh.triangles.T
         distinct = (a != b) & (b != c) & (c != a)
         ends = edge_ends(mesh.triangles[distinct], counted)
-        crossing = crossing_triangles(mesh, threads=self.threads) & done
+        crossing = self_intersecting_triangles(mesh, threads=self.threads) & done
         tally, passed = self.tally, mesh.selected(done)
         area, volume, flat = passed.measures_from((0.0, 0.0, 0.0))
         tally.triangles += int(done.sum())
         tally.vertices += int(counted.sum())
         tally.open_edges += ends.open_edges
-        tally.nonmanifold_edges += ends.crowded_edges
+        tally.nonmanifold_edges += ends.non_manifold_edges
         tally.misoriented_edges += ends.misoriented_edges
-        tally.nonmanifold_vertices += ends.extra_fans
+        tally.nonmanifold_vertices += ends.non_manifold_vertices
         tally.self_intersections += int(crossing.sum())
         tally.degenerate_triangles += flat
         tally.duplicate_triangles += duplicates(mesh.triangles[crossing])

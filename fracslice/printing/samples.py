@@ -37,7 +37,7 @@ class Samples:
 
     def __init__(self, bricks: Bricks) -> None:
         self.bricks = bricks
-        self.bounds = _bounds(bricks)
+        self.brick_bounds = _brick_bounds(bricks)
 
     @property
     def box(self) -> Box:
@@ -57,7 +57,7 @@ class Samples:
         """Which samples have one on the other side of the surface among the 26 around them, bool [n, 512]."""
         b = self.bricks
         found = np.empty(b.values.shape, np.bool_)
-        _beside(b.ijk, b.index, self.bounds, b.values, found)
+        _beside(b.ijk, b.index, self.brick_bounds, b.values, found)
         return found
 
     def free(self, start: np.ndarray, ways: np.ndarray, far: np.ndarray) -> np.ndarray:
@@ -72,11 +72,11 @@ class Samples:
         """Values at points, float64 of their shape."""
         b, out = self.bricks, np.empty(np.shape(x))
         u, v, w = (np.ascontiguousarray(a, np.float64).ravel() for a in (x, y, z))
-        _interpolate(u, v, w, *b.origin, b.voxel, b.index, self.bounds, b.values, out.ravel())
+        _interpolate(u, v, w, *b.origin, b.voxel, b.index, self.brick_bounds, b.values, out.ravel())
         return out
 
 
-def _bounds(bricks: Bricks) -> np.ndarray:
+def _brick_bounds(bricks: Bricks) -> np.ndarray:
     """For each brick without samples, how far its points are from the surface at least, signed, float32."""
     from scipy.ndimage import distance_transform_cdt
 
@@ -86,20 +86,20 @@ def _bounds(bricks: Bricks) -> np.ndarray:
 
 
 @compiled
-def _interpolate(xs, ys, zs, x0, y0, z0, voxel, index, bounds, values, out):  # type: ignore[no-untyped-def]
+def _interpolate(xs, ys, zs, x0, y0, z0, voxel, index, brick_bounds, values, out):  # type: ignore[no-untyped-def]
     for n in range(len(xs)):
-        out[n] = interpolated(xs[n], ys[n], zs[n], x0, y0, z0, voxel, index, bounds, values)
+        out[n] = interpolated(xs[n], ys[n], zs[n], x0, y0, z0, voxel, index, brick_bounds, values)
 
 
 @compiled
-def interpolated(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ignore[no-untyped-def]
+def interpolated(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
     """The value at one point, scene units."""
     u, v, w = (x - x0) / voxel, (y - y0) / voxel, (z - z0) / voxel
-    return between(u, v, w, voxel, index, bounds, values)
+    return between(u, v, w, voxel, index, brick_bounds, values)
 
 
 @compiled
-def between(u, v, w, voxel, index, bounds, values):  # type: ignore[no-untyped-def]
+def between(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
     """The value at one point, given in voxels from the origin of the grid."""
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
     u, v, w = u - i, v - j, w - k
@@ -109,7 +109,7 @@ def between(u, v, w, voxel, index, bounds, values):  # type: ignore[no-untyped-d
     if max(p, q, r) < 7 and 0 <= bi < nx and 0 <= bj < ny and 0 <= bk < nz:
         row = index[bi, bj, bk]
         if row < 0:
-            return float(bounds[bi, bj, bk])
+            return float(brick_bounds[bi, bj, bk])
         f, s = values[row], 64 * p + 8 * q + r
         a, b = (1 - w) * f[s] + w * f[s + 1], (1 - w) * f[s + 8] + w * f[s + 9]
         c, d = (1 - w) * f[s + 64] + w * f[s + 65], (1 - w) * f[s + 72] + w * f[s + 73]
@@ -118,12 +118,12 @@ def between(u, v, w, voxel, index, bounds, values):  # type: ignore[no-untyped-d
     for corner in range(8):
         a, b, c = corner >> 2, (corner >> 1) & 1, corner & 1
         share = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w)
-        total += share * sample_at(index, bounds, values, voxel, i + a, j + b, k + c)
+        total += share * sample_at(index, brick_bounds, values, voxel, i + a, j + b, k + c)
     return total
 
 
 @compiled
-def sample_at(index, bounds, values, voxel, i, j, k):  # type: ignore[no-untyped-def]
+def sample_at(index, brick_bounds, values, voxel, i, j, k):  # type: ignore[no-untyped-def]
     """The sample of a grid point, or a bound; beyond the bricks, from how far beyond it is."""
     bi, bj, bk = i >> 3, j >> 3, k >> 3
     nx, ny, nz = index.shape
@@ -132,12 +132,12 @@ def sample_at(index, bounds, values, voxel, i, j, k):  # type: ignore[no-untyped
         return voxel * (NEAR + beyond - 1)
     row = index[bi, bj, bk]
     if row < 0:
-        return float(bounds[bi, bj, bk])
+        return float(brick_bounds[bi, bj, bk])
     return float(values[row, (i & 7) * 64 + (j & 7) * 8 + (k & 7)])
 
 
 @compiled
-def gather(ijk, index, bounds, values, row, f):  # type: ignore[no-untyped-def]
+def gather(ijk, index, brick_bounds, values, row, f):  # type: ignore[no-untyped-def]
     """A brick's samples with one layer before them and two after them along each axis, [SIDE^3]."""
     x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
     nx, ny, nz = index.shape
@@ -147,7 +147,7 @@ def gather(ijk, index, bounds, values, row, f):  # type: ignore[no-untyped-def]
                 u, v, w = x + a - 1, y + b - 1, z + c - 1
                 known = 0 <= u < nx and 0 <= v < ny and 0 <= w < nz
                 there = index[u, v, w] if known else -1
-                flat = bounds[u, v, w] if known else bounds[x, y, z]
+                flat = brick_bounds[u, v, w] if known else brick_bounds[x, y, z]
                 for i in range((0, 1, 9)[a], (1, 9, 11)[a]):
                     for j in range((0, 1, 9)[b], (1, 9, 11)[b]):
                         to = (i * SIDE + j) * SIDE
@@ -157,11 +157,11 @@ def gather(ijk, index, bounds, values, row, f):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _beside(ijk, index, bounds, values, found):  # type: ignore[no-untyped-def]
+def _beside(ijk, index, brick_bounds, values, found):  # type: ignore[no-untyped-def]
     f = np.empty(SIDE**3, np.float32)
     one, two = np.empty(SIDE**3, np.uint8), np.empty(SIDE**3, np.uint8)
     for row in range(len(ijk)):
-        gather(ijk, index, bounds, values, row, f)
+        gather(ijk, index, brick_bounds, values, row, f)
         for s in range(SIDE**3):
             one[s] = 1 if f[s] < 0 else 2
         for step in (1, SIDE, SIDE * SIDE):

@@ -78,7 +78,7 @@ def walls(
     """Walls, or gaps, up to `limit` scene units thick.
 
     direction: measure along it instead of the normal, through faces that look along it or against it. Right
-    within a voxel; what is thinner than one shows only where a sample lies in it, see `slender`.
+    within a voxel; what is thinner than one shows only where a sample lies in it, see `thin_features`.
     """
     b, towards = solid.bricks, -1.0 if gaps else 1.0
 
@@ -88,7 +88,19 @@ def walls(
         if direction is not None:
             ways = np.copysign(1, (ways * direction).sum(1))[:, None] * np.array(direction)
         width = np.empty(len(points))
-        _through(points, ways, limit, towards, *b.origin, b.voxel, b.index, solid.bounds, b.values, solid.beside, width)
+        _through(
+            points,
+            ways,
+            limit,
+            towards,
+            *b.origin,
+            b.voxel,
+            b.index,
+            solid.brick_bounds,
+            b.values,
+            solid.beside,
+            width,
+        )
         thin = (width < limit) & (np.abs((normals * ways).sum(1)) > -OPPOSITE)
         ends = points + width[:, None] * ways
         thin[thin] = (normals_at(solid, ends[thin]) * normals[thin]).sum(1) < OPPOSITE
@@ -115,7 +127,17 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
         points, normals = np.empty((2, room, 3))
         area = np.empty(room)
         n = _cross(
-            begin, end, *b.origin, b.voxel, b.ijk, b.index, solid.bounds, b.values, points, normals, area
+            begin,
+            end,
+            *b.origin,
+            b.voxel,
+            b.ijk,
+            b.index,
+            solid.brick_bounds,
+            b.values,
+            points,
+            normals,
+            area,
         )
     return points[:n].copy(), normals[:n].copy(), area[:n].copy()
 
@@ -123,16 +145,16 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
 def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
     """Unit normals by central differences over a voxel, [n, 3]."""
     b, normals = solid.bricks, np.empty(points.shape)
-    _normals(points, *b.origin, b.voxel, b.index, solid.bounds, b.values, normals)
+    _normals(points, *b.origin, b.voxel, b.index, solid.brick_bounds, b.values, normals)
     return normals
 
 
 @compiled
-def _cross(begin, end, x0, y0, z0, voxel, ijk, index, bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
+def _cross(begin, end, x0, y0, z0, voxel, ijk, index, brick_bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
     """Writes what `crossed` returns, as much as there is room for, and returns how much there is."""
     n, f = 0, np.empty(SIDE**3, np.float32)
     for row in range(begin, end):
-        gather(ijk, index, bounds, values, row, f)
+        gather(ijk, index, brick_bounds, values, row, f)
         for s in range(512):
             u, v, w = s >> 6, (s >> 3) & 7, s & 7
             at = (u + 1) * SIDE * SIDE + (v + 1) * SIDE + w + 1
@@ -174,27 +196,27 @@ def _across(f, at, axis, share, normal):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _normals(points, x0, y0, z0, voxel, index, bounds, values, normals):  # type: ignore[no-untyped-def]
+def _normals(points, x0, y0, z0, voxel, index, brick_bounds, values, normals):  # type: ignore[no-untyped-def]
     for n in range(len(points)):
         x, y, z = points[n]
-        normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, bounds, values)
+        normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
 
 
 @compiled
-def _normal(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ignore[no-untyped-def]
+def _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
     h = voxel / 2
-    u = interpolated(x + h, y, z, x0, y0, z0, voxel, index, bounds, values)
-    u -= interpolated(x - h, y, z, x0, y0, z0, voxel, index, bounds, values)
-    v = interpolated(x, y + h, z, x0, y0, z0, voxel, index, bounds, values)
-    v -= interpolated(x, y - h, z, x0, y0, z0, voxel, index, bounds, values)
-    w = interpolated(x, y, z + h, x0, y0, z0, voxel, index, bounds, values)
-    w -= interpolated(x, y, z - h, x0, y0, z0, voxel, index, bounds, values)
+    u = interpolated(x + h, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
+    u -= interpolated(x - h, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
+    v = interpolated(x, y + h, z, x0, y0, z0, voxel, index, brick_bounds, values)
+    v -= interpolated(x, y - h, z, x0, y0, z0, voxel, index, brick_bounds, values)
+    w = interpolated(x, y, z + h, x0, y0, z0, voxel, index, brick_bounds, values)
+    w -= interpolated(x, y, z - h, x0, y0, z0, voxel, index, brick_bounds, values)
     length = max(np.sqrt(u * u + v * v + w * w), 1e-30)
     return u / length, v / length, w / length
 
 
 @compiled
-def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, bounds, values, beside, width):  # type: ignore[no-untyped-def]
+def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, brick_bounds, values, beside, width):  # type: ignore[no-untyped-def]
     """How far it is to the other side; twice the limit where that is farther."""
     for n in range(len(points)):
         x, y, z = (points[n, 0] - x0) / voxel, (points[n, 1] - y0) / voxel, (points[n, 2] - z0) / voxel
@@ -204,7 +226,7 @@ def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, bounds, val
             u, v, w = x + s * ways[n, 0], y + s * ways[n, 1], z + s * ways[n, 2]
             f = -1.0
             if is_beside(u, v, w, index, beside):
-                f = towards * between(u, v, w, voxel, index, bounds, values)
+                f = towards * between(u, v, w, voxel, index, brick_bounds, values)
             if f >= 0:
                 width[n] = voxel * (s - (STRIDE * f / (f - before) if before < 0 else 0.0))
                 break

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..formulas.box import Box
-from ..formulas.registry import Facts, Node
+from ..formulas.registry import Bounds, Node
 from ..kernel import Compilable, Kernel
-from ..kernel.depth import resolve_depths, told_depths, visible
+from ..kernel.depth import depth_notes, resolve_depths, visible
 from ..kernel.devices import compile_for
 from ..store import Arrays, stored
 from ..work import Work
@@ -73,7 +73,7 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
     found = extent(known, resolution, work)
     voxel = max(found.box.size) / resolution
     shown, notes = visible(known, voxel)
-    return Plan(shown, found.box, found.outer, found.tips, voxel, notes, told_depths(root, known))
+    return Plan(shown, found.box, found.outer, found.tips, voxel, notes, depth_notes(root, known))
 
 
 def with_depths(root: Node, work: Work | None = None) -> Node:
@@ -82,9 +82,9 @@ def with_depths(root: Node, work: Work | None = None) -> Node:
     The depths follow from the object alone, whatever it is sampled for: a mesh, layers and what checks them
     are of the same solid. Raises `VolumeError`.
     """
-    if not root.facts.box.finite:
+    if not root.bounds.box.finite:
         return root
-    size = max(root.facts.box.size)
+    size = max(root.bounds.box.size)
     known = resolve_depths(root, size / DETAIL)
     # A deeper solid is smaller, so that finer detail counts, until no depth changes any more.
     while known is not root:
@@ -107,8 +107,8 @@ def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
     fresh: list[Bricks] = []
 
     def made() -> Arrays:
-        kernel, facts, guard = _fields(planned, work)
-        bricks = sample(kernel, facts, lattice, work, guard)
+        kernel, bounds, conservative = _fields(planned, work)
+        bricks = sample(kernel, bounds, lattice, work, conservative)
         fresh.append(bricks)
         return {"ijk": bricks.ijk, "values": bricks.values, "index": bricks.index}
 
@@ -122,12 +122,12 @@ def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
     """As `sample_scene`, of each sample only its sign."""
     work = work or Work()
     lattice = planned.lattice
-    kernel, facts, guard = _fields(planned, work)
-    return sample_signs(kernel, facts, lattice, work, guard)
+    kernel, bounds, conservative = _fields(planned, work)
+    return sample_signs(kernel, bounds, lattice, work, conservative)
 
 
-def _fields(planned: Plan, work: Work) -> tuple[Kernel, Facts, Kernel]:
+def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:
     """What is sampled, the facts of what is pruned by, and what is pruned by: mostly the same."""
     root = planned.root
-    guard = root.guard()
-    return compile_for(work.device, root), guard.facts, compile_for(work.device, guard)
+    conservative = root.conservative()
+    return compile_for(work.device, root), conservative.bounds, compile_for(work.device, conservative)
