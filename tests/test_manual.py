@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 
 import pytest
-from fracslice_cli.main import commands, run
+from fracslice.cli.main import commands, run
 
 from fracslice.export import write
 

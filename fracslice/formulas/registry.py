@@ -13,11 +13,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from inspect import Signature
 from types import MappingProxyType
 from typing import Any, Literal
 
 from ..errors import SceneError
+from . import signatures
 from .box import Box
+from .operators import Operators
 from .parameters import REQUIRED, Parameter, validated
 
 Kind = Literal["shape", "csg", "domain"]
@@ -62,7 +65,7 @@ class Bounds:
 Hook = Callable[..., Any]
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Formula:
     """A registered formula. Its hooks take a `Node` and tell what the kernel and the sampler need to know."""
 
@@ -75,13 +78,26 @@ class Formula:
     exterior_only: bool = False
     hooks: dict[str, Hook] = field(default_factory=dict)
 
-    def __call__(self, *children: Node, place: str | None = None, **values: Any) -> Node:
-        """A scene node. Raises `SceneError` if a value or the number of children is not possible."""
-        unknown = sorted(set(values) - set(self.parameters))
-        if unknown:
-            raise SceneError(f"<{self.name}> has no attribute {unknown[0]!r}")
+    def __post_init__(self) -> None:
+        self.__name__ = self.__qualname__ = self.name
+        self.__module__ = self.function.__module__
+        self.__doc__ = signatures.docstring(self)
+
+    def __repr__(self) -> str:
+        return f"<{self.kind} {self.name}{signatures.signature(self)}>"
+
+    @property
+    def __signature__(self) -> Signature:
+        return signatures.signature(self)
+
+    def __call__(self, *arguments: Any, place: str | None = None, **keywords: Any) -> Node:
+        """A scene node. Raises `SceneError` if a value or the number of elements is not possible.
+
+        arguments: the elements inside it, or a shape's values in order.
+        """
+        elements, values = signatures.bound(self, arguments, keywords)
         checked = {name: self._value(name, values.get(name)) for name in self.parameters}
-        node = Node(self, MappingProxyType(checked), self._grouped(children), place)
+        node = Node(self, MappingProxyType(checked), self._grouped(elements), place)
         if node.depth > DEEPEST:
             raise node.fail(TOO_DEEP)
         self.hooks.get("check", lambda _: None)(node)
@@ -156,7 +172,7 @@ class Formula:
 
 
 @dataclass(frozen=True)
-class Node:
+class Node(Operators):
     """A formula with its parameters and children: one element of a scene. `place` is "file:line";
     `is_conservative` is set by `conservative`; `depth` counts nested elements, this one included.
     """
@@ -175,7 +191,8 @@ class Node:
         return self.values[parameter]
 
     def __repr__(self) -> str:
-        changed = [f"{k}={v!r}" for k, v in self.values.items() if v != self.formula.parameters[k].default]
+        kinds, name = self.formula.parameters, signatures.python_name
+        changed = [f"{name(k)}={v!r}" for k, v in self.values.items() if v != kinds[k].default]
         return f"{self.formula.name}({', '.join([*map(repr, self.children), *changed])})"
 
     def __hash__(self) -> int:

@@ -24,8 +24,8 @@ class Known:
 def field_key(root: Node | Compilable) -> str:
     """The key of all that a field's values, and what is known of them, follow from.
 
-    Of the scene itself and of its conservative: the linked text, the parameters and the facts. Depths must be
-    resolved; raises `KernelError`.
+    Of the scene itself and of its conservative field: the linked text, the parameters and the bounds. Depths
+    must be resolved; raises `KernelError`.
     """
     if not isinstance(root, Node):
         return root.key

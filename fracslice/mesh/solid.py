@@ -46,6 +46,6 @@ def to_manifold(mesh: Mesh) -> Manifold:
 def place_on_bed(mesh: Mesh, middle: tuple[float, float]) -> Mesh:
     """Move the mesh to stand on z = 0 with a point (x, y) over the origin."""
     low, high = mesh.bounds
-    placed = mesh.translated((-middle[0], -middle[1], -low[2]))
-    placed.vertices[placed.vertices[:, 2] < FLAT * (high - low).max(), 2] = 0
-    return placed
+    vertices = mesh.vertices - (*middle, low[2])
+    vertices[vertices[:, 2] < FLAT * (high - low).max(), 2] = 0
+    return Mesh(vertices, mesh.triangles)

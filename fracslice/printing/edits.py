@@ -38,7 +38,7 @@ class Term:
 class EditedField:
     """A field, and what is done to it, one after the other.
 
-    It stands where a root does: it has facts, and `compile_scene` makes a kernel of it.
+    It stands where a root does: it has bounds, and `compile_scene` makes a kernel of it.
     """
 
     root: Node | Compilable

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..formulas import material
+from ..formulas.material import material
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linker
 from ..kernel.structure import link_tree

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..formulas import material
+from ..formulas.material import material
 from ..formulas.registry import Node
 from ..kernel import source
 from ..kernel.linker import OF_FORMULAS, FieldDialect, folded, function, leading

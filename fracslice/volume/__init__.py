@@ -127,7 +127,7 @@ def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
 
 
 def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:
-    """What is sampled, the facts of what is pruned by, and what is pruned by: mostly the same."""
+    """What is sampled, the bounds of what is pruned by, and what is pruned by: mostly the same."""
     root = planned.root
     conservative = root.conservative()
     return compile_for(work.device, root), conservative.bounds, compile_for(work.device, conservative)

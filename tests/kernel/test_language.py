@@ -18,7 +18,7 @@ from fracslice.kernel import compile_scene, cuda_source, link, reference
 HEAD = """\
 import math
 import numpy as np
-from fracslice.formulas import Box, Number, blend, shape, warp
+from fracslice.formulas import Box, Number, csg_operator, domain_operator, shape
 TURN = 0.5
 @shape(radius=Number(1.0, "the radius", above=0))
 def mine(x, y, z, radius):

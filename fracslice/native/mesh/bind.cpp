@@ -2,16 +2,16 @@
 #include <nanobind/stl/optional.h>
 
 #include "../unlocked.h"
-#include "crossings.h"
+#include "self_intersections.h"
 #include "input.h"
-#include "links.h"
+#include "edge_topology.h"
 #include "measures.h"
 #include "nesting.h"
 #include "predicates.h"
 #include "tree.h"
 #include "weld.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 using Point = std::array<double, 3>;
@@ -134,9 +134,8 @@ void bind_mesh(nb::module_& module) {
                "threads"_a = 0, "among"_a = nb::none());
     module.def("nesting", &bind_nesting, "vertices"_a, "triangles"_a, "labels"_a, "sizes"_a, "first"_a, "order"_a,
                "low"_a, "high"_a);
-    bind_reduction(module);
     module.def("side_of_line", &side_of_line, "ax"_a, "ay"_a, "bx"_a, "by"_a, "cx"_a, "cy"_a);
     module.def("side_of_plane", &bind_side_of_plane, "a"_a, "b"_a, "c"_a, "d"_a);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

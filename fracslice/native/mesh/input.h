@@ -5,7 +5,7 @@
 #include "../numpy.h"
 #include "triangles.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 template <class T>
 using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
@@ -39,6 +39,4 @@ inline TreeView tree_of(const MeshView& mesh, const Vector<int64_t>& order, cons
     return tree;
 }
 
-void bind_reduction(nb::module_& module);
-
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "links.h"
+#include "edge_topology.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 constexpr size_t kBlock = size_t(1) << 14;
@@ -104,4 +104,4 @@ Bounds bounds(const double* points, size_t count) {
     return all;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -5,7 +5,7 @@
 
 #include "predicates.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 // 1 if the ray up from p leaves through the triangle, -1 if it enters, else 0.
@@ -93,4 +93,4 @@ Nesting nesting(const MeshView& mesh, const TreeView& tree, const int32_t* label
     return nested;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

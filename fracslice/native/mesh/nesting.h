@@ -3,7 +3,7 @@
 #include "../array.h"
 #include "triangles.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 struct Nesting {
     Array<int64_t> winding;  // how often others surround each shell
@@ -16,4 +16,4 @@ struct Nesting {
 Nesting nesting(const MeshView& mesh, const TreeView& tree, const int32_t* labels, const double* sizes,
                 const int64_t* first, size_t shells);
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

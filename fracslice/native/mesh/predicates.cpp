@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace fracslice::exact {
+namespace fracslice::mesh::exact {
 namespace {
 
 using Vec3 = std::array<double, 3>;
@@ -105,4 +105,4 @@ int side_of_plane(const double* pa, const double* pb, const double* pc, const do
     return sum.sign();
 }
 
-}  // namespace fracslice::exact
+}  // namespace fracslice::mesh::exact

@@ -8,9 +8,9 @@
 #include "coverage.h"
 #include "deflate.h"
 #include "turn.h"
-#include "wide.h"
+#include "avx512.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // The numbers of bits that differ from the one before, of n words that are eight words apart; returns the end. Up to `kSlack`
 // numbers behind the end are written.
@@ -141,4 +141,4 @@ class Band {
     Adler sum_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -13,7 +13,7 @@
 
 namespace nb = nanobind;
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 // Machine code of a scene, `fracslice.kernel.loops.POINTS` on float.
@@ -138,11 +138,11 @@ nb::tuple bind_signs(const Slab& slab) {
 }
 
 }  // namespace
-}  // namespace fracslice
+}  // namespace fracslice::slices
 
 NB_MODULE(_slices, module) {
     using namespace nanobind::literals;
-    using namespace fracslice;
+    using namespace fracslice::slices;
     nb::exception<std::domain_error>(module, "BorderError", PyExc_ValueError);
     nb::class_<Field>(module, "Field");
     nb::class_<Compiled, Field>(module, "Compiled").def(nb::init<nb::tuple>(), "entry"_a);

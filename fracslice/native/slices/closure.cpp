@@ -4,7 +4,7 @@
 
 #include "evaluate.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 int32_t Slab::add(int y, int x) {
     int32_t* here = &where[size_t(y) * tx_ + x];
@@ -144,4 +144,4 @@ void Slab::corners() {
     }
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

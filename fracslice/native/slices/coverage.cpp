@@ -2,9 +2,9 @@
 
 #include <cstring>
 
-#include "wide.h"
+#include "avx512.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr int kEnds = kTile + 1;  // samples along a row of cells
@@ -227,4 +227,4 @@ void Coverage::operator()(const Quad& tiles, const Corners& corners, Levels& lev
     });
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -5,7 +5,7 @@
 
 #include "pixels.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // Of the cells of a tile, by their bits: 0 to 255, which are those wholly outside and inside.
 struct alignas(64) Levels : std::array<uint8_t, 64> {};
@@ -25,4 +25,4 @@ class Coverage {
     std::array<double, kTile> sums_{};  // by columns
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

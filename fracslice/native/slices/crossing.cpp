@@ -3,7 +3,7 @@
 
 #include "evaluate.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr size_t kFew = 128;
@@ -53,4 +53,4 @@ float Slab::inside_scale() {
     return std::clamp(*chosen, 0.125f, kSmallest);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

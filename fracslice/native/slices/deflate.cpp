@@ -4,7 +4,7 @@
 #include <array>
 #include <cstring>
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr int kEnd = 256, kCodes = 286, kMostBits = 15;
@@ -54,7 +54,7 @@ Sizes sizes_of(Counts counts) {
         for (int i = 2 * n - 3; i >= 0; --i) depth[i] = depth[parent[i]] + 1;
         if (depth[0] <= kMostBits) {
             Sizes sizes{};
-            for (int i = 0; i < n; ++i) sizes[used[i] & 0xFFFF] = uint8_t(depth[i]);
+            for (int i = 0; i < n; ++i) sizes[used[i] & 0xFFFF] = uint8_t(std::max(depth[i], 1));  // one symbol takes a bit, too
             return sizes;
         }
         for (uint32_t& count : counts) count = count ? count / 2 + 1 : 0;
@@ -239,4 +239,4 @@ const Rows<uint8_t>& Runs::zlib(uint32_t checksum) {
     return data_;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

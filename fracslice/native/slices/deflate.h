@@ -5,7 +5,7 @@
 
 #include "tiles.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr int kShortest = 3, kLongest = 258;  // bytes that a match repeats
 
@@ -40,7 +40,7 @@ class Runs {
             plain();
             Bytes bytes;
             std::memcpy(&bytes, from, sizeof bytes);
-            bytes = __builtin_shuffle(bytes, Bytes{}, Bytes{0, 16, 1, 16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16});
+            bytes = __builtin_shufflevector(bytes, Bytes{}, 0, 16, 1, 16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16);
             std::memcpy(symbol, &bytes, sizeof bytes);
             symbol += n;
         }
@@ -88,4 +88,4 @@ class Runs {
     End end_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -7,7 +7,7 @@
 
 #include "picture.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // Eight rows of pixels after eight rows, sorted by counting: first by columns, then by rows.
 class InRows {
@@ -42,4 +42,4 @@ class InRows {
     std::vector<int32_t> begin_;  // of each row of tiles
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

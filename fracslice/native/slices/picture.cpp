@@ -1,13 +1,15 @@
 #include "picture.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <utility>
 
+#include "../compiler.h"
 #include "band.h"
 #include "in_rows.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 // A tile of which some cells are cut, and where their levels go.
@@ -101,12 +103,12 @@ class Shown {
         const Corners corners(slab_, tiles);
         const uint64_t cut = corners.mixed() | slab_.sharp[tiles.own];
         if (!cut) {
-            painted_.area += __builtin_popcountll(corners.whole());
+            painted_.area += std::popcount(corners.whole());
             return false;
         }
         const float* values = slab_.values[tiles.own].data();
-        for (int k = 0; k < 64; k += 16) __builtin_prefetch(values + k);
-        painted_.partly += __builtin_popcountll(cut);
+        for (int k = 0; k < 64; k += 16) prefetch(values + k);
+        painted_.partly += std::popcount(cut);
         cut_.push_back({tiles, corners, &band_.cut(i, cut)});
         return true;
     }
@@ -144,4 +146,4 @@ const Rows<uint8_t>& deflated(const Canvas& image) {
     return runs.zlib(sum.value(uint64_t(stride) * uint64_t(image.rows)));
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

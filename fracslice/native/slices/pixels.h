@@ -2,7 +2,7 @@
 #pragma once
 #include "slab.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // A tile, and those to its right, above it, and to the right of that.
 struct Quad {
@@ -83,4 +83,4 @@ class Cells {
     Quad tiles_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

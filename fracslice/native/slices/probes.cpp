@@ -1,7 +1,7 @@
 // One sample of each block of 2 of undecided tiles, and the others, as long as no value reaches them.
 #include "evaluate.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 // One sample of each block of 2, the last; every other sample.
@@ -112,4 +112,4 @@ void Slab::rest() {
     evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) { set(ask, found.negative, 0, 0); });
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "evaluate.h"
-#include "squares.h"
+#include "marching_squares.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr float kPrecise = 2e-3f;  // pixels that a last step may take a crossing
@@ -204,4 +204,4 @@ void Slab::put_tip(int row, int column, float area) {
     sharp[t] |= cell;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -6,7 +6,7 @@
 
 #include "evaluate.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr int kCoarsest = 8;        // tiles along a block of the first level
@@ -21,7 +21,10 @@ constexpr double kMiddle = (kTile + 1) / 2.0;  // from the next tile's first sam
 constexpr uint64_t kQuarters[] = {block(4), block(4) << 4, block(4) << 32, block(4) << 36};
 
 // Places that are full: few, so that a call of `memset` would take longer.
-__attribute__((optimize("no-tree-loop-distribute-patterns"))) void fill(int32_t* place, int n) {
+#if defined(__GNUC__) && !defined(__clang__)
+__attribute__((optimize("no-tree-loop-distribute-patterns")))
+#endif
+void fill(int32_t* place, int n) {
     for (int i = 0; i < n; ++i) place[i] = kFull;
 }
 
@@ -48,7 +51,7 @@ class Likely {
           least_(float(bounds.outside)), most_(float(bounds.proven)) {}
     float operator()(const float* middle) const {
         const float x = across_ * most(middle, 1), y = along_ * most(middle, row_), steep = std::sqrt(x * x + y * y);
-        return (x > 0) & (y > 0) & (steep < most_) ? std::max(steep, least_) : most_;
+        return ((x > 0) & (y > 0) & (steep < most_)) ? std::max(steep, least_) : most_;
     }
 
  private:
@@ -146,7 +149,7 @@ std::vector<Slab::Block> Slab::coarse() {
 
 void Slab::fill(const Block& block) {
     const int last = std::min(block.y + block.size, ty_ - 1), n = std::min(block.size, tx_ - 1 - block.x);
-    for (int y = block.y; y < last; ++y) fracslice::fill(&where[size_t(y) * tx_ + block.x], n);
+    for (int y = block.y; y < last; ++y) slices::fill(&where[size_t(y) * tx_ + block.x], n);
 }
 
 // The places whose middle, halfway between two layers, leaves open what is around it in them and between.
@@ -233,4 +236,4 @@ void Slab::begin() {
     known.assign(count(), 0), sharp.assign(count(), 0);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -12,7 +12,7 @@
 #include "bits.h"
 #include "samples.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr float kWhole = 32768;
 
@@ -184,4 +184,4 @@ class Slab : public Tiles {
     int ty_, tx_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -3,10 +3,11 @@
 #include <array>
 #include <cstring>
 
+#include "../compiler.h"
 #include "bits.h"
 #include "coverage.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // Turns tiles: their rows are rows of the picture, from above.
 class Turn {
@@ -25,7 +26,7 @@ class Turn {
             std::memcpy(eight, tiles[i].data(), sizeof eight);
             if (transposed_) swap_rows_and_columns(eight);
             for (int row = 0; row < kTile; ++row) {
-                const uint64_t bytes = reversed_ ? __builtin_bswap64(eight[kTile - 1 - row]) : eight[kTile - 1 - row];
+                const uint64_t bytes = reversed_ ? byteswapped(eight[kTile - 1 - row]) : eight[kTile - 1 - row];
                 std::memcpy(rows + row * stride, &bytes, sizeof bytes);
             }
         }
@@ -34,14 +35,14 @@ class Turn {
     void operator()(const uint64_t* words, int n, uint64_t* rows) const {
         for (int i = 0; i < n; i += 8) {
             for (int k = i; k < i + 8; ++k) rows[k] = turned(words[k]);
-            swap_rows_and_columns(rows + i);
+            swap_rows_and_columns(std::span<uint64_t, 8>(rows + i, 8));
         }
     }
 
  private:
     uint64_t turned(uint64_t word) const {
         if (transposed_) word = transposed(word);
-        word = __builtin_bswap64(word);
+        word = byteswapped(word);
         return reversed_ ? mirrored(word) : word;
     }
 
@@ -49,4 +50,4 @@ class Turn {
     std::array<uint8_t, 256> shown_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices
