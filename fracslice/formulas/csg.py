@@ -136,7 +136,7 @@ def _slope(node: Node) -> float:
     """Minimum, maximum and their quadratic seams weigh the gradients with weights whose sum is 1: L = max.
 
     A seam follows level sets other than the surface, where the field of an escape-time fractal is steeper
-    than its bound says. How much is measured (`docs/accuracy.md`): for one such field, and for several.
+    than its bound says. How much is measured (`docs/how/accuracy.md`): for one such field, and for several.
     """
     fields = [child.bounds for child in node.children]
     exterior_only = (

@@ -39,8 +39,8 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat,
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
     1989, "Ray Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is
     Koebe's bound for connected complex Julia sets; one that falls apart has its derivative taken at a larger
-    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/accuracy.md`. What is returned is
-    held still from the escape on; w itself runs on, and its lanes are not looked at.
+    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/how/accuracy.md`. What is returned
+    is held still from the escape on; w itself runs on, and its lanes are not looked at.
     """
     cr, ci, cj, ck = c
     imaginary2 = y * y + z * z

@@ -94,8 +94,8 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
     it is taken here, as far out as a point of the solid can come (`escape.farthest`). Beyond, each step leads
     farther away whatever its direction, so that only how radii stretch matters; there it is faded out.
-    There is no theorem for three dimensions; L = 2 is measured (`docs/accuracy.md`). Where a set falls apart
-    (a constant far out) that fails, and the field is also kept below twice a sure distance,
+    There is no theorem for three dimensions; L = 2 is measured (`docs/how/accuracy.md`). Where a set falls
+    apart (a constant far out) that fails, and the field is also kept below twice a sure distance,
     `escape.sure_distance`. A power that is not whole tears space where the azimuth jumps from pi to -pi: no
     bound holds across the tear, and the guarded field stays below the sure distance from it.
     """

@@ -12,14 +12,16 @@ import pytest
 
 from fracslice.errors import KernelError
 from fracslice.formulas import box
-from fracslice.kernel import CpuKernel, intrinsics
+from fracslice.formulas.field import Kernel, Precision
+from fracslice.kernel import intrinsics
+from fracslice.kernel.arrays import ArrayField
 from fracslice.kernel.cpu import load_functions
 from fracslice.kernel.host import lane_count
 from fracslice.kernel.intrinsics import load, store
 from fracslice.kernel.linker import Linked
 from fracslice.kernel.loop_linker import loop_source
 from fracslice.kernel.loops import Loop, loop
-from fracslice.render import packets
+from fracslice.rendering import packets
 from fracslice.volume import roots
 
 STEP = 3
@@ -134,22 +136,21 @@ def test_roots_of_a_field_that_is_not_linked_move_as_the_compiled_ones_do() -> N
     """`polish` says how far it moved a root: a row of lanes that was read does not change with what is
     written."""
     root, voxel = box(), 0.1
-    kernel = CpuKernel(roots.link(root), "float64")
 
-    class Field:
+    class Plain(ArrayField):
         bounds = root.bounds
 
-        def compiled(self, precision: str) -> CpuKernel:
-            return kernel
+        def kernel(self, device: str, precision: Precision) -> Kernel:  # type: ignore[override]
+            return root.kernel(device, precision)  # type: ignore[arg-type]
 
-    ways = roots.Roots(root, "float64", voxel), roots.Roots(Field(), "float64", voxel)  # type: ignore[arg-type]
+    ways = roots.Roots(root, "float64", voxel), roots.Roots(Plain(), "float64", voxel)  # type: ignore[abstract]
     n = ways[0].width
     segments = np.zeros((6, n))
     segments[0], segments[1], segments[3] = 0.45, np.linspace(-0.3, 0.3, n), voxel
     found = []
     for way in ways:
         out = np.full((5, n), 0.25)
-        way._functions["polish"](way._frame, segments, out)
+        way._runs["polish"](way._frame, segments, out)
         found.append(out)
     np.testing.assert_allclose(found[1], found[0], atol=1e-9)
     assert found[0][4].min() > 0.01

@@ -25,8 +25,8 @@ from fracslice.formulas import (
 from fracslice.kernel import compile_scene, compiler, link, reference
 from fracslice.kernel.host import REGISTERS, host
 from fracslice.kernel.loops import points
-from fracslice.render.linking import link_frame
-from fracslice.render.optics import optics
+from fracslice.rendering.linking import link_frame
+from fracslice.rendering.optics import optics
 from fracslice.scene.view import Camera, Light, View
 
 P = np.random.default_rng(2).uniform(-1.5, 1.5, (3, 500))

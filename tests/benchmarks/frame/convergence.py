@@ -20,9 +20,9 @@ import numpy as np
 
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
 from fracslice.kernel.loop_linker import link_loops
-from fracslice.render import Renderer, packets
-from fracslice.render.cpu import ordered
-from fracslice.render.units.random import hashed
+from fracslice.rendering import Renderer, packets
+from fracslice.rendering.cpu import ordered
+from fracslice.rendering.units.random import hashed
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work
 

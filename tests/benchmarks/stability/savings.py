@@ -15,9 +15,9 @@ import numpy as np
 from fracslice.formulas import Node, mandelbulb, material, sphere, transform, union
 from fracslice.kernel import compile_scene, link
 from fracslice.kernel.linker import CALLED, FIELD, Linked
-from fracslice.render.linking import link_frame
-from fracslice.render.optics import optics
-from fracslice.render.packets import loops
+from fracslice.rendering.linking import link_frame
+from fracslice.rendering.optics import optics
+from fracslice.rendering.packets import loops
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
 from fracslice.volume import Lattice, sample
 from fracslice.volume.bricks import INSIDE, Bricks
