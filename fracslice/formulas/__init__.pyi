@@ -31,7 +31,7 @@ from .vocabulary import sin as sin
 from .vocabulary import sqrt as sqrt
 from .vocabulary import where as where
 
-def bend(*elements: fracslice.formulas.node.Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> fracslice.formulas.node.Node:
+def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
     """A straight axis made an arc (Barr 1984, "Global and Local Deformations of Solid Primitives").
 
     In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is looked
@@ -53,7 +53,7 @@ def bend(*elements: fracslice.formulas.node.Node, degrees: float, axis: Literal[
     Node
     """
 
-def bounds(*elements: fracslice.formulas.node.Node, min: Sequence[float], max: Sequence[float]) -> fracslice.formulas.node.Node:
+def bounds(*elements: Node, min: Sequence[float], max: Sequence[float]) -> Node:
     """What is inside a box; the element is not looked at far from it, however much of it there is.
 
     L = max of 1, which is the box', and the element's.
@@ -72,7 +72,7 @@ def bounds(*elements: fracslice.formulas.node.Node, min: Sequence[float], max: S
     Node
     """
 
-def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> fracslice.formulas.node.Node:
+def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> Node:
     """A box around the origin, its edges sharp or rounded. L = 1: a distance.
 
     Parameters
@@ -87,7 +87,7 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> fracslic
     Node
     """
 
-def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.0, 0.0, 0.5), radius: float = 0.25) -> fracslice.formulas.node.Node:
+def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.0, 0.0, 0.5), radius: float = 0.25) -> Node:
     """All points within the radius of a segment. L = 1: a distance.
 
     Parameters
@@ -104,7 +104,7 @@ def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.
     Node
     """
 
-def cone(radius: float = 0.5, height: float = 1.0) -> fracslice.formulas.node.Node:
+def cone(radius: float = 0.5, height: float = 1.0) -> Node:
     """A cone along the z axis, its tip up. L = 1: a distance.
 
     Parameters
@@ -119,7 +119,7 @@ def cone(radius: float = 0.5, height: float = 1.0) -> fracslice.formulas.node.No
     Node
     """
 
-def cylinder(radius: float = 0.5, height: float = 1.0) -> fracslice.formulas.node.Node:
+def cylinder(radius: float = 0.5, height: float = 1.0) -> Node:
     """A cylinder along the z axis, with flat ends. L = 1: a distance.
 
     Parameters
@@ -134,7 +134,7 @@ def cylinder(radius: float = 0.5, height: float = 1.0) -> fracslice.formulas.nod
     Node
     """
 
-def difference(*elements: fracslice.formulas.node.Node, smooth: float = 0.0) -> fracslice.formulas.node.Node:
+def difference(*elements: Node, smooth: float = 0.0) -> Node:
     """The first element without the others. L = max of theirs, as of a union.
 
     Parameters
@@ -149,7 +149,7 @@ def difference(*elements: fracslice.formulas.node.Node, smooth: float = 0.0) -> 
     Node
     """
 
-def intersection(*elements: fracslice.formulas.node.Node, smooth: float = 0.0) -> fracslice.formulas.node.Node:
+def intersection(*elements: Node, smooth: float = 0.0) -> Node:
     """What is in all of the elements. L = max of theirs, as of a union.
 
     Parameters
@@ -164,7 +164,7 @@ def intersection(*elements: fracslice.formulas.node.Node, smooth: float = 0.0) -
     Node
     """
 
-def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0) -> fracslice.formulas.node.Node:
+def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0) -> Node:
     """The solid filled Julia set of q^2 + c in the quaternions, cut at k = 0.
 
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
@@ -187,7 +187,7 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
     Node
     """
 
-def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0, julia: Sequence[float] | None = None) -> fracslice.formulas.node.Node:
+def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0, julia: Sequence[float] | None = None) -> Node:
     """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
@@ -221,7 +221,7 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     Node
     """
 
-def material(*elements: fracslice.formulas.node.Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> fracslice.formulas.node.Node:
+def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """What the element inside looks like in pictures. A material further inside takes precedence.
 
     It is not in the field: L = the element's.
@@ -256,7 +256,7 @@ def material(*elements: fracslice.formulas.node.Node, colour: Sequence[float] = 
     Node
     """
 
-def menger(level: int = 3) -> fracslice.formulas.node.Node:
+def menger(level: int = 3) -> Node:
     """The Menger sponge of any level in the cube [-1, 1]^3.
 
     Menger 1926; distance: Quilez 2011, "Menger fractal": a box minus, per level, an infinite lattice of
@@ -275,7 +275,7 @@ def menger(level: int = 3) -> fracslice.formulas.node.Node:
     Node
     """
 
-def mirror(*elements: fracslice.formulas.node.Node, axis: Literal['x', 'y', 'z']) -> fracslice.formulas.node.Node:
+def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
     """The half of the element on the axis' positive side, and its mirror image.
 
     L = the element's: folding brings points no further apart.
@@ -292,7 +292,7 @@ def mirror(*elements: fracslice.formulas.node.Node, axis: Literal['x', 'y', 'z']
     Node
     """
 
-def octahedron(radius: float = 1.0) -> fracslice.formulas.node.Node:
+def octahedron(radius: float = 1.0) -> Node:
     """A regular octahedron around the origin. L = 1: a distance.
 
     Parameters
@@ -305,7 +305,7 @@ def octahedron(radius: float = 1.0) -> fracslice.formulas.node.Node:
     Node
     """
 
-def offset(*elements: fracslice.formulas.node.Node, distance: float) -> fracslice.formulas.node.Node:
+def offset(*elements: Node, distance: float) -> Node:
     """The element grown or shrunk; exact where its field is a distance.
 
     A field that underestimates distances would grow further than it should; it is cut off at the grown box.
@@ -325,7 +325,7 @@ def offset(*elements: fracslice.formulas.node.Node, distance: float) -> fracslic
     Node
     """
 
-def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> fracslice.formulas.node.Node:
+def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> Node:
     """The half space behind a plane. L = 1: a distance.
 
     Parameters
@@ -340,7 +340,7 @@ def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> fra
     Node
     """
 
-def repeat(*elements: fracslice.formulas.node.Node, period: Sequence[float], count: Sequence[int] = (0, 0, 0)) -> fracslice.formulas.node.Node:
+def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 0, 0)) -> Node:
     """Copies on a lattice. Every copy that can be the nearest is looked at, so cell borders are right.
 
     Copies further than `gap` are not; the value never exceeds it inside the lattice, so that leaving one out
@@ -361,7 +361,7 @@ def repeat(*elements: fracslice.formulas.node.Node, period: Sequence[float], cou
     Node
     """
 
-def shell(*elements: fracslice.formulas.node.Node, thickness: float) -> fracslice.formulas.node.Node:
+def shell(*elements: Node, thickness: float) -> Node:
     """The element made hollow: what is deeper inside than the thickness is taken out. L = the element's.
 
     Parameters
@@ -376,7 +376,7 @@ def shell(*elements: fracslice.formulas.node.Node, thickness: float) -> fracslic
     Node
     """
 
-def sphere(radius: float = 1.0) -> fracslice.formulas.node.Node:
+def sphere(radius: float = 1.0) -> Node:
     """A sphere around the origin. L = 1: a distance.
 
     Parameters
@@ -389,7 +389,7 @@ def sphere(radius: float = 1.0) -> fracslice.formulas.node.Node:
     Node
     """
 
-def torus(radius: float = 1.0, tube: float = 0.25) -> fracslice.formulas.node.Node:
+def torus(radius: float = 1.0, tube: float = 0.25) -> Node:
     """A torus around the z axis. L = 1: a distance.
 
     Parameters
@@ -404,7 +404,7 @@ def torus(radius: float = 1.0, tube: float = 0.25) -> fracslice.formulas.node.No
     Node
     """
 
-def transform(*elements: fracslice.formulas.node.Node, translate: Sequence[float] = (0.0, 0.0, 0.0), rotate: Sequence[float] | None = None, scale: float | Sequence[float] = (1.0,), matrix: Sequence[float] | None = None) -> fracslice.formulas.node.Node:
+def transform(*elements: Node, translate: Sequence[float] = (0.0, 0.0, 0.0), rotate: Sequence[float] | None = None, scale: float | Sequence[float] = (1.0,), matrix: Sequence[float] | None = None) -> Node:
     """Scaled, then rotated, then moved.
 
     The child's field is multiplied by the smallest stretch of the map, its smallest singular value: f never
@@ -428,7 +428,7 @@ def transform(*elements: fracslice.formulas.node.Node, translate: Sequence[float
     Node
     """
 
-def twist(*elements: fracslice.formulas.node.Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> fracslice.formulas.node.Node:
+def twist(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
     """Turned about an axis, further the further along it (Barr 1984, "Global and Local Deformations of Solid
     Primitives").
 
@@ -450,7 +450,7 @@ def twist(*elements: fracslice.formulas.node.Node, degrees: float, axis: Literal
     Node
     """
 
-def union(*elements: fracslice.formulas.node.Node, smooth: float = 0.0) -> fracslice.formulas.node.Node:
+def union(*elements: Node, smooth: float = 0.0) -> Node:
     """All that is in any of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
     quadratic).
 
