@@ -36,7 +36,7 @@ def bound(
     Positional arguments of a shape fill its parameters in order; those of other formulas are elements.
     Raises `SceneError` for an unknown name, and for a value that is given twice or has no parameter.
     """
-    names = {python_name(name): name for name in ordered(formula)}
+    names = formula.names
     given = {names.get(name, name): value for name, value in keywords.items()}
     for name in given:
         if name not in formula.parameters:
