@@ -19,8 +19,7 @@ from .scene.lengths import Length
 from .work import Clock, Work
 
 if TYPE_CHECKING:
-    from .formulas import Node
-    from .kernel import Compilable
+    from .kernel import Field
     from .mesh import Mesh
     from .mesh.components import Removed
     from .volume import Bricks, Plan
@@ -113,7 +112,7 @@ class Result:
     mesh: Mesh
     report: Report
     bricks: Bricks
-    root: Node | Compilable
+    root: Field
     place: Placement
 
     @property

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.cpu import Precision
+from ..formulas.field import Precision
 from ..kernel.cuda import launched, load_loops, parameters, require
 from ..work import Work
 from .cpu import BLOCK

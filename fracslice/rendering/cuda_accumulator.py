@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.cpu import Precision
+from ..formulas.field import Precision
 from ..kernel.cuda import launched, load_loops, require
 from ..kernel.linker import Linked
 from ..scene.view import Film

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..errors import SceneError
 from ..formulas.registry import Node
-from ..kernel.cpu import compile_scene
 from ..kernel.depth import resolve_depths
 from ..scene.view import Camera, Light, View
 from .linking import Optics, optics
@@ -67,7 +66,7 @@ def clearance(root: Node, camera: Camera) -> float:
 
     Raises `SceneError` from inside the solid.
     """
-    f = float(compile_scene(root, "float64").points(*(np.array([c]) for c in camera.eye))[0])
+    f = float(root.kernel("cpu", "float64").points(*(np.array([c]) for c in camera.eye))[0])
     if not f > 0:
         raise camera.fail("eye: expected a place outside the solid")
     nearest = f / root.bounds.lipschitz
