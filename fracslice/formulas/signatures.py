@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 from collections.abc import Mapping, Sequence
 from inspect import Parameter, Signature
 from keyword import iskeyword
@@ -130,8 +131,6 @@ from typing import Literal, Union
 
 def _function(formula: Formula) -> str:
     """A formula in a stub file."""
-    text = str(signature(formula))
-    for module in ("fracslice.formulas.registry.", "collections.abc."):
-        text = text.replace(module, "")
+    text = re.sub(r"\b(?:fracslice\.formulas\.\w+|collections\.abc)\.", "", str(signature(formula)))
     body = docstring(formula).replace("\n", "\n    ").replace("\n    \n", "\n\n")
     return f'def {formula.name}{text}:\n    """{body}\n    """'
