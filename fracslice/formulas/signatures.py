@@ -131,7 +131,7 @@ from typing import Literal, Union
 def _function(formula: Formula) -> str:
     """A formula in a stub file."""
     text = str(signature(formula))
-    for module in ("fracslice.formulas.registry.", "collections.abc."):
+    for module in ("fracslice.formulas.node.", "collections.abc."):
         text = text.replace(module, "")
     body = docstring(formula).replace("\n", "\n    ").replace("\n    \n", "\n\n")
     return f'def {formula.name}{text}:\n    """{body}\n    """'
