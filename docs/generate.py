@@ -1,4 +1,4 @@
-"""Writes docs/reference/elements.md, the schema and the stub file of formulas: run it after adding a formula."""
+"""Writes docs/reference/elements.md, the schema and the stub of the formulas: run it for a new formula."""
 
 from pathlib import Path
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fracslice import read
 from fracslice.export.images import write_image
-from fracslice.render import Renderer, develop
+from fracslice.rendering import Renderer, develop
 from fracslice.scene import library
 from fracslice.scene.view import Camera
 

@@ -24,14 +24,14 @@ def marching_cubes(
     index: NDArray[int32],
     origin: Point,
     voxel: float,
-    clamp: float,
+    minimum_edge_parameter: float,
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[int32]]:
     """The surface between the samples < 0 and the others: closed, an oriented 2-manifold, free of
     self-crossings.
 
-    clamp: how near a grid point a vertex may come, as a share of the edge. threads: 0 for all cores; the
-    result is the same for any number.
+    minimum_edge_parameter: how near a grid point a vertex may come, as a share of the edge. threads: 0 for
+    all cores; the result is the same for any number.
 
     Returns vertices float64 [n, 3] at origin + voxel * (grid position); triangles int32 [m, 3],
     counter-clockwise seen from outside. Marching cubes after Lorensen and Cline (1987), with a table that
@@ -45,9 +45,9 @@ def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
     """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) set where < 0."""
 
 class RootLoops:
-    """The loops of `fracslice.volume.root_loops` that find crossings: FIND in float32 and in float64, and
-    POLISH. field: the same float64 field, `CpuKernel.entry` or a function of points [3, n] and of [1, n] for
-    their values. Holds all of them. lanes: segments and points come in multiples of it. batch: how many
+    """The loops of `fracslice.volume.root_loops` that find crossings: `find` in float32 and in float64, and
+    `polish`. field: the same float64 field, `CpuKernel.entry` or a function of points [3, n] and of [1, n]
+    for their values. Holds all of them. lanes: segments and points come in multiples of it. batch: how many
     segments are worth a call. steps: that all segments are given, and those that then are left. sure: a root
     is exact where it moved less."""
 
@@ -103,7 +103,13 @@ class Contouring:
     """
 
     def __init__(
-        self, cells: Cells, first: int, last: int, origin: Point, voxel: float, clamp: float
+        self,
+        cells: Cells,
+        first: int,
+        last: int,
+        origin: Point,
+        voxel: float,
+        minimum_edge_parameter: float,
     ) -> None: ...
     def advance(self, end: int, first: int, t: NDArray[float64], normals: NDArray[float32]) -> None:
         """Goes on to the layer before `end`. t: where on its edge the surface crosses each of those numbered

@@ -20,8 +20,7 @@ from .scene.lengths import Length
 from .work import Clock, Work
 
 if TYPE_CHECKING:
-    from .formulas import Node
-    from .kernel import Compilable
+    from .kernel import Field
     from .mesh import Mesh
     from .mesh.certificate import Certificate
     from .mesh.components import Removed
@@ -115,7 +114,7 @@ class Result:
     mesh: Mesh
     report: Report
     bricks: Bricks
-    root: Node | Compilable
+    root: Field
     place: Placement
 
     @property

@@ -59,7 +59,7 @@ def test_what_is_told_to_type_is_understood(line: str, folder: Path, monkeypatch
     for work in (
         "job.make_mesh",
         "slicing.plan_stack",
-        "render.Renderer",
+        "rendering.Renderer",
         "bench.runs.measure",
         "viewer.fly",
     ):

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SceneError
 from ..formulas import Node
 from ..formulas.parameters import AUTO
-from ..kernel import compile_scene
 from ..volume import with_depths
 from ..work import Work, chunks
 
@@ -18,7 +17,7 @@ from ..work import Work, chunks
 def distance(shape: Node, points: ArrayLike) -> NDArray[np.floating]:
     """As `Node.distance`."""
     array = _points(points)
-    kernel = compile_scene(_with_depths(shape), "float32" if array.dtype == np.float32 else "float64")
+    kernel = _with_depths(shape).kernel("cpu", "float32" if array.dtype == np.float32 else "float64")
     flat, found = array.reshape(-1, 3), np.empty(array.size // 3, array.dtype)
 
     def evaluate(part: slice) -> None:

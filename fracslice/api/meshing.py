@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ..errors import SceneError
-from ..formulas import Node
 from ..job import MeshJob, Placement
 from ..job import make_mesh as make_mesh_job
 from ..mesh import Mesh
@@ -16,7 +15,7 @@ from .options import Length, Options, keywords, print_of, work_of
 from .sources import Source, as_scene, found
 
 if TYPE_CHECKING:
-    from ..kernel import Compilable
+    from ..kernel import Field
     from ..report import Report
     from ..volume import Bricks
 
@@ -31,7 +30,7 @@ class Result(Mesh):
 
     report: Report
     bricks: Bricks
-    root: Node | Compilable
+    root: Field
     place: Placement
 
     @property

@@ -9,7 +9,7 @@ from typing import Unpack
 import numpy as np
 
 from ..formulas import Node
-from ..render import Renderer
+from ..rendering import Renderer
 from ..scene.view import Camera, Film, View
 from .options import WorkOptions, keywords, work_of
 from .sources import Source, found

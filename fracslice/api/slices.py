@@ -88,7 +88,7 @@ class Slices(Layers[NDArray[np.uint8]]):
 
     @property
     def polygons(self) -> Layers[MultiPolygon]:
-        """The layers as `shapely.MultiPolygon`, mm from the middle of the object's box.
+        """The layers as MultiPolygon objects of shapely, mm from the middle of the object's box.
 
         Raises
         ------

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import pointed
-from ..formulas.registry import Node
-from ..kernel import Compilable, compile_scene
+from ..kernel import Field
 from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
 from ..work import Work
@@ -63,7 +62,7 @@ class Cap(NamedTuple):
 
 
 def with_tips(
-    root: Node | Compilable, mesh: Mesh, voxel: float, work: Work | None = None
+    root: Field, mesh: Mesh, voxel: float, work: Work | None = None
 ) -> tuple[Mesh, NDArray[np.bool_]]:
     """The mesh with the solid's own tips in place of blunt ends, and which triangles are new, bool [m].
 
@@ -95,11 +94,11 @@ def with_tips(
 
 
 def _found(
-    root: Node | Compilable, rings: Rings, at: NDArray[np.int64], voxel: float, work: Work
+    root: Field, rings: Rings, at: NDArray[np.int64], voxel: float, work: Work
 ) -> list[tuple[float, int, NDArray[np.float64]]]:
     """Tips that the mesh does not reach: how far it is from them, the nearest vertex, and where they are; the
     farthest one first."""
-    kernel, mesh = compile_scene(root, "float64"), rings.mesh
+    kernel, mesh = root.kernel("cpu", "float64"), rings.mesh
     exact = EXACT * float(mesh.size.max())
 
     def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:
