@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from . import escape
 from .box import Box, Triple
-from .escape import CORE, farthest, levels, potential_distance, sure_distance
+from .escape import CORE, potential_distance, sure_distance
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
 from .vocabulary import (
@@ -60,13 +61,11 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     z,
     power,
     iterations,
-    first_level,
-    last_level,
-    escape2,
-    least_r2,
-    fade,
-    fading,
+    levels,
+    calm,
     c,
+    separate,
+    half_less,
     digits,
     turns,
     half_digits,
@@ -74,13 +73,8 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     linear,
     fixed_c,
     loose,
-    least,
-    bailout,
-    reach,
-    half_less,
     torn,
     curved,
-    whole,
 ):
     """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
 
@@ -99,6 +93,8 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     `escape.sure_distance`. A power that is not whole tears space where the azimuth jumps from pi to -pi: no
     bound holds across the tear, and the guarded field stays below the sure distance from it.
     """
+    first_level, last_level, escape2, least_r2 = levels
+    fade, fading = calm
     cx, cy, cz = x, y, z
     grow = 1.0
     if fixed_c:
@@ -114,6 +110,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     if curved:
         bend = 0.0 * x
     if loose:
+        least, bailout, reach = separate
         sure = sqrt(minimum(r2, 1e30)) - reach
     if torn:
         tear = 0.0 * x + 1e30
@@ -123,7 +120,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
         rho2 = maximum(rho2, 1e-30)
         if even:
             rho = sqrt(rho2)
-        if whole:
+        if digits:
             re, im, norm2 = z, 1.0, r2
             for odd in digits:
                 twice = re + re
@@ -202,27 +199,20 @@ def _digits(n: int) -> tuple[int, ...]:
 @mandelbulb.arguments
 def mandelbulb_arguments(node: Node) -> dict[str, object]:
     power = node["power"]
-    first, last, escape2, least_r2 = levels(power, node["iterations"], node["bailout"], ESCAPED)
+    first, last, escape2, least_r2 = escape.levels(power, node["iterations"], node["bailout"], ESCAPED)
     loose, torn = _falls_apart(node, escape2), bool(node.is_conservative and power % 1)
-    constant = _constant(node)
-    reach = farthest(power, node["bailout"], constant)
+    reach = escape.farthest(power, node["bailout"], _constant(node))
     fading = 1 / (min(CALM * reach**2, escape2) - reach**2)
     return {
         "power": power,
         "iterations": node["iterations"],
-        "first_level": first,
-        "last_level": last,
-        "escape2": escape2,
-        "least_r2": least_r2,
-        "fade": 1 + reach**2 * fading,
-        "fading": fading,
+        "levels": (first, last, escape2, least_r2),
+        "calm": (1 + reach**2 * fading, fading),
         "c": node["julia"] or (0.0, 0.0, 0.0),
+        "separate": (CORE ** ((power - 1) / 2), node["bailout"], reach),
+        "half_less": (power - 1) / 2,
         "fixed_c": Fixed(node["julia"] is not None),
         "loose": Fixed(loose),
-        "least": CORE ** ((power - 1) / 2),
-        "bailout": node["bailout"],
-        "reach": reach,
-        "half_less": (power - 1) / 2,
         "torn": Fixed(torn),
         "curved": Fixed(loose or torn),
         **_products(power),
@@ -259,8 +249,7 @@ def _products(power: float) -> dict[str, Fixed]:
     whole = power == int(power)
     n = int(power) if whole else 2
     return {
-        "whole": Fixed(whole),
-        "digits": Fixed(_digits(n)),
+        "digits": Fixed(_digits(n) if whole else ()),
         "turns": Fixed(_digits(n // 2)),
         "half_digits": Fixed(_digits((n - 1) // 2)),
         "even": Fixed(n % 2 == 0),

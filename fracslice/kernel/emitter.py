@@ -18,6 +18,7 @@ from llvmlite import ir
 
 from ..errors import KernelError
 from .expressions import Expressions
+from .syntax import assigned_names
 from .values import (
     WHOLE,
     Kind,
@@ -156,8 +157,10 @@ class Body(Expressions):
                 return False
             case ast.If(test, body, orelse):
                 return self.branch(self.condition(test), body, orelse)
-            case ast.While(test, body):
-                return self.loop(node, (), lambda: None if _always(test) else self.condition(test))
+            case ast.While(ast.Constant(True)):
+                return self.loop(node, (), lambda: None)
+            case ast.While(test):
+                return self.loop(node, (), lambda: self.condition(test))
             case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), limits), body):
                 return self.counted(
                     node, counter, [number(self.builder, self.value(v), WHOLE) for v in limits]
@@ -234,7 +237,7 @@ class Body(Expressions):
         function, start = self.builder.function, self.builder.block
         names, blocks, size = dict(self.names), len(function.blocks), len(start.instructions)
         returns, depth = len(self.returns), len(self.loops)
-        changed = _assigned(node.body) | set(own)
+        changed = assigned_names(node.body) | set(own)
         kinds: dict[str, Kind] = {}
         while True:
             try:
@@ -292,15 +295,3 @@ class Body(Expressions):
                 for phi, part in zip(phis[name], parts, strict=True):
                     phi.add_incoming(part, block)
         return self.joined(self.loops.pop().left)
-
-
-def _always(test: ast.expr) -> bool:
-    return isinstance(test, ast.Constant) and bool(test.value)
-
-
-def _assigned(body: Sequence[ast.stmt]) -> set[str]:
-    """The names that statements give values to."""
-    names = (n for statement in body for n in ast.walk(statement) if isinstance(n, ast.Name))
-    loops = [n for statement in body for n in ast.walk(statement) if isinstance(n, ast.For)]
-    counters = {f"{ast.unparse(loop.target)} of {loop.lineno}" for loop in loops}
-    return counters | {n.id for n in names if isinstance(n.ctx, ast.Store)}

@@ -14,7 +14,7 @@ import inspect
 import math
 import re
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import lru_cache
 from types import FunctionType, ModuleType
 from typing import Any, NoReturn
@@ -23,9 +23,7 @@ from ..errors import KernelError
 from ..formulas import vocabulary
 from ..nearest import hint
 from .seen import seen
-
-CHILD = "child"
-"""What a warp calls its element."""
+from .syntax import depends_on_points, point_names, stored_names
 
 _OF_THE_KERNEL = re.compile(r"[NT]\d+|P0?")
 
@@ -113,8 +111,8 @@ class _Language(ast.NodeTransformer):
     def __init__(self, function: Callable[..., Any], tree: ast.FunctionDef, place: str, first: int) -> None:
         self.scope, self.place, self.first = scope(function), place, first
         arguments = parameters(function)
-        self.local = {*arguments, *(n.id for n in _names(tree) if isinstance(n.ctx, ast.Store))}
-        self.points = _points(tree, {a for a in arguments if a in ("x", "y", "z", "a", "b")})
+        self.local = {*arguments, *stored_names(tree)}
+        self.points = point_names(tree, {a for a in arguments if a in ("x", "y", "z", "a", "b")})
 
     def fail(self, node: ast.AST, message: str) -> NoReturn:
         line = self.first + getattr(node, "lineno", 1) - 1
@@ -167,7 +165,7 @@ class _Language(ast.NodeTransformer):
             )
 
     def on_points(self, node: ast.expr) -> bool:
-        return _is_of_points(node, self.points)
+        return depends_on_points(node, self.points)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
         return self.of_numbers(node, node.op)
@@ -258,47 +256,6 @@ def is_number(value: Any) -> bool:
     if isinstance(value, tuple):
         return all(map(is_number, value))
     return isinstance(value, (int, float))
-
-
-def _names(tree: ast.AST) -> Iterator[ast.Name]:
-    return (n for n in ast.walk(tree) if isinstance(n, ast.Name))
-
-
-def _points(tree: ast.FunctionDef, first: set[str]) -> set[str]:
-    """The names of what differs from point to point: these, and what follows from them."""
-    found = set(first)
-    while True:
-        more = {
-            name.id
-            for node in ast.walk(tree)
-            if isinstance(node, (ast.Assign, ast.AugAssign)) and _is_of_points(node.value, found)
-            for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
-            for name in _assigned(target, node.value, found)
-        }
-        if more <= found:
-            return found
-        found |= more
-
-
-def _assigned(target: ast.expr, value: ast.expr, points: set[str]) -> Iterator[ast.Name]:
-    """The names of a target that are given points: of ``a, b = x, 1.0`` the first."""
-    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
-        for part, given in zip(target.elts, value.elts, strict=True):
-            if _is_of_points(given, points):
-                yield from _names(part)
-    else:
-        yield from _names(target)
-
-
-def _is_of_points(node: ast.expr, points: set[str]) -> bool:
-    """Whether a value may differ from point to point; ``any_of`` and what a tuple is do not."""
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("any_of", CHILD):
-        return node.func.id == CHILD
-    if isinstance(node, ast.Name):
-        return node.id in points
-    return any(
-        _is_of_points(part, points) for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr)
-    )
 
 
 def _call(name: str, *arguments: ast.expr) -> ast.Call:

@@ -25,6 +25,7 @@ from ..formulas.parameters import AUTO
 from ..formulas.registry import Fixed, Node
 from . import language, source
 from .structure import UNROLLED, Arguments, Run, Subroutine, arguments, link_tree, read
+from .syntax import CHILD
 
 FIELD = "field"
 
@@ -91,8 +92,8 @@ class Linker:
         """
         suffix = "".join(f"_{k}_{v}" for k, v in sorted(fixed))
         name = prefix + function.__name__ + "".join(c if c.isalnum() else "_" for c in suffix)
-        found = source.shared(function, tuple(fixed), self.given)
-        return self.add((prefix, function, tuple(fixed)), name, found, prefix)
+        copy = source.shared(function, tuple(fixed), self.given)
+        return self.add((prefix, function, tuple(fixed)), name, copy, prefix)
 
     def add(self, key: tuple[Any, ...], name: str, copy: source.Copy, prefix: str) -> str:
         """Writes a copy and the functions it calls, once a key; returns its name: another one if that is
@@ -104,15 +105,18 @@ class Linker:
                 n for n in range(1, len(taken) + 2) if (f"{name}_{n}" if n > 1 else name) not in taken
             )
             name = self._shared[key] = f"{name}_{number}" if number > 1 else name
-            names = {called: self.share(f, (), prefix) for called, f in copy.calls.items()}
-            self.functions[name] = copy.renamed({**names, copy.name: name})
+            self.functions[name] = self.renamed(copy, name, prefix)
         return self._shared[key]
+
+    def renamed(self, copy: source.Copy, name: str, prefix: str) -> str:
+        """The text of a copy under a name; the functions that it calls are written, too."""
+        names = {called: self.share(f, (), prefix) for called, f in copy.calls.items()}
+        return copy.renamed({**names, copy.name: name})
 
     def named(self, name: str, tree: ast.FunctionDef, function: Callable[..., Any]) -> str:
         """The text under a name of a tree made from a formula, of which it writes what it calls."""
         copy = source.copied(tree, function, self.given | self.functions.keys())
-        names = {called: self.share(f, (), OF_FORMULAS) for called, f in copy.calls.items()}
-        return copy.renamed({**names, copy.name: name})
+        return self.renamed(copy, name, OF_FORMULAS)
 
     def bind(self, name: str, function: Callable[..., Any], values: dict[str, Any]) -> None:
         """Writes ``name(rest..., P)``: the function with `values` taken from P (or fixed), the rest of its
@@ -232,7 +236,7 @@ class _CallsChild(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
-        if isinstance(node.func, ast.Name) and node.func.id == language.CHILD:
+        if isinstance(node.func, ast.Name) and node.func.id == CHILD:
             points = ", ".join(map(ast.unparse, node.args))
             return ast.parse(self.child.call(points=points), mode="eval").body
         return node

@@ -14,6 +14,7 @@ from typing import Any
 
 from . import language
 from .seen import seen
+from .syntax import stored_names
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,9 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
     """A function's specialised tree as text, the numbers that it takes from outside filled in."""
     tree = _Forget().visit(tree)
     scope = language.scope(function)
-    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
-    stored = {n.id for n in names if isinstance(n.ctx, ast.Store)} | {a.arg for a in tree.args.args}
-    outside = sorted({n.id for n in names} - stored - language.INTRINSICS - given)
+    names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    stored = stored_names(tree) | {a.arg for a in tree.args.args}
+    outside = sorted(names - stored - language.INTRINSICS - given)
     numbers = {name: _plain(scope[name]) for name in outside if language.is_number(scope.get(name))}
     calls = {name: scope[name] for name in outside if isinstance(scope.get(name), FunctionType)}
     tree = _Substitute(numbers).visit(tree)

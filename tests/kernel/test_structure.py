@@ -129,6 +129,7 @@ def test_facts_and_texts_of_a_deep_tree_need_no_deep_recursion() -> None:
     assert hash(root) == hash(root.changed()) and root == root.changed()
     assert "sphere" in repr(root)
     assert root.conservative().is_conservative
+    assert root.key == root.changed().key
     assert len(list(root.walk())) == 97
 
 

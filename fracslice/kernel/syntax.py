@@ -1,0 +1,61 @@
+"""The names in a function: those that it assigns, and those whose values differ from point to point."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+
+CHILD = "child"
+"""What a warp calls its element."""
+
+
+def stored_names(*trees: ast.AST) -> set[str]:
+    """The names that are given values."""
+    return {n.id for tree in trees for n in _names(tree) if isinstance(n.ctx, ast.Store)}
+
+
+def assigned_names(body: Sequence[ast.stmt]) -> set[str]:
+    """The names that statements give values to, the places of loops' counters included."""
+    loops = [n for statement in body for n in ast.walk(statement) if isinstance(n, ast.For)]
+    return stored_names(*body) | {f"{ast.unparse(loop.target)} of {loop.lineno}" for loop in loops}
+
+
+def _names(tree: ast.AST) -> Iterator[ast.Name]:
+    return (n for n in ast.walk(tree) if isinstance(n, ast.Name))
+
+
+def point_names(tree: ast.FunctionDef, first: set[str]) -> set[str]:
+    """The names of what differs from point to point: these, and what follows from them."""
+    found = set(first)
+    while True:
+        more = {
+            name.id
+            for node in ast.walk(tree)
+            if isinstance(node, (ast.Assign, ast.AugAssign)) and depends_on_points(node.value, found)
+            for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
+            for name in _assigned_points(target, node.value, found)
+        }
+        if more <= found:
+            return found
+        found |= more
+
+
+def _assigned_points(target: ast.expr, value: ast.expr, points: set[str]) -> Iterator[ast.Name]:
+    """The names of a target that are given points: of ``a, b = x, 1.0`` the first."""
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
+        for part, given in zip(target.elts, value.elts, strict=True):
+            if depends_on_points(given, points):
+                yield from _names(part)
+    else:
+        yield from _names(target)
+
+
+def depends_on_points(node: ast.expr, points: set[str]) -> bool:
+    """Whether a value may differ from point to point; ``any_of`` and what a tuple is do not."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("any_of", CHILD):
+        return node.func.id == CHILD
+    if isinstance(node, ast.Name):
+        return node.id in points
+    return any(
+        depends_on_points(part, points) for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr)
+    )
