@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
@@ -15,6 +15,7 @@ from numpy.lib.npyio import NpzFile
 
 from ..errors import RenderError
 from ..scene.view import Film
+from ..work import Work, chunks
 from .cpu import ordered
 from .film import develop
 from .packets import CHANNELS
@@ -26,6 +27,8 @@ COARSE = 4
 NEARLY = 0.999
 """The largest of some numbers is not below so much of their mean, however that is rounded."""
 
+BAND = 32
+"""Rows of a picture that are judged at once."""
 COARSEST, MOST_PASSES = 64, 1 << 24
 """What a saved picture may say of itself."""
 HEADER = 1 << 12
@@ -58,8 +61,9 @@ class Accumulator(Protocol):
         completed.
         """
 
-    def receive(self, add: Callable[[Any], None]) -> None:
-        """Lets a pass be added to the sums. If it raises anything, the picture stays as it was."""
+    def receive(self, pixels: Any, add: Callable[[Any], None]) -> None:
+        """Lets a pass over some pixels be added to the sums. If it raises anything, the picture stays as it
+        was."""
 
     def anew(self, coarse: int) -> Accumulator:
         """A picture of the same size without a sample; this one is gone."""
@@ -84,10 +88,15 @@ class HostAccumulator:
     sums: np.ndarray
     passes: int = 0
     coarse: int = COARSE
+    work: Work = field(default_factory=lambda: Work(1))
+    _squares: np.ndarray | None = None
 
     @classmethod
-    def empty(cls, width: int, height: int, dtype: np.dtype, coarse: int = COARSE) -> HostAccumulator:
-        return cls(width, height, np.zeros((width * height, CHANNELS), dtype), coarse=coarse)
+    def empty(
+        cls, width: int, height: int, dtype: np.dtype, coarse: int = COARSE, work: Work | None = None
+    ) -> HostAccumulator:
+        sums = np.zeros((width * height, CHANNELS), dtype)
+        return cls(width, height, sums, coarse=coarse, work=work or Work(1))
 
     @classmethod
     def of(cls, other: HostAccumulator) -> HostAccumulator:
@@ -123,46 +132,58 @@ class HostAccumulator:
 
     def statistics(self) -> tuple[float, float]:
         squares = self.squares() if self.passes > 2 else np.array([np.inf])
-        known = squares[np.isfinite(squares)]
+        finite = np.isfinite(squares)
+        known = squares.ravel() if finite.all() else squares[finite]
         error = float(np.sqrt(known.mean())) if known.size else float("inf")
         return float(self.counts.mean(dtype=np.float64)), error
 
     def squares(self) -> np.ndarray:
         """The squared standard error of each pixel's brightness, as shown: float64 [height, width]; infinite
         below 2 samples."""
-        n = self.sums[:, 5].astype(np.float64)
-        mean = self.sums[:, 3] / np.maximum(n, 1)
-        spread = np.maximum(self.sums[:, 4] / np.maximum(n, 1) - mean * mean, 0)
-        squares = np.where(n < 2, np.inf, spread / np.maximum(n - 1, 1))
-        return np.asarray(squares.reshape(self.height, self.width))
+        if self._squares is None:
+            self._squares = squared_errors(self.sums)
+        return self._squares.reshape(self.height, self.width)
 
     def wanted(self, most: int, tolerance: float) -> tuple[np.ndarray, int]:
         first = first_passes(self.width, self.height, self.coarse)
         if self.passes < len(first):
             pixels = first[self.passes]
         else:
-            order, mask = ordered(self.width, self.height), self._pressing(most, tolerance)
-            pixels = order[mask[order >> 16, order & 65535]]
+            order, places = ordered(self.width, self.height), ordered_places(self.width, self.height)
+            pixels = order[self._pressing(most, tolerance).ravel().take(places)]
         return pixels, len(pixels)
 
     def _pressing(self, most: int, tolerance: float) -> np.ndarray:
-        n = self.counts.astype(np.int32)
-        squares = np.where(n < TRUSTED, np.inf, self.squares())
-        unfinished = (n < most) & (around(squares) > tolerance * tolerance)
-        gain = around(squares / n)
+        n, squares = self.counts.astype(np.int32), self.squares()
+        unfinished, gain = np.empty(n.shape, bool), np.empty(n.shape)
+
+        def judge(rows: slice) -> None:
+            seen = slice(max(rows.start - 1, 0), rows.stop + 1)
+            own = slice(rows.start - seen.start, rows.stop - seen.start)
+            trusted = np.where(n[seen] < TRUSTED, np.inf, squares[seen])
+            unfinished[rows] = (n[rows] < most) & (around(trusted)[own] > tolerance * tolerance)
+            gain[rows] = around(trusted / n[seen])[own]
+
+        self.work.map(judge, chunks(self.height, BAND))
         begun = (n & (n - 1)) != 0
         known = gain[unfinished]
         least = NEARLY * known.mean() if known.size > FEW * gain.size else 0.0
         return np.asarray(unfinished & (begun | (gain >= least)))
 
-    def receive(self, add: Callable[[Any], None]) -> None:
-        sums = self.sums.copy()
-        add(sums)
-        self.sums = sums
+    def receive(self, pixels: np.ndarray, add: Callable[[Any], None]) -> None:
+        places = places_of(pixels, self.width)
+        before = self.sums[places]
+        try:
+            add(self.sums)
+        except BaseException:
+            self.sums[places] = before
+            raise
+        if self._squares is not None:
+            self._squares[places] = squared_errors(self.sums[places])
         self.passes += 1
 
     def anew(self, coarse: int) -> HostAccumulator:
-        return self.empty(self.width, self.height, self.sums.dtype, coarse)
+        return self.empty(self.width, self.height, self.sums.dtype, coarse, self.work)
 
     def save(self, file: BinaryIO, key: str) -> None:
         """Writes it as an .npz file, from which rendering goes on as if it had not stopped. key: of what it
@@ -182,7 +203,8 @@ class HostAccumulator:
                 if str(_small(stored, "key")) != key:
                     raise RenderError(f"{path}: is of another scene, view, size or version")
                 width, height, passes, coarse = map(int, _small(stored, "shape"))
-                found = cls(width, height, _small(stored, "sums", like.sums.nbytes), passes, coarse)
+                sums = _small(stored, "sums", like.sums.nbytes)
+                found = cls(width, height, sums, passes, coarse, like.work)
         except OSError as error:
             raise RenderError(f"{path}: {error.strerror or error}") from None
         except (ValueError, KeyError, EOFError, BadZipFile, NotImplementedError, zlib.error):
@@ -225,11 +247,36 @@ def first_passes(width: int, height: int, coarse: int) -> tuple[np.ndarray, ...]
     return parts
 
 
+@lru_cache(maxsize=4)
+def ordered_places(width: int, height: int) -> np.ndarray:
+    """Where in a picture the pixels of `ordered` are. Read-only."""
+    places = places_of(ordered(width, height), width)
+    places.setflags(write=False)
+    return places
+
+
+def places_of(pixels: np.ndarray, width: int) -> np.ndarray:
+    """Where in a picture, row by row, pixels ``y << 16 | x`` are."""
+    return np.asarray((pixels >> 16).astype(np.intp) * width + (pixels & 65535))
+
+
+def squared_errors(sums: np.ndarray) -> np.ndarray:
+    """The squared standard error of pixels' brightness, as shown: float64; infinite below 2 samples."""
+    n = sums[:, 5].astype(np.float64)
+    mean = sums[:, 3] / np.maximum(n, 1)
+    spread = np.maximum(sums[:, 4] / np.maximum(n, 1) - mean * mean, 0)
+    return np.where(n < 2, np.inf, spread / np.maximum(n - 1, 1))
+
+
 def around(values: np.ndarray) -> np.ndarray:
     """The largest of each pixel's value and its eight neighbours'."""
-    padded = np.pad(values, 1, mode="edge")
-    rows = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
-    return np.asarray(np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
+    rows = values.copy()
+    np.maximum(rows[1:], values[:-1], out=rows[1:])
+    np.maximum(rows[:-1], values[1:], out=rows[:-1])
+    found = rows.copy()
+    np.maximum(found[:, 1:], rows[:, :-1], out=found[:, 1:])
+    np.maximum(found[:, :-1], rows[:, 1:], out=found[:, :-1])
+    return found
 
 
 def levels(shown: np.ndarray) -> np.ndarray:

@@ -84,7 +84,7 @@ class CudaAccumulator:
         chosen = (self._gains, self._order, self._pixels, self._parts, self.width, least)
         return self._pixels, int(self._summed(self._loops.choose, *chosen)[0])
 
-    def receive(self, add: Callable[[Any], None]) -> None:
+    def receive(self, pixels: Any, add: Callable[[Any], None]) -> None:
         add(self.sums)
         self.passes += 1
 

@@ -113,7 +113,7 @@ class Renderer:
 
     @property
     def _empty(self) -> HostAccumulator:
-        return HostAccumulator.empty(self.width, self.height, self.dtype)
+        return HostAccumulator.empty(self.width, self.height, self.dtype, work=self.work)
 
     @property
     def key(self) -> str:
@@ -173,7 +173,7 @@ class Renderer:
         limit = STEPS + STEPS * (GROWTH - 1) * min(number, GROWN) // GROWN
         start = time.perf_counter()
         self._aim(number, limit)
-        self.accumulator.receive(lambda sums: self.tracer.add(sums, pixels, number, limit, self.work))
+        self.accumulator.receive(pixels, lambda sums: self.tracer.add(sums, pixels, number, limit, self.work))
         samples, error = self.accumulator.statistics()
         self._rate = count / (time.perf_counter() - start)
         return self._seen(samples, error, count, self._rate)

@@ -47,7 +47,9 @@ def main(picture: str | None = None) -> None:
     pixels = numba_cuda.to_device(ordered(1920, 1080))
 
     def traced() -> None:
-        of.accumulator.receive(lambda sums: of.tracer.add(sums, pixels, 4096, STEPS * GROWTH, of.work))
+        of.accumulator.receive(
+            pixels, lambda sums: of.tracer.add(sums, pixels, 4096, STEPS * GROWTH, of.work)
+        )
         numba_cuda.synchronize()
 
     alone = median(traced)
