@@ -15,7 +15,7 @@ from .options import NAME, Whole, device_option, quiet_option, set_option, sourc
 from .working import working
 
 if TYPE_CHECKING:
-    from fracslice.render import Pass, Renderer
+    from fracslice.rendering import Pass, Renderer
     from fracslice.scene import Scene
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
@@ -57,7 +57,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     "--samples",
     type=Whole(1, 1_000_000),
     metavar="N",
-    help="The most samples of a pixel; the scene's by default, or 64.",
+    help="Maximum number of samples per pixel; the scene's by default, or 64.",
 )
 @click.option(
     "--size",
@@ -67,17 +67,24 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 )
 @device_option
 @click.option(
-    "--time", "limit", callback=duration, metavar="TIME", help="Stop after so long, such as 10s, 2min or 1h."
+    "--time",
+    "limit",
+    callback=duration,
+    metavar="TIME",
+    help="Stop after this time: 10s, 2min or 1h.",
 )
 @click.option(
-    "--bits", type=click.Choice(["8", "16"]), default="8", help="Bits per colour of a PNG file; 8 by default."
+    "--bits",
+    type=click.Choice(["8", "16"]),
+    default="8",
+    help="Bits per channel of a PNG; 8 by default.",
 )
-@click.option("--pass-images", type=NAME, metavar="DIR", help="Keep the picture of every pass in a folder.")
+@click.option("--pass-images", type=NAME, metavar="DIR", help="Write the picture of every pass there.")
 @click.option(
     "--state",
     type=NAME,
     metavar="FILE.npz",
-    help="Go on from this file, if it is there, and save to it after every pass.",
+    help="Resume from this file if it exists, and save to it after every pass.",
 )
 @set_option
 @threads_option
@@ -98,7 +105,7 @@ def render(
 ) -> None:
     """Render a picture of SCENE, as its camera, lights and materials say."""
     from fracslice.export.images import check_image
-    from fracslice.render import Renderer
+    from fracslice.rendering import Renderer
 
     check_image(output)
     check_targets(source, output, state)
@@ -151,7 +158,7 @@ def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:
     """Writes a picture with what it is of."""
     from fracslice.export import application
     from fracslice.export.images import write_image
-    from fracslice.render import develop
+    from fracslice.rendering import develop
 
     text = {
         "Title": scene.name,

@@ -1,21 +1,19 @@
-"""One scene, several objects: the Mandelbulb from power 2 to 9, each as a small STL.
+"""
+A family of Mandelbulbs
+=======================
 
-python examples/a_family.py [FOLDER] [RESOLUTION]
+One shape, several objects, each as a small STL: ``python examples/a_family.py [FOLDER] [RESOLUTION]``.
 """
 
 import sys
 from pathlib import Path
 
-from fracslice import MeshJob, make_mesh, read, write
-from fracslice.scene import Print, library
+from fracslice import make_mesh, mandelbulb
 
-if __name__ == "__main__":
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    resolution = float(sys.argv[2]) if len(sys.argv) > 2 else 160
-    bulb = read(library.path("mandelbulb"))
-    for power in range(2, 10):
-        member = bulb.with_values([f"mandelbulb.power={power}", "solid.size=3cm"])
-        result = make_mesh(member, MeshJob(resolution=resolution, printing=Print(keep="largest")))
-        write(result.mesh, folder / f"mandelbulb-{power}.stl")
-        volume = result.report.mesh.volume_mm3
-        print(f"power {power}: {volume:.0f} mm3, {result.report.mesh.triangles} triangles")
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+resolution = float(sys.argv[2]) if len(sys.argv) > 2 else 160
+
+for power in range(2, 10):
+    mesh = make_mesh(mandelbulb(power), size="3cm", resolution=resolution, keep="largest")
+    mesh.export(folder / f"mandelbulb-{power}.stl")
+    print(f"power {power}: {mesh.volume:.0f} mm3, {len(mesh.faces)} triangles")

@@ -14,22 +14,6 @@ from .kernel.machine import Function
 class BorderError(ValueError):
     """The solid reaches the rim of the lattice."""
 
-class Field:
-    """What is sampled."""
-
-class Compiled(Field):
-    """Machine code: `loops.POINTS` for float32 and its parameters, which it holds."""
-
-    def __init__(self, entry: tuple[Function, NDArray[float32]]) -> None: ...
-
-class Called(Field):
-    """A function of x, y, z, float32 [n], that returns values float32 [n]."""
-
-    def __init__(
-        self,
-        function: Callable[[NDArray[float32], NDArray[float32], NDArray[float32]], NDArray[float32]],
-    ) -> None: ...
-
 class ProbeBounds:
     """How far values reach: a block is decided where |f| exceeds a bound times the distance from its middle
     to its farthest sample.
@@ -57,14 +41,15 @@ class Memory:
 class Slab:
     """The samples of one layer after the other, on a lattice of ny x nx points at (x0 + dx i, y0 + dy j).
 
-    memory: shared by slabs of one job. frame: (x0, y0, dx, dy). z: heights of neighbouring layers. All in
-    scene units. What is read of a layer is read before the next one is sampled; a ValueError else.
+    memory: shared by slabs of one job. entry: of the field's float32 kernel (`Kernel.entry`). frame: (x0,
+    y0, dx, dy). z: heights of neighbouring layers. All in scene units. What is read of a layer is read before
+    the next one is sampled; a ValueError else.
     """
 
     def __init__(
         self,
         memory: Memory,
-        field: Field,
+        entry: tuple[Function, NDArray[float32]] | Callable[[NDArray[float32], NDArray[float32]], None],
         bounds: ProbeBounds,
         frame: tuple[float, float, float, float],
         z: list[float],

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fracslice.errors import MeshError
 from fracslice.extras import lacking
+from fracslice.mesh.certificate import Certificate
 from fracslice.mesh.model import Mesh
 
 if TYPE_CHECKING:
@@ -35,7 +37,7 @@ def to_manifold(mesh: Mesh) -> Manifold:
 
     if not len(mesh.triangles):
         raise MeshError("the mesh has no triangles")
-    corners = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
+    corners = np.array(mesh.vertices, np.float64)  # a copy: manifold3d takes none that is read-only
     solid = manifold3d.Manifold(manifold3d.Mesh64(corners, mesh.triangles.astype(np.uint64)))
     status = solid.status().name
     if status != "NoError":
@@ -43,9 +45,14 @@ def to_manifold(mesh: Mesh) -> Manifold:
     return solid
 
 
-def place_on_bed(mesh: Mesh, middle: tuple[float, float]) -> Mesh:
-    """Move the mesh to stand on z = 0 with a point (x, y) over the origin."""
+def place_on_bed(
+    mesh: Mesh, middle: tuple[float, float], certificate: Certificate
+) -> tuple[Mesh, Certificate]:
+    """Move the mesh to stand on z = 0 with a point (x, y) over the origin, and what is known of it."""
     low, high = mesh.bounds
-    placed = mesh.translated((-middle[0], -middle[1], -low[2]))
-    placed.vertices[placed.vertices[:, 2] < FLAT * (high - low).max(), 2] = 0
-    return placed
+    offset, flat = np.array([-middle[0], -middle[1], -low[2]]), FLAT * (high - low).max()
+    vertices, moved = mesh.vertices + offset, certificate.translated(offset)
+    vertices[vertices[:, 2] < flat, 2] = 0
+    if ((moved.planes[:, 2] >= 0) & (moved.planes[:, 2] < flat)).any():  # some are below it now
+        moved = replace(moved, holds=moved.holds & (vertices[:, 2] > 0)[mesh.triangles].all(axis=1))
+    return Mesh(vertices, mesh.triangles), moved

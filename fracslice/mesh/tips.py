@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import pointed
-from ..formulas.registry import Node
-from ..kernel import Compilable, compile_scene
+from ..kernel import Field
 from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
 from ..work import Work
 from .fit import OFF, UPRIGHT, Fit
 from .model import Mesh
-from .quantisation import float32_points
+from .quantisation import quantise
 from .self_intersections import self_intersecting_triangles
 from .topology import corners_by_vertex
 
@@ -62,8 +61,10 @@ class Cap(NamedTuple):
         return np.concatenate([rim, np.broadcast_to(self.tip, (len(rim), 1, 3))], axis=1)
 
 
-def with_tips(root: Node | Compilable, mesh: Mesh, voxel: float, work: Work | None = None) -> Mesh:
-    """The mesh with the solid's own tips in place of blunt ends.
+def with_tips(
+    root: Field, mesh: Mesh, voxel: float, work: Work | None = None
+) -> tuple[Mesh, NDArray[np.bool_]]:
+    """The mesh with the solid's own tips in place of blunt ends, and which triangles are new, bool [m].
 
     mesh: closed, an oriented 2-manifold, scene units, its vertices on the zero set of root's field, a voxel
     apart. Where the solid goes on above a triangle at a pointed vertex, its farthest point is looked for, and
@@ -72,9 +73,9 @@ def with_tips(root: Node | Compilable, mesh: Mesh, voxel: float, work: Work | No
     fractal, stays as it is. Raises `Cancelled`.
     """
     work = work or Work()
-    at = pointed(mesh.vertices, mesh.triangles, POINTED)
+    at = pointed(mesh.vertices, mesh.triangles, POINTED, work.threads)
     if not 0 < len(at) <= MANY:
-        return mesh
+        return mesh, np.zeros(len(mesh.triangles), bool)
     rings, fit = Rings(mesh), Fit(root, STEP * voxel, voxel, work)
     found = [
         _best(rings.caps(end, tip), gain, mesh, fit, voxel)
@@ -84,20 +85,20 @@ def with_tips(root: Node | Compilable, mesh: Mesh, voxel: float, work: Work | No
     while caps:
         work.check()
         made, of_cap = _capped(mesh, caps)
-        as_written = Mesh(float32_points(made).astype(np.float64), made.triangles)
+        as_written = Mesh(quantise(made, threads=work.threads)[0], made.triangles)
         wrong = of_cap[self_intersecting_triangles(as_written, threads=work.threads, among=of_cap >= 0)]
         if not (wrong >= 0).any():
-            return made
+            return made, of_cap >= 0
         caps = [cap for number, cap in enumerate(caps) if number not in wrong]
-    return mesh
+    return mesh, np.zeros(len(mesh.triangles), bool)
 
 
 def _found(
-    root: Node | Compilable, rings: Rings, at: NDArray[np.int64], voxel: float, work: Work
+    root: Field, rings: Rings, at: NDArray[np.int64], voxel: float, work: Work
 ) -> list[tuple[float, int, NDArray[np.float64]]]:
     """Tips that the mesh does not reach: how far it is from them, the nearest vertex, and where they are; the
     farthest one first."""
-    kernel, mesh = compile_scene(root, "float64"), rings.mesh
+    kernel, mesh = root.kernel("cpu", "float64"), rings.mesh
     exact = EXACT * float(mesh.size.max())
 
     def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
-from ..formulas import Box, Node
+from ..formulas import Box
 from ..formulas.parameters import Number, validate
-from ..kernel import Compilable
+from ..kernel import Field
 from ..scene.lengths import Length
 from ..volume import Bricks
 from ..work import Work
 from .components import components_of
 from .connectivity import resolved, shown
 from .faces import projected
-from .samples import lengths
+from .samples import Samples
 from .thin_features import thin_features
 from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
@@ -97,7 +97,7 @@ class SolidReport:
 
 
 def check_object(
-    root: Node | Compilable,
+    root: Field,
     outer: Box,
     scale: float,
     limits: Limits | None = None,
@@ -116,7 +116,7 @@ def check_object(
 
 
 def check_solid(
-    root: Node | Compilable,
+    root: Field,
     bricks: Bricks,
     scale: float,
     limits: Limits | None = None,
@@ -132,7 +132,7 @@ def check_solid(
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
     most = float(BINS[-1]) / scale
-    solid = lengths(bricks, root.bounds, most)
+    solid = Samples(bricks)
     work.check()
     thin, tight = thin_features(root, solid, work)
 
