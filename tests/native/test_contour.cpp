@@ -28,17 +28,20 @@ struct Brick {
     Bricks view() const { return {{ijk.data(), 1, &index, {1, 1, 1}}, values.data()}; }
 };
 
-// Every directed edge once, and its opposite once.
+// Every directed edge once, and its opposite once; every vertex used.
 void check_closed(const Array<int32_t>& triangles, size_t vertices) {
     std::map<std::pair<int32_t, int32_t>, int> edges;
+    std::vector<bool> used(vertices);
     for (size_t t = 0; t < triangles.rows; ++t) {
         const int32_t* v = &triangles.data[3 * t];
         for (int k = 0; k < 3; ++k) {
             REQUIRE(v[k] >= 0);
             REQUIRE(size_t(v[k]) < vertices);
+            used[size_t(v[k])] = true;
             ++edges[{v[k], v[(k + 1) % 3]}];
         }
     }
+    CHECK(std::count(used.begin(), used.end(), true) == int64_t(vertices));
     for (auto [edge, count] : edges) {
         CHECK(count == 1);
         CHECK(edges.count({edge.second, edge.first}) == 1);

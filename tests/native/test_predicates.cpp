@@ -62,7 +62,8 @@ TEST_CASE("side_of_plane: exact for points in a plane and beside it, in any orde
         Integers a, u, v, b, c, d;
         const int64_t s = few(random), t = few(random);
         for (size_t k = 0; k < 3; ++k) {
-            a[k] = far(random), u[k] = far(random) >> 4, v[k] = far(random) >> 4;
+            a[k] = far(random), u[k] = far(random) >> 4;
+            v[k] = i % 4 == 3 ? 3 * u[k] + near(random) : far(random) >> 4;  // nearly parallel: rounding hides the sign
             b[k] = a[k] + u[k], c[k] = a[k] + v[k], d[k] = a[k] + s * u[k] + t * v[k] + (i % 2 ? near(random) : 0);
         }
         const int expected = plane_by_integers(a, b, c, d);

@@ -20,6 +20,13 @@ else
     tests="$tests mesh/test_check.py volume/test_grid.py"  # not for races: the library of OpenVDB waits by TBB
 fi
 
+mkdir -p "$build"
+if [ "$kind" = thread ]; then
+    # shellcheck disable=SC2086
+    g++ -O1 -g $flags tests/sanitize/race.cpp -ltbb -o "$build/race"
+    ! setarch -R "$build/race" 2>/dev/null || { echo "the sanitizer does not see a race between tasks" >&2; exit 1; }
+fi
+
 PATH=$(dirname "$python"):$PATH cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=None -DPython_EXECUTABLE="$python" \
     -DCMAKE_CXX_FLAGS="-O1 -g -fno-omit-frame-pointer $flags"
 cmake --build "$build" -j 2

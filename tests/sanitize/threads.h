@@ -1,6 +1,6 @@
 // Included first in every file of a build with the thread sanitizer: TBB's algorithms run on plain threads, for the sanitizer
-// does not see what the library of TBB, which is built without it, synchronises. No task of one call waits for another, so that
-// a race between two of them is seen whatever the order they run in.
+// does not see what the library of TBB, which is built without it, synchronises. Every thread gets some of the tasks, and none
+// waits for another: a race between two tasks is seen whatever the order they run in.
 #pragma once
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -8,7 +8,6 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <atomic>
 #include <deque>
 #include <exception>
 #include <mutex>
@@ -20,30 +19,27 @@ namespace tbb::plain {
 
 inline thread_local int concurrency = 4;
 
-// Calls task(k) for 0 <= k < n, each on one of some threads; rethrows the first exception. Within a task: on its thread.
+// Calls task(k) for 0 <= k < n, in turn on each of some threads; rethrows the first exception. Within a task: on its thread.
 template <class Task>
 void run(size_t n, const Task& task) {
-    std::atomic<size_t> next{0};
-    std::exception_ptr failure;
-    std::mutex failing;
-    auto work = [&] {
-        concurrency = 1;
-        for (size_t k; (k = next.fetch_add(1, std::memory_order_relaxed)) < n;) {
-            try {
-                task(k);
-            } catch (...) {
-                std::lock_guard lock(failing);
-                if (!failure) failure = std::current_exception();
-            }
-        }
-    };
     const size_t threads = std::min(n, size_t(std::max(concurrency, 1)));
     if (threads < 2) {
         for (size_t k = 0; k < n; ++k) task(k);
         return;
     }
+    std::exception_ptr failure;
+    std::mutex failing;
+    auto work = [&](size_t first) {
+        concurrency = 1;
+        try {
+            for (size_t k = first; k < n; k += threads) task(k);
+        } catch (...) {
+            std::lock_guard lock(failing);
+            if (!failure) failure = std::current_exception();
+        }
+    };
     std::vector<std::thread> all;
-    for (size_t i = 0; i < threads; ++i) all.emplace_back(work);
+    for (size_t i = 0; i < threads; ++i) all.emplace_back(work, i);
     for (std::thread& thread : all) thread.join();
     if (failure) std::rethrow_exception(failure);
 }
