@@ -25,6 +25,15 @@ int winding_of(const MeshView& mesh, size_t t, const double* p) {
     return side_of_plane(mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2), p) * turn > 0 ? turn : 0;
 }
 
+// Whether the ray up from p passes the box of a triangle.
+bool below(const MeshView& mesh, size_t t, const double* p) {
+    const double *a = mesh.corner(t, 0), *b = mesh.corner(t, 1), *c = mesh.corner(t, 2);
+    for (int k = 0; k < 2; ++k) {
+        if (!(std::min({a[k], b[k], c[k]}) <= p[k] && p[k] <= std::max({a[k], b[k], c[k]}))) return false;
+    }
+    return p[2] <= std::max({a[2], b[2], c[2]});
+}
+
 // The start of a shell's ray.
 struct Start {
     double at[3];
@@ -34,46 +43,53 @@ struct Start {
 // The starts, by cells of a grid across the rays.
 class Starts {
   public:
-    Starts(const MeshView& mesh, std::span<const int64_t> first) {
+    Starts(const MeshView& mesh, std::span<const int64_t> first) : mesh_(mesh), of_vertex_(mesh.vertices, 1) {
         for (size_t shell = 0; shell < first.size(); ++shell) {
             if (first[shell] < 0) continue;
             const double* p = mesh.point(int32_t(first[shell]));
             starts_.push_back({{p[0], p[1], p[2]}, shell});
             for (size_t k = 0; k < 2; ++k) low_[k] = std::min(low_[k], p[k]), high_[k] = std::max(high_[k], p[k]);
         }
-        side_ = std::clamp(int(kFine * std::sqrt(double(starts_.size()))), 1, kMostCells);
-        for (size_t k = 0; k < 2; ++k) scale_[k] = high_[k] > low_[k] ? side_ / (high_[k] - low_[k]) : 0;
-        auto cell_of = [&](const Start& start) { return cell(place(start.at[0], 0), place(start.at[1], 1)); };
-        std::sort(starts_.begin(), starts_.end(), [&](const Start& a, const Start& b) { return cell_of(a) < cell_of(b); });
-        cells_.resize(size_t(side_) * size_t(side_) + 1, 0);
-        for (const Start& start : starts_) ++cells_[cell_of(start) + 1];
+        if (starts_.empty()) low_.fill(0);
+        side_ = std::clamp(size_t(kFine * std::sqrt(double(starts_.size()))), size_t(1), kMostCells);
+        for (size_t k = 0; k < 2; ++k) scale_[k] = high_[k] > low_[k] ? double(side_) / (high_[k] - low_[k]) : 0;
+        auto before = [&](const Start& a, const Start& b) { return number(cell(a.at)) < number(cell(b.at)); };
+        std::sort(starts_.begin(), starts_.end(), before);
+        cells_.resize(side_ * side_ + 1, 0);
+        for (const Start& start : starts_) ++cells_[number(cell(start.at)) + 1];
         for (size_t i = 1; i < cells_.size(); ++i) cells_[i] += cells_[i - 1];
+        for_each_block(mesh.vertices, [&](size_t, size_t begin, size_t end) {
+            for (size_t v = begin; v < end; ++v) of_vertex_.data[v] = cell(mesh.point(int32_t(v)));
+        });
     }
 
-    // Calls act(start) for the rays that may pass a box: those that start in its cells below its top.
+    // Calls act(start) for the rays that start in the cells of a triangle's box.
     template <class Do>
-    void for_each_in(const double* low, const double* high, const Do& act) const {
-        if (low[0] > high_[0] || low[1] > high_[1] || high[0] < low_[0] || high[1] < low_[1]) return;
-        int y0 = place(low[1], 1), y1 = place(high[1], 1);
-        for (int x = place(low[0], 0), last = place(high[0], 0); x <= last; ++x) {
-            for (size_t i = cells_[cell(x, y0)], end = cells_[cell(x, y1) + 1]; i < end; ++i) {
-                const double* p = starts_[i].at;
-                if (low[0] <= p[0] && p[0] <= high[0] && low[1] <= p[1] && p[1] <= high[1] && p[2] <= high[2]) act(starts_[i]);
-            }
+    void for_each_at(size_t t, const Do& act) const {
+        const Cell &a = of_vertex_.data[mesh_[t][0]], &b = of_vertex_.data[mesh_[t][1]], &c = of_vertex_.data[mesh_[t][2]];
+        uint16_t x0 = std::min({a[0], b[0], c[0]}), x1 = std::max({a[0], b[0], c[0]});
+        uint16_t y0 = std::min({a[1], b[1], c[1]}), y1 = std::max({a[1], b[1], c[1]});
+        for (uint16_t x = x0; x <= x1; ++x) {
+            for (uint32_t i = cells_[number({x, y0})], end = cells_[number({x, y1}) + 1]; i < end; ++i) act(starts_[i]);
         }
     }
 
   private:
-    static constexpr int kFine = 4, kMostCells = 1024;  // cells per start, its root; along a side
+    static constexpr double kFine = 2;  // cells per start, its root
+    static constexpr size_t kMostCells = 1024;
+    using Cell = std::array<uint16_t, 2>;
 
-    // Of the cell along an axis: the same or a higher one for a greater coordinate.
-    int place(double x, size_t k) const { return int(std::clamp((x - low_[k]) * scale_[k], 0.0, side_ - 1.0)); }
-    size_t cell(int x, int y) const { return size_t(x) * size_t(side_) + size_t(y); }
+    // The same or a higher one for a greater coordinate.
+    uint16_t place(double x, size_t k) const { return uint16_t(std::clamp((x - low_[k]) * scale_[k], 0.0, double(side_ - 1))); }
+    Cell cell(const double* p) const { return {place(p[0], 0), place(p[1], 1)}; }
+    size_t number(const Cell& cell) const { return cell[0] * side_ + cell[1]; }
 
+    const MeshView& mesh_;
     std::array<double, 2> low_{HUGE_VAL, HUGE_VAL}, high_{-HUGE_VAL, -HUGE_VAL}, scale_{};
-    int side_ = 1;
+    size_t side_ = 1;
     std::vector<Start> starts_;
-    std::vector<size_t> cells_;  // the first start of each, and behind the last
+    std::vector<uint32_t> cells_;  // the first start of each, and behind the last
+    Array<Cell> of_vertex_;
 };
 
 // A triangle that a shell's ray passes.
@@ -87,12 +103,9 @@ std::vector<Hit> hits(const MeshView& mesh, std::span<const int32_t> labels, con
     return joined(in_blocks<std::vector<Hit>>(mesh.count, [&](size_t begin, size_t end) {
         std::vector<Hit> found;
         for (size_t t = begin; t < end; ++t) {
-            const double *a = mesh.corner(t, 0), *b = mesh.corner(t, 1), *c = mesh.corner(t, 2);
-            double low[2], high[3];
-            for (int k = 0; k < 2; ++k) low[k] = std::min({a[k], b[k], c[k]});
-            for (int k = 0; k < 3; ++k) high[k] = std::max({a[k], b[k], c[k]});
-            starts.for_each_in(low, high, [&](const Start& start) {
-                int winding = size_t(labels[t]) == start.shell ? 0 : winding_of(mesh, t, start.at);
+            starts.for_each_at(t, [&](const Start& start) {
+                if (size_t(labels[t]) == start.shell || !below(mesh, t, start.at)) return;
+                int winding = winding_of(mesh, t, start.at);
                 if (winding != 0) found.push_back({start.shell, labels[t], winding});
             });
         }
