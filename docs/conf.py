@@ -43,7 +43,7 @@ html_theme_options = {
     "show_prev_next": False,
     "secondary_sidebar_items": ["page-toc"],
 }
-html_sidebars = dict.fromkeys(["index", "start", "measurements", "gallery", "changelog"], [])
+html_sidebars = {page: [] for page in ("index", "start", "measurements", "gallery", "changelog")}
 html_title = "fracslice"
 html_show_sourcelink = False
 
