@@ -22,7 +22,9 @@ MODULES = {"pillow": "PIL", "scikit-image": "skimage", "numba-cuda": "numba_cuda
 WITHIN = {"vtkmodules": "pyvista"}
 """Modules that come with a package, and no other way."""
 
-BLOCKED = "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx hypothesis"
+BLOCKED = (
+    "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx hypothesis shapely"
+)
 
 
 DEVELOPERS = {"dev", "docs"}

@@ -130,4 +130,6 @@ def make_mesh(
     if printing.keep == "largest" and job.size_mm is None and not isinstance(source, Scene):
         raise SceneError("keep='largest': expected a size, too, such as size='40mm', of the body that stays")
     made = make_mesh_job(scene, replace(job, printing=printing), how)
+    for array in (made.bricks.ijk, made.bricks.values, made.bricks.index):
+        array.flags.writeable = False
     return Result(made.mesh.vertices, made.mesh.triangles, made.report, made.bricks, made.root, made.place)

@@ -71,7 +71,7 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat,
 
 
 @julia.arguments
-def _(node: Node) -> dict[str, object]:
+def julia_arguments(node: Node) -> dict[str, object]:
     first, last, escape2, least = levels(2, node["iterations"], node["bailout"], ESCAPED)
     flat = Fixed(node["c"][3] == 0)
     return {
@@ -97,12 +97,12 @@ def _falls_apart(c: Sequence[float], iterations: int, bailout: float, escape2: f
 
 
 @julia.steepening
-def _(node: Node) -> float:
+def julia_steepening(node: Node) -> float:
     return 2.0
 
 
 @julia.bounds
-def _(node: Node) -> Box:
+def julia_bounds(node: Node) -> Box:
     # |w_n+1| >= |w_n|^2 - |c|, so |w_N| <= R bounds |w_n| backwards, down to the point itself.
     radius, steps = node["bailout"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
     for _ in range(steps):
