@@ -166,7 +166,7 @@ class _Run:
         """The space that nothing reaches becomes solid."""
         return self.without(self.connected().components.cavities)
 
-    def without(self, cavities: np.ndarray) -> Node | Compilable:
+    def without(self, cavities: np.ndarray) -> Field:
         """These become solid."""
         from .border import nearer
 
@@ -178,18 +178,11 @@ class _Run:
 
     def largest(self) -> Field:
         """Only the largest body stays."""
-<<<<<<< HEAD
-        return self.only(self.connected().components.bodies[:1])
-
-    def only(self, bodies: np.ndarray) -> Field:
-        """Only these bodies stay."""
-=======
->>>>>>> print
         from .border import nearer
 
         found = self.connected()
-        (first, *others) = found.components.bodies.tolist()
-        return edited(self.thing, "keep", nearer(found, [first], others)) if others else self.thing
+        first, others = np.split(found.components.bodies, [1])
+        return edited(self.thing, "keep", nearer(found, first, others)) if len(others) else self.thing
 
     def bridged(self) -> Field:
         """Struts between bodies, as few and as short as can be, and no dust."""
@@ -208,7 +201,7 @@ class _Run:
         width = max(self.how.bridge, self.how.thickness) / self.scale
         return self.with_capsules(capsules(start, end, width / 2, found.solid), width)
 
-    def unsealed(self) -> Node | Compilable:
+    def unsealed(self) -> Field:
         """What only samples as far apart as a mesh's seal becomes solid."""
         from .components import Connected
 
@@ -250,20 +243,11 @@ class _Run:
         self.known = Connected.of(together(solid.bricks, balls.bricks))
         return self.without(self.known.sealed(before))
 
-<<<<<<< HEAD
-    def added(self, start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Field:
-        """With strokes, if there are any."""
-        from .capsules import capsules
-
-        self.planned = replace(self.planned, outer=self.planned.outer.grown(2 * radius))
-        return edited(self.thing, "add", capsules(start, end, radius, like)) if len(start) else self.thing
-=======
-    def with_capsules(self, made: Samples, width: float) -> Node | Compilable:
+    def with_capsules(self, made: Samples, width: float) -> Field:
         """With capsules so wide, which may join what was apart."""
         self.known = None
         self.planned = replace(self.planned, outer=self.planned.outer.grown(width))
         return edited(self.thing, "add", made)
->>>>>>> print
 
     def hollowed(self) -> Field:
         """Everything farther inside than the walls are thick is taken away, and two holes made into each part

@@ -81,7 +81,6 @@ class Samples(ArrayField):
         return out
 
 
-<<<<<<< HEAD
 class _Interpolated(Kernel):
     """The kernel of samples."""
 
@@ -91,7 +90,8 @@ class _Interpolated(Kernel):
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """`Kernel.points`."""
         return self._samples.points(x, y, z).astype(self.dtype, copy=False)
-=======
+
+
 def together(solid: Bricks, added: Bricks) -> Bricks:
     """The samples of the union of two fields that are sampled on one grid, maybe in other bricks."""
     shift = np.round((np.array(added.origin) - solid.origin) / (8 * solid.voxel)).astype(int)
@@ -120,7 +120,6 @@ def _least(some, rows, more, others, out):  # type: ignore[no-untyped-def]
             out[n] = some[rows[n]]
         else:
             out[n] = np.minimum(some[rows[n]], more[others[n]])
->>>>>>> print
 
 
 def _brick_bounds(bricks: Bricks) -> np.ndarray:
