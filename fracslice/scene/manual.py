@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import SceneError
 from ..formulas.parameters import REQUIRED
+from ..formulas.registry import Formula
 from ..nearest import hint
 from .layout import SCENE, SECTIONS, Element, formulas
 
@@ -62,11 +63,18 @@ def _page() -> Iterator[str]:
         yield f"## {title}\n\n{doc}\n"
         for formula in formulas():
             if formula.kind == kind:
-                yield from _described(formula)
+                yield from _described(formula, f"Python: `{_call(formula)}`\n")
 
 
-def _described(element: Element) -> Iterator[str]:
+def _call(formula: Formula) -> str:
+    """How Python calls a formula, with its defaults."""
+    found = inspect.signature(formula).parameters.values()
+    return f"{formula.name}({', '.join(str(p.replace(annotation=p.empty)) for p in found)})"
+
+
+def _described(element: Element, call: str | None = None) -> Iterator[str]:
     yield f"### `<{element.name}>`\n\n{prose(element.doc)}\n"
+    yield from filter(None, [call])
     if element.parameters:
         yield "| attribute | default | expected | meaning |\n|---|---|---|---|"
         for name, kind in element.parameters.items():
