@@ -19,10 +19,10 @@ class ProbeBounds:
     to its farthest sample.
 
     proven: for blocks over all layers. outside, inside: for finer ones, by the sign of the middle.
-    stop_outside, stop_inside: blocks of so many pixels are not cut any more. even: inside values are of
-    another scale than outside ones, but of one everywhere, so that a part of the crossings tells for all, and
-    the bound outside follows the steepness of the field, from `outside` up to `proven`. In a field that is
-    not even every crossing is settled on the field, and so are corners within pixels.
+    stop_outside, stop_inside: blocks of so many pixels are not cut any more. escape_time_only: inside values
+    are of another scale than outside ones, but of one everywhere, so that a part of the crossings tells for
+    all, and the bound outside follows the steepness of the field, from `outside` up to `proven`. In other
+    fields every crossing is projected to the surface, and so are corners within pixels.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class ProbeBounds:
         inside: float,
         stop_outside: int,
         stop_inside: int,
-        even: bool,
+        escape_time_only: bool,
     ) -> None: ...
 
 class Memory:

@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import SceneError, TooLargeError, VolumeError
 from .formulas import Box
@@ -21,6 +22,7 @@ from .work import Clock, Work
 if TYPE_CHECKING:
     from .kernel import Field
     from .mesh import Mesh
+    from .mesh.certificate import Certificate
     from .mesh.components import Removed
     from .volume import Bricks, Plan
 
@@ -136,7 +138,8 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     """
     what, work = what or MeshJob(), work or Work()
     voxels, clock = what.voxels(scene), Clock(work)
-    from .mesh.check import check_mesh
+    from .mesh.certificate import Certificate
+    from .mesh.check import check_quantised
     from .mesh.missed import surface_to_mesh
     from .mesh.refine import refine
     from .mesh.simplify import simplify
@@ -152,27 +155,31 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     if not how.whole:
         with clock("changing"):
             planned, scale, left = _changed(planned, what, how, what.size(scene), work)
-    bricks, raw, pieces = _surface(planned, clock)
+    bricks, raw, certificate, pieces = _surface(planned, clock)
     if how.whole and how.sorts and pieces:  # what is one body only the field tells
         with clock("changing"):
             planned, scale, left = _changed(planned, what, how, what.size(scene), work)
-        bricks, raw, pieces = _surface(planned, clock)
+        bricks, raw, certificate, pieces = _surface(planned, clock)
     refined = None
     if what.chord_mm is not None:
         with clock("refining"):
             unit = 1 / (scale or what.size(scene) / max(planned.box.size))
             raw, done = refine(planned.root, raw, what.chord_mm * unit, planned.voxel, work)
+            certificate = Certificate.none(len(raw.triangles))
             refined = done.scaled(1 / unit)
     with clock("finishing"):
         left = replace(left, keep="all") if pieces else left
-        mesh, removed, place = _finished(planned, raw, what, left, what.size(scene), scale, work)
+        mesh, proved, removed, place = _finished(
+            planned, raw, certificate, what, left, what.size(scene), scale, work
+        )
         made = mesh.volume + removed.bodies_mm3 - removed.filled_mm3
     simplified = None
     if what.simplify_mm is not None:
         with clock("simplifying"):
             mesh, simplified = simplify(mesh, what.simplify_mm, work)
+            proved = np.zeros(len(mesh.triangles), bool)
     with clock("checking"):
-        checked = check_mesh(mesh, threads=work.threads)
+        checked = check_quantised(mesh, proved, work.threads)
         points = (mesh.vertices - np.array(place.offset)) / place.scale
         error = place.scale * surface_error(planned.root, points, planned.voxel, work)
         back = surface_to_mesh(planned, lambda: [raw], place.scale, work)
@@ -205,8 +212,11 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
     return Result(mesh, report, bricks, planned.root, place)
 
 
-def _surface(planned: Plan, clock: Clock) -> tuple[Bricks, Mesh, str]:
-    """The samples of a planned scene, their mesh, in scene units, and what fell to pieces in it."""
+def _surface(planned: Plan, clock: Clock) -> tuple[Bricks, Mesh, Certificate, str]:
+    """The samples of a planned scene, their mesh, in scene units, what is known of it, and what of it fell to
+    pieces.
+    """
+    from .mesh.certificate import Certificate
     from .mesh.components import in_pieces
     from .mesh.extract import contour
     from .mesh.tips import with_tips
@@ -216,8 +226,9 @@ def _surface(planned: Plan, clock: Clock) -> tuple[Bricks, Mesh, str]:
         bricks = sample_scene(planned, clock.work)
     with clock("meshing"):
         mesh = contour(planned.root, bricks, clock.work)
-        mesh = with_tips(planned.root, mesh, planned.voxel, clock.work)
-        return bricks, mesh, in_pieces(mesh, planned.voxel)
+        mesh, new = with_tips(planned.root, mesh, planned.voxel, clock.work)
+        certificate = replace(Certificate.of(bricks, len(new)), holds=~new)
+        return bricks, mesh, certificate, in_pieces(mesh, planned.voxel, clock.work.threads)
 
 
 def _changed(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> tuple[Plan, float, Print]:
@@ -269,30 +280,42 @@ def _thinner(pieces: str, voxel: float) -> tuple[str, ...]:
 
 
 def _finished(
-    planned: Plan, raw: Mesh, what: MeshJob, how: Print, size: float, scale: float | None, work: Work
-) -> tuple[Mesh, Removed, Placement]:
-    """The mesh that is wanted, in mm on the bed, as a file will hold it. scale: mm per scene unit; without
-    one, what stays is made to be of that size.
+    planned: Plan,
+    raw: Mesh,
+    certificate: Certificate,
+    what: MeshJob,
+    how: Print,
+    size: float,
+    scale: float | None,
+    work: Work,
+) -> tuple[Mesh, NDArray[np.bool_], Removed, Placement]:
+    """The mesh that is wanted, in mm on the bed, as a file will hold it, and which of its triangles are
+    proved not to intersect. scale: mm per scene unit; without one, what stays is made to be of that size.
     """
-    from .mesh.clean import clean
+    from .mesh.clean import cleaned
     from .mesh.solid import place_on_bed
 
     rough = scale or size / max(planned.box.size)
-    kept, removed = _kept(raw.scaled(rough), what, how)
+    kept, stays, removed = _kept(raw.scaled(rough), what, how, work)
     box = _box_of_kept(planned, raw, kept, rough, work)
     exact = scale or size / max(box.size)
     mesh = kept.scaled(exact / rough)
-    placed = place_on_bed(mesh, (exact * box.centre[0], exact * box.centre[1]))
+    known = certificate.selected(stays).scaled(rough).scaled(exact / rough)
+    placed, known = place_on_bed(mesh, (exact * box.centre[0], exact * box.centre[1]), known)
     x, y, z = (placed.bounds[0] - mesh.bounds[0]).tolist()
-    return clean(placed), removed, Placement(exact, (x, y, z))
+    made = cleaned(placed, known, threads=work.threads)
+    return made.mesh, made.proved, removed, Placement(exact, (x, y, z))
 
 
-def _kept(mesh: Mesh, what: MeshJob, how: Print) -> tuple[Mesh, Removed]:
-    """The bodies of a mesh in mm that are wanted."""
-    from .mesh.components import select
+def _kept(mesh: Mesh, what: MeshJob, how: Print, work: Work) -> tuple[Mesh, NDArray[np.bool_], Removed]:
+    """The bodies of a mesh in mm that are wanted, and which triangles these are."""
+    from .mesh.components import choose, shells
 
     cavities = how.cavities if how.whole else "keep"  # a hollow is one, too
-    return select(mesh, keep=how.keep, dust_mm3=what.dust(mesh.volume), cavities=cavities)
+    found, dust = shells(mesh, work.threads), what.dust(mesh.measured(work.threads)[1])
+    staying, removed = choose(found, keep=how.keep, dust_mm3=dust, cavities=cavities)
+    stays = staying[found.labels]
+    return mesh.selected(stays, work.threads), stays, removed
 
 
 def _box_of_mesh(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> Box:
@@ -302,9 +325,9 @@ def _box_of_mesh(planned: Plan, what: MeshJob, how: Print, size: float, work: Wo
     from .volume import sample_scene
 
     raw = contour(planned.root, sample_scene(planned, work), work)
-    how = replace(how, keep="all") if in_pieces(raw, planned.voxel) else how
+    how = replace(how, keep="all") if in_pieces(raw, planned.voxel, work.threads) else how
     rough = size / max(planned.box.size)
-    kept, _ = _kept(raw.scaled(rough), what, how)
+    kept, *_ = _kept(raw.scaled(rough), what, how, work)
     return _box_of_kept(planned, raw, kept, rough, work)
 
 

@@ -25,6 +25,7 @@ from .work import Clock, Work
 
 if TYPE_CHECKING:
     from .mesh import Mesh
+    from .mesh.certificate import Certificate
     from .mesh.check import MeshReport
     from .mesh.extract import Piece
     from .mesh.survey import WholeShells
@@ -58,6 +59,7 @@ def stream_mesh(
         if length is not None:
             raise SceneError(f"{name} {length:g}mm: needs the whole mesh, which does not fit in memory")
     from .export import application
+    from .mesh.certificate import Certificate
     from .mesh.extract import contour_pieces
     from .mesh.missed import surface_to_mesh
     from .mesh.survey import Survey
@@ -76,9 +78,8 @@ def stream_mesh(
                 pieces.add(piece, survey.add(piece))
                 work.progress("meshing", min((piece.end - planned.outer.lo[0]) / planned.outer.size[0], 1.0))
         with clock("finishing"), replacing(path) as file:
-            finish = _Finish(
-                planned, pieces, survey.shells(), replace(what, printing=how), what.size(scene), work
-            )
+            what, grid = replace(what, printing=how), Certificate.of(signs, 0)
+            finish = _Finish(planned, pieces, survey.shells(), grid, what, what.size(scene), work)
             known = {"Application": application()} | dict(metadata or {})
             back = surface_to_mesh(planned, finish.surface, finish.scale, work)
             write_pieces(finish.meshes(MOST_ERRORS / (40 * len(signs))), file, known)
@@ -129,7 +130,14 @@ class _Finish:
     """The second time over the surface: what stays of it, where it is to be, what it is like."""
 
     def __init__(
-        self, planned: Plan, pieces: Pieces, whole: WholeShells, what: MeshJob, size: float, work: Work
+        self,
+        planned: Plan,
+        pieces: Pieces,
+        whole: WholeShells,
+        grid: Certificate,
+        what: MeshJob,
+        size: float,
+        work: Work,
     ) -> None:
         from .mesh.components import choose
         from .mesh.window import Window
@@ -148,6 +156,7 @@ class _Finish:
         self.scale = size / max(box.size)
         self.offset = -self.scale * np.array([*box.centre[:2], rest[0, 2]])
         self.voxel = planned.voxel * self.scale
+        self.grid = grid.scaled(self.scale).translated(self.offset)
         self.window = Window(self.voxel, work.threads)
         self.errors: list[np.ndarray] = []
 
@@ -159,7 +168,8 @@ class _Finish:
             self.work.progress("finishing", number / len(self.pieces.ends))
             kept = mesh.selected(self.staying(labels)).scaled(self.scale).translated(self.offset)
             end = self.scale * self.pieces.ends[number] + float(self.offset[0])
-            done = self.window.add(kept, end if number < last else np.inf)
+            known = replace(self.grid, holds=np.ones(len(kept.triangles), bool))
+            done = self.window.add(kept, end if number < last else np.inf, known)
             self._measure(done.vertices[::stride])
             yield done
 

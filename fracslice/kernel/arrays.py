@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from ..formulas import vocabulary
 from ..formulas.field import Field, Kernel, Loops, Precision
 from .loops import Loop
 
@@ -22,33 +20,21 @@ class ArrayField(Field, Protocol):
     """A field whose kernel is called on arrays."""
 
     def loops(self, loops: Sequence[Loop], precision: Precision) -> Loops:
-        """The same texts run by NumPy: all points are one vector."""
+        """The same functions run by NumPy: all points are one vector."""
         kernel = self.kernel("cpu", precision)
-        return Loops(1, BATCH, {loop.name: ArrayLoop(_function(kernel, loop)) for loop in loops})
+        return Loops(1, BATCH, {loop.name: ArrayLoop(loop, kernel) for loop in loops})
 
 
 @dataclass(frozen=True, eq=False)
 class ArrayLoop:
     """A `formulas.field.Run` in Python."""
 
-    function: Callable[..., None]
+    loop: Loop
+    kernel: Kernel
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
         with np.errstate(all="ignore"):
-            self.function(None, frame, *rows, *out, *numbers, rows.shape[1])
+            self.loop.function(self.kernel.points, frame, *rows, *out, *numbers, rows.shape[1])
 
     def native(self, frame: np.ndarray) -> Callable[..., None]:
         return partial(self, frame)
-
-
-def _function(kernel: Kernel, loop: Loop) -> Callable[..., None]:
-    scope: dict[str, Any] = {
-        **vars(vocabulary),
-        "WIDTH": sys.maxsize,
-        "load": lambda row, _: row,
-        "store": lambda row, _, values: np.copyto(row, values),
-        "field": lambda x, y, z, _: kernel.points(x, y, z),
-    }
-    exec(loop.source, scope)
-    function: Callable[..., None] = scope[loop.name]
-    return function

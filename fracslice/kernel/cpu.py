@@ -16,7 +16,7 @@ from ..formulas.field import Kernel, Loops, Precision
 from ..formulas.registry import Node
 from .host import lane_count
 from .linker import Linked, link
-from .loops import BRICKS, POINTS, Loop
+from .loops import Loop, bricks, points
 from .machine import Function, constant, loaded
 from .objects import object_code
 
@@ -30,14 +30,14 @@ class CpuKernel(Kernel):
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
-        functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (POINTS, BRICKS))
+        functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
         self._parameters = constant(linked.parameters, self.dtype)
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
 
     @property
     def entry(self) -> tuple[Function, np.ndarray]:
-        """`loops.POINTS` as compiled, and its parameters."""
+        """`loops.points` as compiled, and its parameters."""
         return self._points, self._parameters
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:

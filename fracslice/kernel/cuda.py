@@ -16,6 +16,7 @@ import shutil
 import sys
 import tempfile
 import threading
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import version
@@ -32,7 +33,9 @@ from ..formulas.field import Kernel, Precision
 from ..formulas.registry import Node
 from ..keys import key, texts
 from . import cuda_source
+from .cuda_loops import bricks, points
 from .linker import Linked, link
+from .loops import Loop
 from .objects import cache_folder
 
 BLOCK = 128
@@ -41,8 +44,7 @@ BLOCK = 128
 _LAUNCH = threading.Lock()
 """Numba's first launch of a kernel may happen once only, and launching holds the interpreter anyway."""
 
-LOOPS = cuda_source.POINTS + cuda_source.BRICKS
-
+LOOPS = points, bricks
 
 NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
 
@@ -156,11 +158,11 @@ def parameters(linked: Linked, precision: Precision) -> Any:
     return require().to_device(linked.parameters.astype(precision))
 
 
-def load_loops(linked: Linked, precision: Precision, loops: str) -> ModuleType:
+def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> ModuleType:
     """Loops over a linked scene, as attributes of a module; each is compiled for the types of its first
     call's arguments.
 
-    loops: as `cuda_source.module` takes them. Raises `KernelError` if there is no GPU.
+    Raises `KernelError` if there is no GPU.
     """
     require()
     text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)

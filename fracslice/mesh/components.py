@@ -50,38 +50,38 @@ class Shells:
         return volumes
 
 
-def shells(mesh: Mesh) -> Shells:
-    """Find the shells of a closed, oriented mesh: triangles that share vertices, O(m log m)."""
-    from fracslice.mesh.topology import connected_components, shell_volumes
+def shells(mesh: Mesh, threads: int = 0) -> Shells:
+    """Find the shells of a closed, oriented mesh: triangles that share vertices, O(m)."""
+    from fracslice.mesh.topology import component_sizes, connected_components
 
-    labels, count = connected_components(mesh.triangles, len(mesh.vertices))
-    volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
+    labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
+    volumes, _ = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)
     hollow = volumes < 0
     parent = np.full(count, -1, dtype=np.int64)
     if hollow.any():
         from fracslice.mesh.nesting import nesting
 
-        parent = nesting(mesh, labels, volumes).parent
+        parent = nesting(mesh, labels, volumes, threads=threads).parent
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
     return Shells(labels, volumes, parent)
 
 
-def in_pieces(mesh: Mesh, voxel: float) -> str:
+def in_pieces(mesh: Mesh, voxel: float, threads: int = 0) -> str:
     """What walls came to that are thinner than the voxel of a mesh, in words; empty where all are thicker.
 
     Between samples such walls are missed: they have holes, or fall to pieces. A body counts if on average it
     is thinner than a voxel; the dust around a fractal is such, too, but less than `PIECES` of the material.
     """
-    from fracslice.mesh.topology import connected_components, shell_volumes
+    from fracslice.mesh.topology import component_sizes, connected_components
 
-    if voxel * mesh.area < 2 * PIECES * mesh.volume:  # such bodies would have more surface
+    area, volume, _ = mesh.measured(threads)
+    if voxel * area < 2 * PIECES * volume:  # such bodies would have more surface
         return ""
-    labels, count = connected_components(mesh.triangles, len(mesh.vertices))
-    volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
-    areas = np.bincount(labels, np.linalg.norm(mesh.normals, axis=1) / 2, minlength=count)
+    labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
+    volumes, areas = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)
     thin, bodies = (volumes > 0) & (2 * volumes < voxel * areas), int((volumes > 0).sum())
-    share = float(volumes[thin].sum() / mesh.volume)
+    share = float(volumes[thin].sum() / volume)
     holes = "have holes" if bodies == 1 else f"fell to pieces: {thin.sum()} of {bodies} bodies"
     return f"walls thinner than a voxel {holes}, {share:.0%} of the material" if share >= PIECES else ""
 

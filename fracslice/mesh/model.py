@@ -67,7 +67,7 @@ class Mesh(Exchange):
             return np.zeros((2, 3))
         from fracslice._native import bounds
 
-        return np.array(bounds(self.vertices))
+        return np.array(bounds(self.vertices, 1))
 
     @property
     def size(self) -> NDArray[np.float64]:
@@ -95,16 +95,20 @@ class Mesh(Exchange):
     @property
     def measures(self) -> tuple[float, float, int]:
         """`area`, `volume`, and how many triangles have no area."""
-        x, y, z = self.bounds.mean(axis=0).tolist()
-        return self.measures_from((x, y, z))
+        return self.measured(1)
 
-    def measures_from(self, point: tuple[float, float, float]) -> tuple[float, float, int]:
+    def measured(self, threads: int) -> tuple[float, float, int]:
+        """`measures`, by several threads."""
+        x, y, z = self.bounds.mean(axis=0).tolist()
+        return self.measures_from((x, y, z), threads)
+
+    def measures_from(self, point: tuple[float, float, float], threads: int = 1) -> tuple[float, float, int]:
         """`measures`, with the signed volume between the triangles and a point: of an open mesh, a part of
         the whole one's.
         """
         from fracslice._native import measures
 
-        return measures(self.vertices, self.triangles, point)
+        return measures(self.vertices, self.triangles, point, threads)
 
     def translated(self, offset: tuple[float, float, float] | NDArray[np.float64]) -> Mesh:
         """A copy moved by `offset`."""
@@ -116,13 +120,14 @@ class Mesh(Exchange):
             raise ValueError(f"scale factor must be positive, not {factor}")
         return Mesh(self.vertices * factor, self.triangles)
 
-    def selected(self, keep: NDArray[np.bool_]) -> Mesh:
-        """A copy with the triangles where `keep` (bool [m]) is true, and only the vertices that those use."""
-        triangles = self.triangles[keep]
-        used = np.zeros(len(self.vertices), dtype=bool)
-        used[triangles] = True
-        renumbered = np.cumsum(used, dtype=np.int32) - np.int32(1)
-        return Mesh(self.vertices[used], renumbered[triangles])
+    def selected(self, keep: NDArray[np.bool_], threads: int = 1) -> Mesh:
+        """The triangles where `keep` (bool [m]) is true, and only the vertices that those use: this mesh if
+        that is all of it.
+        """
+        from fracslice._native import selected
+
+        found = selected(self.vertices, self.triangles, keep, threads)
+        return Mesh(*found) if found else self
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from ..volume.values import values_at
 from ..work import Work
 from .fit import OFF, UPRIGHT, Fit
 from .model import Mesh
-from .quantisation import float32_points
+from .quantisation import quantise
 from .self_intersections import self_intersecting_triangles
 from .topology import corners_by_vertex
 
@@ -61,8 +61,10 @@ class Cap(NamedTuple):
         return np.concatenate([rim, np.broadcast_to(self.tip, (len(rim), 1, 3))], axis=1)
 
 
-def with_tips(root: Field, mesh: Mesh, voxel: float, work: Work | None = None) -> Mesh:
-    """The mesh with the solid's own tips in place of blunt ends.
+def with_tips(
+    root: Field, mesh: Mesh, voxel: float, work: Work | None = None
+) -> tuple[Mesh, NDArray[np.bool_]]:
+    """The mesh with the solid's own tips in place of blunt ends, and which triangles are new, bool [m].
 
     mesh: closed, an oriented 2-manifold, scene units, its vertices on the zero set of root's field, a voxel
     apart. Where the solid goes on above a triangle at a pointed vertex, its farthest point is looked for, and
@@ -71,9 +73,9 @@ def with_tips(root: Field, mesh: Mesh, voxel: float, work: Work | None = None) -
     fractal, stays as it is. Raises `Cancelled`.
     """
     work = work or Work()
-    at = pointed(mesh.vertices, mesh.triangles, POINTED)
+    at = pointed(mesh.vertices, mesh.triangles, POINTED, work.threads)
     if not 0 < len(at) <= MANY:
-        return mesh
+        return mesh, np.zeros(len(mesh.triangles), bool)
     rings, fit = Rings(mesh), Fit(root, STEP * voxel, voxel, work)
     found = [
         _best(rings.caps(end, tip), gain, mesh, fit, voxel)
@@ -83,12 +85,12 @@ def with_tips(root: Field, mesh: Mesh, voxel: float, work: Work | None = None) -
     while caps:
         work.check()
         made, of_cap = _capped(mesh, caps)
-        as_written = Mesh(float32_points(made).astype(np.float64), made.triangles)
+        as_written = Mesh(quantise(made, threads=work.threads)[0], made.triangles)
         wrong = of_cap[self_intersecting_triangles(as_written, threads=work.threads, among=of_cap >= 0)]
         if not (wrong >= 0).any():
-            return made
+            return made, of_cap >= 0
         caps = [cap for number, cap in enumerate(caps) if number not in wrong]
-    return mesh
+    return mesh, np.zeros(len(mesh.triangles), bool)
 
 
 def _found(

@@ -6,15 +6,15 @@ has its surroundings with it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .clean import mended
+from .certificate import Certificate
+from .clean import cleaned
 from .model import Mesh
-from .quantisation import quantised
 
 if TYPE_CHECKING:
     from .check import MeshReport
@@ -38,6 +38,7 @@ class Tally:
     misoriented_edges: int = 0
     nonmanifold_vertices: int = 0
     self_intersections: int = 0
+    searched_triangles: int = 0
     degenerate_triangles: int = 0
     duplicate_triangles: int = 0
     volume: float = 0.0
@@ -49,26 +50,34 @@ class Window:
 
     def __init__(self, voxel: float, threads: int | None = None) -> None:
         self.voxel, self.threads = voxel, threads
-        self.waiting, self.end = NOTHING, -np.inf
+        self.waiting, self.end, self.holds = NOTHING, -np.inf, np.zeros(0, bool)
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.tally = Tally()
 
-    def add(self, piece: Mesh, end: float) -> Mesh:
-        """Takes in the piece that ends at x = `end` (infinity for the last one). Returns what is finished by
-        it, rounded to float32; its edges to what has been returned before and to what comes are open.
+    def add(self, piece: Mesh, end: float, certificate: Certificate | None = None) -> Mesh:
+        """Takes in the piece that ends at x = `end` (infinity for the last one), and what is known of it: all
+        pieces are of one grid. Returns what is finished by it, rounded to float32; its edges to what has been
+        returned before and to what comes are open.
         """
-        before, self.end = self.end, end
+        before, self.end, known = self.end, end, certificate or Certificate.none(len(piece.triangles))
         whole = _joined(self.waiting, piece, before, self.voxel / 2)
-        whole = mended(whole, before - MENDS * self.voxel, end - MENDS * self.voxel)
-        final = quantised(whole)
+        known = replace(known, holds=np.concatenate([self.holds, known.holds]))
+        low, high = before - MENDS * self.voxel, end - MENDS * self.voxel
+        final, proved, whole, known = cleaned(whole, known, low, high, self.threads or 0)
         x = final.vertices[:, 0]
         done = x[final.triangles].max(axis=1, initial=-np.inf) < end - WAITS * self.voxel
         counted = (x >= before - COUNTS * self.voxel) & (x < end - COUNTS * self.voxel)
-        self._count(final, done, counted)
-        self.waiting = whole.selected(~done)
+        self._count(final, proved, done, counted)
+        self.waiting, self.holds = whole.selected(~done), known.holds[~done]
         return final.selected(done)
 
-    def _count(self, mesh: Mesh, done: NDArray[np.bool_], counted: NDArray[np.bool_]) -> None:
+    def _count(
+        self,
+        mesh: Mesh,
+        proved: NDArray[np.bool_],
+        done: NDArray[np.bool_],
+        counted: NDArray[np.bool_],
+    ) -> None:
         from .check import duplicates
         from .self_intersections import self_intersecting_triangles
         from .topology import edge_ends
@@ -76,7 +85,7 @@ class Window:
         a, b, c = mesh.triangles.T
         distinct = (a != b) & (b != c) & (c != a)
         ends = edge_ends(mesh.triangles[distinct], counted)
-        crossing = self_intersecting_triangles(mesh, threads=self.threads) & done
+        crossing = self_intersecting_triangles(mesh, threads=self.threads, among=~proved) & done
         tally, passed = self.tally, mesh.selected(done)
         area, volume, flat = passed.measures_from((0.0, 0.0, 0.0))
         tally.triangles += int(done.sum())
@@ -86,6 +95,7 @@ class Window:
         tally.misoriented_edges += ends.misoriented_edges
         tally.nonmanifold_vertices += ends.non_manifold_vertices
         tally.self_intersections += int(crossing.sum())
+        tally.searched_triangles += int((done & ~proved).sum())
         tally.degenerate_triangles += flat
         tally.duplicate_triangles += duplicates(mesh.triangles[crossing])
         tally.volume += volume
@@ -108,6 +118,7 @@ class Window:
             manifold=manifold,
             oriented=not (tally.misoriented_edges or misplaced),
             self_intersections=tally.self_intersections,
+            searched_triangles=tally.searched_triangles,
             degenerate_triangles=tally.degenerate_triangles,
             duplicate_triangles=tally.duplicate_triangles,
             open_edges=tally.open_edges // 2,

@@ -155,10 +155,10 @@ class _Run:
         return self.known
 
     def seen(self, length: float) -> Samples:
-        """The same, as distances by which walls and gaps are measured."""
-        from .samples import lengths
+        """The same, as a field between the samples."""
+        from .samples import Samples
 
-        return lengths(self.sampled(length), self.thing.bounds, length / self.scale)
+        return Samples(self.sampled(length))
 
     def filled(self) -> Field:
         """The space that nothing reaches becomes solid."""

@@ -17,7 +17,7 @@ from ..errors import RenderError
 from ..scene.view import Film
 from .cpu import ordered
 from .film import develop
-from .waves import CHANNELS
+from .packets import CHANNELS
 
 TRUSTED = 8
 """Samples that a pixel has before its spread is believed."""
@@ -77,7 +77,7 @@ class Accumulator(Protocol):
 
 @dataclass(eq=False)
 class HostAccumulator:
-    """sums: [height * width, 6] of the kernel's float type, see `waves.CHANNELS`."""
+    """sums: [height * width, 6] of the kernel's float type, see `packets.CHANNELS`."""
 
     width: int
     height: int

@@ -12,8 +12,8 @@ from ..kernel.host import lane_count
 from ..kernel.machine import constant
 from ..work import Work
 from .linking import Frame
+from .packets import Lane, loops, workspace
 from .sequence import points
-from .waves import loops, workspace
 
 TILE = 2048
 """Rays that are in the works at once: their rows stay in the cache."""
@@ -29,8 +29,7 @@ class CpuTracer:
         self.dtype, self.width, self.height = dtype, width, height
         bits = dtype.itemsize * 8
         self.lanes = lane_count(bits)
-        linked, entries = loops(frame, BLOCK)
-        functions = load_functions(linked, bits, self.lanes, entries)
+        functions = load_functions(frame.linked, bits, self.lanes, loops(frame))
         self._tile, self._cones = functions["tile"], functions.get("cones")
         self._own = threading.local()
         self._points = np.empty((0, frame.samples), np.int32)
@@ -51,8 +50,8 @@ class CpuTracer:
         ids = np.arange(len(self._starts), dtype=np.int32)
 
         def task(part: np.ndarray) -> None:
-            m, space, who = self._room(part)
-            cones(self._parameters, self._starts, who, space, len(part), m, self.blocks, limit)
+            m, space = self._room(len(part))
+            cones(self._parameters, self._starts, part, *space, len(part), m, self.blocks, limit)
 
         work.map(task, np.array_split(ids, max(1, len(ids) // 512)))
 
@@ -66,20 +65,19 @@ class CpuTracer:
             self._points = points(2 * most + 64, self.frame.samples)
 
         def task(part: np.ndarray) -> None:
-            m, space, who = self._room(part)
-            arrays = self._parameters, self._points, self._starts, space, who, sums
+            m, space = self._room(len(part))
+            arrays = self._parameters, self._points, self._starts, *space, part, sums
             self._tile(*arrays, len(part), m, self.width, limit, self.blocks)
 
         work.map(task, [pixels[i : i + TILE] for i in range(0, len(pixels), TILE)])
 
-    def _room(self, part: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
-        """The row length for so many rays, and the thread's own workspace and list of pixels, filled in."""
-        m = -(-len(part) // self.lanes) * self.lanes
+    def _room(self, rays: int) -> tuple[int, tuple[np.ndarray, ...]]:
+        """The row length for so many rays, and the thread's own W, L and rays (see `packets`)."""
         if not hasattr(self._own, "space"):
-            self._own.space = np.zeros(workspace(self.frame, TILE, self.lanes), self.dtype)
-            self._own.who = np.zeros(self.lanes + TILE, np.int32)
-        self._own.who[self.lanes : self.lanes + len(part)] = part
-        return m, self._own.space, self._own.who
+            sizes = workspace(self.frame, TILE), len(Lane) * self.lanes
+            rows, lanes = (np.zeros(size, self.dtype) for size in sizes)
+            self._own.space = rows, lanes, np.zeros(self.lanes, np.int32)
+        return -(-rays // self.lanes) * self.lanes, self._own.space
 
 
 @lru_cache(maxsize=4)

@@ -22,7 +22,7 @@ class CudaTracer:
         self._cuda = require()
         self.dtype, self.width, self.height = dtype, width, height
         self._precision: Precision = "float32" if dtype == np.float32 else "float64"
-        self._loops = load_loops(frame.linked, self._precision, loops(frame, BLOCK))
+        self._loops = load_loops(frame.linked, self._precision, loops(frame))
         self._points = np.empty((0, frame.samples), np.int32)
         self.aim(frame)
 

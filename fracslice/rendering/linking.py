@@ -8,20 +8,22 @@ The text that is written here is straight-line code; every calculation is in a u
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..formulas.registry import Fixed, Node
+from ..kernel import language
 from ..kernel.linker import Linked, Linker
 from ..scene.view import Camera, Light, View
 from .colours import Look, linear
+from .optics import Optics
 from .units import camera as cameras
 from .units import lights, march, shade
-from .units.intrinsics import GIVEN
+from .units.intrinsics import GIVEN, background, surface
 from .units.normal import normal
-from .units.random import centred, sample
 
 RELAX = 1.4
 """Measured on the Mandelbulb: 8.1 M evaluations a frame at 1.0, 6.0 at 1.4, 8.4 at 1.7."""
@@ -32,42 +34,26 @@ class Frame:
     """A kernel for one scene, camera and depth. Two frames of one scene differ in their parameters only.
 
     linked: the source and P. camera_samples, bounce_samples: how many random numbers a ray takes at the
-    start, and at each bounce. bounces: how often a ray goes on. inside: whether rays go through the solid.
-    far: an expression for how far there is anything. sharp: rays of a pixel start at the eye, so that empty
-    space before a block of pixels can be remembered.
+    start, and at each bounce. bounces: how often a ray goes on. sharp: rays of a pixel start at the eye, so
+    that empty space before a block of pixels can be remembered. far: where in P stands how far there is
+    anything. block: pixels along the side of a block, a power of two.
     """
 
     linked: Linked
     camera_samples: int
     bounce_samples: int
     bounces: int
-    inside: bool
     sharp: bool
-    far: str
+    far: int
+    block: int
 
     @property
     def samples(self) -> int:
         return self.camera_samples + (self.bounces + 1) * self.bounce_samples
 
-
-@dataclass(frozen=True)
-class Optics:
-    """What the kernel has to know of lengths: the film's size in pixels, a pixel's half width at distance 1,
-    the smallest distance that counts, how far there is anything."""
-
-    size: tuple[int, int]
-    cone: float
-    least: float
-    far: float
-
-
-def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> Optics:
-    """The optics of a picture of this many pixels."""
-    box = root.bounds.box
-    corners = [c for c in box.corners if all(map(math.isfinite, c))]
-    far = max([math.dist(camera.eye, c) for c in corners] + [4 * math.dist(camera.eye, camera.target)])
-    far = far if box.finite else 25 * far
-    return Optics(size, math.tan(math.radians(camera.fov) / 2) / size[1], least, far)
+    @property
+    def shift(self) -> int:
+        return self.block.bit_length() - 1
 
 
 def link_frame(root: Node, view: View, camera: Camera, seen: Optics, block: int) -> Frame:
@@ -92,16 +78,13 @@ class _Frame:
         self.marching()
         camera_samples = self.cameras()
         look = Look(linker, self.root)
-        far = linker.argument(self.seen.far)
+        far = len(linker.parameters)
+        linker.argument(self.seen.far)
         self.bounces = self.view.shading.bounces if look.bounces and self.view.shading.mode == "light" else 0
-        surface = self.surface(look)
-        linker.functions |= {"surface": surface, "background": self.background()}
-        for function in (sample, centred):
-            linker.share(function)
+        linker.functions |= {"surface": self.surface(look), "background": self.background()}
         linked = Linked(linker.text(), np.array(linker.parameters, np.float64))
-        return Frame(
-            linked, camera_samples, self.dimensions, self.bounces, self.inside, self.camera.aperture == 0, far
-        )
+        samples, sharp = (camera_samples, self.dimensions), self.camera.aperture == 0
+        return Frame(linked, *samples, self.bounces, sharp, far, self.block)
 
     def marching(self) -> None:
         seen, steepness = self.seen, 1 / self.root.bounds.lipschitz
@@ -110,14 +93,11 @@ class _Frame:
         hi = tuple(min(a, e + seen.far) for a, e in zip(box.hi, self.camera.eye, strict=True))
         self.linker.bind("span_box", march.span, {"lo": lo, "hi": hi})
         widest = 1.4143 * self.block * seen.cone * 1.02
-        side: dict[str, Any] = {} if self.inside else {"side": Fixed(1.0)}
-        common = {"steepness": steepness}
-        stepping = {"relax": RELAX, "cone": seen.cone, "least": seen.least, "glass": Fixed(self.inside)}
-        self.linker.bind("step_ray", march.advance, side | common | stepping)
-        self.linker.bind(
-            "step_cone", march.widen, {"side": Fixed(1.0), "path": Fixed(0.0)} | common | {"spread": widest}
-        )
-        self.linker.bind("width_at", _width, {"cone": seen.cone, "least": seen.least})
+        width = {"cone": seen.cone, "least": seen.least}
+        stepping = {"steepness": steepness, "relax": RELAX, **width, "glass": Fixed(self.inside)}
+        self.linker.bind("step_ray", march.advance, stepping)
+        self.linker.bind("step_cone", march.widen, {"steepness": steepness, "spread": widest})
+        self.linker.bind("width_at", _width, width)
 
     @property
     def inside(self) -> bool:
@@ -146,13 +126,12 @@ class _Frame:
 
     def draw(self, count: int) -> list[str]:
         """Names of the next random numbers."""
-        names = [f"u{self.dimensions + k}" for k in range(count)]
+        names = [f"u[{self.dimensions + k}]" for k in range(count)]
         self.dimensions += count
         return names
 
     def surface(self, look: Look) -> str:
-        """``surface(x, y, z, dx, dy, dz, t, path, steps, side, u..., P)``: colour, then the ray that goes
-        on."""
+        """The text of `units.intrinsics.surface`."""
         mode = self.view.shading.mode
         lines = ["h = width_at(path + t, P)"]
         if mode in ("light", "normal"):
@@ -163,10 +142,8 @@ class _Frame:
         else:
             lines += self.shown(mode)
         lines += self.fogged()
-        numbers = "".join(f"u{k}, " for k in range(self.dimensions))
-        outs = "r, g, b" + (", tr, tg, tb, ox, oy, oz, ex, ey, ez, es" if self.bounces else "")
-        body = "\n    ".join([*lines, f"return {outs}"])
-        return f"def surface(x, y, z, dx, dy, dz, t, path, steps, side, {numbers}P):\n    {body}"
+        onward = "tr, tg, tb, ox, oy, oz, ex, ey, ez, es" if self.bounces else ""
+        return text_of(surface, [*lines, f"return (r, g, b), ({onward})"])
 
     def lit(self, look: Look) -> list[str]:
         """Ambient light, then every light in turn."""
@@ -290,14 +267,20 @@ class _Frame:
         return ["air = clearness(t, P)", *lines, *(f"t{c} = air * t{c}" for c in "rgb" if self.bounces)]
 
     def background(self) -> str:
-        """``background(dx, dy, dz, P)``: the colour where nothing is."""
+        """The text of `units.intrinsics.background`."""
         view = self.view
         skies = [light for light in view.lights if light.kind == "sky"]
         if view.fog is None and skies and view.shading.mode == "light":
-            return "def background(dx, dy, dz, P):\n    return sky_(dx, dy, dz, P)"
+            return text_of(background, ["return sky_(dx, dy, dz, P)"])
         colour = linear(view.fog.colour if view.fog else view.film.background)
         values = ", ".join(f"{self.linker.argument(c)} + 0.0 * dx" for c in colour)
-        return f"def background(dx, dy, dz, P):\n    return {values}"
+        return text_of(background, [f"return {values}"])
+
+
+def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:
+    """The text of a function with these lines."""
+    names = ", ".join(language.parameters(function))
+    return "\n    ".join([f"def {function.__name__}({names}):", *lines])
 
 
 def _width(t, cone, least):  # type: ignore[no-untyped-def]

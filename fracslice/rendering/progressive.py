@@ -21,7 +21,8 @@ from ..scene.view import Camera, Film, View
 from ..work import Work
 from .accumulator import COARSE, Accumulator, HostAccumulator
 from .cpu import BLOCK, CpuTracer
-from .linking import Frame, link_frame, optics
+from .linking import Frame, link_frame
+from .optics import optics
 from .setup import RenderSetup, prepare
 
 STEPS, GROWTH, GROWN = 160, 10, 16

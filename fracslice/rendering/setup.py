@@ -12,7 +12,7 @@ from ..formulas.registry import Node
 from ..kernel.cells import possible_cells
 from ..kernel.depth import resolve_depths
 from ..scene.view import Camera, Light, View
-from .linking import Optics, optics
+from .optics import Optics, optics
 
 SUN = Light(kind="sun", position=(-0.6, -1.0, 1.4), colour=(1.0, 0.95, 0.86), strength=1.6, size=2.0)
 SKY = Light(

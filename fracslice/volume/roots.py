@@ -13,7 +13,7 @@ import numpy as np
 
 from ..formulas.field import Field, Precision
 from ..kernel.machine import constant
-from .root_loops import AIM, FIND, LEAD, POLISH
+from .root_loops import aim, find, lead, polish
 
 FRAMES = {"float32": (1e-6, 1e-5, 5e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-5, 1e-6, 1e-7)}
 """FRAME but for its first number, the lengths in voxels."""
@@ -21,7 +21,7 @@ FRAMES = {"float32": (1e-6, 1e-5, 5e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-
 QUICK, MOST = 8, 48
 """Steps towards a root that all segments are given, and those that then are left."""
 
-LOOPS = {"float32": (FIND, LEAD), "float64": (FIND, POLISH, AIM)}
+LOOPS = {"float32": (find, lead), "float64": (find, polish, aim)}
 
 
 class Roots:

@@ -7,6 +7,7 @@ import pytest
 
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
+from fracslice.mesh.certificate import Certificate
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.clean import clean
 from fracslice.mesh.quantisation import quantised
@@ -29,14 +30,18 @@ def test_manifold3d_refuses_in_plain_words(spoil) -> None:  # type: ignore[no-un
 
 
 def test_a_mesh_is_put_on_the_bed() -> None:
-    placed = place_on_bed(sphere(10, at=(5, 6, 7)), (5, 6))
+    ball = sphere(10, at=(5, 6, 7))
+    placed, _ = place_on_bed(ball, (5, 6), Certificate.none(len(ball.triangles)))
     low, high = placed.bounds
     assert low[2] == 0
     assert low[:2] + high[:2] == pytest.approx((0, 0), abs=1e-6)
     lifted = placed.vertices + [0, 0, 1e-6] * (np.arange(len(placed.vertices))[:, None] % 2)
-    assert np.array_equal(
-        place_on_bed(Mesh(lifted, placed.triangles), (0, 0)).vertices[:, 2] == 0, lifted[:, 2] < 1e-5
-    )
+    planes = np.tile(np.array([[-5.0], [5e-6], [15.0]]), 3)
+    known = Certificate(planes, np.ones(len(placed.triangles), bool))
+    again, known = place_on_bed(Mesh(lifted, placed.triangles), (0, 0), known)
+    flat = lifted[:, 2] < 1e-5
+    assert np.array_equal(again.vertices[:, 2] == 0, flat)
+    assert np.array_equal(known.holds, ~flat[placed.triangles].any(axis=1))
 
 
 def test_rounding_is_done_once() -> None:

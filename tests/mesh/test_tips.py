@@ -22,7 +22,7 @@ def made(root: Node, resolution: float, threads: int = 2) -> tuple[Mesh, Mesh, f
     """Without and with tips; the voxel."""
     planned, work = plan(root, resolution), Work(threads=threads)
     mesh = contour(planned.root, sample_scene(planned, work), work)
-    return mesh, with_tips(planned.root, mesh, planned.voxel, work), planned.voxel
+    return mesh, with_tips(planned.root, mesh, planned.voxel, work)[0], planned.voxel
 
 
 def nearest(mesh: Mesh, points: np.ndarray) -> np.ndarray:

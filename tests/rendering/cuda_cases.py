@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from fracslice.formulas import Node, box, get, mandelbulb, menger, plane, sphere, torus, transform, union
 from fracslice.rendering.cpu import BLOCK
-from fracslice.rendering.linking import Frame, link_frame, optics
+from fracslice.rendering.linking import Frame, link_frame
+from fracslice.rendering.optics import optics
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
 
 WIDTH, HEIGHT = 17, 12

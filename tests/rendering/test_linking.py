@@ -7,7 +7,8 @@ import pytest
 from fracslice.formulas import mandelbulb, material, sphere, union
 from fracslice.formulas.registry import Node
 from fracslice.kernel.linker import link
-from fracslice.rendering.linking import Frame, link_frame, optics
+from fracslice.rendering.linking import Frame, link_frame
+from fracslice.rendering.optics import optics
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
 
 CAMERA = Camera(eye=(2, -2, 1))

@@ -9,9 +9,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <deque>
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 namespace tbb::plain {
@@ -46,19 +48,20 @@ void run(size_t n, const Task& task) {
     if (failure) std::rethrow_exception(failure);
 }
 
-// At most 64 pieces of a range.
+// A range in 2^halvings pieces, or fewer where it cannot be cut.
 template <class Range>
-std::vector<Range> pieces(const Range& range) {
-    std::vector<Range> all{range};
-    for (size_t i = 0; i < all.size() && all.size() < 64;) {
-        if (!all[i].is_divisible()) {
-            ++i;
-            continue;
-        }
-        Range upper(all[i], tbb::split());
-        all.insert(all.begin() + std::ptrdiff_t(i) + 1, upper);
-        i = (i + 2) % all.size();
+void cut(const Range& range, int halvings, std::deque<Range>& pieces) {
+    if (!halvings || !range.is_divisible()) {
+        pieces.push_back(range);
+        return;
     }
+    Range first = range, second(first, tbb::split());
+    cut(first, halvings - 1, pieces), cut(second, halvings - 1, pieces);
+}
+template <class Range>
+std::deque<Range> pieces(const Range& range) {
+    std::deque<Range> all;
+    cut(range, 6, all);
     return all;
 }
 
@@ -71,13 +74,13 @@ void parallel_for(Index first, Index last, const Body& body) {
 template <class Range, class Body, class... Partitioner>
     requires(!std::is_integral_v<Range>)
 void parallel_for(const Range& range, const Body& body, Partitioner&&...) {
-    std::vector<Range> all = pieces(range);
+    std::deque<Range> all = pieces(range);
     run(all.size(), [&](size_t k) { body(all[k]); });
 }
 
 template <class Range, class Value, class Body, class Join>
 Value parallel_reduce(const Range& range, const Value& identity, const Body& body, const Join& join) {
-    std::vector<Range> all = pieces(range);
+    std::deque<Range> all = pieces(range);
     std::vector<Value> values(all.size(), identity);
     run(all.size(), [&](size_t k) { values[k] = body(all[k], identity); });
     Value total = identity;

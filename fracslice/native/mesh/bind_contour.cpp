@@ -16,9 +16,9 @@ using RootsOut = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>
 using NormalsOut = nb::ndarray<float, nb::shape<3, -1>, nb::device::cpu>;
 
 nb::tuple bind_marching_cubes(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index,
-                              const std::array<double, 3>& origin, double voxel, double clamp, int threads) {
+                              const std::array<double, 3>& origin, double voxel, double margin, int threads) {
     Bricks bricks = volume::view(ijk, values, index);
-    Surface surface = unlocked(threads, [&] { return marching_cubes(bricks, {origin, voxel, clamp}); });
+    Surface surface = unlocked(threads, [&] { return marching_cubes(bricks, {origin, voxel, margin}); });
     size_t n = surface.vertices.rows, m = surface.triangles.rows;
     return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}));
 }
@@ -79,13 +79,13 @@ class Cells {
 // The surface in some layers of cells, while it is made.
 class Surfacing {
   public:
-    Surfacing(const Cells& cells, int first, int last, const std::array<double, 3>& origin, double voxel, double clamp)
-        : threads_(cells.threads()), clamp_(clamp), made_(cells.grid(), {first, last}, {origin, voxel, clamp}) {}
+    Surfacing(const Cells& cells, int first, int last, const std::array<double, 3>& origin, double voxel, double margin)
+        : threads_(cells.threads()), margin_(margin), made_(cells.grid(), {first, last}, {origin, voxel, margin}) {}
 
     void advance(int end, size_t first, const RootsArray& t, const NormalsArray& normals) {
         if (t.shape(0) != normals.shape(1)) throw nb::value_error("t and normals differ in length");
         if (normals.stride(1) != 1) throw nb::value_error("each row of normals contiguous");
-        Hermite data{first, t.shape(0), size_t(normals.stride(0)), t.data(), normals.data(), clamp_};
+        Hermite data{first, t.shape(0), size_t(normals.stride(0)), t.data(), normals.data(), margin_};
         unlocked(threads_, [&] { return made_.advance(end, data), 0; });
     }
 
@@ -99,7 +99,7 @@ class Surfacing {
 
   private:
     int threads_;
-    double clamp_;
+    double margin_;
     Contouring made_;
 };
 
@@ -108,7 +108,7 @@ class Surfacing {
 void bind_contour(nb::module_& module) {
     using namespace nanobind::literals;
     module.def("marching_cubes", &bind_marching_cubes, "ijk"_a, "values"_a, "index"_a, "origin"_a, "voxel"_a,
-               "clamp"_a, "threads"_a = 0);
+               "minimum_edge_parameter"_a, "threads"_a = 0);
     nb::class_<RootLoops>(module, "RootLoops")
         .def(nb::new_(&root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "field"_a,
              "steps"_a, "sure"_a);
@@ -120,7 +120,7 @@ void bind_contour(nb::module_& module) {
         .def("crossings_before", &Cells::crossings_before, "layer"_a);
     nb::class_<Surfacing>(module, "Contouring")
         .def(nb::init<const Cells&, int, int, const std::array<double, 3>&, double, double>(),
-             nb::keep_alive<1, 2>(), "cells"_a, "first"_a, "last"_a, "origin"_a, "voxel"_a, "clamp"_a)
+             nb::keep_alive<1, 2>(), "cells"_a, "first"_a, "last"_a, "origin"_a, "voxel"_a, "minimum_edge_parameter"_a)
         .def("advance", &Surfacing::advance, "end"_a, "first"_a, "t"_a, "normals"_a)
         .def("finish", &Surfacing::finish);
 }

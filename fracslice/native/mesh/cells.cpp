@@ -11,7 +11,7 @@ namespace {
 constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
 
 // Finds a brick's crossings and returns their number.
-size_t find_crossings(const std::array<Corners, kSide + 1>& corners, Crossings& found) {
+size_t find_crossings(const std::array<Corners, kSide + 1>& corners, BrickCrossings& found) {
     for (int x = 0; x < kSide; ++x) {
         const Corners& own = corners[x];
         found.bits[0][x] = own[0] ^ corners[x + 1][0];
@@ -63,12 +63,12 @@ CellGrid::CellGrid(const Layout& layout, std::vector<Signs> signs)
     tbb::parallel_for(size_t(0), layout.count, [&](size_t i) {
         crossings_[i].base = find_crossings(corners_of(octant(i), signs_), crossings_[i]);
     });
-    vertices_ = running_sum(crossings_, &Crossings::base, "vertices");
+    vertices_ = running_sum(crossings_, &BrickCrossings::base, "vertices");
     for (const Place& place : ghosts(layout, signs_)) places_.push_back(place);
 }
 
 size_t CellGrid::brick_of(size_t crossing) const {
-    auto after = [](size_t number, const Crossings& brick) { return number < brick.base; };
+    auto after = [](size_t number, const BrickCrossings& brick) { return number < brick.base; };
     size_t row = size_t(std::upper_bound(crossings_.begin(), crossings_.end(), crossing, after) - crossings_.begin());
     return row ? row - 1 : 0;
 }
@@ -119,7 +119,7 @@ size_t CellGrid::lower_bound(size_t begin, size_t end, int layer) const {
                   places_.begin());
 }
 
-Span CellGrid::span(Layers layers) const {
+LayerBricks CellGrid::bricks_of(Layers layers) const {
     size_t row = lower_bound(0, sampled(), layers.first), end = lower_bound(0, sampled(), layers.last);
     size_t ghost = lower_bound(sampled(), size(), layers.first), ghost_end = lower_bound(sampled(), size(), layers.last);
     return {row, end - row, ghost, ghost_end - ghost};

@@ -40,9 +40,9 @@ constexpr size_t number_at(int axis, int x, int y, int z) {
 }
 
 // Where a brick's crossings are numbered: by axis, then by x, then by bit.
-struct Crossings {
+struct BrickCrossings {
     std::array<Signs, 3> bits;
-    std::array<std::array<uint16_t, kSide>, 3> rank;  // crossings of this brick before that slab
+    std::array<std::array<uint16_t, kSide>, 3> rank;  // crossings of this brick before that plane
     size_t base;                                      // vertices before this brick
 };
 
@@ -70,7 +70,7 @@ struct GridEdges {
     size_t axis(size_t edge) const { return leaders[led[edge]].axis; }
 };
 
-// A bit for each cell between two slabs of corners whose corners are not all alike.
+// A bit for each cell between two planes of corners whose corners are not all alike.
 inline BitPlane mixed(const Corners& a, const Corners& b) {
     BitPlane any = a[0] | a[1] | a[2] | a[3] | b[0] | b[1] | b[2] | b[3];
     BitPlane all = a[0] & a[1] & a[2] & a[3] & b[0] & b[1] & b[2] & b[3];
@@ -91,7 +91,7 @@ inline BitPlane cases_of_row(const Corners& a, const Corners& b, int y) {
     return m ^ t ^ t << 28;
 }
 
-// Cells that the surface passes, between two slabs of corners: by the one axis along which it crosses edges of theirs, all four
+// Cells that the surface passes, between two planes of corners: by the one axis along which it crosses edges of theirs, all four
 // in one direction, up where the lower end is outside; and the rest.
 struct Passed {
     std::array<std::array<BitPlane, 2>, 3> flat;  // by axis and whether up
@@ -118,7 +118,7 @@ struct Passed {
 // The cases of flat cells.
 constexpr uint8_t kFlat[3][2] = {{0x55, 0xaa}, {0x33, 0xcc}, {0x0f, 0xf0}};
 
-// Calls visit(x, y, z, case) for some cells between two slabs of corners, in order.
+// Calls visit(x, y, z, case) for some cells between two planes of corners, in order.
 template <class Visit>
 inline void for_each_cell(const Corners& a, const Corners& b, int x, BitPlane cells, const Visit& visit) {
     while (cells) {
@@ -159,7 +159,7 @@ struct Layers {
 };
 
 // The bricks of some layers: those with samples, then the ghosts.
-struct Span {
+struct LayerBricks {
     size_t row, rows, ghost, ghosts;
 
     size_t size() const { return rows + ghosts; }
@@ -191,7 +191,7 @@ class CellGrid {
     void for_each_near(const Octant& near, const Visit& visit) const {
         for (int k = 0; k < 8; ++k) {
             if (near.rows[k] < 0) continue;
-            const Crossings& owner = crossings_[size_t(near.rows[k])];
+            const BrickCrossings& owner = crossings_[size_t(near.rows[k])];
             BitPlane seen = (k & 2 ? kFirstY : ~BitPlane(0)) & (k & 4 ? kFirstZ : ~BitPlane(0));
             for (int axis = 0; axis < 3; ++axis) {
                 if (k >> axis & 1) continue;
@@ -219,11 +219,11 @@ class CellGrid {
     // The numbers of these crossings; the rest is not written.
     void collect(const Octant& near, Numbers& numbers) const;
 
-    Span span(Layers layers) const;
+    LayerBricks bricks_of(Layers layers) const;
 
     // The numbers of a brick's own crossings along each axis: those of axis k are [k] to [k + 1] - 1.
     std::array<size_t, 4> ranges(size_t brick) const {
-        const Crossings& own = crossings_[brick];
+        const BrickCrossings& own = crossings_[brick];
         size_t end = brick + 1 < sampled() ? crossings_[brick + 1].base : vertices_;
         return {own.base, own.base + own.rank[1][0], own.base + own.rank[2][0], end};
     }
@@ -235,7 +235,7 @@ class CellGrid {
     template <class Visit>
     void for_each_own_edge(size_t i, const Visit& visit) const {
         if (i >= sampled()) return;
-        const Crossings& own = crossings_[i];
+        const BrickCrossings& own = crossings_[i];
         uint32_t vertex = uint32_t(own.base);
         for (uint8_t axis = 0; axis < 3; ++axis) {
             for (int x = 0; x < kSide; ++x) {
@@ -254,7 +254,7 @@ class CellGrid {
 
     Layout layout_;
     std::vector<Signs> signs_;
-    std::vector<Crossings> crossings_;
+    std::vector<BrickCrossings> crossings_;
     std::vector<Place> places_;
     size_t vertices_;
 };

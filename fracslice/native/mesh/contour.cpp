@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <string>
 #include <utility>
 
@@ -36,8 +37,8 @@ int32_t* write_fan(const Around& around, const Cell& cell, int64_t tip, int32_t*
     return out;
 }
 
-// The two triangles of each of some flat cells of slab x.
-int32_t* write_flat(const Near& near, int x, BitPlane cells, uint8_t number, int32_t* out) {
+// The two triangles of each of some flat cells of plane x.
+int32_t* write_flat(const BrickCells& near, int x, BitPlane cells, uint8_t number, int32_t* out) {
     std::array<uint16_t, 6> places;
     for (int k = 0; k < 6; ++k) places[k] = kPlaces[kCases[number].corners[k]];
     for (; cells; cells &= cells - 1) {
@@ -65,9 +66,8 @@ Contour room(size_t crossings, size_t known) {
 
 Contouring::Contouring(const CellGrid& cells, Layers layers, const Placement& placement)
     : cells_(cells), layers_(layers), placement_(placement), features_(cells, layers), next_(layers.first - 1),
-      first_vertex_(cells.crossings_before(layers.first)),
-      result_(room(crossings_of(cells, {layers.first, layers.last + 1}),
-                   crossings_of(cells, {layers.first - 1, layers.last + 2}))) {}
+      first_vertex_(cells.crossings_before(layers.first)), known_(crossings_of(cells, {layers.first - 1, layers.last + 2})),
+      result_(room(crossings_of(cells, {layers.first, layers.last + 1}), known_)) {}
 
 void Contouring::advance(int end, const Hermite& data) {
     size_t first = cells_.crossings_before(next_), last = cells_.crossings_before(end + 1);
@@ -79,7 +79,7 @@ void Contouring::advance(int end, const Hermite& data) {
         if (next_ < layers_.first) continue;
         features_.choose(next_);
         number_corners(next_);
-        for_each_brick(cells_.span({next_, next_ + 1}), [&](size_t i) { write_vertices(i, data); });
+        for_each_brick(cells_.bricks_of({next_, next_ + 1}), [&](size_t i) { write_vertices(i, data); });
         if (next_ > layers_.first) write_layer(next_ - 1);
     }
 }
@@ -92,38 +92,40 @@ Contour Contouring::finish() {
 
 // Gives features their places, brick by brick.
 void Contouring::number_corners(int layer) {
-    Span span = cells_.span({layer, layer + 1});
-    for (size_t k = 0; k < span.size(); ++k) {
-        Features& own = features_.of(span.brick(k));
+    LayerBricks bricks = cells_.bricks_of({layer, layer + 1});
+    for (size_t k = 0; k < bricks.size(); ++k) {
+        Features& own = features_.of(bricks.brick(k));
         for (size_t axis = 0; axis < 3; ++axis) own.corner_base[axis] = numbered(own.counts[axis]);
     }
 }
 
 void Contouring::number_tips(int layer) {
-    Span span = cells_.span({layer, layer + 1});
-    for (size_t k = 0; k < span.size(); ++k) {
-        Features& own = features_.of(span.brick(k));
+    LayerBricks bricks = cells_.bricks_of({layer, layer + 1});
+    for (size_t k = 0; k < bricks.size(); ++k) {
+        Features& own = features_.of(bricks.brick(k));
         own.tip_base = numbered(own.tip_count);
     }
 }
 
 size_t Contouring::numbered(size_t count) {
     size_t first = result_.crossings + result_.cases.rows;
+    assert(result_.cases.rows + count <= known_ * 10 / 3);
     if (first + count > kMostElements) throw std::length_error("the surface has more than 2^31 vertices");
     result_.cases.rows += count;
     return first;
 }
 
 void Contouring::write_layer(int layer) {
-    Span span = cells_.span({layer, layer + 1});
+    LayerBricks bricks = cells_.bricks_of({layer, layer + 1});
     features_.straighten(layer);
     number_tips(layer);
-    for (size_t k = 0; k < span.size(); ++k) {
-        size_t& count = features_.of(span.brick(k)).triangles;
+    for (size_t k = 0; k < bricks.size(); ++k) {
+        size_t& count = features_.of(bricks.brick(k)).triangles;
         count = std::exchange(result_.triangles.rows, result_.triangles.rows + count);
     }
+    assert(result_.triangles.rows <= 8 * known_);
     if (result_.triangles.rows > kMostElements) throw std::length_error("the surface has more than 2^31 triangles");
-    for_each_brick(span, [&](size_t i) { write_triangles(i); });
+    for_each_brick(bricks, [&](size_t i) { write_triangles(i); });
 }
 
 void Contouring::put(size_t vertex, const Vec3& point) {
@@ -134,6 +136,7 @@ void Contouring::put(size_t vertex, const Vec3& point) {
 
 void Contouring::put(size_t vertex, const Feature& feature) {
     size_t row = vertex - result_.crossings;
+    assert(row < result_.cases.rows);
     put(vertex, feature.point);
     std::copy(feature.to_mean.begin(), feature.to_mean.end(), &result_.to_means.data[3 * row]);
     result_.cases.data[row] = feature.number;
@@ -154,7 +157,7 @@ void Contouring::write_vertices(size_t i, const Hermite& data) {
 void Contouring::write_triangles(size_t i) {
     const Features& own = features_.of(i);
     int32_t* out = result_.triangles.data.get() + 3 * own.triangles;
-    Near near(cells_, i);
+    BrickCells near(cells_, i);
     cells_.for_each_near(near.octant,
                          [&](size_t at, uint32_t vertex) { near.numbers[at] = uint32_t(vertex - first_vertex_); });
     Around around(features_, i);
@@ -182,6 +185,7 @@ void Contouring::write_triangles(size_t i) {
         }
         near.for_each(x, left, write);
     }
+    assert(tip == own.tip_base + own.tip_count);  // as many as were counted, so that no brick writes into another's places
 }
 
 }  // namespace fracslice::mesh

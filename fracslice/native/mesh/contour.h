@@ -59,7 +59,7 @@ class Contouring {
     Placement placement_;
     FeatureGrid features_;
     int next_;
-    size_t first_vertex_;
+    size_t first_vertex_, known_;  // crossings of these layers and of the ones beside them
     Contour result_;
 };
 

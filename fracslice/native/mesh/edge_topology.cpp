@@ -5,8 +5,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
-#include <numeric>
-#include <vector>
+#include "stars.h"
 
 namespace fracslice::mesh {
 namespace {
@@ -102,67 +101,35 @@ Links operator+(const Links& a, const Links& b) {
 }  // namespace
 
 CornersByVertex corners_by_vertex(const Triangles& triangles) {
-    size_t corners = 3 * triangles.count;
-    CornersByVertex found{{triangles.vertices + 1, 1}, {corners, 1}};
-    int64_t* start = found.start.data.get();
-    std::fill(start, start + triangles.vertices + 1, 0);
-    // Where each vertex ends, then filled backwards to where it starts.
-    for (size_t c = 0; c < corners; ++c) ++start[triangles.corners[c]];
-    std::partial_sum(start, start + triangles.vertices + 1, start);
-    for (size_t c = corners; c-- > 0;) found.corner.data[--start[triangles.corners[c]]] = int64_t(c);
+    CornersByVertex found{{triangles.vertices + 1, 1}, {3 * triangles.count, 1}};
+    int64_t *start = found.start.data.get(), *corner = found.corner.data.get();
+    Stars stars(triangles);
+    tbb::parallel_for(size_t(0), stars.blocks(), [&](size_t block) {
+        size_t next = stars.corners_before(block);
+        stars.for_each(block, [&](size_t v, std::span<const int64_t> corners) {
+            start[v] = int64_t(next);
+            std::copy(corners.begin(), corners.end(), corner + next);
+            next += corners.size();
+        });
+    });
+    start[triangles.vertices] = int64_t(3 * triangles.count);
     return found;
 }
 
 Links links(const Triangles& triangles, const bool* counted) {
-    CornersByVertex corners = corners_by_vertex(triangles);
-    const int64_t* start = corners.start.data.get();
+    Stars stars(triangles);
     return tbb::parallel_reduce(
-        tbb::blocked_range<size_t>(0, triangles.vertices, 4096), Links(),
+        tbb::blocked_range<size_t>(0, stars.blocks(), 1), Links(),
         [&](const tbb::blocked_range<size_t>& range, const Links& before) {
             Fans fans(triangles);
-            for (size_t v = range.begin(); v < range.end(); ++v) {
-                size_t degree = size_t(start[v + 1] - start[v]);
-                if (degree && counted[v]) fans.add(corners.corner.data.get() + start[v], degree);
+            for (size_t block = range.begin(); block < range.end(); ++block) {
+                stars.for_each(block, [&](size_t v, std::span<const int64_t> corners) {
+                    if (!corners.empty() && counted[v]) fans.add(corners.data(), corners.size());
+                });
             }
             return before + fans.counts;
         },
         [](const Links& a, const Links& b) { return a + b; });
-}
-
-Parts parts(const Triangles& triangles) {
-    std::vector<int32_t> parent(triangles.vertices);
-    std::iota(parent.begin(), parent.end(), 0);
-    for (size_t t = 0; t < triangles.count; ++t) {
-        unite(parent, triangles[t][0], triangles[t][1]);
-        unite(parent, triangles[t][0], triangles[t][2]);
-    }
-    // Parents are lower than their children, so that one pass leaves roots alone.
-    for (int32_t& p : parent) p = parent[p];
-    Parts found{{triangles.count, 1}};
-    std::vector<int32_t> number(triangles.vertices, -1);
-    for (size_t t = 0; t < triangles.count; ++t) {
-        int32_t& part = number[parent[triangles[t][0]]];
-        if (part < 0) part = found.count++;
-        found.labels.data[t] = part;
-    }
-    return found;
-}
-
-Array<double> shell_volumes(const MeshView& mesh, const int32_t* labels, size_t parts) {
-    Array<double> volumes(parts, 1);
-    std::fill_n(volumes.data.get(), parts, 0.0);
-    std::vector<const double*> origin(parts, nullptr);
-    for (size_t t = 0; t < mesh.count; ++t) {
-        const double*& o = origin[labels[t]];
-        if (!o) o = mesh.corner(t, 0);
-        const double *a = mesh.corner(t, 0), *b = mesh.corner(t, 1), *c = mesh.corner(t, 2);
-        double ax = a[0] - o[0], ay = a[1] - o[1], az = a[2] - o[2];
-        double bx = b[0] - o[0], by = b[1] - o[1], bz = b[2] - o[2];
-        double cx = c[0] - o[0], cy = c[1] - o[1], cz = c[2] - o[2];
-        volumes.data[labels[t]] += (ay * bz - az * by) * cx + (az * bx - ax * bz) * cy + (ax * by - ay * bx) * cz;
-    }
-    for (size_t part = 0; part < parts; ++part) volumes.data[part] /= 6;
-    return volumes;
 }
 
 }  // namespace fracslice::mesh

@@ -1,4 +1,4 @@
-// How triangles hang together: the edges and fans around every vertex, and the parts they form.
+// How triangles hang together: the edges and fans around every vertex.
 #pragma once
 #include "../array.h"
 #include "triangles.h"
@@ -21,17 +21,5 @@ struct Links {
 
 // At the vertices where counted is true: [vertices]. Triangles have three different corners.
 Links links(const Triangles& triangles, const bool* counted);
-
-struct Parts {
-    Array<int32_t> labels;  // of triangles, numbered by first appearance
-    int32_t count = 0;
-};
-
-// Triangles with a common vertex are of one part.
-Parts parts(const Triangles& triangles);
-
-// The signed volume of each part, measured from a vertex of its own: dust keeps its digits. labels: of the triangles, each below
-// parts.
-Array<double> shell_volumes(const MeshView& mesh, const int32_t* labels, size_t parts);
 
 }  // namespace fracslice::mesh

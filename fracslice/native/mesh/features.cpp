@@ -10,9 +10,9 @@
 namespace fracslice::mesh {
 namespace {
 
-// The slab read one step against y or z; `before` is the slab of the neighbour on that side.
-BitPlane from_y(BitPlane slab, BitPlane before) { return slab << 8 | before >> 56; }
-BitPlane from_z(BitPlane slab, BitPlane before) { return (slab << 1 & ~kFirstZ) | (before >> 7 & kFirstZ); }
+// The plane read one step against y or z; `before` is the plane of the neighbour on that side.
+BitPlane from_y(BitPlane plane, BitPlane before) { return plane << 8 | before >> 56; }
+BitPlane from_z(BitPlane plane, BitPlane before) { return (plane << 1 & ~kFirstZ) | (before >> 7 & kFirstZ); }
 
 // Keeps the corners between two cells with features. below: the brick's neighbours on the lower sides.
 void keep_corners(Features& own, const std::array<const Features*, 3>& below) {
@@ -43,7 +43,7 @@ bool between(const Vec3& point, const Vec3& a, const Vec3& b) {
     return dot(off, off) <= kStraight * kStraight * dot(along, along);
 }
 
-// The cells of slab x whose features lie between their two corners.
+// The cells of plane x whose features lie between their two corners.
 BitPlane straight_cells(const Features& own, const Around& around, int x, const Feature* features) {
     BitPlane one = 0, two = 0, more = 0;
     for (int face = 0; face < 6; ++face) {
@@ -70,12 +70,12 @@ BitPlane straight_cells(const Features& own, const Around& around, int x, const 
 }  // namespace
 
 FeatureGrid::FeatureGrid(const CellGrid& cells, Layers layers)
-    : cells_(cells), near_(cells.span({layers.first - 1, layers.last + 2})), features_(near_.size()),
+    : cells_(cells), near_(cells.bricks_of({layers.first - 1, layers.last + 2})), features_(near_.size()),
       along_(near_.size()), looked_(layers.first - 1) {}
 
 void FeatureGrid::look(int layer, const Hermite& data) {
-    Span span = cells_.span({layer, layer + 1});
-    tbb::parallel_for(span.row, span.row + span.rows, [&](size_t i) {
+    LayerBricks bricks = cells_.bricks_of({layer, layer + 1});
+    tbb::parallel_for(bricks.row, bricks.row + bricks.rows, [&](size_t i) {
         auto ranges = cells_.ranges(i);
         bool along = true;
         for (int axis = 0; axis < 3; ++axis) along = along && data.along(axis, ranges[axis], ranges[axis + 1]);
@@ -94,19 +94,19 @@ void FeatureGrid::find(int layer, const Hermite& data) {
     Stores& stores = stores_[size_t(layer + 3) % 3];
     for (FeatureStore& store : stores) store.forget();
     for (; looked_ <= layer + 1; ++looked_) look(looked_, data);
-    for_each_brick(cells_.span({layer, layer + 1}),
+    for_each_brick(cells_.bricks_of({layer, layer + 1}),
                    [&](size_t i) { find_features(cells_, data, i, all_along(i), of(i), stores.local()); });
 }
 
 void FeatureGrid::choose(int layer) {
-    for_each_brick(cells_.span({layer, layer + 1}), [&](size_t i) {
+    for_each_brick(cells_.bricks_of({layer, layer + 1}), [&](size_t i) {
         Features& own = of(i);
         if (own.counts[3]) keep_corners(own, {beside(i, 0, -1), beside(i, 1, -1), beside(i, 2, -1)});
     });
 }
 
 void FeatureGrid::straighten(int layer) {
-    for_each_brick(cells_.span({layer, layer + 1}), [&](size_t i) {
+    for_each_brick(cells_.bricks_of({layer, layer + 1}), [&](size_t i) {
         Features& own = of(i);
         own.triangles = own.loops;
         if (!own.counts[3]) return;

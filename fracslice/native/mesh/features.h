@@ -7,7 +7,7 @@
 #include <bit>
 
 #include "../array.h"
-#include "near.h"
+#include "brick_cells.h"
 
 namespace fracslice::mesh {
 
@@ -43,13 +43,13 @@ struct Feature {
     uint8_t number;
 };
 
-// The features of a brick's cells: bit y*8 + z of slab x for each cell that has one, and for its lower face along each axis.
+// The features of a brick's cells: bit y*8 + z of plane x for each cell that has one, and for its lower face along each axis.
 struct Features {
     Signs cells{};
     std::array<Signs, 3> corners{};
     Signs lined{};     // cells that lie in two planes, so that two corners say all that a tip would
     Signs straight{};  // cells whose two corners do say it
-    std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that slab
+    std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that plane
     std::array<Feature*, 4> found{};  // in lower faces along each axis, then one a cell, in order
     std::array<uint32_t, 4> counts{};
     uint32_t tip_count = 0;
@@ -127,7 +127,7 @@ class FeatureGrid {
     bool all_along(size_t i) const;
 
     const CellGrid& cells_;
-    Span near_;
+    LayerBricks near_;
     std::vector<Features> features_;
     std::vector<uint8_t> along_;
     int looked_;  // the next layer to look at
@@ -139,7 +139,7 @@ class Around {
   public:
     Around(const FeatureGrid& grid, size_t i);
 
-    // The cells of slab x with a corner in that face.
+    // The cells of plane x with a corner in that face.
     BitPlane at(int x, int face) const { return faces_[x][face]; }
 
     // A corner of a brick.
@@ -151,7 +151,7 @@ class Around {
         size_t vertex() const { return owner->corner_base[axis] + index; }
     };
 
-    // The one in a face of the cell at that bit of slab x, where there is one.
+    // The one in a face of the cell at that bit of plane x, where there is one.
     Corner corner(int x, int face, int bit) const {
         int axis = face / 2, at = x * 64 + bit, step = 64 >> 3 * axis;
         const Features* owner = own_;
@@ -170,10 +170,10 @@ class Around {
     std::array<std::array<BitPlane, 6>, kSide> faces_;
 };
 
-// Calls act(brick) for the bricks of a span, in parallel.
+// Calls act(brick) for the bricks of some layers, in parallel.
 template <class Do>
-void for_each_brick(const Span& span, const Do& act) {
-    tbb::parallel_for(size_t(0), span.size(), [&](size_t k) { act(span.brick(k)); });
+void for_each_brick(const LayerBricks& bricks, const Do& act) {
+    tbb::parallel_for(size_t(0), bricks.size(), [&](size_t k) { act(bricks.brick(k)); });
 }
 
 }  // namespace fracslice::mesh

@@ -1,5 +1,7 @@
 #include "finder.h"
 
+#include <cassert>
+
 #include "faces.h"
 
 namespace fracslice::mesh {
@@ -7,7 +9,7 @@ namespace {
 
 // A brick's cells, their crossings numbered as they are seen; and these.
 struct Seen {
-    Near near;
+    BrickCells near;
     std::array<uint32_t, std::tuple_size<Numbers>::value> vertices;
     std::array<double, std::tuple_size<Numbers>::value> roots;
     uint32_t count = 0;
@@ -57,12 +59,14 @@ class Finder {
                 own.loops += type.triangles;
                 return;
             }
+            assert(inside(tip));
             own.loops += type.loop_length;
             own.cells[cell.x] |= cell.bit();
             own.add(3, {cell.lower + tip, to_mean(tip, 0, length_), cell.number});
             for (int axis = 0; axis < 3; ++axis) {
                 Vec3 corner;
                 if (!corner_in(cell, axis, corner)) continue;
+                assert(corner[axis] == 0 && inside(corner, axis));
                 own.corners[axis][cell.x] |= cell.bit();
                 own.add(size_t(axis), {cell.lower + corner, to_mean(corner, kFaces[cell.number].lower[axis], 2), cell.number});
             }
@@ -107,6 +111,13 @@ class Finder {
         if (k < 0) return false;
         const Crossing &a = loop_[k], &b = loop_[k + 1 < length_ ? k + 1 : 0];
         return sharp(a, b) && face_corner(a, b, axis, margin_, corner);
+    }
+
+    // Whether a point lies strictly inside the unit cell, or inside its face across an axis: fans around it do not meet themselves.
+    static bool inside(const Vec3& p, int face = -1) {
+        bool within = true;
+        for (int k = 0; k < 3; ++k) within &= k == face || (p[k] > 0 && p[k] < 1);
+        return within;
     }
 
     // The way from a point to the mean of `count` crossings of the loop from number `first` on.

@@ -4,6 +4,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include <cassert>
+
 #include "cells.h"
 
 namespace fracslice::mesh {
@@ -67,11 +69,12 @@ class Extraction {
     }
 
     double crossing(double a, double b) const {
-        double t = a / (a - b), low = placement_.clamp, high = 1 - low;
+        double t = a / (a - b), low = placement_.minimum_edge_parameter, high = 1 - low;
         return t > low ? (t < high ? t : high) : low;
     }
 
     void write_vertex(const CellEdge& edge, double t) {
+        assert(t > 0 && t < 1);  // strictly within its edge: no triangle touches another cell's
         size_t first = 3 * size_t(edge.vertex);
         std::array<double, 3> place = {double(edge.lower[0]), double(edge.lower[1]), double(edge.lower[2])};
         place[edge.axis] += t;

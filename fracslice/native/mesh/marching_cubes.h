@@ -14,7 +14,7 @@ struct Surface {
 struct Placement {
     std::array<double, 3> origin;
     double voxel;
-    double clamp;  // how near a grid point a vertex may come, as a share of the edge
+    double minimum_edge_parameter;  // how near a grid point a vertex may come, as a share of the edge
 };
 
 // The surface between the samples < 0 and the others, by marching cubes with the table of make_cases.py.

@@ -79,7 +79,7 @@ struct Segments {
 };
 
 // What is found of crossings: roots, and rows of normals.
-struct Found {
+struct RootRows {
     double* t;
     float* normals;
     size_t stride;
@@ -127,7 +127,7 @@ class Search {
     Search(const CellGrid& cells, const RootLoops& loops, const std::array<double, 3>& origin, double voxel)
         : cells_(cells), loops_(loops), origin_(origin), voxel_(voxel) {}
 
-    void run(size_t begin, size_t end, const Found& found) {
+    void run(size_t begin, size_t end, const RootRows& found) {
         cells_.lay(begin, end, origin_, voxel_, edges_);
         choose();
         each(found);
@@ -153,7 +153,7 @@ class Search {
     }
 
     // Takes what leaders in planes across their edges have found for those that they lead; `which_` is the rest of these.
-    void follow(const Found& found) {
+    void follow(const RootRows& found) {
         look(found);
         which_.clear();
         auto curved = [&](const FlatBrick& brick) {
@@ -173,7 +173,7 @@ class Search {
     }
 
     // What the leaders of bricks that look flat have found.
-    void look(const Found& found) {
+    void look(const RootRows& found) {
         leads_.resize(edges_.leaders.size());
         for (const FlatBrick& brick : flat_) {
             for (uint32_t k = brick.leader; k < brick.leader_end; ++k) {
@@ -185,7 +185,7 @@ class Search {
     }
 
     // The same in bricks that are flat.
-    void compare(const Found& found) {
+    void compare(const RootRows& found) {
         evaluate();
         const double* value = values_.data();
         for (const FlatBrick& brick : flat_) {
@@ -222,7 +222,7 @@ class Search {
     }
 
     // Looks for each of `which_` by itself.
-    void each(const Found& found) {
+    void each(const RootRows& found) {
         exact_.take(edges_, which_, voxel_, loops_.lanes);
         fast_.convert(exact_, loops_.lanes);
         fast_.find(loops_.guess, loops_, fast_left_, slow_ones_);
@@ -236,7 +236,7 @@ class Search {
         if (!unsure_.empty()) again(found);
     }
 
-    void again(const Found& found) {
+    void again(const RootRows& found) {
         slow_.take(exact_, unsure_, loops_.lanes);
         slow_.find(loops_.find, loops_, left_, slow_ones_);
         roots_.assign(slow_.out.begin(), slow_.out.begin() + ptrdiff_t(slow_.count));

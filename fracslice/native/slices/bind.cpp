@@ -16,7 +16,7 @@ namespace nb = nanobind;
 namespace fracslice::slices {
 namespace {
 
-// Machine code of a scene, `fracslice.kernel.loops.POINTS` on float.
+// Machine code of a scene, `fracslice.kernel.loops.points` on float.
 class Compiled : public Field {
  public:
     explicit Compiled(const nb::tuple& entry)
@@ -138,7 +138,7 @@ nb::tuple bind_signs(const Slab& slab) {
         for (size_t c = 0; c < columns; ++c) {
             const int y = int(r / kTile) + 1, x = int(c / kTile) + 1, bit = int(kTile * (r % kTile) + c % kTile);
             inside[r * columns + c] = slab.word(y, x) >> bit & 1;
-            known[r * columns + c] = slab.known[slab.at(y, x)] >> bit & 1;
+            known[r * columns + c] = slab.tiles().known[slab.at(y, x)] >> bit & 1;
         }
     return nb::make_tuple(owned<uint8_t>(std::move(inside), {rows, columns}), owned<uint8_t>(std::move(known), {rows, columns}));
 }
@@ -150,21 +150,21 @@ NB_MODULE(_slices, module) {
     using namespace nanobind::literals;
     using namespace fracslice::slices;
     nb::exception<std::domain_error>(module, "BorderError", PyExc_ValueError);
-    nb::class_<Bounds>(module, "ProbeBounds")
+    nb::class_<ProbeBounds>(module, "ProbeBounds")
         .def(nb::init<double, double, double, int, int, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
-             "stop_inside"_a, "even"_a);
+             "stop_inside"_a, "escape_time_only"_a);
     module.def("deflated", &bind_deflated, "image"_a);
     nb::class_<Memory>(module, "Memory").def(nb::init<>());
     nb::class_<Slab>(module, "Slab")
         .def("__init__",
-             [](Slab* self, std::shared_ptr<Memory> memory, const nb::object& entry, const Bounds& bounds,
+             [](Slab* self, std::shared_ptr<Memory> memory, const nb::object& entry, const ProbeBounds& bounds,
                 std::array<double, 4> f, std::vector<double> z, int ny, int nx) {
                  const Frame frame{f[0], f[1], f[2], f[3]};
                  new (self) Slab(std::move(memory), field_of(entry), bounds, frame, std::move(z), ny, nx);
              },
              "memory"_a, "entry"_a, "bounds"_a, "frame"_a, "z"_a, "ny"_a, "nx"_a)
         .def("sample", &Slab::sample, "layer"_a, nb::call_guard<nb::gil_scoped_release>())
-        .def_ro("evaluations", &Slab::evaluations)
+        .def_prop_ro("evaluations", &Slab::evaluations)
         .def("paint", &bind_paint, "layer"_a, "image"_a)
         .def("runs", &bind_runs, "layer"_a, "shape"_a)
         .def("picture", &bind_picture, "layer"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a)

@@ -12,7 +12,7 @@ struct alignas(64) Levels : std::array<uint8_t, 64> {};
 
 class Coverage {
  public:
-    explicit Coverage(const Slab& slab) : slab_(slab), scale_(slab.scale) {}
+    explicit Coverage(const Slab& slab) : slab_(slab), scale_(slab.scale()) {}
 
     // Sets the levels of a tile.
     void operator()(const Quad& tiles, const Corners& corners, Levels& levels);

@@ -1,5 +1,6 @@
 // Runs of equal bytes, deflated without ever being laid out.
 #pragma once
+#include <cassert>
 #include <cstdint>
 #include <cstring>
 
@@ -78,7 +79,10 @@ class Runs {
     void add(uint8_t value, uint64_t n);
     // Where so many symbols may be written, and longest matches of n bytes; then so far they were.
     End room(size_t symbols, uint64_t n);
-    void set(const End& end) { end_ = end; }
+    void set(const End& end) {
+        assert(end.symbol <= symbols_.data() + symbols_.size());
+        end_ = end;
+    }
     // Ends; checksum: of all bytes. The result stays until another is asked for.
     const Rows<uint8_t>& zlib(uint32_t checksum);
 

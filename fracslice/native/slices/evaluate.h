@@ -34,7 +34,7 @@ struct Batch {
 template <class Where, class Take>
 void Slab::evaluate(size_t n, const Where& where, const Take& take) {
     Batch batch;
-    evaluations += int64_t(n);
+    evaluations_ += int64_t(n);
     for (size_t begin = 0; begin < n; begin += kBatch) {
         size_t m = std::min(kBatch, n - begin);
         for (size_t i = 0; i < m; ++i) where(begin + i, batch.x[i], batch.y[i], batch.z[i]);
@@ -55,7 +55,7 @@ void Slab::evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take) {
         const std::span some(&asks[begin], end - begin);
         gather(some, *this, x_.data(), y_.data(), batch.x, batch.y);
         batch.values(*field_, n);
-        evaluations += int64_t(n);
+        evaluations_ += int64_t(n);
         scatter(some, batch.f, rim, *this, found.data());
         for (size_t i = begin; i < end; ++i) take(asks[i], found[i - begin]);
     }

@@ -52,7 +52,7 @@ Painted paint(const Slab& slab, const Canvas& canvas) {
             bool empty = t == kEmpty || x0 >= canvas.columns;
             const Quad tiles(slab, {y, empty ? 0 : x, kEmpty});
             const Corners corners(slab, tiles);
-            uint64_t sharp = slab.sharp[t];
+            uint64_t sharp = slab.tiles().sharp[t];
             if (!empty && corners.whole() == kAll && !sharp) {
                 ++full;
                 continue;
@@ -78,14 +78,14 @@ Painted paint(const Slab& slab, const Canvas& canvas) {
 
 Crossings crossings(const Slab& slab) {
     Crossings found;
-    const int32_t first = kTiles, end = int32_t(slab.count());
+    const int32_t first = kTiles, end = int32_t(slab.tiles().count());
     std::unique_ptr<int32_t[]> ids(new int32_t[size_t(end - first) * 128]);
     auto id = [&](int32_t t, int number) -> int32_t& { return ids[128 * size_t(t - first) + number]; };
     for (int y = 1; y < slab.rows() - 1; ++y)
         for (int x = 1; x < slab.columns() - 1; ++x) {
             int32_t t = slab.at(y, x);
             if (t < kTiles) continue;
-            uint64_t of = slab.inside[t];
+            uint64_t of = slab.tiles().inside[t];
             uint64_t words[2] = {of ^ rights(of, slab.word(y, x + 1)), of ^ uppers(of, slab.word(y + 1, x))};
             for (uint64_t w = words[0] | words[1]; w; w &= w - 1)
                 slab.crossed(t, w & -w, [&, t = t](int number, float a, float b) {
@@ -101,7 +101,7 @@ Crossings crossings(const Slab& slab) {
             if (t < kTiles) continue;
             const Quad tiles(slab, {y, x, kEmpty});
             const Corners corners(slab, tiles);
-            const Cells cells(slab, slab.scale, tiles);
+            const Cells cells(slab, slab.scale(), tiles);
             for (uint64_t mixed = corners.mixed(); mixed; mixed &= mixed - 1) {
                 int bit = std::countr_zero(mixed);
                 int32_t right = (bit & 7) == 7 ? std::max(slab.at(y, x + 1), first) : t;

@@ -51,7 +51,7 @@ SolidRuns solid_runs(const Slab& slab, int rows, int columns) {
             const int32_t t = slab.at(y, x);
             const Quad tiles(slab, {y, x, kEmpty});
             const Corners corners(slab, tiles);
-            const uint64_t sharp = slab.sharp[t], cut = t < kTiles ? 0 : corners.mixed() | sharp;
+            const uint64_t sharp = slab.tiles().sharp[t], cut = t < kTiles ? 0 : corners.mixed() | sharp;
             const bool whole = t != kEmpty && corners.whole() == kAll && !sharp;
             uint64_t solid = whole ? kAll : 0;
             full += whole;

@@ -36,7 +36,7 @@ int64_t across(const Signs& s, int axis, bool high, BitPlane sign) {
     if (axis == 0) return std::popcount(s[high ? 7 : 0] ^ sign);
     BitPlane face = axis == 1 ? (high ? kLastY : kFirstY) : (high ? kLastZ : kFirstZ);
     int64_t total = 0;
-    for (BitPlane slab : s) total += std::popcount((slab ^ sign) & face);
+    for (BitPlane plane : s) total += std::popcount((plane ^ sign) & face);
     return total;
 }
 

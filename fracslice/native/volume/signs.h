@@ -9,7 +9,7 @@ namespace fracslice::volume {
 using BitPlane = uint64_t;
 using Signs = std::array<BitPlane, kSide>;
 
-// The bits of a slab's samples at y = 0, and at z = 0.
+// The bits of a plane's samples at y = 0, and at z = 0.
 constexpr BitPlane kFirstY = 0xff, kFirstZ = 0x0101010101010101u;
 
 std::vector<Signs> signs_of(const Bricks& bricks);
@@ -19,10 +19,10 @@ int64_t open_edges(const Layout& layout, const std::vector<Signs>& signs);
 
 inline BitPlane constant(int32_t at) { return at == kInside ? ~BitPlane(0) : BitPlane(0); }
 
-// The slab read one step along y or z; `next` is the slab of the neighbour on that side.
-inline BitPlane shift_y(BitPlane slab, BitPlane next) { return slab >> 8 | next << 56; }
-inline BitPlane shift_z(BitPlane slab, BitPlane next) {
-    return (slab >> 1 & ~(kFirstZ << 7)) | (next & kFirstZ) << 7;
+// The plane read one step along y or z; `next` is the plane of the neighbour on that side.
+inline BitPlane shift_y(BitPlane plane, BitPlane next) { return plane >> 8 | next << 56; }
+inline BitPlane shift_z(BitPlane plane, BitPlane next) {
+    return (plane >> 1 & ~(kFirstZ << 7)) | (next & kFirstZ) << 7;
 }
 
 // A brick and its neighbours on the positive sides: number dx + 2*dy + 4*dz.
@@ -34,7 +34,7 @@ struct Octant {
     }
 };
 
-// Corner signs of a brick's cells. Word k of slab x holds, at bit y*8 + z, the sign at (x, y + k % 2, z + k / 2).
+// Corner signs of a brick's cells. Word k of plane x holds, at bit y*8 + z, the sign at (x, y + k % 2, z + k / 2).
 using Corners = std::array<BitPlane, 4>;
 std::array<Corners, kSide + 1> corners_of(const Octant& octant, const std::vector<Signs>& signs);
 

@@ -6,7 +6,7 @@ from .lights import disc
 from .normal import normalised
 
 
-def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):  # type: ignore[no-untyped-def]
+def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):
     """The ray through pixel position (px, py) of an ideal camera: everything is sharp."""
     ex, ey, ez = eye
     cx, cy, cz = corner
@@ -17,7 +17,7 @@ def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):  # type: ignore[
     return ex + zero, ey + zero, ez + zero, dx, dy, dz
 
 
-def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):  # type: ignore[no-untyped-def]
+def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
     """The ray from a point of a thin lens to where the ideal camera's ray meets the plane of focus.
 
     Cook, Porter, Carpenter 1984, "Distributed Ray Tracing". right, up: the lens' half axes; focus: the

@@ -9,7 +9,7 @@ from .normal import normalised
 TURN = 6.283185307179586
 
 
-def frame(x, y, z):  # type: ignore[no-untyped-def]
+def frame(x, y, z):
     """Two unit vectors at right angles to a unit vector and to each other (Duff et al. 2017, "Building an
     Orthonormal Basis, Revisited")."""
     sign = where(z < 0.0, -1.0, 1.0 + 0.0 * z)
@@ -18,7 +18,7 @@ def frame(x, y, z):  # type: ignore[no-untyped-def]
     return 1.0 + sign * x * x * a, sign * b, -sign * x, b, sign + y * y * a, -y
 
 
-def disc(u, v):  # type: ignore[no-untyped-def]
+def disc(u, v):
     """A point of the unit disc, as likely as its area; neighbours in the square stay neighbours (Shirley
     and Chiu 1997, "A Low Distortion Map Between Disk and Square"), so that fewer samples do than
     by radius and angle.
@@ -34,7 +34,7 @@ def disc(u, v):  # type: ignore[no-untyped-def]
     return where(wide, p, q), where(wide, q, p)
 
 
-def sun(x, y, z, u, v, towards, spread, far):  # type: ignore[no-untyped-def]
+def sun(x, y, z, u, v, towards, spread, far):
     """A disc in the sky: u, v choose a point of it. spread: the tangent of half its angle."""
     lx, ly, lz = towards
     zero = 0.0 * x
@@ -46,14 +46,14 @@ def sun(x, y, z, u, v, towards, spread, far):  # type: ignore[no-untyped-def]
     return dx, dy, dz, far + zero, 1.0 + zero
 
 
-def sharp_sun(x, y, z, u, v, towards, far):  # type: ignore[no-untyped-def]
+def sharp_sun(x, y, z, u, v, towards, far):
     """A point in the sky: its shadows are sharp."""
     lx, ly, lz = towards
     zero = 0.0 * x
     return lx + zero, ly + zero, lz + zero, far + zero, 1.0 + zero
 
 
-def lamp(x, y, z, u, v, position, radius):  # type: ignore[no-untyped-def]
+def lamp(x, y, z, u, v, position, radius):
     """A ball: u, v choose a point on it. Its strength is that at distance 1 and falls with the square."""
     px, py, pz = position
     h = 1.0 - 2.0 * u
@@ -66,7 +66,7 @@ def lamp(x, y, z, u, v, position, radius):  # type: ignore[no-untyped-def]
     return lx * over, ly * over, lz * over, d2 * over, over * over
 
 
-def sharp_lamp(x, y, z, u, v, position):  # type: ignore[no-untyped-def]
+def sharp_lamp(x, y, z, u, v, position):
     """A point: its shadows are sharp."""
     px, py, pz = position
     lx = px - x
@@ -77,7 +77,7 @@ def sharp_lamp(x, y, z, u, v, position):  # type: ignore[no-untyped-def]
     return lx * over, ly * over, lz * over, d2 * over, over * over
 
 
-def upward(nx, ny, nz, u, v):  # type: ignore[no-untyped-def]
+def upward(nx, ny, nz, u, v):
     """A direction around a normal, as likely as the cosine of the angle to it (Malley's method)."""
     ax, ay, az, bx, by, bz = frame(nx, ny, nz)
     p, q = disc(u, v)
@@ -85,7 +85,7 @@ def upward(nx, ny, nz, u, v):  # type: ignore[no-untyped-def]
     return normalised(p * ax + q * bx + h * nx, p * ay + q * by + h * ny, p * az + q * bz + h * nz)
 
 
-def sky(dx, dy, dz, zenith, horizon, ground):  # type: ignore[no-untyped-def]
+def sky(dx, dy, dz, zenith, horizon, ground):
     """The colour of the sky in a direction: from the horizon up to the zenith, and down to the ground."""
     zr, zg, zb = zenith
     hr, hg, hb = horizon

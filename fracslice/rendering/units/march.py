@@ -6,7 +6,7 @@ from ...formulas.vocabulary import any_of, maximum, minimum, sqrt, where
 from .intrinsics import field
 
 
-def span(ox, oy, oz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped-def]
+def span(ox, oy, oz, dx, dy, dz, lo, hi):
     """Where a ray enters and leaves a box; it misses where the first is not smaller (Kay and Kajiya 1986,
     slabs).
 
@@ -28,7 +28,7 @@ def span(ox, oy, oz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped-def]
     return maximum(enter, 0.0), leave
 
 
-def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, relax, cone, least, glass):  # type: ignore[no-untyped-def]
+def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, relax, cone, least, glass):
     """One step of safe, over-relaxed sphere tracing: the new t, radius and stride, and the gap, negative at
     a hit.
 
@@ -38,7 +38,10 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     a pixel is wide. side: -1 inside, where the field of a fractal says little: there a hit is a change of
     sign, and steps are two pixels at least.
     """
-    radius = side * field(ox + t * dx, oy + t * dy, oz + t * dz, P) * steepness
+    f = field(ox + t * dx, oy + t * dy, oz + t * dz, P)
+    if glass:
+        f = side * f
+    radius = f * steepness
     near = cone * (path + t) + least
     kept = radius + before >= stride
     step = relax * radius
@@ -53,7 +56,7 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     return after, where(kept, radius, before), where(kept, step, 0.0), gap
 
 
-def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, spread):  # type: ignore[no-untyped-def]
+def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, spread):
     """One step of a cone `spread` wide at distance 1: as far as the empty ball holds the whole cone.
 
     The gap is negative where the ball is hardly wider than the cone: up to there every ray in it is free.
@@ -65,7 +68,7 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, s
     return where(gap < 0.0, t, t + step), before, stride, gap
 
 
-def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience):  # type: ignore[no-untyped-def]
+def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
     """1 where the light at distance `far` along a ray is seen, 0 where something is nearer than `least` to
     the ray."""
     t = 0.0 * x

@@ -6,13 +6,13 @@ from ...formulas.vocabulary import maximum, rsqrt
 from .intrinsics import field
 
 
-def normalised(x, y, z):  # type: ignore[no-untyped-def]
+def normalised(x, y, z):
     """A vector of length 1; zero stays zero."""
     over = rsqrt(maximum(x * x + y * y + z * z, 1e-36))
     return x * over, y * over, z * over
 
 
-def normal(x, y, z, h, P):  # type: ignore[no-untyped-def]
+def normal(x, y, z, h, P):
     """The unit normal from four samples at the corners of a tetrahedron of half edge h (Quilez 2015)."""
     gx, gy, gz = 0.0 * x, 0.0 * x, 0.0 * x
     for k in range(4):

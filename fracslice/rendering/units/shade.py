@@ -7,7 +7,7 @@ from .intrinsics import field
 from .normal import normalised
 
 
-def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):  # type: ignore[no-untyped-def]
+def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):
     """Diffuse and specular factors of one light (Phong 1975, with Blinn's 1977 half vector).
 
     n: unit normal; d: unit direction of the ray; l: unit direction to the light.
@@ -18,7 +18,7 @@ def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):  # type: ign
     return diffuse, where(diffuse > 0.0, specular * exp(shininess * log(cosine)), 0.0)
 
 
-def occlusion(x, y, z, nx, ny, nz, P, strength, reach):  # type: ignore[no-untyped-def]
+def occlusion(x, y, z, nx, ny, nz, P, strength, reach):
     """How open a point is: the field along the normal against the distance walked (Evans 2006; five
     samples)."""
     closed = 0.0 * x
@@ -31,12 +31,12 @@ def occlusion(x, y, z, nx, ny, nz, P, strength, reach):  # type: ignore[no-untyp
     return maximum(1.0 - strength * closed, 0.0)
 
 
-def fog(t, density):  # type: ignore[no-untyped-def]
+def fog(t, density):
     """The part of the light that comes through (Beer and Lambert)."""
     return exp(-density * t)
 
 
-def palette(tone, P, stops, count):  # type: ignore[no-untyped-def]
+def palette(tone, P, stops, count):
     """A colour between stops; tone 0 is the first of them, 1 the first again: the palette is a ring."""
     r = 0.0 * tone
     g = 0.0 * tone
@@ -51,20 +51,20 @@ def palette(tone, P, stops, count):  # type: ignore[no-untyped-def]
     return r, g, b
 
 
-def mirrored(dx, dy, dz, nx, ny, nz):  # type: ignore[no-untyped-def]
+def mirrored(dx, dy, dz, nx, ny, nz):
     """The direction of a reflection."""
     twice = 2.0 * (dx * nx + dy * ny + dz * nz)
     return dx - twice * nx, dy - twice * ny, dz - twice * nz
 
 
-def fresnel(cosine, least):  # type: ignore[no-untyped-def]
+def fresnel(cosine, least):
     """The part that is reflected at an angle: `least` head on, all at grazing (Schlick 1994)."""
     a = 1.0 - minimum(maximum(cosine, 0.0), 1.0)
     a2 = a * a
     return least + (1.0 - least) * a2 * a2 * a
 
 
-def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):  # type: ignore[no-untyped-def]
+def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):
     """The direction of a refraction, and what is below zero where all is reflected (Snell).
 
     cosine: of the angle between the normal and the ray's reverse; ratio: of the refractive indices, here over
@@ -75,7 +75,7 @@ def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):  # type: ignore[no-untyped-def]
     return ratio * dx + k * nx, ratio * dy + k * ny, ratio * dz + k * nz, left
 
 
-def reflects(dx, dy, dz, nx, ny, nz, reflect):  # type: ignore[no-untyped-def]
+def reflects(dx, dy, dz, nx, ny, nz, reflect):
     """The part that a mirror reflects, and where to."""
     cosine = -(dx * nx + dy * ny + dz * nz)
     part = where(reflect > 0.0, fresnel(cosine, reflect), 0.0)
@@ -83,7 +83,7 @@ def reflects(dx, dy, dz, nx, ny, nz, reflect):  # type: ignore[no-untyped-def]
     return part, rx, ry, rz
 
 
-def goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, chance):  # type: ignore[no-untyped-def]
+def goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, chance):
     """The part of the light that goes on, one direction for it, and -1 if that is through the surface.
 
     n points to where the ray comes from. Between reflection and refraction chance decides, as Fresnel's law

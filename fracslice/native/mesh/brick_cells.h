@@ -25,13 +25,13 @@ struct Cell {
 };
 
 // A brick's cells; its crossings are still to be numbered.
-struct Near {
+struct BrickCells {
     Octant octant;
     std::array<Corners, kSide + 1> corners;
     Numbers numbers;
     std::array<int, 3> first;  // its lowest grid point
 
-    Near(const CellGrid& cells, size_t i)
+    BrickCells(const CellGrid& cells, size_t i)
         : octant(cells.octant(i)), corners(corners_of(octant, cells.signs())), first(cells.place(i)) {
         for (int& k : first) k *= kSide;
     }
@@ -42,7 +42,7 @@ struct Near {
         for_each_cell(corners, [&](int x, int y, int z, uint8_t number) { visit(cell(x, y, z, number)); });
     }
 
-    // The same for some of slab x.
+    // The same for some of plane x.
     template <class Visit>
     void for_each(int x, BitPlane cells, const Visit& visit) const {
         for_each_cell(corners[x], corners[x + 1], x, cells,

@@ -10,10 +10,10 @@
 namespace fracslice::slices {
 
 // Turns tiles: their rows are rows of the picture, from above.
-class Turn {
+class Orientation {
  public:
     // shown: levels as they are shown, by the coverage.
-    Turn(bool transposed, bool backwards, const std::array<uint8_t, 256>& shown)
+    Orientation(bool transposed, bool backwards, const std::array<uint8_t, 256>& shown)
         : transposed_(transposed), reversed_(backwards), shown_(shown) {
         for (int level = 0; level < 256; ++level) plain_ &= shown_[level] == level;
     }

@@ -10,19 +10,19 @@
 namespace fracslice::slices {
 
 // Eight rows of pixels after eight rows, sorted by counting: first by columns, then by rows.
-class InRows {
+class TileRows {
  public:
     struct Spot {
         int32_t across, tile;
     };
 
-    InRows(const Slab& slab, const View& view, int down, int across) {
-        const auto first = kTiles, last = int32_t(slab.count());
+    TileRows(const Slab& slab, const View& view, int down, int across) {
+        const auto first = kTiles, last = int32_t(slab.tiles().count());
         spots_.resize(size_t(last - first));
         Rows<int32_t> by_column(spots_.size());
-        auto row = [&](int32_t t) { return down - (view.transposed ? slab.place[t].x : slab.place[t].y); };
+        auto row = [&](int32_t t) { return down - (view.transposed ? slab.tiles().place[t].x : slab.tiles().place[t].y); };
         auto column = [&](int32_t t) {
-            const int at = view.transposed ? slab.place[t].y : slab.place[t].x;
+            const int at = view.transposed ? slab.tiles().place[t].y : slab.tiles().place[t].x;
             return view.backwards ? across - at : at - 1;
         };
         std::vector<int32_t> columns(across + 1), rows(down + 1);

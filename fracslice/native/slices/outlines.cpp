@@ -1,4 +1,4 @@
-// Where the outlines of a layer are, exactly: crossings settled on the field, and corners and bends within pixels.
+// The outlines of a layer, exactly: crossings projected to the surface, corners and bends within pixels.
 #include <algorithm>
 #include <cmath>
 
@@ -43,7 +43,7 @@ struct Outline {
             const Crossing& e = edges[i];
             const int y = e.row / kTile + 1, x = e.column / kTile + 1;
             int number = 64 * e.up + kTile * (e.row % kTile) + e.column % kTile;
-            double share = slab.cross[slab.at(y, x)][number] / kWhole;
+            double share = slab.tiles().cross[slab.at(y, x)][number] / kWhole;
             places.push_back({e.column + (e.up ? 0 : share), e.row + (e.up ? share : 0)});
             before[e.following] = int32_t(i);
         }
@@ -82,12 +82,12 @@ double share_beyond(Vector a, Vector b, Vector tip, const Place& own, const Plac
 
 // How the outline turns after a crossing: what an arc there adds to the inside, pixels; and, where the sides before that
 // crossing and after the next one meet, what a corner adds that may be there, 0 for none.
-struct Turn {
+struct Bend {
     int32_t edge;
     double arc, corner;
     Vector tip{0, 0}, away{0, 0};  // where they meet, and as far from there as the field must change its sign
 
-    Turn(const Outline& outline, int32_t i) : edge(i), arc(0), corner(0) {
+    Bend(const Outline& outline, int32_t i) : edge(i), arc(0), corner(0) {
         const auto [before, after] = outline.sides(i);
         const double turn = det(before, after), most = dot(before, before) * dot(after, after);
         if (!(turn * turn > kStraight * kStraight * most)) return;
@@ -110,7 +110,7 @@ struct Turn {
 // Crossings on the zero set: false position with the Illinois rule (Dowell and Jarratt 1971) or halving, all edges at once. Straight
 // lines between the values at both ends would miss it by up to half a pixel where other faces are nearer, as just below a
 // horizontal one.
-void Slab::settle(const std::vector<Edge>& edges) {
+void Slab::project(const std::vector<Edge>& edges) {
     cross.resize(count());
     struct Root {
         float low, high, below, above, share;
@@ -168,10 +168,10 @@ void Slab::settle(const std::vector<Edge>& edges) {
 // crossings belong to, or in one beside it. Other sides are arcs.
 void Slab::sharpen() {
     const Outline outline(*this);
-    std::vector<Turn> turns;
+    std::vector<Bend> turns;
     std::vector<Spot> spots;
     for (int32_t i = 0; i < int32_t(outline.edges.size()); ++i) {
-        const Turn turn(outline, i);
+        const Bend turn(outline, i);
         if (turn.matters()) turns.push_back(turn);
         if (turn.corner == 0) continue;
         for (const Vector& spot : {turn.tip + turn.away, turn.tip - turn.away}) spots.push_back({spot.x, spot.y});
@@ -179,7 +179,7 @@ void Slab::sharpen() {
     const std::vector<float> f = values_at(spots);
     tips.resize(count());
     size_t n = 0;
-    for (const Turn& turn : turns) {
+    for (const Bend& turn : turns) {
         const Place own = outline.pixel(turn.edge), beside{int(std::floor(turn.tip.y)), int(std::floor(turn.tip.x)), kEmpty};
         const bool maybe = turn.corner != 0, is_corner = maybe && (f[n] < 0) != (f[n + 1] < 0);
         if (maybe) n += 2;
