@@ -39,13 +39,13 @@ class Result(Mesh):
         """The mesh alone."""
         return self.made.mesh
 
-    @property
-    def vertices(self) -> NDArray[np.float64]:  # type: ignore[misc]  # there is none of a mesh in a file only
+    @property  # type: ignore[misc]
+    def vertices(self) -> NDArray[np.float64]:
         """float64 [n, 3], mm."""
         return self.mesh.vertices
 
-    @property
-    def triangles(self) -> NDArray[np.int32]:  # type: ignore[misc]
+    @property  # type: ignore[misc]
+    def triangles(self) -> NDArray[np.int32]:
         """int32 [m, 3], counter-clockwise seen from outside."""
         return self.mesh.triangles
 
