@@ -43,6 +43,8 @@ html_theme_options = {
     "show_prev_next": False,
     "secondary_sidebar_items": ["page-toc"],
 }
+html_sidebars = {page: [] for page in ("index", "start", "measurements", "gallery", "changelog")}
+html_title = "fracslice"
 html_show_sourcelink = False
 
 

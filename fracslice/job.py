@@ -172,7 +172,7 @@ def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = Non
         mesh, proved, removed, place = _finished(
             planned, raw, certificate, what, left, what.size(scene), scale, work
         )
-        made = mesh.volume + removed.bodies_mm3 - removed.filled_mm3
+        made = mesh.measured(work.threads)[1] + removed.bodies_mm3 - removed.filled_mm3
     simplified = None
     if what.simplify_mm is not None:
         with clock("simplifying"):

@@ -13,7 +13,7 @@ from ..kernel import Kernel
 from ..kernel.arrays import ArrayField
 from ..keys import key
 from ..volume import Bricks
-from ..volume.bricks import INSIDE
+from ..volume.bricks import INSIDE, OUTSIDE
 from ..volume.lattice import BRICK
 
 STRIDE = 0.5
@@ -90,6 +90,36 @@ class _Interpolated(Kernel):
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """`Kernel.points`."""
         return self._samples.points(x, y, z).astype(self.dtype, copy=False)
+
+
+def together(solid: Bricks, added: Bricks) -> Bricks:
+    """The samples of the union of two fields that are sampled on one grid, maybe in other bricks."""
+    shift = np.round((np.array(added.origin) - solid.origin) / (8 * solid.voxel)).astype(int)
+    low = np.minimum(shift, 0)
+    shape = np.maximum(shift + added.index.shape, solid.index.shape) - low
+    rows, others = np.full((2, *shape), OUTSIDE, np.int32)
+    for bricks, to, first in ((solid, rows, -low), (added, others, shift - low)):
+        to[tuple(slice(f, f + n) for f, n in zip(first, bricks.index.shape, strict=True))] = bricks.index
+    index = np.where((rows == INSIDE) | (others == INSIDE), INSIDE, np.maximum(rows, others)).astype(np.int32)
+    sampled = index >= 0
+    index[sampled] = np.arange(np.count_nonzero(sampled))
+    values = np.empty((np.count_nonzero(sampled), 512), np.float32)
+    _least(solid.values, rows[sampled], added.values, others[sampled], values)
+    x, y, z = (np.array(solid.origin) + 8 * solid.voxel * low).tolist()
+    ijk = np.ascontiguousarray(8 * np.argwhere(sampled), np.int32)
+    return Bricks((x, y, z), solid.voxel, ijk, values, index)
+
+
+@compiled
+def _least(some, rows, more, others, out):  # type: ignore[no-untyped-def]
+    """Of each row of two fields the lesser samples, or those of the one field that has it."""
+    for n in range(len(out)):
+        if rows[n] < 0:
+            out[n] = more[others[n]]
+        elif others[n] < 0:
+            out[n] = some[rows[n]]
+        else:
+            out[n] = np.minimum(some[rows[n]], more[others[n]])
 
 
 def _brick_bounds(bricks: Bricks) -> np.ndarray:
