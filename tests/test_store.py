@@ -63,7 +63,7 @@ def test_samples_follow_from_what_is_known_of_a_field(
     work = Work(store=Store(tmp_path))
     first, again = sampled(work, sphere(), sphere())
     assert first > 0 == again
-    monkeypatch.setattr(sphere, "lipschitz", 1.5)
+    monkeypatch.setitem(vars(sphere), "lipschitz", 1.5)
     assert sampled(work, sphere())[0] > first
     assert sampled(work, sphere()) == [0]
     monkeypatch.setitem(sphere.hooks, "bounds", lambda _: Box((-2, -2, -2), (2, 2, 2)))

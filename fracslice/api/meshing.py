@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ..errors import SceneError
-from ..job import MeshJob, Placement
+from ..job import MeshJob
+from ..job import Result as Made
 from ..job import make_mesh as make_mesh_job
 from ..mesh import Mesh
 from ..scene import Scene, parse_length
@@ -15,28 +16,66 @@ from .options import Length, Options, keywords, print_of, work_of
 from .sources import Source, as_scene, found
 
 if TYPE_CHECKING:
-    from ..kernel import Field
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ..formulas.field import Field
+    from ..job import Placement
     from ..report import Report
     from ..volume import Bricks
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class Result(Mesh):
-    """A mesh in mm, standing on z = 0, with what is known of it.
+    """A mesh in mm, standing on z = 0, with what is known of it."""
 
-    report: what was made, how good it is and what it took. bricks: the samples, in scene units. root: the
-    field that they are samples of. place: the map from there to the mesh.
-    """
+    made: Made
 
-    report: Report
-    bricks: Bricks
-    root: Field
-    place: Placement
+    def __init__(self, made: Made) -> None:
+        object.__setattr__(self, "made", made)
 
     @property
     def mesh(self) -> Mesh:
         """The mesh alone."""
-        return Mesh(self.vertices, self.triangles)
+        return self.made.mesh
+
+    @property  # type: ignore[misc]
+    def vertices(self) -> NDArray[np.float64]:
+        """float64 [n, 3], mm."""
+        return self.mesh.vertices
+
+    @property  # type: ignore[misc]
+    def triangles(self) -> NDArray[np.int32]:
+        """int32 [m, 3], counter-clockwise seen from outside."""
+        return self.mesh.triangles
+
+    @property
+    def report(self) -> Report:
+        """What was made, how good it is and what it took."""
+        return self.made.report
+
+    @property
+    def root(self) -> Field:
+        """The field that was meshed."""
+        return self.made.root
+
+    @property
+    def place(self) -> Placement:
+        """The map from the scene to the mesh."""
+        return self.made.place
+
+    @property
+    def bricks(self) -> Bricks:
+        """The samples of the field, in scene units."""
+        bricks = self.made.bricks
+        for array in (bricks.ijk, bricks.values, bricks.index):
+            array.flags.writeable = False
+        return bricks
+
+    @property
+    def bricks_mm(self) -> Bricks:
+        """The samples in the mesh's space, in mm."""
+        return self.made.bricks_mm
 
 
 @keywords
@@ -129,7 +168,4 @@ def make_mesh(
     printing = print_of(replace(scene, printing=job.how(scene)), options)
     if printing.keep == "largest" and job.size_mm is None and not isinstance(source, Scene):
         raise SceneError("keep='largest': expected a size, too, such as size='40mm', of the body that stays")
-    made = make_mesh_job(scene, replace(job, printing=printing), how)
-    for array in (made.bricks.ijk, made.bricks.values, made.bricks.index):
-        array.flags.writeable = False
-    return Result(made.mesh.vertices, made.mesh.triangles, made.report, made.bricks, made.root, made.place)
+    return Result(make_mesh_job(scene, replace(job, printing=printing), how))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..formulas.registry import Node
+from ..kernel.cells import possible_cells
 from ..kernel.depth import resolve_depths
 from ..scene.view import Camera, Light, View
 from .optics import Optics, optics
@@ -17,6 +18,9 @@ SUN = Light(kind="sun", position=(-0.6, -1.0, 1.4), colour=(1.0, 0.95, 0.86), st
 SKY = Light(
     kind="sky", colour=(0.42, 0.58, 0.85), horizon=(0.82, 0.86, 0.92), ground=(0.35, 0.33, 0.31), strength=0.8
 )
+CELLS = 1 << 13
+"""In which the object is looked for, to have it in view."""
+
 DETAIL = (4.0, 1.0, 0.5)
 """The finest detail of the first passes and all later ones, in pixels."""
 ROUNDING = {"float32": 2.0**-21, "float64": 2.0**-49}
@@ -42,7 +46,7 @@ class RenderSetup:
 
 def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     """Chooses what is open. Raises `SceneError` for a view that shows nothing: from inside the solid, say."""
-    camera = view.camera or _whole(root)
+    camera = view.camera or _whole(root, size[0] / size[1])
     lights = view.lights or (SUN, SKY)
     if sum(light.kind == "sky" for light in lights) > 1:
         raise lights[-1].fail("kind: expected at most one sky")
@@ -55,10 +59,18 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     return RenderSetup(roots, replace(view, lights=lights), camera, seen, precision)
 
 
-def _whole(root: Node) -> Camera:
-    if not root.bounds.box.finite:
+def _whole(root: Node, aspect: float) -> Camera:
+    """A camera that has all cells in view that the object may be in."""
+    box = root.bounds.box
+    if not box.finite:
         raise SceneError("<camera> is missing: expected one in a scene without an end")
-    return Camera.around(root.bounds.box)
+    known = resolve_depths(root, max(box.size) / CELLS ** (1 / 3)).conservative()
+    kernel = known.kernel("cpu", "float64")
+    cells, _, step = possible_cells(lambda p: kernel.points(*p), known.bounds.lipschitz, box, CELLS)
+    if not cells.size:
+        return Camera.around(box, aspect=aspect)
+    corners = cells[:, :, None] + (np.indices((2, 2, 2)).reshape(3, 1, 8) - 0.5) * step[:, None, None]
+    return Camera.around(box, corners.reshape(3, -1), aspect)
 
 
 def clearance(root: Node, camera: Camera) -> float:

@@ -9,14 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..errors import SceneError
 from ..formulas.box import Box
 from ..formulas.parameters import Choice, Count, Number, Vector, validate, validated
 
+if TYPE_CHECKING:
+    import numpy as np
+
 Triple = tuple[float, float, float]
 WHITE = (1.0, 1.0, 1.0)
+FILLED = 0.95
+"""Of the picture, by the object that a camera is chosen for."""
 SHIFT = Vector((0.0, 0.0, 0.0), "so much forwards, to the right and up")
 TURN = Vector((0.0, 0.0), "degrees to the right and up", sizes=(2,))
 
@@ -78,11 +83,19 @@ class Camera(Part):
             raise self.fail("up: expected a direction other than the one the camera looks in")
 
     @classmethod
-    def around(cls, box: Box) -> Camera:
-        """A camera that has the whole of a finite box in view."""
-        reach = math.hypot(*box.size) / 2
-        eye = _along(box.centre, _unit((2.2, -2.0, 1.4)), reach / math.sin(math.radians(20)) * 0.66)
-        return cls(eye=eye, target=box.centre)
+    def around(cls, box: Box, points: np.ndarray | None = None, aspect: float = 1.0) -> Camera:
+        """A camera that looks at the middle of a finite box and has points [3, n] in view, the box' corners
+        if none are given. aspect: of the picture, its width by its height.
+        """
+        import numpy as np  # help does without
+
+        away = _unit((2.2, -2.0, 1.4))
+        draft = cls(eye=_along(box.centre, away, max(box.size)), target=box.centre)
+        x, y, z = np.array(box.corners).T if points is None else points
+        x, y, z = (a - c for a, c in zip((x, y, z), box.centre, strict=True))
+        near, across, up = (x * a + y * b + z * c for a, b, c in (away, draft.right, draft.above))
+        reach = np.maximum(abs(across) / aspect, abs(up)) / (FILLED * math.tan(math.radians(draft.fov / 2)))
+        return replace(draft, eye=_along(box.centre, away, float((near + reach).max())))
 
     @property
     def forward(self) -> Triple:

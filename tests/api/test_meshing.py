@@ -166,7 +166,7 @@ def test_results_cannot_be_changed(made: Result) -> None:
     for array in (made.vertices, made.triangles, made.faces, made.mesh.vertices, made.bricks.values):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
-    for name in ("vertices", "report"):
+    for name in ("vertices", "report", "made", "colour"):
         with pytest.raises(FrozenInstanceError):
             setattr(made, name, None)
     with pytest.raises(FrozenInstanceError):

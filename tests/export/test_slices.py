@@ -319,7 +319,7 @@ def test_a_job_is_known_by_all_that_its_layers_follow_from(monkeypatch: pytest.M
         changed = [replace(whole, **value) for value in values]
         jobs += [replace(job, **{part: each}) for each in changed] if part else changed
     keys = [each.key("png") for each in jobs] + [job.key("svg")]
-    monkeypatch.setattr(sphere, "lipschitz", 1.5)
+    monkeypatch.setitem(vars(sphere), "lipschitz", 1.5)
     keys.append(run(root=difference(menger(level=1), sphere(radius=0.9))).key("png"))
     assert len(set(keys)) == len(keys)
     monkeypatch.undo()
