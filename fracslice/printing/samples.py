@@ -152,10 +152,11 @@ def between(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-unt
     p, q, r = i & 7, j & 7, k & 7
     bi, bj, bk = i >> 3, j >> 3, k >> 3
     nx, ny, nz = index.shape
-    if max(p, q, r) < 7 and 0 <= bi < nx and 0 <= bj < ny and 0 <= bk < nz:
-        row = index[bi, bj, bk]
-        if row < 0:
-            return float(brick_bounds[bi, bj, bk])
+    within = 0 <= bi < nx and 0 <= bj < ny and 0 <= bk < nz
+    row = index[bi, bj, bk] if within else 0
+    if row < 0 and (max(p, q, r) < 7 or abs(brick_bounds[bi, bj, bk]) > BRICK / 2 * voxel):
+        return float(brick_bounds[bi, bj, bk])
+    if within and max(p, q, r) < 7:
         f, s = values[row], 64 * p + 8 * q + r
         a, b = (1 - w) * f[s] + w * f[s + 1], (1 - w) * f[s + 8] + w * f[s + 9]
         c, d = (1 - w) * f[s + 64] + w * f[s + 65], (1 - w) * f[s + 72] + w * f[s + 73]

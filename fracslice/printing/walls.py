@@ -30,6 +30,9 @@ AT_ONCE = 512
 ROOM = 8
 """Samples for each crossing that room is made for at first."""
 
+ALONG = 0.999
+"""The share of a normal's largest component that is taken for as large."""
+
 FIRST = 0.1
 """Voxels along a ray to the first point that is looked at, off the surface that it begins on."""
 
@@ -118,6 +121,7 @@ def gathered(look: Callable[[slice], R], count: int, size: int, work: Work) -> R
 def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where the surface crosses the edges of the grid that begin in some bricks, float64 [n, 3], its unit
     normals there, [n, 3], and how much of it each crossing stands for, [n], scene units.
+    Of a smooth surface, one for each line of the grid along the axis that is nearest to its normal.
     """
     b = solid.bricks
     begin, end, _ = rows.indices(len(b))
@@ -169,7 +173,10 @@ def _cross(begin, end, x0, y0, z0, voxel, ijk, index, brick_bounds, values, poin
                     points[n, 2] = z0 + voxel * (ijk[row, 2] + w)
                     points[n, axis] += voxel * share
                     _across(f, at, axis, share, normals[n])
-                    area[n] = voxel * voxel * abs(normals[n, axis])
+                    along = abs(normals[n, axis])
+                    if along < ALONG * np.abs(normals[n]).max():
+                        continue
+                    area[n] = voxel * voxel / along
                 n += 1
     return n
 
