@@ -48,8 +48,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .errors import FracsliceError
     from .export import write
-    from .job import MeshJob, Result, make_mesh
+    from .job import Result, make_mesh
     from .mesh import Mesh
+    from .meshjob import MeshJob
     from .report import Report
     from .scene import Scene, read, reads, to_xml
     from .work import Work
@@ -57,7 +58,7 @@ if TYPE_CHECKING:
 _WHERE = {
     "FracsliceError": "errors",
     "Mesh": "mesh",
-    "MeshJob": "job",
+    "MeshJob": "meshjob",
     "Report": "report",
     "Result": "job",
     "Scene": "scene",

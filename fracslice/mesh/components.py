@@ -67,25 +67,6 @@ def shells(mesh: Mesh) -> Shells:
     return Shells(labels, volumes, parent)
 
 
-def in_pieces(mesh: Mesh, voxel: float) -> str:
-    """What walls came to that are thinner than the voxel of a mesh, in words; empty where all are thicker.
-
-    Between samples such walls are missed: they have holes, or fall to pieces. A body counts if on average it
-    is thinner than a voxel; the dust around a fractal is such, too, but less than `PIECES` of the material.
-    """
-    from fracslice.mesh.links import parts, shell_volumes
-
-    if voxel * mesh.area < 2 * PIECES * mesh.volume:  # such bodies would have more surface
-        return ""
-    labels, count = parts(mesh.triangles, len(mesh.vertices))
-    volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
-    areas = np.bincount(labels, np.linalg.norm(mesh.normals, axis=1) / 2, minlength=count)
-    thin, bodies = (volumes > 0) & (2 * volumes < voxel * areas), int((volumes > 0).sum())
-    share = float(volumes[thin].sum() / mesh.volume)
-    holes = "have holes" if bodies == 1 else f"fell to pieces: {thin.sum()} of {bodies} bodies"
-    return f"walls thinner than a voxel {holes}, {share:.0%} of the material" if share >= PIECES else ""
-
-
 def select(
     mesh: Mesh,
     *,

@@ -1,4 +1,4 @@
-"""Meshes as solids: proof by manifold3d, place on the bed."""
+"""Meshes as solids: proof by manifold3d."""
 
 from __future__ import annotations
 
@@ -12,9 +12,6 @@ from fracslice.mesh.model import Mesh
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
-
-FLAT = 1e-6
-"""Of the mesh's size: what is not higher than this above the bed lies on it, so that a flat base is flat."""
 
 _REASONS = {
     "NonFiniteVertex": "a coordinate is not a finite number",
@@ -41,11 +38,3 @@ def to_manifold(mesh: Mesh) -> Manifold:
     if status != "NoError":
         raise MeshError(f"the mesh is not a solid: {_REASONS.get(status, status)}")
     return solid
-
-
-def place_on_bed(mesh: Mesh, middle: tuple[float, float]) -> Mesh:
-    """Move the mesh to stand on z = 0 with a point (x, y) over the origin."""
-    low, high = mesh.bounds
-    placed = mesh.translated((-middle[0], -middle[1], -low[2]))
-    placed.vertices[placed.vertices[:, 2] < FLAT * (high - low).max(), 2] = 0
-    return placed

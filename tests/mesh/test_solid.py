@@ -10,7 +10,7 @@ from fracslice.mesh import Mesh
 from fracslice.mesh.check import check
 from fracslice.mesh.clean import clean
 from fracslice.mesh.rounding import rounded
-from fracslice.mesh.solid import place_on_bed, to_manifold
+from fracslice.mesh.solid import to_manifold
 
 from .shapes import GOOD, cube, sphere, with_flipped, without
 
@@ -26,17 +26,6 @@ def test_manifold3d_takes_good_meshes_as_they_are(name: str) -> None:
 def test_manifold3d_refuses_in_plain_words(spoil) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(MeshError, match="not closed"):
         to_manifold(spoil(sphere(), 7))
-
-
-def test_a_mesh_is_put_on_the_bed() -> None:
-    placed = place_on_bed(sphere(10, at=(5, 6, 7)), (5, 6))
-    low, high = placed.bounds
-    assert low[2] == 0
-    assert low[:2] + high[:2] == pytest.approx((0, 0), abs=1e-6)
-    lifted = placed.vertices + [0, 0, 1e-6] * (np.arange(len(placed.vertices))[:, None] % 2)
-    assert np.array_equal(
-        place_on_bed(Mesh(lifted, placed.triangles), (0, 0)).vertices[:, 2] == 0, lifted[:, 2] < 1e-5
-    )
 
 
 def test_rounding_is_done_once() -> None:
