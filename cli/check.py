@@ -75,7 +75,7 @@ def check(
     The options between --json and --threads are for scenes. Exit status: 1 if it would not print.
     """
     from fracslice.job import make_mesh
-    from fracslice.mesh.check import check as examined
+    from fracslice.mesh.check import check_mesh as examined
 
     if options["layer"] is not None and not is_model(source):
         refuse_options(context, OF_MESHES, "only for meshes, and --layer checks layers")

@@ -125,7 +125,7 @@ def render(
     if not quiet:
         click.echo(
             f"{output}: {renderer.width} x {renderer.height} pixels, {reached(last)}, "
-            f"{renderer.setting.precision}, {renderer.device}, {time.monotonic() - start:.1f} s"
+            f"{renderer.setup.precision}, {renderer.device}, {time.monotonic() - start:.1f} s"
         )
 
 
@@ -144,7 +144,7 @@ def reached(done: Pass) -> str:
 
 
 def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
-    return min(done.samples / (samples or renderer.setting.view.film.samples), 1.0)
+    return min(done.samples / (samples or renderer.setup.view.film.samples), 1.0)
 
 
 def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:

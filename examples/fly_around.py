@@ -18,7 +18,7 @@ if __name__ == "__main__":
     steps = int(sys.argv[2]) if len(sys.argv) > 2 else 24
     width, height = map(int, (sys.argv[3] if len(sys.argv) > 3 else "480x300").split("x"))
     scene = read(library.path("mandelbulb"))
-    start = Camera.around(scene.root.facts.box)
+    start = Camera.around(scene.root.bounds.box)
     for step in range(steps):
         view = replace(scene.view, camera=start.orbited(360 * step / steps))
         *_, picture = Renderer(scene.root, view, (width, height)).passes(samples=16)

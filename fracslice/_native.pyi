@@ -167,11 +167,11 @@ class Grid:
 # On triangle meshes: vertices [n, 3], triangles [m, 3]. All raise ValueError for an index out of range and
 # for arrays that contradict each other; results are the same for any number of threads.
 
-def links(triangles: NDArray[int32], counted: NDArray[bool_]) -> tuple[int, int, int, int, int]:
+def edge_topology(triangles: NDArray[int32], counted: NDArray[bool_]) -> tuple[int, int, int, int, int]:
     """`fracslice.mesh.links.edge_ends`."""
 
 def corners_by_vertex(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int64], NDArray[int64]]: ...
-def parts(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int32], int]: ...
+def connected_components(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int32], int]: ...
 def shell_volumes(
     vertices: NDArray[float64], triangles: NDArray[int32], labels: NDArray[int32], count: int
 ) -> NDArray[float64]: ...
@@ -194,7 +194,7 @@ def tree(
 ) -> tuple[NDArray[int64], NDArray[float64], NDArray[float64]]:
     """`fracslice.mesh.tree.Tree`."""
 
-def crossing_triangles(
+def self_intersecting_triangles(
     vertices: NDArray[float64],
     triangles: NDArray[int32],
     order: NDArray[int64],

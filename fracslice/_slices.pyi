@@ -30,7 +30,7 @@ class Called(Field):
         function: Callable[[NDArray[float32], NDArray[float32], NDArray[float32]], NDArray[float32]],
     ) -> None: ...
 
-class Bounds:
+class ProbeBounds:
     """How far values reach: a block is decided where |f| exceeds a bound times the distance from its middle
     to its farthest sample.
 
@@ -65,7 +65,7 @@ class Slab:
         self,
         memory: Memory,
         field: Field,
-        bounds: Bounds,
+        bounds: ProbeBounds,
         frame: tuple[float, float, float, float],
         z: list[float],
         ny: int,

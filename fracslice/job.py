@@ -168,7 +168,7 @@ class _Job:
         with self.clock("changing"):
             made, scale = printable(planned, self.what.size(self.scene), how, self.clock.work)
         # Of walls thinner than a voxel a mesh has crumbs only: bodies are chosen in the field where it tells.
-        keep = how.keep if planned.root.facts.weak else "all"
+        keep = how.keep if planned.root.bounds.exterior_only else "all"
         # A hollow is a cavity, too.
         return _Sized(made, scale, Print(keep=keep, cavities=how.cavities if how.whole else "keep"))
 

@@ -44,9 +44,9 @@ class Work:
     device: Device = "cpu"
 
     def __post_init__(self) -> None:
-        from .formulas.parameters import Count, settle  # loads NumPy, which help does without
+        from .formulas.parameters import Count, validate  # loads NumPy, which help does without
 
-        settle(self, {"threads": Count(1, "how many", least=1, most=1024)}, SceneError)
+        validate(self, {"threads": Count(1, "how many", least=1, most=1024)}, SceneError)
 
     def check(self) -> None:
         """Raises `Cancelled` once somebody asked to stop."""

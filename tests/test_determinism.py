@@ -46,8 +46,8 @@ def sampled(work: Work) -> bytes:
 
 
 def meshed(work: Work) -> bytes:
-    lattice = Lattice.around(ROOT.facts.box, 0.1)
-    bricks = sample(compile_scene(ROOT), ROOT.facts, lattice, work)
+    lattice = Lattice.around(ROOT.bounds.box, 0.1)
+    bricks = sample(compile_scene(ROOT), ROOT.bounds, lattice, work)
     mesh = contour(ROOT, bricks, work)
     return bricks.values.tobytes() + mesh.vertices.tobytes() + mesh.triangles.tobytes()
 

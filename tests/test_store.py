@@ -12,7 +12,7 @@ from fracslice import MeshJob, Work, keys, make_mesh
 from fracslice.errors import FracsliceWarning, VolumeError
 from fracslice.formulas import Box, Node, mandelbulb, offset, sphere
 from fracslice.kernel import Compilable, compile_scene, field_key
-from fracslice.printing.altered import Altered, Term
+from fracslice.printing.edits import EditedField, Term
 from fracslice.printing.samples import Samples
 from fracslice.scene import scene
 from fracslice.store import Store
@@ -73,7 +73,7 @@ def test_samples_follow_from_what_is_known_of_a_field(
 def test_samples_follow_from_the_guard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     work = Work(store=Store(tmp_path))
     assert sampled(work, sphere())[0] > 0
-    monkeypatch.setattr(Node, "guard", lambda self: offset(self, distance=0.1))
+    monkeypatch.setattr(Node, "conservative", lambda self: offset(self, distance=0.1))
     assert sampled(work, sphere())[0] > 0
 
 
@@ -104,8 +104,10 @@ def test_keys_tell_arrays_of_other_shapes_and_types_apart() -> None:
 
 def test_what_is_altered_is_kept_and_known_by_all_its_parts(tmp_path: Path) -> None:
     work, near = Work(store=Store(tmp_path)), Lattice.around(BOX, 0.2)
-    inner = [sample(compile_scene(s), s.facts, near) for s in (sphere(radius=0.5), sphere(radius=0.6))]
-    roots = [Altered(sphere(), (Term(Samples(bricks), does),)) for bricks in inner for does in ("cut", "add")]
+    inner = [sample(compile_scene(s), s.bounds, near) for s in (sphere(radius=0.5), sphere(radius=0.6))]
+    roots = [
+        EditedField(sphere(), (Term(Samples(bricks), does),)) for bricks in inner for does in ("cut", "add")
+    ]
     assert len({field_key(root) for root in roots}) == len(roots)
     found = [sample_scene(planned(roots[0]), work) for _ in range(2)]
     assert found[0].evaluations > 0 == found[1].evaluations

@@ -115,7 +115,7 @@ def corners(degrees: float) -> np.ndarray:
 
 def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Triangles taken out of every piece: each open edge is counted once, wherever the pieces end."""
-    from fracslice.mesh.check import check
+    from fracslice.mesh.check import check_mesh
     from fracslice.mesh.extract import contour_pieces
     from fracslice.mesh.window import Tally, Window
     from fracslice.volume import plan, sample_scene_signs
@@ -132,7 +132,7 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
         finished = window.add(piece.mesh.selected(keep), piece.end)
         tally.add(finished)
         passed += len(finished.passed.triangles)
-    truth, told = check(whole.selected(~lost)), tally.report(1, 0, 0)
+    truth, told = check_mesh(whole.selected(~lost)), tally.report(1, 0, 0)
     assert len(pieces) > 4 and passed == truth.triangles == told.triangles
     assert told.open_edges == truth.open_edges > 100
     assert (told.vertices, told.nonmanifold_vertices) == (truth.vertices, truth.nonmanifold_vertices)

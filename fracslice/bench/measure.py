@@ -33,8 +33,8 @@ def measured(method: str, what: Workload, resolution: int, work: Work) -> dict[s
     mesh, evaluations, kept = make(what, resolution, work)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     memory = peak_rss_mb()
-    told = {"wall_s": wall, "cpu_s": cpu, "peak_mb": memory, "evaluations": evaluations, "kept": kept}
-    return told | errors(mesh, what, resolution)
+    figures = {"wall_s": wall, "cpu_s": cpu, "peak_mb": memory, "evaluations": evaluations, "kept": kept}
+    return figures | errors(mesh, what, resolution)
 
 
 def errors(mesh: Mesh, what: Workload, resolution: int) -> dict[str, Any]:
@@ -67,10 +67,10 @@ def main() -> None:
     if "mesh" in asked:
         from ..mesh.reading import read_mesh
 
-        told = errors(read_mesh(asked["mesh"]), what, resolution)
+        figures = errors(read_mesh(asked["mesh"]), what, resolution)
     else:
-        told = measured(asked["method"], what, resolution, Work(threads=asked["threads"]))
-    json.dump(told, sys.stdout)
+        figures = measured(asked["method"], what, resolution, Work(threads=asked["threads"]))
+    json.dump(figures, sys.stdout)
 
 
 if __name__ == "__main__":

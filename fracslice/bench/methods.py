@@ -24,14 +24,14 @@ Made = tuple[Mesh, int, int]
 def plain(what: Workload, resolution: int, work: Work) -> Made:
     """Sparse float32 samples and marching cubes."""
     kernel = compile_scene(what.root)
-    bricks = sample(kernel, what.root.facts, what.lattice(resolution), work)
+    bricks = sample(kernel, what.root.bounds, what.lattice(resolution), work)
     return extract(bricks, work.threads), bricks.evaluations, bricks.values.size
 
 
 def exact(what: Workload, resolution: int, work: Work) -> Made:
     """Sparse float32 samples; vertices on roots of the float64 field, whose evaluations are not told."""
     kernel = compile_scene(what.root)
-    bricks = sample(kernel, what.root.facts, what.lattice(resolution), work)
+    bricks = sample(kernel, what.root.bounds, what.lattice(resolution), work)
     return contour(what.root, bricks, work), bricks.evaluations, bricks.values.size
 
 

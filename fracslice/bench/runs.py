@@ -18,13 +18,13 @@ from statistics import median
 from typing import Any
 
 from ..errors import BenchError, FracsliceError
-from ..formulas.parameters import Count, Number, settle, settled
+from ..formulas.parameters import Count, Number, validate, validated
 from ..work import Work
 from .methods import METHODS
 from .workloads import WORKLOADS
 
 PLACES = ("{workload}", "{resolution}", "{output}")
-TOLD = ("wall_s", "cpu_s", "peak_mb", "evaluations")
+FIGURES = ("wall_s", "cpu_s", "peak_mb", "evaluations")
 """What a peer may know better than the process around it."""
 
 
@@ -66,9 +66,9 @@ class Task:
         for name in self.workloads:
             if name not in WORKLOADS:
                 raise BenchError(f"workload {name!r}: expected one of {', '.join(WORKLOADS)}")
-        settle(self, _KINDS, BenchError)
+        validate(self, _KINDS, BenchError)
         for n in self.resolutions:
-            settled("resolution", n, RESOLUTION, BenchError)
+            validated("resolution", n, RESOLUTION, BenchError)
 
 
 RESOLUTION = Count(256, "voxels along the cube", least=16, most=2048)
@@ -132,8 +132,8 @@ def _runs(
 
 def _child(asked: dict[str, Any], work: Work) -> dict[str, float]:
     output, _ = _run([sys.executable, "-m", "fracslice.bench.measure"], json.dumps(asked), work)
-    told: dict[str, float] = json.loads(output)
-    return told
+    figures: dict[str, float] = json.loads(output)
+    return figures
 
 
 def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
@@ -144,8 +144,8 @@ def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
         words = [word.format(**places) for word in peer.command]
         output, used = _run(words, "", work)
         with suppress(ValueError, IndexError):
-            told = json.loads(output.splitlines()[-1])
-            used |= {key: float(told[key]) for key in TOLD if key in told}
+            figures = json.loads(output.splitlines()[-1])
+            used |= {key: float(figures[key]) for key in FIGURES if key in figures}
         if not path.exists():
             raise _FailedError(f"{words[0]} wrote no mesh")
         return used | _child(about | {"mesh": str(path)}, work)

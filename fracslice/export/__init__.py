@@ -44,8 +44,8 @@ def write(mesh: Mesh, path: str | Path, metadata: Mapping[str, str] | None = Non
 
     metadata: names and values that the format has room for, such as Title, Description or scene_hash;
     Application is added. Coordinates are written as float32: pass a mesh through
-    `fracslice.mesh.rounding.rounded` first, and check that. Returns the path. Raises ExportError in one line
-    for an empty mesh, an unknown ending, or what the file system refuses.
+    `fracslice.mesh.quantisation.quantised` first, and check that. Returns the path. Raises ExportError in
+    one line for an empty mesh, an unknown ending, or what the file system refuses.
     """
     format_write = FORMATS[check_format(path)]
     if not len(mesh.triangles):

@@ -39,8 +39,12 @@ def write_image(
     """
     if bits not in (8, 16):
         raise ExportError(f"{path}: {bits} bits: expected 8 or 16")
-    said, ending = text or {}, check_image(path)
-    data = png(shown, bits, said) if ending == ".png" else (exr if ending == ".exr" else tiff)(light, said)
+    metadata, ending = text or {}, check_image(path)
+    data = (
+        png(shown, bits, metadata)
+        if ending == ".png"
+        else (exr if ending == ".exr" else tiff)(light, metadata)
+    )
     with replacing(path) as file:
         file.write(data)
     return Path(path)
@@ -98,14 +102,14 @@ def tiff(light: np.ndarray, text: Mapping[str, str]) -> bytes:
     pixels = np.ascontiguousarray(light, "<f4").tobytes()
     note = "\n".join(f"{k}: {v}" for k, v in text.items()).encode() + b"\0"
     heads = 8 + len(pixels)
-    depths, formats, said = heads, heads + 6, heads + 12
+    depths, formats, metadata = heads, heads + 6, heads + 12
     entries = [
         (256, 4, 1, width),
         (257, 4, 1, height),
         (258, 3, 3, depths),
         (259, 3, 1, 1),
         (262, 3, 1, 2),
-        (270, 2, len(note), said),
+        (270, 2, len(note), metadata),
         (273, 4, 1, 8),
         (277, 3, 1, 3),
         (278, 4, 1, height),
@@ -113,7 +117,7 @@ def tiff(light: np.ndarray, text: Mapping[str, str]) -> bytes:
         (284, 3, 1, 1),
         (339, 3, 3, formats),
     ]
-    start = said + len(note) + len(note) % 2
+    start = metadata + len(note) + len(note) % 2
     table = struct.pack("<H", len(entries)) + b"".join(struct.pack("<HHII", *e) for e in entries) + bytes(4)
     tail = struct.pack("<6H", 32, 32, 32, 3, 3, 3) + note + bytes(len(note) % 2) + table
     return struct.pack("<2sHI", b"II", 42, start) + pixels + tail

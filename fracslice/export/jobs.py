@@ -16,7 +16,7 @@ from isal.isal_zlib import crc32
 from fracslice.errors import ExportError
 from fracslice.export.files import into_place
 from fracslice.export.resuming import remainder
-from fracslice.formulas.parameters import Vector, settle
+from fracslice.formulas.parameters import Vector, validate
 from fracslice.kernel import field_key
 from fracslice.kernel.objects import toolchain
 from fracslice.keys import key, program
@@ -42,7 +42,7 @@ class SliceRun:
     metadata: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        settle(self, {"exposure": EXPOSURE}, ExportError)
+        validate(self, {"exposure": EXPOSURE}, ExportError)
 
     @property
     def slicer(self) -> Slicer:
@@ -64,7 +64,7 @@ class SliceRun:
     def describe(self) -> bytes:
         """What files say of the layers, as JSON."""
         stack, screen = self.stack, self.screen
-        said = {
+        manifest = {
             "application": "fracslice",
             "metadata": self.metadata,
             "size_mm": stack.size,
@@ -78,7 +78,7 @@ class SliceRun:
                 {"file": f"{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)
             ],
         }
-        return json.dumps(said, indent=1).encode()
+        return json.dumps(manifest, indent=1).encode()
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,20 +35,20 @@ def remainder(path: str | Path, job: str) -> Iterator[BinaryIO]:
     and if another process is at it.
     """
     target = check_target(path)
-    part, said = (target.with_name(f".{target.name}.{end}") for end in ("part", "job"))
+    part, manifest = (target.with_name(f".{target.name}.{end}") for end in ("part", "job"))
     try:
         _remove_foreign(part)
         with files.opened(part, "r+b", os.O_CREAT) as file:
             _lock(file, path)
-            if _read(said) != _said(job):
+            if _read(manifest) != _manifest(job):
                 if os.fstat(file.fileno()).st_size:
                     _tell(path)
-                said.unlink(missing_ok=True)
+                manifest.unlink(missing_ok=True)
                 file.truncate()
                 os.fsync(file.fileno())  # or after a power cut what is said could be of what was there before
-                _say(said, job)
+                _write_manifest(manifest, job)
             yield file
-        said.unlink(missing_ok=True)
+        manifest.unlink(missing_ok=True)
         part.unlink(missing_ok=True)
     except OSError as error:
         raise ExportError(f"{path}: {reason(error)}") from error
@@ -65,16 +65,16 @@ def resumable_folder(
     try:
         folder.mkdir(exist_ok=True)
         names = set(os.listdir(folder))
-        said = _read(folder / JOB)
-        if names and not (said.startswith(OURS) and all(n == JOB or LAYER.fullmatch(n) for n in names)):
+        manifest = _read(folder / JOB)
+        if names and not (manifest.startswith(OURS) and all(n == JOB or LAYER.fullmatch(n) for n in names)):
             raise ExportError(f"{folder}: the folder is not empty, and what is in it is no interrupted job")
-        if said != _said(job):
+        if manifest != _manifest(job):
             if names:
                 _tell(folder)
             for layer in sorted(names - {JOB}):
                 (folder / layer).unlink()
             names = set()
-            _say(folder / JOB, job)
+            _write_manifest(folder / JOB, job)
         index = 0
         while name(index) in names and is_whole((folder / name(index)).read_bytes()):
             index += 1
@@ -83,27 +83,27 @@ def resumable_folder(
         raise ExportError(f"{folder}: {reason(error)}") from error
 
 
-def _read(said: Path) -> bytes:
+def _read(manifest: Path) -> bytes:
     """What a file says of a job, if only this user can have written it; nothing otherwise."""
     try:
-        with files.opened(said, "rb") as file:
+        with files.opened(manifest, "rb") as file:
             return file.read()
     except OSError:
         return b""
 
 
-def _say(said: Path, job: str) -> None:
-    with files.replacing(said) as file:
-        file.write(_said(job))
+def _write_manifest(manifest: Path, job: str) -> None:
+    with files.replacing(manifest) as file:
+        file.write(_manifest(job))
 
 
-def _said(job: str) -> bytes:
+def _manifest(job: str) -> bytes:
     return OURS + f'"job": "{seal(job)}"}}'.encode()
 
 
 def _tell(path: str | Path) -> None:
-    said = f"{path}: what was left there by another job, or somebody else, is dropped; begun afresh"
-    warnings.warn(said, FracsliceWarning, stacklevel=2)
+    manifest = f"{path}: what was left there by another job, or somebody else, is dropped; begun afresh"
+    warnings.warn(manifest, FracsliceWarning, stacklevel=2)
 
 
 def _remove_foreign(part: Path) -> None:

@@ -83,7 +83,7 @@ def _middle(run: SliceRun) -> np.ndarray:
 
 def _mesh(run: SliceRun) -> Mesh:
     """The object's mesh in mm, where its slices are."""
-    from fracslice.printing.apart import shown  # it needs Numba, and other formats do not
+    from fracslice.printing.connectivity import shown  # it needs Numba, and other formats do not
 
     stack, longest = run.stack, max(run.stack.size)
     finest = max(*stack.pixel, float(stack.heights.max()))

@@ -1,8 +1,8 @@
-"""The formulas: one fractal per file, primitives, blends and warps. Importing this registers them all."""
+"""The formulas: fractals, primitives, CSG and domain operators. Importing this registers them all."""
 
-from .blends import difference, intersection, shell, union
 from .box import Box
 from .confining import bounds, offset, repeat
+from .csg import difference, intersection, shell, union
 from .deformations import bend, twist
 from .julia import julia
 from .mandelbulb import mandelbulb
@@ -10,7 +10,7 @@ from .material import material
 from .menger import menger
 from .parameters import Axis, Choice, Count, Number, Vector
 from .primitives import box, capsule, cone, cylinder, octahedron, plane, sphere, torus
-from .registry import Fixed, Formula, Node, blend, get, names, shape, warp
+from .registry import Fixed, Formula, Node, csg_operator, domain_operator, get, names, shape
 from .transforms import mirror, transform
 from .vocabulary import (
     absolute,
@@ -43,14 +43,15 @@ __all__ = [
     "any_of",
     "atan2",
     "bend",
-    "blend",
     "bounds",
     "box",
     "capsule",
     "cone",
     "cos",
+    "csg_operator",
     "cylinder",
     "difference",
+    "domain_operator",
     "exp",
     "floor",
     "get",
@@ -79,6 +80,5 @@ __all__ = [
     "transform",
     "twist",
     "union",
-    "warp",
     "where",
 ]

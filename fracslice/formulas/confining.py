@@ -6,7 +6,7 @@ import math
 
 from .box import Box
 from .parameters import REQUIRED, Number, Vector
-from .registry import Fixed, Node, warp
+from .registry import Fixed, Node, domain_operator
 from .vocabulary import absolute, any_of, floor, maximum, minimum
 
 # Each operator below that confines its child returns ``maximum(d, minimum(child, 2 m - d))`` with d a
@@ -15,7 +15,7 @@ from .vocabulary import absolute, any_of, floor, maximum, minimum
 # Lipschitz bound is not needed either.
 
 
-@warp(
+@domain_operator(
     min=Vector(REQUIRED, "the corner with the smallest coordinates"),
     max=Vector(REQUIRED, "the corner with the largest coordinates"),
 )
@@ -48,21 +48,23 @@ def _(node: Node) -> dict[str, object]:
 
 @bounds.bounds
 def _(node: Node) -> Box:
-    return Box(node["min"], node["max"]) & node.children[0].facts.box
+    return Box(node["min"], node["max"]) & node.children[0].bounds.box
 
 
 @bounds.slope
 def _(node: Node) -> float:
-    return max(1.0, node.children[0].facts.lipschitz)
+    return max(1.0, node.children[0].bounds.lipschitz)
 
 
-@warp(distance=Number(REQUIRED, "how far outward the surface moves, in scene units; negative: inward"))
+@domain_operator(
+    distance=Number(REQUIRED, "how far outward the surface moves, in scene units; negative: inward")
+)
 def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-def]
     """The element grown or shrunk; exact where its field is a distance.
 
     A field that underestimates distances would grow further than it should; it is cut off at the grown box.
     L = the element's, at least 1, the box'; more around an escape-time fractal, whose field is steeper away
-    from its surface (`Facts.steepening`; measured). What is shrunk lies in the element: where that is a
+    from its surface (`Bounds.steepening`; measured). What is shrunk lies in the element: where that is a
     fractal, whose inside bounds nothing, space is skipped by its own field.
     """
     cx, cy, cz = centre
@@ -73,22 +75,22 @@ def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-d
 
 @offset.arguments
 def _(node: Node) -> dict[str, object]:
-    only_grown = node.guarded and node.facts.weak
+    only_grown = node.is_conservative and node.bounds.exterior_only
     distance = max(node["distance"], 0.0) if only_grown else node["distance"]
-    return {"distance": distance, **_frame(node.facts.box)}
+    return {"distance": distance, **_frame(node.bounds.box)}
 
 
 @offset.bounds
 def _(node: Node) -> Box:
-    return node.children[0].facts.box.grown(node["distance"])
+    return node.children[0].bounds.box.grown(node["distance"])
 
 
 @offset.slope
 def _(node: Node) -> float:
-    inner = node.children[0].facts
+    inner = node.children[0].bounds
     n = inner.steepening
     # By how steeply the stretch along circles of latitude ends: within 1/n, in narrow rings within 3/n^2.
-    steeper = 2 + n / 4 + n * n / 128 if inner.weak and node["distance"] > 0 else 1.0
+    steeper = 2 + n / 4 + n * n / 128 if inner.exterior_only and node["distance"] > 0 else 1.0
     return max(1.0, inner.lipschitz * steeper)
 
 
@@ -105,7 +107,7 @@ def _frame(box: Box) -> dict[str, object]:
     }
 
 
-@warp(
+@domain_operator(
     period=Vector(REQUIRED, "distance between copies along x, y and z", above=0),
     count=Vector(
         (0, 0, 0),
@@ -149,7 +151,7 @@ ENDLESS = 1 << 20
 
 def _window(node: Node, axis: int) -> int:
     """How many neighbouring copies can be nearest along an axis."""
-    box, period, count = node.children[0].facts.box, node["period"][axis], node["count"][axis]
+    box, period, count = node.children[0].bounds.box, node["period"][axis], node["count"][axis]
     if count == 1:
         return 1
     overlap = box.size[axis] / 2 / period
@@ -164,7 +166,7 @@ def _window(node: Node, axis: int) -> int:
 
 @repeat.arguments
 def _(node: Node) -> dict[str, object]:
-    box, period, count = node.children[0].facts.box, node["period"], node["count"]
+    box, period, count = node.children[0].bounds.box, node["period"], node["count"]
     windows = [_window(node, axis) for axis in range(3)]
     number = [c or ENDLESS for c in count]
     first = tuple(-((c - 1) / 2) if c else -float(ENDLESS // 2) for c in count)
@@ -185,7 +187,7 @@ def _(node: Node) -> dict[str, object]:
 
 
 def _lattice(node: Node) -> Box:
-    box, lo, hi = node.children[0].facts.box, [], []
+    box, lo, hi = node.children[0].bounds.box, [], []
     for a, b, p, c in zip(box.lo, box.hi, node["period"], node["count"], strict=True):
         reach = (c - 1) / 2 * p if c else math.inf
         lo.append(a - reach)
@@ -200,4 +202,4 @@ def _(node: Node) -> Box:
 
 @repeat.slope
 def _(node: Node) -> float:
-    return max(1.0, node.children[0].facts.lipschitz)
+    return max(1.0, node.children[0].bounds.lipschitz)

@@ -8,12 +8,12 @@ import math
 
 from .box import Box
 from .parameters import REQUIRED, SMALLEST, Axis, Number
-from .registry import Node, warp
+from .registry import Node, domain_operator
 from .transforms import along
 from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt, where
 
 
-@warp(
+@domain_operator(
     axis=Axis("z", "the axis to turn about"),
     degrees=Number(REQUIRED, "how far to turn per unit of length along the axis"),
 )
@@ -50,7 +50,7 @@ def twist(child, x, y, z, rate, radius, margin, along_x, along_y):  # type: igno
 
 def _twist_radius(node: Node) -> float:
     across = [a for a in range(3) if a != "xyz".index(node["axis"])]
-    radius = node.children[0].facts.box.radius(*across)
+    radius = node.children[0].bounds.box.radius(*across)
     if not math.isfinite(radius):
         raise node.fail(
             f"can only twist what is bounded across the {node['axis']} axis; put <bounds> around it"
@@ -71,7 +71,7 @@ def _(node: Node) -> dict[str, object]:
 
 @twist.bounds
 def _(node: Node) -> Box:
-    axis, radius, box = "xyz".index(node["axis"]), _twist_radius(node), node.children[0].facts.box
+    axis, radius, box = "xyz".index(node["axis"]), _twist_radius(node), node.children[0].bounds.box
     lo, hi = [-radius] * 3, [radius] * 3
     lo[axis], hi[axis] = box.lo[axis], box.hi[axis]
     return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
@@ -80,10 +80,10 @@ def _(node: Node) -> Box:
 @twist.slope
 def _(node: Node) -> float:
     shear = abs(math.radians(node["degrees"])) * 1.25 * _twist_radius(node)
-    return max(1.0, node.children[0].facts.lipschitz * (shear + math.sqrt(shear * shear + 4)) / 2)
+    return max(1.0, node.children[0].bounds.lipschitz * (shear + math.sqrt(shear * shear + 4)) / 2)
 
 
-@warp(
+@domain_operator(
     axis=Axis(
         "z", "the hinge, which stays straight: z bends x towards y, x bends y towards z, y bends z towards x"
     ),
@@ -128,7 +128,7 @@ def _bend_frame(node: Node) -> tuple[float, float, float, float]:
     """Curvature, side (+1 or -1), the smallest radius the element reaches, and its half length along the bent
     axis.
     """
-    hinge, box = "xyz".index(node["axis"]), node.children[0].facts.box
+    hinge, box = "xyz".index(node["axis"]), node.children[0].bounds.box
     along, across = (hinge + 1) % 3, (hinge + 2) % 3
     curvature, side = abs(math.radians(node["degrees"])), math.copysign(1.0, node["degrees"])
     half = max(abs(box.lo[along]), abs(box.hi[along]))
@@ -171,9 +171,9 @@ def _(node: Node) -> dict[str, object]:
 @bend.bounds
 def _(node: Node) -> Box:
     if node.is_identity:
-        return node.children[0].facts.box
+        return node.children[0].bounds.box
     curvature, side, inner_radius, half = _bend_frame(node)
-    hinge, box = "xyz".index(node["axis"]), node.children[0].facts.box
+    hinge, box = "xyz".index(node["axis"]), node.children[0].bounds.box
     along, across = (hinge + 1) % 3, (hinge + 2) % 3
     outer = 1 / curvature - min(side * box.lo[across], side * box.hi[across])
     top = half * curvature
@@ -192,6 +192,6 @@ def _(node: Node) -> Box:
 @bend.slope
 def _(node: Node) -> float:
     if node.is_identity:
-        return node.children[0].facts.lipschitz
+        return node.children[0].bounds.lipschitz
     curvature, _, inner_radius, _ = _bend_frame(node)
-    return max(1.0, node.children[0].facts.lipschitz * 2 / (curvature * inner_radius))
+    return max(1.0, node.children[0].bounds.lipschitz * 2 / (curvature * inner_radius))

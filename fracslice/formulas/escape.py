@@ -35,7 +35,7 @@ def potential_distance(r2, slope2, level, first_level, last_level, least):  # ty
 
     The largest, not the last: inside, an attracting orbit lets the derivative decay and the quotient grow
     without limit. There r2 is cut off so that about ``0.1 / slope`` is left, which is below the distance to
-    the surface nearly always; deep sets have exceptions, so nothing may rely on it (`registry.Facts`).
+    the surface nearly always; deep sets have exceptions, so nothing may rely on it (`registry.Bounds`).
     """
     r2 = minimum(maximum(r2, least), 1e30)
     level = minimum(level, last_level)

@@ -17,7 +17,7 @@ ESCAPED = 256.0
 
 @shape(
     lipschitz=2.0,
-    weak=True,
+    exterior_only=True,
     c=Vector(
         (-0.2, 0.8, 0.0, 0.0),
         "the constant added in each step: real part, i, j, k",

@@ -36,7 +36,7 @@ evaluations, but makes the levels steeper that seams lie on.
 
 @shape(
     lipschitz=2.0,
-    weak=True,
+    exterior_only=True,
     power=Number(
         8.0, "the exponent; whole numbers need no trigonometry and are several times faster", least=2, most=32
     ),
@@ -203,7 +203,7 @@ def _digits(n: int) -> tuple[int, ...]:
 def _(node: Node) -> dict[str, object]:
     power = node["power"]
     first, last, escape2, least_r2 = levels(power, node["iterations"], node["bailout"], ESCAPED)
-    loose, torn = _falls_apart(node, escape2), bool(node.guarded and power % 1)
+    loose, torn = _falls_apart(node, escape2), bool(node.is_conservative and power % 1)
     constant = _constant(node)
     reach = farthest(power, node["bailout"], constant)
     fading = 1 / (min(CALM * reach**2, escape2) - reach**2)
@@ -231,7 +231,7 @@ def _(node: Node) -> dict[str, object]:
 
 def _constant(node: Node) -> float:
     """The largest |c| of all points of the solid."""
-    return math.hypot(*node["julia"]) if node["julia"] else node.facts.box.hi[0]
+    return math.hypot(*node["julia"]) if node["julia"] else node.bounds.box.hi[0]
 
 
 def _falls_apart(node: Node, escape2: float) -> bool:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from .box import Box
 from .parameters import Number, Vector
-from .registry import Node, warp
+from .registry import Node, domain_operator
 
 
-@warp(
+@domain_operator(
     colour=Vector(
         (0.8, 0.8, 0.8),
         "red, green and blue; several colours, three numbers each, are a palette for the orbit",
@@ -39,7 +39,7 @@ def material(child, x, y, z):  # type: ignore[no-untyped-def]
 
 @material.bounds
 def _(node: Node) -> Box:
-    return node.children[0].facts.box
+    return node.children[0].bounds.box
 
 
 @material.identity

@@ -2,7 +2,7 @@
 
 Each kind turns text from a scene file into a value (`read`), refuses what cannot be (`check`, a `ValueError`
 that says what is expected) and writes the value back (`text`). The schema and the documentation are made from
-the same objects, and `settle` gives a record's fields the same care.
+the same objects, and `validate` gives a record's fields the same care.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ class Choice:
 Parameter = Number | Count | Vector | Axis | Choice
 
 
-def settle(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exception]) -> None:
+def validate(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exception]) -> None:
     """Replaces fields of a frozen record by what their kinds make of them. None stays where it is the
     default.
 
@@ -174,11 +174,11 @@ def settle(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exceptio
     for name, kind in kinds.items():
         value = getattr(record, name)
         if value is not None or kind.default is not None:
-            object.__setattr__(record, name, settled(name, value, kind, fail))
+            object.__setattr__(record, name, validated(name, value, kind, fail))
 
 
-def settled(name: str, value: Any, kind: Any, fail: Callable[[str], Exception]) -> Any:
-    """What a kind makes of one value. Raises as `settle`."""
+def validated(name: str, value: Any, kind: Any, fail: Callable[[str], Exception]) -> Any:
+    """What a kind makes of one value. Raises as `validate`."""
     try:
         return kind.check(value)
     except ValueError as error:

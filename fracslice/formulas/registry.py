@@ -18,9 +18,9 @@ from typing import Any, Literal
 
 from ..errors import SceneError
 from .box import Box
-from .parameters import REQUIRED, Parameter, settled
+from .parameters import REQUIRED, Parameter, validated
 
-Kind = Literal["shape", "blend", "warp"]
+Kind = Literal["shape", "csg", "domain"]
 
 DEEPEST = 100
 """How deep elements may be nested: far above any use, far below Python's limit on recursion."""
@@ -38,15 +38,15 @@ class Fixed:
 
 
 @dataclass(frozen=True)
-class Facts:
+class Bounds:
     """What is known of a field without evaluating it.
 
     box: encloses all points where the field is negative, in the node's own coordinates.
-    lipschitz: L such that ``|f(p) - f(q)| <= L |p - q|``. Of a weak field only: a point outside is at least
-    ``f(p) / L`` away from the surface.
-    weak: True if there is an escape-time fractal in it. Its inside values are much smaller than the distance
-    to the surface, and bound nothing: the inside cannot be recognised from afar.
-    steepening: of a weak field, the highest power n in it. Along circles of latitude the derivative changes
+    lipschitz: L such that ``|f(p) - f(q)| <= L |p - q|``. With `exterior_only`: a point outside is at
+    least ``f(p) / L`` away from the surface.
+    exterior_only: an escape-time fractal is part of the field. Its inside values bound no distance: the
+    inside cannot be recognised from afar.
+    steepening: of such a field, the highest power n in it. Along circles of latitude the derivative changes
     n times within 2/n of the poles; so level sets other than the surface are steeper: how much is measured
     (`docs/accuracy.md`).
     boxless: the names of the formulas in it that state no box.
@@ -54,7 +54,7 @@ class Facts:
 
     box: Box
     lipschitz: float
-    weak: bool
+    exterior_only: bool
     steepening: float = 0.0
     boxless: tuple[str, ...] = ()
 
@@ -72,7 +72,7 @@ class Formula:
     parameters: Mapping[str, Parameter]
     children: tuple[int, int | None] = (0, 0)
     lipschitz: float = 1.0
-    weak: bool = False
+    exterior_only: bool = False
     hooks: dict[str, Hook] = field(default_factory=dict)
 
     def __call__(self, *children: Node, place: str | None = None, **values: Any) -> Node:
@@ -93,7 +93,7 @@ class Formula:
             if kind.default is REQUIRED:
                 raise SceneError(f"<{self.name}> needs {name}: expected {kind.expects}")
             return kind.default
-        return settled(name, value, kind, lambda message: SceneError(f"<{self.name}> {message}"))
+        return validated(name, value, kind, lambda message: SceneError(f"<{self.name}> {message}"))
 
     def _grouped(self, children: tuple[Node, ...]) -> tuple[Node, ...]:
         least, most = self.children
@@ -119,7 +119,7 @@ class Formula:
         return self._hook("slope", hook)
 
     def steepening(self, hook: Callable[[Node], float]) -> Callable[[Node], float]:
-        """`Facts.steepening`, where it is not the largest of the children's."""
+        """`Bounds.steepening`, where it is not the largest of the children's."""
         return self._hook("steepening", hook)
 
     def arguments(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
@@ -157,15 +157,15 @@ class Formula:
 
 @dataclass(frozen=True)
 class Node:
-    """A formula with its parameters and children: one element of a scene. `place` is "file:line"; `guarded`
-    is told by `guard`; `depth` is how many elements are inside each other, this one included.
+    """A formula with its parameters and children: one element of a scene. `place` is "file:line";
+    `is_conservative` is set by `conservative`; `depth` counts nested elements, this one included.
     """
 
     formula: Formula
     values: Mapping[str, Any]
     children: tuple[Node, ...] = ()
     place: str | None = field(default=None, compare=False)
-    guarded: bool = False
+    is_conservative: bool = False
     depth: int = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -194,21 +194,23 @@ class Node:
         kept = self.children if children is None else children
         return self.formula(*kept, place=self.place, **{**_given(self), **values})
 
-    def guard(self) -> Node:
+    def conservative(self) -> Node:
         """The scene by whose field space may be skipped, where its own exceeds its bound: beside the tears of
         powers that are not whole, and at seams with an escape-time fractal. Only its positive values say
         something: as much, divided by its own Lipschitz bound, is the distance from the surface at least.
         """
-        return replace(self, guarded=True, children=tuple(child.guard() for child in self.children))
+        return replace(
+            self, is_conservative=True, children=tuple(child.conservative() for child in self.children)
+        )
 
     def fail(self, message: str) -> SceneError:
         """The error to raise about this node: file, line and element, then `message`."""
         return SceneError(f"{self.place + ': ' if self.place else ''}<{self.formula.name}> {message}")
 
     @cached_property
-    def facts(self) -> Facts:
+    def bounds(self) -> Bounds:
         """Box, Lipschitz bound and weakness of this field."""
-        hooks, below = self.formula.hooks, [child.facts for child in self.children]
+        hooks, below = self.formula.hooks, [child.bounds for child in self.children]
         box = hooks["bounds"](self) if "bounds" in hooks else Box.everywhere()
         slope = (
             hooks["slope"](self)
@@ -221,8 +223,8 @@ class Node:
             else max((b.steepening for b in below), default=0.0)
         )
         names = [*(n for b in below for n in b.boxless), *([] if "bounds" in hooks else [self.formula.name])]
-        weak = self.formula.weak or any(b.weak for b in below)
-        return Facts(box, slope, weak, steepening, tuple(dict.fromkeys(names)))
+        exterior_only = self.formula.exterior_only or any(b.exterior_only for b in below)
+        return Bounds(box, slope, exterior_only, steepening, tuple(dict.fromkeys(names)))
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -261,19 +263,21 @@ def _given(node: Node) -> dict[str, Any]:
 _REGISTRY: dict[str, Formula] = {}
 
 
-def shape(lipschitz: float = 1.0, weak: bool = False, **parameters: Parameter) -> Callable[..., Formula]:
+def shape(
+    lipschitz: float = 1.0, exterior_only: bool = False, **parameters: Parameter
+) -> Callable[..., Formula]:
     """Registers ``f(x, y, z, ...)`` under the function's name."""
-    return _register("shape", (0, 0), parameters, lipschitz=lipschitz, weak=weak)
+    return _register("shape", (0, 0), parameters, lipschitz=lipschitz, exterior_only=exterior_only)
 
 
-def blend(children: tuple[int, int | None], **parameters: Parameter) -> Callable[..., Formula]:
+def csg_operator(children: tuple[int, int | None], **parameters: Parameter) -> Callable[..., Formula]:
     """Registers ``f(a, ...)`` of one child's values, or ``f(a, b, ...)`` that folds the values of several."""
-    return _register("blend", children, parameters)
+    return _register("csg", children, parameters)
 
 
-def warp(**parameters: Parameter) -> Callable[..., Formula]:
+def domain_operator(**parameters: Parameter) -> Callable[..., Formula]:
     """Registers ``f(child, x, y, z, ...)``, which calls ``child(x, y, z)``."""
-    return _register("warp", (1, 1), parameters)
+    return _register("domain", (1, 1), parameters)
 
 
 def _register(

@@ -10,11 +10,11 @@ import numpy as np
 from .algebra import inverse, length, product, stretches
 from .box import Box
 from .parameters import REQUIRED, SMALLEST, Axis, Vector
-from .registry import Fixed, Node, warp
+from .registry import Fixed, Node, domain_operator
 from .vocabulary import absolute
 
 
-@warp(
+@domain_operator(
     translate=Vector((0.0, 0.0, 0.0), "moves by this, last"),
     rotate=Vector(
         None, "an axis and an angle in degrees, counter-clockwise seen against the axis", sizes=(4,)
@@ -97,7 +97,7 @@ def _(node: Node) -> dict[str, object]:
 
 @transform.bounds
 def _(node: Node) -> Box:
-    box = node.children[0].facts.box
+    box = node.children[0].bounds.box
     if box.empty:
         return box
     linear, offset = affine(node)
@@ -109,7 +109,7 @@ def _(node: Node) -> Box:
     return Box(tuple(low.tolist()), tuple(high.tolist()))
 
 
-@warp(
+@domain_operator(
     axis=Axis(
         REQUIRED, "the axis that is mirrored: what is on its positive side also appears on its negative side"
     )
@@ -135,7 +135,7 @@ def _(node: Node) -> dict[str, object]:
 
 @mirror.bounds
 def _(node: Node) -> Box:
-    axis, box = "xyz".index(node["axis"]), node.children[0].facts.box
+    axis, box = "xyz".index(node["axis"]), node.children[0].bounds.box
     lo, hi = list(box.lo), list(box.hi)
     lo[axis] = -hi[axis]
     return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))

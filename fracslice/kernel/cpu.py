@@ -12,7 +12,7 @@ from typing import Literal, Protocol, overload
 
 import numpy as np
 
-from ..formulas.registry import Facts, Node
+from ..formulas.registry import Bounds, Node
 from .host import lane_count
 from .linker import Linked, link
 from .loops import BRICKS, POINTS, Loop
@@ -43,13 +43,13 @@ class Compilable(Protocol):
     """What stands where the root of a scene does, though it is more than a tree of formulas."""
 
     @property
-    def facts(self) -> Facts: ...
+    def bounds(self) -> Bounds: ...
 
     @property
     def key(self) -> str:
         """As `identity.field_key`."""
 
-    def guard(self) -> Compilable: ...
+    def conservative(self) -> Compilable: ...
 
     def compiled(self, precision: Precision, /) -> Kernel: ...
 

@@ -54,10 +54,10 @@ def missing() -> str | None:
     if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1" and not _driver():
         return NO_GPU
     try:
-        from . import cuda_words
+        from . import cuda_intrinsics
     except (ImportError, RuntimeError) as error:
         return f"CUDA cannot be used: {str(error).splitlines()[0]}"
-    return None if cuda_words.cuda.is_available() else NO_GPU
+    return None if cuda_intrinsics.cuda.is_available() else NO_GPU
 
 
 def _driver() -> bool:
@@ -79,9 +79,9 @@ def require() -> Any:
     reason = missing()
     if reason:
         raise KernelError(reason)
-    from . import cuda_words
+    from . import cuda_intrinsics
 
-    return cuda_words.cuda
+    return cuda_intrinsics.cuda
 
 
 class CudaKernel:
@@ -179,7 +179,7 @@ def load_loops(linked: Linked, precision: Precision, loops: str) -> ModuleType:
 @lru_cache(maxsize=1)
 def _toolchain() -> str:
     """The key of everything beside the module's own text that the machine code depends on."""
-    words = texts(Path(__file__).parent / "cuda_words.py")
+    words = texts(Path(__file__).parent / "cuda_intrinsics.py")
     versions = (version(name) for name in ("numba-cuda", "numba", "llvmlite"))
     return key(words, *versions, *_numba_settings())
 

@@ -13,7 +13,7 @@ from ..errors import KernelError
 from ..formulas.vocabulary import NAMES
 from .linker import CALLED, Linked
 
-WORDS = "fracslice.kernel.cuda_words"
+INTRINSICS = "fracslice.kernel.cuda_intrinsics"
 
 POINTS = """
 @kernel
@@ -59,7 +59,7 @@ def module(linked: Linked, bits: int, loops: str) -> str:
         "kernel",
         "together",
     ]
-    header = f"from numba import cuda\nfrom {WORDS} import {', '.join(words)}\n"
+    header = f"from numba import cuda\nfrom {INTRINSICS} import {', '.join(words)}\n"
     return "\n".join([header, typed(linked.source), loops])
 
 

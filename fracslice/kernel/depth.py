@@ -36,7 +36,7 @@ def resolve_depths(root: Node, detail: float) -> Node:
     return root if children == root.children else root.changed(children)
 
 
-def told_depths(root: Node, known: Node) -> tuple[str, ...]:
+def depth_notes(root: Node, known: Node) -> tuple[str, ...]:
     """The automatic depths of a scene by those of the same one with numbers, such as "mandelbulb 5"."""
     pairs = zip(root.walk(), known.walk(), strict=True)
     return tuple(f"{a.formula.name} {b['iterations']}" for a, b in pairs if a.values != b.values)
@@ -100,8 +100,8 @@ def _surface_points(solid: Known) -> np.ndarray:
     """Points [3, n] on the surface, always the same: bisected between random points inside and outside, of
     cells that may be inside; none where nothing is found.
     """
-    kernel, facts = compile_scene(solid.node, "float64"), solid.node.facts
-    cells, _, step = possible_cells(lambda p: kernel.points(*p), facts.lipschitz, facts.box, CELLS)
+    kernel, bounds = compile_scene(solid.node, "float64"), solid.node.bounds
+    cells, _, step = possible_cells(lambda p: kernel.points(*p), bounds.lipschitz, bounds.box, CELLS)
     if not cells.shape[1]:
         return cells
     rng = np.random.default_rng(0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from ..errors import DeviceError
-from ..formulas.parameters import Choice, settled
+from ..formulas.parameters import Choice, validated
 from ..formulas.registry import Node
 from .cpu import Compilable, Kernel
 from .cpu import compile_scene as compile_for_cpu
@@ -18,7 +18,7 @@ def chosen(device: str) -> Device:
     """The device to use: "cpu", "cuda", or "auto", which takes the GPU if there is one. Raises `DeviceError`
     if there is none, or for another word.
     """
-    settled("device", device, DEVICES, DeviceError)
+    validated("device", device, DEVICES, DeviceError)
     if device == "cpu":
         return "cpu"
     from .cuda import missing

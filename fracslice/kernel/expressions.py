@@ -45,7 +45,7 @@ _ON_LANES: dict[type, Callable[[Vec, Vec], Vec]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq,
 }  # fmt: skip
-_WORDS = {
+_INTRINSICS = {
     name: (getattr(lanes_math, name), count)
     for count, names in (
         (1, ("sqrt", "rsqrt", "log", "exp", "sin", "cos", "floor", "absolute")),
@@ -204,16 +204,16 @@ class Expressions:
     def call(self, name: str, given: list[Value]) -> Value:
         if name in self.emitter.functions:
             count = len(self.emitter.functions[name].args.args)
-        elif name in _WORDS or name in _OWN:
-            count = _WORDS[name][1] if name in _WORDS else _OWN[name]
+        elif name in _INTRINSICS or name in _OWN:
+            count = _INTRINSICS[name][1] if name in _INTRINSICS else _OWN[name]
         else:
             raise MismatchError(f"{name!r} is no function")
         if len(given) != count:
             raise MismatchError(f"{name} takes {count} values, found {len(given)}")
         if name in self.emitter.functions:
             return self.called(name, given)
-        if name in _WORDS:
-            return _WORDS[name][0](*(self.lanes.vec(self.builder, v) for v in given))
+        if name in _INTRINSICS:
+            return _INTRINSICS[name][0](*(self.lanes.vec(self.builder, v) for v in given))
         found: Value = getattr(self, f"word_{name}")(*given)
         return found
 

@@ -24,13 +24,13 @@ class Known:
 def field_key(root: Node | Compilable) -> str:
     """The key of all that a field's values, and what is known of them, follow from.
 
-    Of the scene itself and of its guard: the linked text, the parameters and the facts. Depths must be
+    Of the scene itself and of its conservative: the linked text, the parameters and the facts. Depths must be
     resolved; raises `KernelError`.
     """
     if not isinstance(root, Node):
         return root.key
     parts: list[object] = []
-    for node in (root, root.guard()):
+    for node in (root, root.conservative()):
         linked = link(node)
-        parts += [linked.source, linked.parameters, node.facts]
+        parts += [linked.source, linked.parameters, node.bounds]
     return key(*parts)

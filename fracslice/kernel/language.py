@@ -93,13 +93,13 @@ def _text(function: Callable[..., Any], _: object) -> str:
 
 def word(value: Any) -> str | None:
     """The word that something means, if it is one: ``np.sqrt`` is ``sqrt``."""
-    return _WORDS.get(id(value))
+    return _INTRINSICS.get(id(value))
 
 
-WORDS = frozenset({*vocabulary.NAMES, *_PLAIN})
+INTRINSICS = frozenset({*vocabulary.NAMES, *_PLAIN})
 """All names that a text in the language has without saying what they are."""
 
-_WORDS = {id(getattr(vocabulary, name)): name for name in (*vocabulary.NAMES, "orbit")} | {
+_INTRINSICS = {id(getattr(vocabulary, name)): name for name in (*vocabulary.NAMES, "orbit")} | {
     id(getattr(module, name)): _PYTHON.get(name, name)
     for module in (builtins, math)
     for name in (*_PYTHON, *vocabulary.NAMES)

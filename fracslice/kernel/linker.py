@@ -24,14 +24,14 @@ from ..errors import KernelError
 from ..formulas.parameters import AUTO
 from ..formulas.registry import Fixed, Node
 from . import language, source
-from .structure import UNROLLED, Arguments, Part, Run, arguments, link_tree, read
+from .structure import UNROLLED, Arguments, Run, Subroutine, arguments, link_tree, read
 
 FIELD = "field"
 
 CALLED = "called"
 """Decorates the functions that are called, not inlined."""
 
-LEADING = {"shape": 3, "blend": 2, "warp": 4}
+LEADING = {"shape": 3, "csg": 2, "domain": 4}
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Linker:
     parameters: list[float] = field(default_factory=list)
     functions: dict[str, str] = field(default_factory=dict)
     apart: set[str] = field(default_factory=set)
-    _parts: dict[Any, Part] = field(default_factory=dict)
+    _parts: dict[Any, Subroutine] = field(default_factory=dict)
     _shared: dict[Any, str] = field(default_factory=dict)
 
     def field(self, root: Node) -> None:
@@ -72,7 +72,7 @@ class Linker:
         call = link_tree(self, root, FieldDialect(self))
         self.functions[FIELD] = f"def {FIELD}(x, y, z, P):\n    return {call}"
 
-    def part(self, prefix: str, key: tuple[Any, ...], write: Callable[[str], Part]) -> Part:
+    def part(self, prefix: str, key: tuple[Any, ...], write: Callable[[str], Subroutine]) -> Subroutine:
         """The function of a structure, written once."""
         if (prefix, *key) not in self._parts:
             self._parts[prefix, *key] = write(f"{prefix}{len(self._parts)}")
@@ -147,7 +147,7 @@ class FieldDialect:
     prefix: str = "N"
 
     def kept(self, node: Node) -> Node:
-        while node.is_identity or (node.formula.kind == "blend" and _folds(node) and len(node.children) == 1):
+        while node.is_identity or (node.formula.kind == "csg" and _folds(node) and len(node.children) == 1):
             node = node.children[0]
         return node
 
@@ -158,7 +158,7 @@ class FieldDialect:
             )
         return arguments(node, leading(node))
 
-    def order(self, node: Node, parts: Sequence[Part]) -> Sequence[int]:
+    def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Elements of one structure side by side, where their order changes no bit of the result."""
         places = range(len(parts))
         if not node.is_unordered:
@@ -167,7 +167,9 @@ class FieldDialect:
         return sorted(places, key=lambda k: first.index(parts[k].name))
 
     def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
-        write = {"shape": self.shape, "blend": self.blend, "warp": self.warp}[node.formula.kind]
+        write = {"shape": self.shape, "csg": self.csg_operator, "domain": self.domain_operator}[
+            node.formula.kind
+        ]
         return write(name, given, runs)
 
     def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
@@ -175,7 +177,7 @@ class FieldDialect:
         passed = ", ".join(["x", "y", "z", *given.passed])
         return function(name, [f"return {called}({passed})"])
 
-    def blend(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+    def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
         called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
         lines = [f"f = {runs[0].call()}"]
         if sum(run.count for run in runs) == 1:
@@ -186,7 +188,7 @@ class FieldDialect:
             )
         return function(name, [*lines, "return f"])
 
-    def warp(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+    def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
         tree = source.specialised(given.function, dict(given.fixed))
         arguments = [a.arg for a in tree.args.args][4:]
         tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]
@@ -203,7 +205,7 @@ def _folds(node: Node) -> bool:
 
 def leading(node: Node) -> int:
     """How many of a node's arguments are points, values or its child."""
-    return 1 if node.formula.kind == "blend" and not _folds(node) else LEADING[node.formula.kind]
+    return 1 if node.formula.kind == "csg" and not _folds(node) else LEADING[node.formula.kind]
 
 
 def folded(run: Run, begun: bool, lines: Callable[[str], list[str]]) -> list[str]:

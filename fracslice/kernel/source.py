@@ -49,7 +49,7 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
     scope = language.scope(function)
     names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
     stored = {n.id for n in names if isinstance(n.ctx, ast.Store)} | {a.arg for a in tree.args.args}
-    outside = sorted({n.id for n in names} - stored - language.WORDS - given)
+    outside = sorted({n.id for n in names} - stored - language.INTRINSICS - given)
     numbers = {name: _plain(scope[name]) for name in outside if language.is_number(scope.get(name))}
     calls = {name: scope[name] for name in outside if isinstance(scope.get(name), FunctionType)}
     tree = _Substitute(numbers).visit(tree)

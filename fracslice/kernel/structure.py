@@ -24,7 +24,7 @@ UNROLLED = 3
 
 
 @dataclass(frozen=True)
-class Part:
+class Subroutine:
     """The function ``name(x, y, z, P, P0)`` of all trees of one structure.
 
     size: how many numbers of P it reads, from P0 on. weight: how many parts' code it holds.
@@ -41,7 +41,7 @@ class Run:
     on.
     """
 
-    part: Part
+    part: Subroutine
     count: int
     start: int
 
@@ -81,7 +81,7 @@ class Dialect(Protocol):
 
     def arguments(self, node: Node) -> Arguments: ...
 
-    def order(self, node: Node, parts: Sequence[Part]) -> Sequence[int]:
+    def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """The order in which the children may be evaluated."""
 
     def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
@@ -102,11 +102,11 @@ def link_tree(linker: Linker, root: Node, dialect: Dialect) -> str:
 class _Tree:
     linker: Linker
     dialect: Dialect
-    parts: dict[int, Part] = field(default_factory=dict)
+    parts: dict[int, Subroutine] = field(default_factory=dict)
     inside: dict[int, list[Node]] = field(default_factory=dict)
     given: dict[int, Arguments] = field(default_factory=dict)
 
-    def linked(self, root: Node) -> Part:
+    def linked(self, root: Node) -> Subroutine:
         order, stack = [], [root]
         while stack:
             node = stack.pop()
@@ -122,7 +122,7 @@ class _Tree:
             stack += reversed(self.inside[id(node)])
         return self.parts[id(root)]
 
-    def part(self, node: Node) -> Part:
+    def part(self, node: Node) -> Subroutine:
         """The function of a node whose children have theirs."""
         given = self.given[id(node)] = self.dialect.arguments(node)
         children = self.inside[id(node)]
@@ -134,9 +134,9 @@ class _Tree:
             size += part.size * runs[-1].count
         key = (given.function, given.fixed, given.passed, *((run.part.name, run.count) for run in runs))
 
-        def written(name: str) -> Part:
+        def written(name: str) -> Subroutine:
             self.linker.functions[name] = self.dialect.write(name, node, given, runs)
-            return Part(name, size, self.weight(runs))
+            return Subroutine(name, size, self.weight(runs))
 
         return self.linker.part(self.dialect.prefix, key, written)
 

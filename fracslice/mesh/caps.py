@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fit import OFF, UPRIGHT, Fit
-from .links import corners_by_vertex
 from .model import Mesh
 from .pieces import rows
+from .topology import corners_by_vertex
 
 ANGLES = 0.6, 0.3, 0.1
 """Sines of angles at which a tip is above the planes of triangles that it replaces, at least."""

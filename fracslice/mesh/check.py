@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fracslice.errors import MeshError
 from fracslice.mesh.model import Mesh
-from fracslice.mesh.rounding import rounded
+from fracslice.mesh.quantisation import quantised
 
 
 @dataclass(frozen=True)
@@ -70,51 +70,51 @@ class MeshReport:
         return asdict(self) | {"printable": self.printable, "problems": list(self.problems)}
 
 
-def check(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
+def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
     """Examine a mesh as its file will be read: rounded to float32, equal positions welded, nothing repaired.
 
     All counts are exact. Self-intersections take most of the time. Raises MeshError for a mesh without
     triangles, with an index out of range or a coordinate that is not finite.
     """
-    from fracslice.mesh.crossings import crossing_triangles
-    from fracslice.mesh.links import links, parts, shell_volumes
+    from fracslice.mesh.self_intersections import self_intersecting_triangles
+    from fracslice.mesh.topology import connected_components, edge_topology, shell_volumes
     from fracslice.mesh.tree import build
 
     if not len(mesh.triangles):
         raise MeshError("the mesh has no triangles")
-    mesh = rounded(mesh)
+    mesh = quantised(mesh)
     a, b, c = mesh.triangles.T
     distinct = (a != b) & (b != c) & (c != a)
     whole = mesh if distinct.all() else mesh.selected(distinct)
     if not len(whole.triangles):
         raise MeshError("the mesh has only triangles without area")
-    link = links(whole.triangles, len(whole.vertices))
-    labels, shells = parts(whole.triangles, len(whole.vertices))
+    link = edge_topology(whole.triangles, len(whole.vertices))
+    labels, shells = connected_components(whole.triangles, len(whole.vertices))
     volumes = shell_volumes(whole.vertices, whole.triangles, labels, shells)
     tree = build(whole)
     closed = not (link.open_edges or link.misoriented_edges)
     misplaced = _misplaced(whole, labels, volumes, tree) if closed else 0
-    crossing = crossing_triangles(whole, tree, threads)
+    crossing = self_intersecting_triangles(whole, tree, threads)
     area, _, flat = mesh.measures
     cavities = int((volumes < 0).sum()) if closed else 0
     return MeshReport(
         triangles=len(mesh.triangles),
         vertices=len(mesh.vertices),
         watertight=link.open_edges == 0,
-        manifold=not (link.open_edges or link.crowded_edges or link.extra_fans),
+        manifold=not (link.open_edges or link.non_manifold_edges or link.non_manifold_vertices),
         oriented=not (link.misoriented_edges or misplaced),
         self_intersections=int(crossing.sum()),
         degenerate_triangles=flat,
         duplicate_triangles=duplicates(whole.triangles[crossing]),
         open_edges=link.open_edges,
-        nonmanifold_edges=link.crowded_edges,
-        nonmanifold_vertices=link.extra_fans,
+        nonmanifold_edges=link.non_manifold_edges,
+        nonmanifold_vertices=link.non_manifold_vertices,
         misoriented_edges=link.misoriented_edges,
         misplaced_shells=misplaced,
         components=shells - cavities,
         cavities=cavities,
         genus=_genus(whole, link.edges, shells)
-        if closed and not (link.crowded_edges or link.extra_fans)
+        if closed and not (link.non_manifold_edges or link.non_manifold_vertices)
         else None,
         volume_mm3=float(volumes.sum()),
         area_mm2=area,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fracslice.formulas.algebra import dot, length
 from fracslice.mesh.model import Mesh
-from fracslice.mesh.rounding import float32_points, rounded
+from fracslice.mesh.quantisation import float32_points, quantised
 
 PASSES = 8
 
@@ -20,9 +20,9 @@ def clean(mesh: Mesh) -> Mesh:
     collapsed along its shortest edge. Neither is done where it would pinch the surface or turn a neighbour
     over (the link condition of Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge contraction",
     1999). What cannot be helped stays, for `check` to report. Equal positions are welded last. Raises
-    MeshError as `rounded` does.
+    MeshError as `quantised` does.
     """
-    return rounded(mended(mesh))
+    return quantised(mended(mesh))
 
 
 def mended(mesh: Mesh, low: float = -np.inf, high: float = np.inf) -> Mesh:
@@ -49,7 +49,7 @@ class _Surface:
     """A mesh edited in few places: the triangles around a vertex are looked up when first asked for."""
 
     def __init__(self, points: NDArray[np.float64], triangles: NDArray[np.int32], bad: set[int]) -> None:
-        from fracslice.mesh.links import corners_by_vertex
+        from fracslice.mesh.topology import corners_by_vertex
 
         self.points = points
         self.bad = bad

@@ -52,9 +52,9 @@ class Shells:
 
 def shells(mesh: Mesh) -> Shells:
     """Find the shells of a closed, oriented mesh: triangles that share vertices, O(m log m)."""
-    from fracslice.mesh.links import parts, shell_volumes
+    from fracslice.mesh.topology import connected_components, shell_volumes
 
-    labels, count = parts(mesh.triangles, len(mesh.vertices))
+    labels, count = connected_components(mesh.triangles, len(mesh.vertices))
     volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
     hollow = volumes < 0
     parent = np.full(count, -1, dtype=np.int64)

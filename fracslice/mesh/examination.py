@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fracslice.mesh.collapse import Collapsed
-from fracslice.mesh.crossings import crossing_triangles
-from fracslice.mesh.links import parts, shell_volumes
 from fracslice.mesh.model import Mesh
 from fracslice.mesh.nearest import Nearest
+from fracslice.mesh.self_intersections import self_intersecting_triangles
+from fracslice.mesh.topology import connected_components, shell_volumes
 from fracslice.mesh.tree import build
 from fracslice.work import Work
 
@@ -85,7 +85,7 @@ class _Left:
 
     def crossing(self, among: NDArray[np.bool_], work: Work) -> NDArray[np.bool_]:
         """Those that cross, of which one at least is among these of the original."""
-        return self.all(crossing_triangles(self.mesh, self.tree, work.threads, among[self.old]))
+        return self.all(self_intersecting_triangles(self.mesh, self.tree, work.threads, among[self.old]))
 
     def all(self, marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """The same marks by the numbers of the original."""
@@ -98,7 +98,7 @@ class _Shells:
     """The shells of a mesh, for one that has the same."""
 
     def __init__(self, mesh: Mesh) -> None:
-        labels, self.count = parts(mesh.triangles, len(mesh.vertices))
+        labels, self.count = connected_components(mesh.triangles, len(mesh.vertices))
         self.of = np.zeros(len(mesh.vertices), labels.dtype)
         self.of[mesh.triangles] = labels[:, None]
         self.outside = self._volumes(mesh) >= 0

@@ -16,7 +16,7 @@ from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
 from ..volume.crossings import Refiner
 from ..volume.lattice import BRICK
-from ..volume.settling import Rooms, settle
+from ..volume.projection import TrustRegions, project
 from ..work import Work
 from .model import Mesh
 
@@ -91,8 +91,8 @@ def contour_pieces(
             _called(surface.advance, end, known.first, known.t, known.normals)
         vertices, triangles, count, cases, to_means = surface.finish()
         features = vertices[count:]
-        rooms = partial(_rooms, features, cases, to_means, signs)
-        moved, places = settle(root, features, rooms, signs.voxel, work)
+        trust_regions = partial(_trust_regions, features, cases, to_means, signs)
+        moved, places = project(root, features, trust_regions, signs.voxel, work)
         features[moved] = places
         mesh, border = Mesh(vertices, triangles), np.inf
         if last < len(signs.index):  # The next piece has what this one numbers and does not use.
@@ -125,18 +125,18 @@ def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
     return list(zip(cuts, [*cuts[1:], len(counts)], strict=True))
 
 
-def _rooms(
+def _trust_regions(
     features: np.ndarray,
     cases: np.ndarray,
     to_means: np.ndarray,
     bricks: SignBricks,
     which: np.ndarray,
     inside: np.ndarray,
-) -> Rooms:
+) -> TrustRegions:
     """How far vertices within cells, or within cells' faces, may move: strictly inside these; or towards the
     corner of theirs with the other sign. The surface around them is known by its crossings.
     """
-    origin, voxel, margin = np.array(bricks.origin)[:, None], bricks.voxel, clamp(bricks)
+    origin, voxel, margin = np.array(bricks.origin)[:, None], bricks.voxel, minimum_edge_parameter(bricks)
     there = np.ascontiguousarray(features[which].T)
     grid = (there - origin) / voxel
     whole = np.round(grid)
@@ -147,7 +147,7 @@ def _rooms(
     corner = _nearest_corners()[face, cases[which], octant, ~inside * 1]
     low = np.where(flat, there, origin + voxel * (cell + margin))
     high = np.where(flat, there, origin + voxel * (cell + (1 - margin)))
-    return Rooms(
+    return TrustRegions(
         low,
         high,
         origin + voxel * (cell + (corner >> np.arange(3)[:, None] & 1)),
@@ -174,10 +174,10 @@ def _nearest_corners() -> np.ndarray:
 def _placement(bricks: Bricks | SignBricks) -> tuple[tuple[float, float, float], float, float]:
     """origin, voxel and clamp, as plain numbers."""
     x, y, z = bricks.origin
-    return (float(x), float(y), float(z)), float(bricks.voxel), clamp(bricks)
+    return (float(x), float(y), float(z)), float(bricks.voxel), minimum_edge_parameter(bricks)
 
 
-def clamp(bricks: Bricks | SignBricks) -> float:
+def minimum_edge_parameter(bricks: Bricks | SignBricks) -> float:
     """How near a grid point a vertex may come, as a share of a voxel, so that no two are one in float32.
 
     Vertices of one cell differ by at least that share along some axis; four float32 steps survive any

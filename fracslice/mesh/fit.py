@@ -109,7 +109,7 @@ class Fitted:
 
     mesh: Mesh
     fit: Fit
-    told: NDArray[np.float64]
+    measured: NDArray[np.float64]
 
     @classmethod
     def of(cls, mesh: Mesh, fit: Fit) -> Fitted:
@@ -118,29 +118,29 @@ class Fitted:
 
     def become(self, mesh: Mesh, parents: NDArray[np.int64], fresh: NDArray[np.bool_]) -> Fitted:
         """Another mesh whose triangles are these, by number, but for fresh ones."""
-        told = self.told[parents]
-        told[fresh] = self.fit.triangles(mesh.corners[fresh])
-        return Fitted(mesh, self.fit, told)
+        measured = self.measured[parents]
+        measured[fresh] = self.fit.triangles(mesh.corners[fresh])
+        return Fitted(mesh, self.fit, measured)
 
     @property
     def ways(self) -> NDArray[np.float64]:
         """The field's unit normals at the triangles' middles, [m, 3]."""
-        return self.told[:, :3]
+        return self.measured[:, :3]
 
     @property
     def upright(self) -> NDArray[np.float64]:
         """The cosines between these and the triangles' own, [m]."""
-        return self.told[:, UPRIGHT]
+        return self.measured[:, UPRIGHT]
 
     @property
     def sides(self) -> NDArray[np.float64]:
         """How far the samples of each side are from the surface, [m, 3]."""
-        return self.told[:, 4:7]
+        return self.measured[:, 4:7]
 
     @property
     def off(self) -> NDArray[np.float64]:
         """How far those of the whole triangle are, [m]."""
-        return self.told[:, OFF]
+        return self.measured[:, OFF]
 
 
 def _cosines(corners: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:

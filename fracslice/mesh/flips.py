@@ -45,14 +45,14 @@ def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool
     An edge stays if a triangle's normal would be farther off, as at a sharp edge, or the triangle from the
     surface.
     """
-    mesh, told = Mesh(state.mesh.vertices, state.mesh.triangles.copy()), state.told.copy()
-    changed = np.zeros(len(told), bool)
+    mesh, measured = Mesh(state.mesh.vertices, state.mesh.triangles.copy()), state.measured.copy()
+    changed = np.zeros(len(measured), bool)
     for _ in range(ROUNDS):
-        flips, worth = _candidates(mesh, due, told[:, UPRIGHT] < STEEP)
-        flips = flips.some(_apart(flips, worth, len(told)))
+        flips, worth = _candidates(mesh, due, measured[:, UPRIGHT] < STEEP)
+        flips = flips.some(_apart(flips, worth, len(measured)))
         if not len(flips.old):
             break
-        before = told[flips.old]
+        before = measured[flips.old]
         after = state.fit.triangles(mesh.vertices[flips.new].reshape(-1, 3, 3)).reshape(
             -1, 2, before.shape[2]
         )
@@ -60,10 +60,10 @@ def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool
         good = np.where(was < STEEP, now > was + BETTER, now >= np.minimum(was, FINE))
         good &= after[..., OFF].max(axis=1) <= np.maximum(before[..., OFF].max(axis=1), state.fit.reach)
         flips = flips.some(good)
-        mesh.triangles[flips.old], told[flips.old] = flips.new, after[good]
-        due = np.zeros(len(told), bool)
+        mesh.triangles[flips.old], measured[flips.old] = flips.new, after[good]
+        due = np.zeros(len(measured), bool)
         changed[flips.old] = due[flips.old] = True
-    return Fitted(mesh, state.fit, told), changed
+    return Fitted(mesh, state.fit, measured), changed
 
 
 def _candidates(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fracslice.errors import MeshError
 from fracslice.mesh.model import Mesh
-from fracslice.mesh.rounding import rounded
+from fracslice.mesh.quantisation import quantised
 
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 MILLIMETRES = {
@@ -47,7 +47,7 @@ def read_mesh(path: str | Path) -> Mesh:
     try:
         if path.is_file() and not path.stat().st_size:
             raise MeshError("the file is empty")
-        mesh = rounded(reader(path))
+        mesh = quantised(reader(path))
     except FileNotFoundError:
         raise MeshError(f"{path}: no such file") from None
     except (OSError, MeshError) as error:

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from ..formulas.registry import Node
 from ..kernel import Compilable
-from ..volume.settling import anywhere, settle
+from ..volume.projection import anywhere, project
 from ..work import Work
 from .creases import on_creases
-from .crossings import crossing_triangles
 from .fit import Fit, Fitted
 from .flips import flip
 from .model import Mesh
+from .self_intersections import self_intersecting_triangles
 from .subdivision import Edges, cut, edges_of, with_needles
 
 PASSES = 12
@@ -117,7 +117,7 @@ def _wanted(
     split[longest[free[longest] & (state.off[left] < rough[longest])]] = True
     split = np.asarray(with_needles(split, sides, lengths) & free)
     chosen = there[split]
-    moved, places = settle(root, chosen, anywhere, voxel, work)
+    moved, places = project(root, chosen, anywhere, voxel, work)
     chosen[moved] = places
     return split, chosen
 
@@ -171,7 +171,7 @@ def _blamed(state: Fitted, fresh: NDArray[np.bool_], first: int, work: Work) -> 
     """Which of the vertices from `first` on are corners of triangles that turn away or cross, or next to
     such."""
     mesh = state.mesh
-    crossing = crossing_triangles(mesh, threads=work.threads, among=fresh)
+    crossing = self_intersecting_triangles(mesh, threads=work.threads, among=fresh)
     away = fresh & (state.upright < UPRIGHT) & (mesh.triangles >= first).any(axis=1)
     marked = np.zeros(len(mesh.vertices), bool)
     marked[mesh.triangles[crossing]] = True

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fracslice.errors import MeshError
-from fracslice.formulas.parameters import Number, settled
+from fracslice.formulas.parameters import Number, validated
 from fracslice.mesh.model import Mesh
 from fracslice.scene import parse_length
 from fracslice.work import Work
@@ -41,13 +41,13 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
     """
     from fracslice.mesh.collapse import FIRST, Collapse
     from fracslice.mesh.examination import Examination
-    from fracslice.mesh.links import links
+    from fracslice.mesh.topology import edge_topology
 
     work = work or Work()
     if isinstance(tolerance, str):
         tolerance = parse_length(tolerance, "tolerance")
-    tolerance = settled("tolerance", tolerance, Number(None, "a length", above=0), MeshError)
-    _, *defects = links(mesh.triangles, len(mesh.vertices))
+    tolerance = validated("tolerance", tolerance, Number(None, "a length", above=0), MeshError)
+    _, *defects = edge_topology(mesh.triangles, len(mesh.vertices))
     if any(defects) or not len(mesh.triangles):
         raise MeshError("only a closed, oriented manifold can be simplified")
     collapse, examination = Collapse(mesh, AIM * tolerance), Examination(mesh, tolerance, work)

@@ -35,9 +35,9 @@ class _Survey:
 
     def add(self, mesh: Mesh, end: float) -> NDArray[np.int64]:
         """Take in a piece; return the label of each of its triangles, int64 [m]."""
-        from .links import parts, shell_volumes
+        from .topology import connected_components, shell_volumes
 
-        local, count = parts(mesh.triangles, len(mesh.vertices))
+        local, count = connected_components(mesh.triangles, len(mesh.vertices))
         of_vertex = np.empty(len(mesh.vertices), np.int64)
         of_vertex[mesh.triangles] = local[:, None]
         low, high = _boxes(mesh.vertices, mesh.vertices, of_vertex, count)
@@ -79,7 +79,7 @@ class _Survey:
 
     def _united(self) -> tuple[NDArray[np.int32], int]:
         """The shell of each label."""
-        from .links import unite
+        from .topology import unite
 
         parent: NDArray[np.int64] = np.arange(self.count)
         for a, b in np.concatenate(self.same).tolist():

@@ -16,12 +16,12 @@ from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
 from ..work import Work
 from .caps import Cap, Rings, apart, best, capped
-from .crossings import crossing_triangles
 from .extract import Piece
 from .fit import Fit
 from .model import Mesh
 from .pieces import NOTHING, Pieces, joined
-from .rounding import float32_points
+from .quantisation import float32_points
+from .self_intersections import self_intersecting_triangles
 
 POINTED = 0.15
 """The sine of the angle by which all edges at a pointed vertex fall off, at least."""
@@ -124,7 +124,7 @@ def _crossing(mesh: Mesh, caps: list[Cap], work: Work) -> set[int]:
     of_cap = np.repeat(np.arange(len(caps)), [len(cap.fan) for cap in caps])
     of_cap = np.concatenate([np.full(len(made.triangles) - len(of_cap), -1), of_cap])
     as_written = Mesh(float32_points(made).astype(np.float64), made.triangles)
-    crossing = crossing_triangles(as_written, threads=work.threads, among=of_cap >= 0)
+    crossing = self_intersecting_triangles(as_written, threads=work.threads, among=of_cap >= 0)
     return set(of_cap[crossing].tolist()) - {-1}
 
 

@@ -16,7 +16,7 @@ from .check import MeshReport, duplicates
 from .clean import mended
 from .model import Mesh
 from .pieces import NOTHING, joined
-from .rounding import rounded
+from .quantisation import quantised
 
 WAITS, COUNTS, MENDS = 7.5, 4.0, 3.0
 """Voxels before the end of a piece: triangles beyond wait for the next; vertices up to there are counted now;
@@ -58,7 +58,7 @@ class Window:
         before, self._end, voxel = self._end, end, self._voxel
         whole = joined(self._waiting, piece, before, voxel / 2) if len(self._waiting.triangles) else piece
         whole = mended(whole, before - MENDS * voxel, end - MENDS * voxel)
-        final = rounded(whole)
+        final = quantised(whole)
         if -before == end == np.inf:
             return Finished.whole(final)
         x = final.vertices[:, 0]
@@ -90,21 +90,21 @@ class Tally:
 
     def add(self, piece: Finished) -> None:
         """Count a piece."""
-        from .crossings import crossing_triangles
-        from .links import edge_ends
+        from .self_intersections import self_intersecting_triangles
+        from .topology import edge_ends
 
         mesh, passed = piece.mesh, piece.passed
         a, b, c = mesh.triangles.T
         distinct = (a != b) & (b != c) & (c != a)
         ends = edge_ends(mesh.triangles if distinct.all() else mesh.triangles[distinct], piece.counted)
-        crossing = crossing_triangles(mesh, threads=self.threads) & piece.done
+        crossing = self_intersecting_triangles(mesh, threads=self.threads) & piece.done
         area, volume, flat = passed.measures_from((0.0, 0.0, 0.0))
         self.triangles += len(passed.triangles)
         self.vertices += int(piece.counted.sum())
         self.open_edges += ends.open_edges
-        self.nonmanifold_edges += ends.crowded_edges
+        self.nonmanifold_edges += ends.non_manifold_edges
         self.misoriented_edges += ends.misoriented_edges
-        self.nonmanifold_vertices += ends.extra_fans
+        self.nonmanifold_vertices += ends.non_manifold_vertices
         self.self_intersections += int(crossing.sum())
         self.degenerate_triangles += flat
         self.duplicate_triangles += duplicates(mesh.triangles[crossing])

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..volume.bricks import INSIDE, OUTSIDE
-from .parts import Connected
+from .components import Connected
 from .samples import Samples
 
 FAR = 255
@@ -22,9 +22,11 @@ def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
     """Negative where fewer samples are on the way to these parts than to the others: half the difference. So
     the border lies midway between them, and the surfaces of both stay as they are.
     """
-    solid, parts = found.solid, found.parts
-    mine, tiles = parts.masks(these)
-    to_these, to_others = (_steps(solid.index, solid.ijk, seeds) for seeds in (mine, parts.masks(others)[0]))
+    solid, components = found.solid, found.components
+    mine, tiles = components.masks(these)
+    to_these, to_others = (
+        _steps(solid.index, solid.ijk, seeds) for seeds in (mine, components.masks(others)[0])
+    )
     half = np.clip((to_these.astype(np.float32) - to_others) / 2, -REACH, REACH)
     index = np.where(solid.index >= 0, solid.index, np.where(tiles, INSIDE, OUTSIDE)).astype(np.int32)
     return Samples(replace(solid, values=half * np.float32(solid.voxel), index=index))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..volume import Bricks
-from .parts import Parts
+from .components import Components
 from .samples import positions
 
 NONE = -1
@@ -16,7 +16,7 @@ ACROSS = 192
 CHUNK = 2048
 
 
-def struts(solid: Bricks, parts: Parts, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def struts(solid: Bricks, components: Components, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The ends of struts, float64 [n - 1, 3] each, scene units, that join n bodies, together as short as can
     be.
 
@@ -31,7 +31,7 @@ def struts(solid: Bricks, parts: Parts, bodies: np.ndarray) -> tuple[np.ndarray,
     if len(bodies) < 2:
         return np.empty((0, 3)), np.empty((0, 3))
     times = -(-8 * max(solid.index.shape) // ACROSS)
-    cell, body, place = _cells(solid, parts, bodies, times)
+    cell, body, place = _cells(solid, components, bodies, times)
     shape = tuple(-(-8 * n // times) for n in solid.index.shape)
     of = np.full(shape, NONE)
     of.flat[cell] = np.arange(len(cell))
@@ -67,18 +67,18 @@ def _nearest(pairs: np.ndarray, ends: np.ndarray, slack: int) -> tuple[np.ndarra
 
 
 def _cells(
-    solid: Bricks, parts: Parts, bodies: np.ndarray, times: int
+    solid: Bricks, components: Components, bodies: np.ndarray, times: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The cells of `times` samples along each side that bodies are in, one after the other: flat index,
     number of the body, and a sample of it there, int64 [n], [n] and [n, 3]. A cell comes once for each body
     in it.
     """
-    number = np.full(len(parts.inside), NONE)
+    number = np.full(len(components.inside), NONE)
     number[bodies] = np.arange(len(bodies))
     shape = [-(-8 * n // times) for n in solid.index.shape]
     keys, places = [np.empty(0, np.int64)], [np.empty((0, 3), np.int64)]
     for begin in range(0, len(solid), CHUNK):
-        body = number[parts.labels[begin : begin + CHUNK]]
+        body = number[components.labels[begin : begin + CHUNK]]
         rows, offsets = np.nonzero(body != NONE)
         place = positions(solid, begin + rows, offsets)
         cell = np.ravel_multi_index(tuple(place.T // times), shape)

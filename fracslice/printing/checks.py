@@ -10,16 +10,16 @@ import numpy as np
 
 from ..errors import SceneError
 from ..formulas import Box, Node
-from ..formulas.parameters import Number, settle
+from ..formulas.parameters import Number, validate
 from ..kernel import Compilable
 from ..scene.lengths import Length
 from ..volume import Bricks
 from ..work import Work
-from .apart import resolved, shown
-from .faces import settled
-from .parts import parts_of
+from .components import components_of
+from .connectivity import resolved, shown
+from .faces import projected
 from .samples import lengths
-from .slender import slender
+from .thin_features import thin_features
 from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
 
@@ -56,7 +56,7 @@ class Limits:
     density: float = 1.1
 
     def __post_init__(self) -> None:
-        settle(self, _KINDS, SceneError)
+        validate(self, _KINDS, SceneError)
 
 
 _KINDS = {
@@ -132,12 +132,12 @@ def check_solid(
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
     most = float(BINS[-1]) / scale
-    solid = lengths(bricks, root.facts, most)
+    solid = lengths(bricks, root.bounds, most)
     work.check()
-    thin, tight = slender(root, solid, work)
+    thin, tight = thin_features(root, solid, work)
 
     def seen(**how: Any) -> Walls:
-        return settled(root, walls(solid, most, work, **how), bricks.voxel, work)
+        return projected(root, walls(solid, most, work, **how), bricks.voxel, work)
 
     thick = thin.beside(seen(), most)
     between = tight.beside(seen(gaps=True), most)
@@ -189,8 +189,10 @@ def counted(things: Sequence[object], one: str, more: str = "") -> str:
 
 def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
     """Of all bodies, and of all cavities, of at least `speck`, the largest first."""
-    parts = parts_of(bricks)
-    sizes = [bricks.voxel**3 * parts.count[numbers] for numbers in (parts.bodies, parts.cavities)]
+    components = components_of(bricks)
+    sizes = [
+        bricks.voxel**3 * components.count[numbers] for numbers in (components.bodies, components.cavities)
+    ]
     bodies, cavities = ([v for v in size.tolist() if v >= speck] for size in sizes)
     return bodies, cavities
 

@@ -27,12 +27,12 @@ def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple
     return length / (2 * step), slope / length
 
 
-def settled(root: Node | Compilable, found: Walls, voxel: float, work: Work) -> Walls:
+def projected(root: Node | Compilable, found: Walls, voxel: float, work: Work) -> Walls:
     """Walls or gaps that samples a voxel apart told of, their ends moved along them to where the field itself
     is zero; without those whose faces do not look away from each other there: crumbs that samples made of
     what is thinner than a voxel. Of escape-time fractals samples tell more than values: all stay as they are.
     """
-    if root.facts.weak or not len(found.width):
+    if root.bounds.exterior_only or not len(found.width):
         return found
     kernel, ways = compile_scene(root), ((found.end - found.start) / found.width[:, None]).T
     ends, normals = [], []

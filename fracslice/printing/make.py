@@ -19,11 +19,11 @@ from ..scene import Print
 from ..volume import Bricks, Plan, extent
 from ..volume.grid import from_grid, to_grid
 from ..work import Work
-from .altered import altered
+from .edits import edited
 
 # What measures needs Numba and SciPy, which take as long to load as a small mesh: only where it is used.
 if TYPE_CHECKING:
-    from .parts import Connected, Parts
+    from .components import Components, Connected
     from .samples import Samples
 
 COARSE, FINE = 128, 640
@@ -122,65 +122,65 @@ class _Run:
         if length < 2 * self.size / samples:
             least = 2 * self.size / samples
             raise VolumeError(f"{length:g} mm in {self.size:g} mm: expected at least {least:.3g} mm, or 0")
-        from .apart import shown
+        from .connectivity import shown
 
         return shown(self.thing, self.planned.outer, max(self.planned.box.size), samples, self.work)
 
     def connected(self) -> Connected:
         """Samples that tell what is connected, and what is: taken once, for cavities, bodies and bridges."""
-        from .apart import resolved
-        from .parts import Connected, parts_of
+        from .components import Connected, components_of
+        from .connectivity import resolved
 
         if self.known is None:
             coarse = self.sampled()
-            found = parts_of(coarse)
+            found = components_of(coarse)
             unit = max(self.planned.box.size) / self.size
             bricks = resolved(self.thing, coarse, THIN * unit**2, len(_large(found)) > 1, self.work)
-            self.known = Connected(bricks, found if bricks is coarse else parts_of(bricks))
+            self.known = Connected(bricks, found if bricks is coarse else components_of(bricks))
         return self.known
 
     def seen(self, length: float) -> Samples:
         """The same, as distances by which walls and gaps are measured."""
         from .samples import lengths
 
-        return lengths(self.sampled(length), self.thing.facts, length / self.scale)
+        return lengths(self.sampled(length), self.thing.bounds, length / self.scale)
 
     def filled(self) -> Node | Compilable:
         """The space that nothing reaches becomes solid."""
         from .border import nearer
 
         found = self.connected()
-        cavities = found.parts.cavities
+        cavities = found.components.cavities
         if not len(cavities):
             return self.thing
         self.known = found.filled() if self.how.chooses else None
-        return altered(self.thing, "add", nearer(found, cavities, np.array([0])))
+        return edited(self.thing, "add", nearer(found, cavities, np.array([0])))
 
     def largest(self) -> Node | Compilable:
         """Only the largest body stays."""
-        return self.only(self.connected().parts.bodies[:1])
+        return self.only(self.connected().components.bodies[:1])
 
     def only(self, bodies: np.ndarray) -> Node | Compilable:
         """Only these bodies stay."""
         from .border import nearer
 
         found = self.connected()
-        others = np.setdiff1d(found.parts.bodies, bodies)
-        return altered(self.thing, "keep", nearer(found, bodies, others)) if len(others) else self.thing
+        others = np.setdiff1d(found.components.bodies, bodies)
+        return edited(self.thing, "keep", nearer(found, bodies, others)) if len(others) else self.thing
 
     def bridged(self) -> Node | Compilable:
         """Struts between bodies, as few and as short as can be, and no dust."""
         from .bridges import struts
 
         found = self.connected()
-        large = _large(found.parts)
-        ends = struts(found.solid, found.parts, large)
+        large = _large(found.components)
+        ends = struts(found.solid, found.components, large)
         self.put(self.only(large))
         return self.added(*ends, self.how.bridge / self.scale / 2, self.sampled())
 
     def closed(self) -> Node | Compilable:
         """Gaps are filled from face to face."""
-        from .slender import all_walls
+        from .thin_features import all_walls
 
         solid = self.seen(self.how.gap)
         found = all_walls(self.thing, solid, self.how.gap / self.scale, self.work, gaps=True)
@@ -192,7 +192,7 @@ class _Run:
         with such a ball would take away (Serra 1982), along the part of the medial axis between opposite
         faces.
         """
-        from .slender import all_walls
+        from .thin_features import all_walls
 
         solid, least = self.seen(self.how.thickness), self.how.thickness / self.scale
         middle = all_walls(self.thing, solid, least, self.work).middle
@@ -201,33 +201,33 @@ class _Run:
 
     def added(self, start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Node | Compilable:
         """With strokes, if there are any."""
-        from .strokes import strokes
+        from .capsules import capsules
 
         self.planned = replace(self.planned, outer=self.planned.outer.grown(2 * radius))
-        return altered(self.thing, "add", strokes(start, end, radius, like)) if len(start) else self.thing
+        return edited(self.thing, "add", capsules(start, end, radius, like)) if len(start) else self.thing
 
     def hollowed(self) -> Node | Compilable:
         """Everything farther inside than the walls are thick is taken away, and two holes made into each part
         of that. With holes, parts under `POCKET` of the largest stay solid.
         """
-        from .parts import Connected, parts_of
+        from .components import Connected, components_of
         from .samples import Samples, positions
 
         swept = to_grid(self.sampled(self.how.hollow)).redistance()
         hollow = from_grid(swept.offset(-self.how.hollow / self.scale))
-        found = Connected(hollow, parts_of(hollow))
-        numbers, count = found.parts.bodies, found.parts.count
+        found = Connected(hollow, components_of(hollow))
+        numbers, count = found.components.bodies, found.components.count
         if not len(numbers):
             raise VolumeError(f"walls of {self.how.hollow:g} mm leave nothing to hollow out")
         if not self.how.drain:
-            return altered(self.thing, "cut", Samples(hollow))
+            return edited(self.thing, "cut", Samples(hollow))
         large = count[numbers] >= POCKET * count[numbers[0]]
-        thing = altered(self.thing, "cut", Samples(found.without(numbers[~large])))
+        thing = edited(self.thing, "cut", Samples(found.without(numbers[~large])))
         for number in numbers[large]:
-            at = (found.parts.labels == number) & (hollow.values > -hollow.voxel)
+            at = (found.components.labels == number) & (hollow.values > -hollow.voxel)
             points = np.array(hollow.origin) + hollow.voxel * positions(hollow, *np.nonzero(at))
             for hole in self.drains(points, -hollow.values[at]):
-                thing = altered(thing, "cut", hole)
+                thing = edited(thing, "cut", hole)
         return thing
 
     def drains(self, hollow: np.ndarray, depth: np.ndarray) -> Iterator[Node]:
@@ -257,10 +257,10 @@ def _apart(points: np.ndarray, voxel: float) -> np.ndarray:
     return np.asarray(first)
 
 
-def _large(parts: Parts) -> np.ndarray:
+def _large(components: Components) -> np.ndarray:
     """The numbers of the bodies that are no dust."""
-    bodies = parts.bodies
-    return np.asarray(bodies[parts.count[bodies] > DUST * parts.count[parts.inside].sum()])
+    bodies = components.bodies
+    return np.asarray(bodies[components.count[bodies] > DUST * components.count[components.inside].sum()])
 
 
 def _standing(made: Plan, how: Print, scale: float) -> Plan:
@@ -279,11 +279,11 @@ def _standing(made: Plan, how: Print, scale: float) -> Plan:
         z0 += base
         if z0 >= z1:
             raise VolumeError(f"a base of {base * scale:g} mm leaves nothing of the object")
-        thing = altered(thing, "keep", plane(normal=(0, 0, -1), offset=-z0))
+        thing = edited(thing, "keep", plane(normal=(0, 0, -1), offset=-z0))
         found = Box((x0, y0, z0), (x1, y1, z1))
     if raft:
         rim = max(found.size) / 10
         lying = Box((x0 - rim, y0 - rim, z0 - raft / 2), (x1 + rim, y1 + rim, z0 + raft / 2))
-        thing = altered(thing, "add", transform(box(size=lying.size), translate=lying.centre))
+        thing = edited(thing, "add", transform(box(size=lying.size), translate=lying.centre))
         found, outer = found | lying, (outer | lying).about(outer.centre)
     return replace(made, root=thing, box=found, outer=outer)

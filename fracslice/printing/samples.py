@@ -9,7 +9,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..formulas.box import Box
-from ..formulas.registry import Facts
+from ..formulas.registry import Bounds
 from ..keys import key
 from ..volume import Bricks
 from ..volume.bricks import INSIDE
@@ -32,7 +32,7 @@ class Samples:
 
     def __init__(self, bricks: Bricks) -> None:
         self.bricks = bricks
-        self.bounds = _bounds(bricks)
+        self.brick_bounds = _brick_bounds(bricks)
 
     @property
     def box(self) -> Box:
@@ -51,23 +51,23 @@ class Samples:
         """Values at points, float64 of their shape."""
         b, out = self.bricks, np.empty(np.shape(x))
         u, v, w = (np.ascontiguousarray(a, np.float64).ravel() for a in (x, y, z))
-        _interpolate(u, v, w, *b.origin, b.voxel, b.index, self.bounds, b.values, out.ravel())
+        _interpolate(u, v, w, *b.origin, b.voxel, b.index, self.brick_bounds, b.values, out.ravel())
         return out
 
 
-def lengths(bricks: Bricks, facts: Facts, limit: float) -> Samples:
+def lengths(bricks: Bricks, bounds: Bounds, limit: float) -> Samples:
     """Samples of a field as distances that none is larger than, for walls and gaps up to `limit` scene units:
     its own values, or where those are far from distances, as of escape-time fractals, measured ones.
     """
     from .distances import distances
 
-    if facts.weak:
+    if bounds.exterior_only:
         reach = limit / 2 + bricks.voxel
         return Samples(distances(bricks, reach, reach))
-    return Samples(replace(bricks, values=bricks.values / np.float32(facts.lipschitz)))
+    return Samples(replace(bricks, values=bricks.values / np.float32(bounds.lipschitz)))
 
 
-def _bounds(bricks: Bricks) -> np.ndarray:
+def _brick_bounds(bricks: Bricks) -> np.ndarray:
     """For each brick without samples, how far its points are from the surface at least, signed, float32."""
     from scipy.ndimage import distance_transform_cdt
 
@@ -77,13 +77,13 @@ def _bounds(bricks: Bricks) -> np.ndarray:
 
 
 @compiled
-def _interpolate(xs, ys, zs, x0, y0, z0, voxel, index, bounds, values, out):  # type: ignore[no-untyped-def]
+def _interpolate(xs, ys, zs, x0, y0, z0, voxel, index, brick_bounds, values, out):  # type: ignore[no-untyped-def]
     for n in range(len(xs)):
-        out[n] = interpolated(xs[n], ys[n], zs[n], x0, y0, z0, voxel, index, bounds, values)
+        out[n] = interpolated(xs[n], ys[n], zs[n], x0, y0, z0, voxel, index, brick_bounds, values)
 
 
 @compiled
-def interpolated(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ignore[no-untyped-def]
+def interpolated(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
     """The value at one point."""
     u, v, w = (x - x0) / voxel, (y - y0) / voxel, (z - z0) / voxel
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
@@ -94,7 +94,7 @@ def interpolated(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ig
     known = 0 <= i < 8 * nx and 0 <= j < 8 * ny and 0 <= k < 8 * nz and max(p, q, r) < 7
     row = index[i >> 3, j >> 3, k >> 3] if known else 0
     if known and row < 0:
-        return float(bounds[i >> 3, j >> 3, k >> 3])
+        return float(brick_bounds[i >> 3, j >> 3, k >> 3])
     first = 64 * p + 8 * q + r
     for corner in range(8):
         a, b, c = corner >> 2, (corner >> 1) & 1, corner & 1
@@ -102,12 +102,12 @@ def interpolated(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ig
         if known:
             total += share * values[row, first + 64 * a + 8 * b + c]
         else:
-            total += share * sample_at(index, bounds, values, voxel, i + a, j + b, k + c)
+            total += share * sample_at(index, brick_bounds, values, voxel, i + a, j + b, k + c)
     return total
 
 
 @compiled
-def sample_at(index, bounds, values, voxel, i, j, k):  # type: ignore[no-untyped-def]
+def sample_at(index, brick_bounds, values, voxel, i, j, k):  # type: ignore[no-untyped-def]
     """The sample of a grid point, or a bound; beyond the bricks, from how far beyond it is."""
     bi, bj, bk = i >> 3, j >> 3, k >> 3
     nx, ny, nz = index.shape
@@ -116,7 +116,7 @@ def sample_at(index, bounds, values, voxel, i, j, k):  # type: ignore[no-untyped
         return voxel * (NEAR + beyond - 1)
     row = index[bi, bj, bk]
     if row < 0:
-        return float(bounds[bi, bj, bk])
+        return float(brick_bounds[bi, bj, bk])
     return float(values[row, (i & 7) * 64 + (j & 7) * 8 + (k & 7)])
 
 

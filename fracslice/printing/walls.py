@@ -75,7 +75,7 @@ def walls(
     """Walls, or gaps, up to `limit` scene units thick, of a field of distances.
 
     direction: measure along it instead of the normal, through faces that look along it or against it. Right
-    within a voxel; what is thinner than one shows only where a sample lies in it, see `slender`.
+    within a voxel; what is thinner than one shows only where a sample lies in it, see `thin_features`.
     """
     b, towards = solid.bricks, -1.0 if gaps else 1.0
 
@@ -85,7 +85,9 @@ def walls(
         if direction is not None:
             ways = np.copysign(1, (ways * direction).sum(1))[:, None] * np.array(direction)
         width = np.empty(len(points))
-        _through(points, ways, limit, towards, *b.origin, b.voxel, b.index, solid.bounds, b.values, width)
+        _through(
+            points, ways, limit, towards, *b.origin, b.voxel, b.index, solid.brick_bounds, b.values, width
+        )
         thin = (width < limit) & (np.abs((normals * ways).sum(1)) > -OPPOSITE)
         ends = points + width[:, None] * ways
         thin[thin] = (normals_at(solid, ends[thin]) * normals[thin]).sum(1) < OPPOSITE
@@ -112,7 +114,7 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
         points, normals = np.empty((2, room, 3))
         area = np.empty(room)
         n = _cross(
-            b.ijk[rows], own, *b.origin, b.voxel, b.index, solid.bounds, b.values, points, normals, area
+            b.ijk[rows], own, *b.origin, b.voxel, b.index, solid.brick_bounds, b.values, points, normals, area
         )
     return points[:n].copy(), normals[:n].copy(), area[:n].copy()
 
@@ -120,12 +122,12 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
 def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
     """Unit normals by central differences over a voxel, [n, 3]."""
     b, normals = solid.bricks, np.empty(points.shape)
-    _normals(points, *b.origin, b.voxel, b.index, solid.bounds, b.values, normals)
+    _normals(points, *b.origin, b.voxel, b.index, solid.brick_bounds, b.values, normals)
     return normals
 
 
 @compiled
-def _cross(ijk, own, x0, y0, z0, voxel, index, bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
+def _cross(ijk, own, x0, y0, z0, voxel, index, brick_bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
     """Writes what `crossed` returns, as much as there is room for, and returns how much there is."""
     n = 0
     for row in range(len(ijk)):
@@ -138,7 +140,7 @@ def _cross(ijk, own, x0, y0, z0, voxel, index, bounds, values, points, normals, 
                     g = float(own[row, s + (1 << shift)])
                 else:
                     there = u + (axis == 0), v + (axis == 1), w + (axis == 2)
-                    g = sample_at(index, bounds, values, voxel, *there)
+                    g = sample_at(index, brick_bounds, values, voxel, *there)
                 if (f < 0) == (g < 0):
                     continue
                 if n >= len(area):
@@ -147,7 +149,7 @@ def _cross(ijk, own, x0, y0, z0, voxel, index, bounds, values, points, normals, 
                 points[n] = x0 + voxel * u, y0 + voxel * v, z0 + voxel * w
                 points[n, axis] += voxel * f / (f - g)
                 x, y, z = points[n]
-                normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, bounds, values)
+                normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
                 area[n] = voxel * voxel * abs(normals[n, axis])
                 n += 1
     return n
@@ -160,27 +162,27 @@ def _place(ijk, row, s):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _normals(points, x0, y0, z0, voxel, index, bounds, values, normals):  # type: ignore[no-untyped-def]
+def _normals(points, x0, y0, z0, voxel, index, brick_bounds, values, normals):  # type: ignore[no-untyped-def]
     for n in range(len(points)):
         x, y, z = points[n]
-        normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, bounds, values)
+        normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
 
 
 @compiled
-def _normal(x, y, z, x0, y0, z0, voxel, index, bounds, values):  # type: ignore[no-untyped-def]
+def _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
     h = voxel / 2
-    u = interpolated(x + h, y, z, x0, y0, z0, voxel, index, bounds, values)
-    u -= interpolated(x - h, y, z, x0, y0, z0, voxel, index, bounds, values)
-    v = interpolated(x, y + h, z, x0, y0, z0, voxel, index, bounds, values)
-    v -= interpolated(x, y - h, z, x0, y0, z0, voxel, index, bounds, values)
-    w = interpolated(x, y, z + h, x0, y0, z0, voxel, index, bounds, values)
-    w -= interpolated(x, y, z - h, x0, y0, z0, voxel, index, bounds, values)
+    u = interpolated(x + h, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
+    u -= interpolated(x - h, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
+    v = interpolated(x, y + h, z, x0, y0, z0, voxel, index, brick_bounds, values)
+    v -= interpolated(x, y - h, z, x0, y0, z0, voxel, index, brick_bounds, values)
+    w = interpolated(x, y, z + h, x0, y0, z0, voxel, index, brick_bounds, values)
+    w -= interpolated(x, y, z - h, x0, y0, z0, voxel, index, brick_bounds, values)
     length = max(np.sqrt(u * u + v * v + w * w), 1e-30)
     return u / length, v / length, w / length
 
 
 @compiled
-def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, bounds, values, width):  # type: ignore[no-untyped-def]
+def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, brick_bounds, values, width):  # type: ignore[no-untyped-def]
     """How far it is to the other side; twice the limit where that is farther."""
     for n in range(len(points)):
         (x, y, z), (u, v, w) = points[n], ways[n]
@@ -188,7 +190,7 @@ def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, bounds, val
         width[n] = 2 * limit
         while s < limit + voxel:
             f = towards * interpolated(
-                x + s * u, y + s * v, z + s * w, x0, y0, z0, voxel, index, bounds, values
+                x + s * u, y + s * v, z + s * w, x0, y0, z0, voxel, index, brick_bounds, values
             )
             if f >= 0:
                 break

@@ -25,7 +25,7 @@ class Wrapped:
 
 
 @dataclass(frozen=True, eq=False)
-class Raised(Wrapped):
+class OffsetField(Wrapped):
     """Lowers all values by a constant: the inside reaches farther, or less far."""
 
     by: float

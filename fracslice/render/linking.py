@@ -19,9 +19,9 @@ from ..scene.view import Camera, Light, View
 from .colours import Look, linear
 from .units import camera as cameras
 from .units import lights, march, shade
+from .units.intrinsics import GIVEN
 from .units.normal import normal
 from .units.random import centred, sample
-from .units.words import GIVEN
 
 RELAX = 1.4
 """Measured on the Mandelbulb: 8.1 M evaluations a frame at 1.0, 6.0 at 1.4, 8.4 at 1.7."""
@@ -63,7 +63,7 @@ class Optics:
 
 def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> Optics:
     """The optics of a picture of this many pixels."""
-    box = root.facts.box
+    box = root.bounds.box
     corners = [c for c in box.corners if all(map(math.isfinite, c))]
     far = max([math.dist(camera.eye, c) for c in corners] + [4 * math.dist(camera.eye, camera.target)])
     far = far if box.finite else 25 * far
@@ -104,8 +104,8 @@ class _Frame:
         )
 
     def marching(self) -> None:
-        seen, steepness = self.seen, 1 / self.root.facts.lipschitz
-        box = self.root.facts.box
+        seen, steepness = self.seen, 1 / self.root.bounds.lipschitz
+        box = self.root.bounds.box
         lo = tuple(max(a, e - seen.far) for a, e in zip(box.lo, self.camera.eye, strict=True))
         hi = tuple(min(a, e + seen.far) for a, e in zip(box.hi, self.camera.eye, strict=True))
         self.linker.bind("span_box", march.span, {"lo": lo, "hi": hi})
@@ -185,7 +185,7 @@ class _Frame:
             lines.append("ambient = ambient + glow")
         lines += ["r = ambient * cr", "g = ambient * cg", "b = ambient * cb"]
         if any(light.shadows == "yes" for light in self.view.lights):
-            steepness = 1 / self.root.facts.lipschitz
+            steepness = 1 / self.root.bounds.lipschitz
             self.linker.bind("visible_", march.visible, {"steepness": steepness, "patience": 200})
             lines += [f"s{a} = {a} + 3.0 * h * n{a}" for a in "xyz"]
         for k, light in enumerate(self.view.lights):

@@ -17,7 +17,7 @@ from ..scene.reader import read
 from ..scene.view import Camera
 from ..work import Work
 from .progressive import Pass, Renderer
-from .setting import clearance
+from .setup import clearance
 
 WITHIN = 0.03
 """Seconds to the first picture from a new place."""
@@ -30,7 +30,7 @@ BOLD = 0.5
 
 
 @dataclass(frozen=True)
-class Stick:
+class CameraInput:
     """Where the pilot steers: -1 to 1 each. pace: how often the way to the surface is flown in a second."""
 
     forward: float = 0.0
@@ -90,7 +90,7 @@ class Live:
         self._renderer = self._made(self._scene.view.camera)
         self.first = self.camera
         self._lock = threading.Lock()
-        self._stick, self._aim, self._trouble = Stick(), self.camera, ""
+        self._camera_input, self._aim, self._trouble = CameraInput(), self.camera, ""
         self._looked = self._stepped = time.monotonic()
         self._pass()
         self._open = True
@@ -101,17 +101,17 @@ class Live:
     @property
     def camera(self) -> Camera:
         """Where the picture is seen from."""
-        return self._renderer.setting.camera
+        return self._renderer.setup.camera
 
     @property
     def scene(self) -> Scene:
         """The last one that could be read."""
         return self._scene
 
-    def steer(self, stick: Stick) -> None:
+    def steer(self, camera_input: CameraInput) -> None:
         """Fly on like this."""
         with self._lock:
-            self._stick = stick
+            self._camera_input = camera_input
         self._work.cancel.set()
 
     def turn(self, yaw: float, pitch: float) -> None:
@@ -167,8 +167,8 @@ class Live:
         """Goes where the pilot steers and shows the picture from there, if that is elsewhere."""
         now = time.monotonic()
         with self._lock:
-            if not self._stick.idle:
-                self._aim = self._stick.flown(self._aim, self._room(), now - self._stepped)
+            if not self._camera_input.idle:
+                self._aim = self._camera_input.flown(self._aim, self._room(), now - self._stepped)
             aim = self._aim
         self._stepped = now
         if aim == self.camera:
@@ -182,7 +182,7 @@ class Live:
         return self._pass()
 
     def _look(self, camera: Camera) -> None:
-        what = self._renderer.setting
+        what = self._renderer.setup
         room = clearance(what.roots[-1], camera)
         if self._settled / NEARER < room < self._settled * NEARER:
             self._renderer.look(camera, WITHIN)
@@ -192,11 +192,11 @@ class Live:
     def _made(self, camera: Camera | None) -> Renderer:
         view = replace(self._scene.view, camera=camera)
         made = Renderer(self._scene.root, view, self._size, self._work, self._device)
-        self._settled = clearance(made.setting.roots[-1], made.setting.camera)
+        self._settled = clearance(made.setup.roots[-1], made.setup.camera)
         return made
 
     def _room(self) -> float:
-        return clearance(self._renderer.setting.roots[-1], self.camera)
+        return clearance(self._renderer.setup.roots[-1], self.camera)
 
     def _read(self) -> Scene:
         return read(self._path).with_values(self._settings)

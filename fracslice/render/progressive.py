@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import RenderError
-from ..formulas.parameters import Number, Vector, settled
+from ..formulas.parameters import Number, Vector, validated
 from ..formulas.registry import Node
 from ..kernel.devices import chosen
 from ..keys import key, program
@@ -22,7 +22,7 @@ from ..work import Work
 from .accumulator import COARSE, Accumulator, HostAccumulator
 from .cpu import BLOCK, CpuTracer
 from .linking import Frame, link_frame, optics
-from .setting import Setting, settle
+from .setup import RenderSetup, prepare
 
 STEPS, GROWTH, GROWN = 160, 10, 16
 """Steps of a ray in the first pass; how often as many after GROWN passes, in equal steps between."""
@@ -99,11 +99,11 @@ class Renderer:
         device: str = "auto",
     ) -> None:
         pixels = (view.film.width, view.film.height) if size is None else size
-        self.width, self.height = settled("size", pixels, SIZE, RenderError)
+        self.width, self.height = validated("size", pixels, SIZE, RenderError)
         self.work = work or Work()
         self.device = chosen(device)
-        self.setting = settle(root, view, (self.width, self.height))
-        self.dtype = np.dtype(self.setting.precision)
+        self.setup = prepare(root, view, (self.width, self.height))
+        self.dtype = np.dtype(self.setup.precision)
         tracer, self._kept = _machinery(self.device)
         self.tracer = tracer(self._frame(0), self.dtype, self.width, self.height)
         self.accumulator = self._kept(self._empty)
@@ -117,7 +117,7 @@ class Renderer:
     @property
     def key(self) -> str:
         """Equal for pictures that the same samples make."""
-        what: Setting = self.setting
+        what: RenderSetup = self.setup
         frames = [self._frame(k).linked for k in range(len(what.roots))]
         parts = [part for frame in frames for part in (frame.source, frame.parameters)]
         return key(program(), self.width, self.height, what.precision, *parts)
@@ -129,9 +129,9 @@ class Renderer:
         solid. within: seconds that the first pass may take, going by the passes so far; it is as fine as
         that allows.
         """
-        what = self.setting
+        what = self.setup
         seen = optics(camera, (self.width, self.height), what.roots[-1], what.optics.least)
-        self.setting = replace(what, camera=camera, optics=seen)
+        self.setup = replace(what, camera=camera, optics=seen)
         self._aimed = None
         self.accumulator = self.accumulator.anew(COARSE if within is None else self._affordable(within))
 
@@ -158,9 +158,9 @@ class Renderer:
         about, `Accumulator.wanted` says. Raises `RenderError` for numbers that cannot be, and `Cancelled`;
         what was complete before stays valid.
         """
-        most = self.setting.view.film.samples if samples is None else samples
-        most = settled("samples", most, Film.kinds()["samples"], RenderError)
-        tolerance = settled("tolerance", tolerance, Number(TOLERANCE, "an error", least=0), RenderError)
+        most = self.setup.view.film.samples if samples is None else samples
+        most = validated("samples", most, Film.kinds()["samples"], RenderError)
+        tolerance = validated("tolerance", tolerance, Number(TOLERANCE, "an error", least=0), RenderError)
         while True:
             pixels, count = self.accumulator.wanted(most, tolerance)
             if not count:
@@ -181,7 +181,7 @@ class Renderer:
         """Points the tracer at the tree of this pass, and looks ahead once for each, where a block of
         pixels has more than one ray."""
         ahead = number > 0 or self.accumulator.coarse < BLOCK
-        aimed = self.setting.root(number), ahead
+        aimed = self.setup.root(number), ahead
         if aimed != self._aimed:
             self.tracer.aim(self._frame(number))
             if ahead:
@@ -189,7 +189,7 @@ class Renderer:
             self._aimed = aimed
 
     def _frame(self, number: int) -> Frame:
-        what = self.setting
+        what = self.setup
         return link_frame(what.root(number), what.view, what.camera, what.optics, BLOCK)
 
     def seen(self) -> Pass:
@@ -197,6 +197,6 @@ class Renderer:
         return self._seen(*self.accumulator.statistics(), 0, 0.0)
 
     def _seen(self, samples: float, error: float, traced: int, rate: float) -> Pass:
-        view, kept = self.setting.view, self.accumulator
+        view, kept = self.setup.view, self.accumulator
         active = traced / (self.width * self.height)
         return Pass(kept.passes, samples, error, active, rate, view.film, view.shading.mode, kept)

@@ -17,7 +17,7 @@ from ..formulas import material
 from ..formulas.registry import Node
 from ..kernel import source
 from ..kernel.linker import OF_FORMULAS, FieldDialect, folded, function, leading
-from ..kernel.structure import Arguments, Part, Run, arguments, read
+from ..kernel.structure import Arguments, Run, Subroutine, arguments, read
 
 
 @dataclass
@@ -39,7 +39,7 @@ class TraceDialect(FieldDialect):
         passed = read(float(self.materials[id(node)]), paint, "P0")
         return Arguments(node.function, (), (passed,), tuple(paint))
 
-    def order(self, node: Node, parts: Sequence[Part]) -> Sequence[int]:
+    def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """As they stand: where two are as near, the first one's paint is taken."""
         return range(len(parts))
 
@@ -70,7 +70,7 @@ class TraceDialect(FieldDialect):
             ],
         )
 
-    def blend(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+    def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
         called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
         lines = [f"f, paint, tone = {runs[0].call()}"]
         if sum(run.count for run in runs) == 1:
@@ -85,7 +85,7 @@ class TraceDialect(FieldDialect):
             lines += folded(run, k == 0, lambda call: [taken[0].format(call), *taken[1:]])
         return function(name, [*lines, "return f, paint, tone"])
 
-    def warp(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+    def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
         tree = source.specialised(given.function, dict(given.fixed))
         arguments = [a.arg for a in tree.args.args][4:]
         tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]

@@ -16,7 +16,7 @@ from .view import PARTS, Part
 
 
 @dataclass(frozen=True)
-class Section:
+class TopElement:
     """`<scene>` or an element directly under it; described like a `Formula`, so that it reads like one.
 
     part: the record it becomes, if it is about pictures or printing. many: whether there may be several.
@@ -30,7 +30,7 @@ class Section:
     many: bool = False
 
 
-Element = Formula | Section
+Element = Formula | TopElement
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,13 @@ class Version:
 
 
 VERSION = 1
-SCENE = Section(
+SCENE = TopElement(
     "scene",
     "The whole file.",
     MappingProxyType({"version": Version()}),
     (1, None),
 )
-SOLID = Section(
+SOLID = TopElement(
     "solid",
     "The object to make. Several elements inside it are a union.",
     MappingProxyType({"size": Length(REQUIRED, "the longest side of the finished object")}),
@@ -65,9 +65,9 @@ SOLID = Section(
 )
 
 
-def _section(part: type[Part]) -> Section:
+def _section(part: type[Part]) -> TopElement:
     parameters = MappingProxyType(part.kinds())
-    return Section(part.element, part.__doc__ or "", parameters, part=part, many=part.many)
+    return TopElement(part.element, part.__doc__ or "", parameters, part=part, many=part.many)
 
 
 PRINT = _section(Print)

@@ -13,8 +13,11 @@ from .nearest import hint
 
 _GROUPS = {
     "shape": ("Shapes", "Solids of their own; they take no elements inside them."),
-    "blend": ("Blends", "One solid made of the elements inside."),
-    "warp": ("Warps", "The element inside, looked at elsewhere. Several elements inside are a union."),
+    "csg": ("CSG operators", "One solid made of the elements inside."),
+    "domain": (
+        "Domain operators",
+        "The element inside, looked at elsewhere. Several elements inside are a union.",
+    ),
 }
 
 _START = """\

@@ -79,7 +79,7 @@ def _refuse_impossible(root: Node) -> None:
     for node in reversed(list(root.walk())):
         with computing(node.fail):
             depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
-            _ = node.facts, (node.changed(**depths) if depths else node).arguments
+            _ = node.bounds, (node.changed(**depths) if depths else node).arguments
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from ..errors import SceneError
 from ..formulas import Node
 from ..formulas.parameters import REQUIRED
 from ..formulas.registry import DEEPEST, TOO_DEEP
-from .layout import SCENE, SECTIONS, SOLID, Element, Section, formulas
+from .layout import SCENE, SECTIONS, SOLID, Element, TopElement, formulas
 from .model import Scene, computing, scene
 from .nearest import hint
 from .printing import Print
@@ -136,7 +136,7 @@ class _Builder:
 
     def end(self, name: str) -> None:
         closed = self.open.pop()
-        if isinstance(closed.element, Section):
+        if isinstance(closed.element, TopElement):
             self.close_section(closed)
             return
         try:
@@ -149,7 +149,7 @@ class _Builder:
 
     def close_section(self, closed: _Open) -> None:
         section = closed.element
-        if isinstance(section, Section) and section.part:
+        if isinstance(section, TopElement) and section.part:
             self.parts.append(section.part(place=closed.place, **closed.values))
             if not section.many:
                 self.done[section.name] = closed

@@ -20,7 +20,7 @@ _FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*(\d+)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.D
 
 
 @dataclass(frozen=True)
-class Setting:
+class Override:
     """One change: of every element of that name, or of the one with this number."""
 
     source: str
@@ -51,49 +51,49 @@ def changed(scene: Scene, settings: Iterable[str]) -> Scene:
     return scene
 
 
-def _parsed(source: str) -> Setting:
+def _parsed(source: str) -> Override:
     match = _FORM.fullmatch(source)
     if not match:
         raise SceneError(f"{source!r}: expected {FORM}")
     element, number, attribute, text = match.groups()
-    return Setting(source, element, int(number) if number else None, attribute, text)
+    return Override(source, element, int(number) if number else None, attribute, text)
 
 
-def _changed(scene: Scene, setting: Setting) -> Scene:
-    if setting.element == SOLID.name:
-        return replace(scene, size_mm=setting.value(SOLID))
-    if setting.element == PRINT.name:
-        return replace(scene, printing=replace(scene.printing, **{setting.attribute: setting.value(PRINT)}))
-    if setting.element in (section.name for section in PICTURE):
-        return replace(scene, view=_relit(scene.view, setting))
+def _changed(scene: Scene, override: Override) -> Scene:
+    if override.element == SOLID.name:
+        return replace(scene, size_mm=override.value(SOLID))
+    if override.element == PRINT.name:
+        return replace(scene, printing=replace(scene.printing, **{override.attribute: override.value(PRINT)}))
+    if override.element in (section.name for section in PICTURE):
+        return replace(scene, view=_relit(scene.view, override))
     present = Counter(node.formula.name for node in scene.root.walk())
-    if setting.element not in present:
-        known = hint(setting.element, present | {SOLID.name: 1}, "<{}>")
-        raise setting.fail(f"the scene has no <{setting.element}>; {known}")
-    if setting.number is not None and not 1 <= setting.number <= present[setting.element]:
-        raise setting.fail(f"the scene has {present[setting.element]} <{setting.element}>, counted from 1")
-    return replace(scene, root=_rebuilt(scene.root, setting, Counter()))
+    if override.element not in present:
+        known = hint(override.element, present | {SOLID.name: 1}, "<{}>")
+        raise override.fail(f"the scene has no <{override.element}>; {known}")
+    if override.number is not None and not 1 <= override.number <= present[override.element]:
+        raise override.fail(f"the scene has {present[override.element]} <{override.element}>, counted from 1")
+    return replace(scene, root=_rebuilt(scene.root, override, Counter()))
 
 
-def _relit(view: View, setting: Setting) -> View:
+def _relit(view: View, override: Override) -> View:
     """The view with one value of its elements changed; film and shading are always there."""
-    section = SECTIONS[setting.element]
+    section = SECTIONS[override.element]
     always = [part for part in (view.film, view.shading) if part not in view.parts]
     found, counted = [], 0
     for part in (*view.parts, *always):
         counted += part.element == section.name
-        meant = part.element == section.name and setting.number in (None, counted)
-        found.append(replace(part, **{setting.attribute: setting.value(section)}) if meant else part)
-    if not counted or not 1 <= (setting.number or 1) <= counted:
-        raise setting.fail(
+        meant = part.element == section.name and override.number in (None, counted)
+        found.append(replace(part, **{override.attribute: override.value(section)}) if meant else part)
+    if not counted or not 1 <= (override.number or 1) <= counted:
+        raise override.fail(
             f"the scene has {counted or 'no'} <{section.name}>{', counted from 1' if counted else ''}"
         )
     return View.of(found)
 
 
-def _rebuilt(node: Node, setting: Setting, seen: Counter[str]) -> Node:
+def _rebuilt(node: Node, override: Override, seen: Counter[str]) -> Node:
     seen[node.formula.name] += 1
-    meant = node.formula.name == setting.element and setting.number in (None, seen[node.formula.name])
-    values: Mapping[str, Any] = {setting.attribute: setting.value(node.formula)} if meant else {}
-    children = tuple(_rebuilt(child, setting, seen) for child in node.children)
+    meant = node.formula.name == override.element and override.number in (None, seen[node.formula.name])
+    values: Mapping[str, Any] = {override.attribute: override.value(node.formula)} if meant else {}
+    children = tuple(_rebuilt(child, override, seen) for child in node.children)
     return node.changed(children, **values)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 from ..errors import SceneError
 from ..formulas.box import Box
-from ..formulas.parameters import Choice, Count, Number, Vector, settle, settled
+from ..formulas.parameters import Choice, Count, Number, Vector, validate, validated
 
 Triple = tuple[float, float, float]
 WHITE = (1.0, 1.0, 1.0)
@@ -35,7 +35,7 @@ class Part:
     place: str | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        settle(self, self.kinds(), self.fail)
+        validate(self, self.kinds(), self.fail)
         self.validate()
 
     def validate(self) -> None:
@@ -99,14 +99,14 @@ class Camera(Part):
 
     def moved(self, forward: float = 0.0, right: float = 0.0, up: float = 0.0) -> Camera:
         """Flown by so much, in scene units, looking in the same direction."""
-        by = settled("moved", (forward, right, up), SHIFT, self.fail)
+        by = validated("moved", (forward, right, up), SHIFT, self.fail)
         shift = tuple(_dot(by, axes) for axes in zip(self.forward, self.right, self.above, strict=True))
         return replace(self, eye=_plus(self.eye, shift), target=_plus(self.target, shift))
 
     def turned(self, yaw: float = 0.0, pitch: float = 0.0) -> Camera:
         """Looking elsewhere from the same place: so many degrees to the right, and up (never over the
         zenith)."""
-        yaw, pitch = settled("turned", (yaw, pitch), TURN, self.fail)
+        yaw, pitch = validated("turned", (yaw, pitch), TURN, self.fail)
         ahead = math.asin(max(-1.0, min(1.0, _dot(self.forward, _unit(self.up)))))
         rise = max(-1.55, min(1.55, ahead + math.radians(pitch))) - ahead
         level = _turn(self.forward, self.right, rise)
@@ -115,7 +115,7 @@ class Camera(Part):
 
     def orbited(self, degrees: float) -> Camera:
         """Carried around the target, about the direction that is up."""
-        degrees = settled("degrees", degrees, Number(0.0, "an angle"), self.fail)
+        degrees = validated("degrees", degrees, Number(0.0, "an angle"), self.fail)
         arm = _turn(_minus(self.eye, self.target), _unit(self.up), math.radians(degrees))
         return replace(self, eye=_plus(self.target, arm))
 

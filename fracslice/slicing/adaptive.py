@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import SliceError
-from ..formulas.parameters import settled
+from ..formulas.parameters import validated
 from ..scene.lengths import Length
 from ..work import Work
 from .layers import Layer, Slicer
@@ -29,7 +29,7 @@ def adapted(stack: Stack, most: float, work: Work | None = None) -> Stack:
     while that is at most the height of one planned layer. The same for any number of threads. Raises
     `SliceError` if `most` is below the planned height.
     """
-    least, most = float(stack.heights[0]), settled("layer", most, Length(None, ""), SliceError)
+    least, most = float(stack.heights[0]), validated("layer", most, Length(None, ""), SliceError)
     if most < least:
         raise SliceError(
             f"layers of {least:g} to {most:g} mm: expected a range from the lowest to the highest"

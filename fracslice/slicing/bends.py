@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..rows import Rows
-from .section import Section, Vertices, alone, free
+from .section import CrossSection, Vertices, alone, free
 
 SAGITTA = 2e-3
 """Pixels that an outline may be away from the middle of a side."""
@@ -67,7 +67,7 @@ class _Sides(Rows):
 
 
 def bends(
-    points: np.ndarray, following: np.ndarray, pixels: np.ndarray, sharp: Vertices, section: Section
+    points: np.ndarray, following: np.ndarray, pixels: np.ndarray, sharp: Vertices, section: CrossSection
 ) -> Vertices:
     """What is to be put between crossings so that no contour is farther than `SAGITTA` from its outline where
     that is smooth.
@@ -132,7 +132,7 @@ def _square(way: np.ndarray) -> np.ndarray:
     return np.asarray(way[:, 0] ** 2 + way[:, 1] ** 2)
 
 
-def _settled(sides: _Sides, section: Section) -> _Sides:
+def _settled(sides: _Sides, section: CrossSection) -> _Sides:
     """Sides with the heights that the field says, by the secant method; without those where it finds none."""
     height, before, last = sides.height.copy(), np.zeros(len(sides.height)), section(sides.middles)
     found, todo = np.zeros(len(height), bool), np.arange(len(height))

@@ -18,7 +18,7 @@ from .graph import Found, Graph, Nodes
 from .layers import Layer, Slicer
 from .printers import Printer
 from .raster import check_fits
-from .runs import Parts, parts_of, unsupported
+from .runs import LayerComponents, components_of, unsupported
 from .stack import Stack
 from .thickness import widths
 
@@ -62,11 +62,11 @@ class PrintReport:
 
 
 @dataclass(frozen=True, eq=False)
-class _Told:
+class _LayerFindings:
     """What a worker tells of one layer."""
 
-    solid: Parts
-    empty: Parts
+    solid: LayerComponents
+    empty: LayerComponents
     area: float
     walls: np.ndarray | None
     gaps: np.ndarray | None
@@ -80,10 +80,10 @@ def check_layers(
     """
     chosen = set(np.linspace(0, len(stack.z) - 1, THICKNESS_LAYERS).astype(int).tolist())
 
-    def make(layer: Layer) -> _Told:
+    def make(layer: Layer) -> _LayerFindings:
         runs = layer.runs
         measured = widths(runs, stack.pixel) if layer.index in chosen else (None, None)
-        return _Told(*parts_of(runs), layer.area, *measured)
+        return _LayerFindings(*components_of(runs), layer.area, *measured)
 
     limits, work = limits or Limits(), work or Work()
     solid = check_object(stack.root, stack.outer, stack.scale, limits, work, max(stack.pixel))
@@ -97,11 +97,11 @@ class _Collector:
     printer: Printer | None
     solid: SolidReport
 
-    def report(self, told: Iterator[_Told]) -> PrintReport:
+    def report(self, findings: Iterator[_LayerFindings]) -> PrintReport:
         stack, solid, empty = self.stack, Graph(), Graph()
         square = stack.pixel[0] * stack.pixel[1]
         volume, overhangs, walls, gaps = 0.0, [], [np.empty((0, 2))], [np.empty((0, 2))]
-        for k, now in enumerate(told):
+        for k, now in enumerate(findings):
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
             overhangs.append(
@@ -114,9 +114,9 @@ class _Collector:
                 walls.append(now.walls)
                 gaps.append(now.gaps)
         unfit = misfit(self.stack, self.printer) if self.printer else ""
-        parts, hollows, overhang = solid.nodes(), empty.nodes(), np.array(overhangs)
-        islands = self.found(parts, parts.islands())
-        bodies = self.bodies(parts)
+        components, hollows, overhang = solid.nodes(), empty.nodes(), np.array(overhangs)
+        islands = self.found(components, components.islands())
+        bodies = self.bodies(components)
         cups = [c for c in self.shut(hollows, False) if self.height(c) >= self.limits.deep]
         traps = self.shut(hollows, True)
         real = [i for i in islands if i.area >= self.limits.speck]

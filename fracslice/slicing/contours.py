@@ -10,7 +10,7 @@ from .._slices import Slab
 from ..kernel import Kernel
 from .bends import bends
 from .corners import corners
-from .section import Section, Vertices
+from .section import CrossSection, Vertices
 from .slab import is_fractal
 from .stack import Stack
 
@@ -61,7 +61,7 @@ def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Conto
     exact: the float64 kernel that the crossings are refined with.
     """
     edges, ends = slab.crossings(k)
-    following, section = edges[:, 3], Section(exact, z, stack.frame)
+    following, section = edges[:, 3], CrossSection(exact, z, stack.frame)
     order, starts = _cycles(following)
     along = refined(section, edges, ends)
     # Never quite at an end: there several contours, or the parts of one, would meet.
@@ -74,7 +74,7 @@ def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Conto
     return _nested(replace(vertices, points=places), order, starts, edges, ends[:, 0] < 0)
 
 
-def _turns(points: np.ndarray, edges: np.ndarray, section: Section) -> Vertices:
+def _turns(points: np.ndarray, edges: np.ndarray, section: CrossSection) -> Vertices:
     """Corners and bends between crossings."""
     following, middles = edges[:, 3], edges[:, :2] + 0.5 * np.eye(2)[edges[:, 2]]
     pixels = np.floor((middles + middles[following]) / 2).astype(int)
@@ -96,7 +96,7 @@ def _cycles(following: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(order, np.int32), np.array(starts, np.int32)
 
 
-def refined(section: Section, edges: np.ndarray, ends: np.ndarray) -> np.ndarray:
+def refined(section: CrossSection, edges: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Where on its edge each crossing lies, 0 to 1, to `PRECISE`: false position with the Illinois rule
     (Dowell and Jarratt 1971), all edges at once; those that are done are left out.
     """

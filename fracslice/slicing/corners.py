@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .section import Section, Vertices, alone, free
+from .section import CrossSection, Vertices, alone, free
 
 STEP = 1e-4
 """Pixels between the points of a slope."""
@@ -16,7 +16,7 @@ NEAR = 0.01
 """Pixels between a corner and the zero set, at most."""
 
 
-def corners(points: np.ndarray, following: np.ndarray, pixels: np.ndarray, section: Section) -> Vertices:
+def corners(points: np.ndarray, following: np.ndarray, pixels: np.ndarray, section: CrossSection) -> Vertices:
     """Corners between crossings.
 
     points, following, pixels: as of `bends`. A corner is where the tangents of two crossings of one pixel
@@ -45,7 +45,7 @@ def corners(points: np.ndarray, following: np.ndarray, pixels: np.ndarray, secti
     return Vertices(meet[right], chosen[right], np.full(np.count_nonzero(right), 0.5))
 
 
-def _tangents(points: np.ndarray, section: Section) -> tuple[np.ndarray, np.ndarray]:
+def _tangents(points: np.ndarray, section: CrossSection) -> tuple[np.ndarray, np.ndarray]:
     """The field at points, and its slope per pixel, float64 [n] and [n, 2]."""
     f = section(points)
     along = [section(points + STEP * step) - f for step in np.eye(2)]

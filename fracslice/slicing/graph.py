@@ -15,7 +15,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..disjoint import find, unite
-from .runs import Parts, overlaps
+from .runs import LayerComponents, overlaps
 
 
 @dataclass(frozen=True)
@@ -39,20 +39,20 @@ class Graph:
     middle: list[np.ndarray] = field(default_factory=list)
     open: list[np.ndarray] = field(default_factory=list)
     edges: list[np.ndarray] = field(default_factory=list)
-    last: Parts | None = None
+    last: LayerComponents | None = None
     count: int = 0
 
-    def add(self, parts: Parts) -> None:
+    def add(self, components: LayerComponents) -> None:
         """The parts of the next layer."""
         if self.last is not None:
-            pairs = overlaps(self.last, parts).astype(np.int64)
+            pairs = overlaps(self.last, components).astype(np.int64)
             self.edges.append(pairs + np.array([self.count - len(self.last), self.count]))
-        self.layer.append(np.full(len(parts), len(self.layer), np.int32))
-        self.area.append(parts.area)
-        self.middle.append(parts.middle)
-        self.open.append(parts.open)
-        self.last = parts
-        self.count += len(parts)
+        self.layer.append(np.full(len(components), len(self.layer), np.int32))
+        self.area.append(components.area)
+        self.middle.append(components.middle)
+        self.open.append(components.open)
+        self.last = components
+        self.count += len(components)
 
     def nodes(self) -> Nodes:
         """All that was fed, as arrays."""

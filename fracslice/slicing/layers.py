@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class View:
+class ScreenView:
     """How a screen shows a layer, its back up.
 
     shape: rows and columns of the picture. transposed: its rows run along the layer's y; backwards: its
@@ -69,7 +69,7 @@ class Layer:
         """mm."""
         return float(self.stack.heights[self.index])
 
-    def deflated(self, view: View) -> bytes:
+    def deflated(self, view: ScreenView) -> bytes:
         """What a PNG file holds of the layer as a screen shows it: rows, each after a byte 0, as a zlib
         stream.
         """
@@ -137,7 +137,7 @@ class Slicer:
         root, shape = self.stack.root, self.stack.shape
         exact = compile_scene(root, "float64")
         lattice = shape[0] + 1, shape[1] + 1
-        sampler = Sampler(compile_scene(root), root, root.facts, self.stack.frame, lattice)
+        sampler = Sampler(compile_scene(root), root, root.bounds, self.stack.frame, lattice)
         chosen = range(len(self.stack.z)) if layers is None else layers
 
         def slab(group: list[int]) -> list[T]:

@@ -9,9 +9,9 @@ import numpy as np
 
 from .._slices import deflated
 from ..errors import SliceError
-from ..formulas.parameters import Number, settle
+from ..formulas.parameters import Number, validate
 from ..scene.lengths import Shift
-from .layers import Layer, View
+from .layers import Layer, ScreenView
 from .printers import Printer
 from .stack import Stack
 
@@ -33,7 +33,7 @@ class Screen:
     mirror: bool | None = None
 
     def __post_init__(self) -> None:
-        settle(self, _KINDS, SliceError)
+        validate(self, _KINDS, SliceError)
         if not abs(self.compensation) <= 1:
             raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
         if self.printer:
@@ -69,11 +69,11 @@ class Screen:
         return deflated(self.picture(layer)) if self.compensation else layer.deflated(self._view)
 
     @cached_property
-    def _view(self) -> View:
+    def _view(self) -> ScreenView:
         mine = self._place
         at = [on.start - of.start for on, of in zip(mine.on_bed, mine.of_layer, strict=True)]
         backwards = self._mirrored != self._portrait
-        return View(self.shape, self._portrait, backwards, (at[0], at[1]), self._levels.tobytes())
+        return ScreenView(self.shape, self._portrait, backwards, (at[0], at[1]), self._levels.tobytes())
 
     @cached_property
     def _levels(self) -> np.ndarray:

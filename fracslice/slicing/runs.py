@@ -36,7 +36,7 @@ class Runs:
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class LayerComponents:
     """The connected parts of one layer, solid ones or empty ones.
 
     rows: int32 [ny + 1], the runs of row y are ``rows[y]:rows[y + 1]``. begin, end: int32 [r], the pixels
@@ -56,12 +56,12 @@ class Parts:
         return len(self.area)
 
 
-def parts_of(solid: Runs) -> tuple[Parts, Parts]:
+def components_of(solid: Runs) -> tuple[LayerComponents, LayerComponents]:
     """The solid parts, pixels that touch at a corner connected, and the empty ones, by sides only."""
     return _labelled(solid, 1), _labelled(solid.gaps, 0)
 
 
-def _labelled(runs: Runs, reach: int) -> Parts:
+def _labelled(runs: Runs, reach: int) -> LayerComponents:
     rows, begin, end = runs.rows, runs.begin, runs.end
     part = np.empty(len(begin), np.int32)
     count = _label(rows, begin, end, reach, part)
@@ -72,7 +72,9 @@ def _labelled(runs: Runs, reach: int) -> Parts:
     rim = (begin == 0) | (end == runs.width) | (row == 0) | (row == runs.height - 1)
     opened = np.zeros(count, bool)
     opened[part[rim]] = True
-    return Parts(rows, begin, end, part, area, np.stack([x, y], 1) / np.maximum(area, 1)[:, None], opened)
+    return LayerComponents(
+        rows, begin, end, part, area, np.stack([x, y], 1) / np.maximum(area, 1)[:, None], opened
+    )
 
 
 @compiled
@@ -114,7 +116,7 @@ def _label(rows, begin, end, reach, part):  # type: ignore[no-untyped-def]
     return count
 
 
-def overlaps(below: Parts, above: Parts) -> np.ndarray:
+def overlaps(below: LayerComponents, above: LayerComponents) -> np.ndarray:
     """Pairs of parts of two layers that share a pixel, int32 [n, 2] (below, above), in order, each once."""
     pairs = np.empty((len(below.begin) + len(above.begin), 2), np.int32)
     count = _overlaps(
@@ -141,7 +143,7 @@ def _overlaps(rows_a, begin_a, end_a, part_a, rows_b, begin_b, end_b, part_b, pa
     return n
 
 
-def unsupported(below: Parts, above: Parts, reach: float, width: int) -> int:
+def unsupported(below: LayerComponents, above: LayerComponents, reach: float, width: int) -> int:
     """Solid pixels of a layer that are farther than `reach` pixels from all solid ones of the layer below."""
     return int(
         _unsupported(below.rows, below.begin, below.end, above.rows, above.begin, above.end, reach, width)

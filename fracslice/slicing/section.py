@@ -11,7 +11,7 @@ from ..rows import Rows
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class CrossSection:
     """kernel: of the field. z: of the layer. frame: (x0, y0, dx, dy) of the lattice. Scene units."""
 
     kernel: Kernel

@@ -11,7 +11,7 @@ from ..errors import SceneError, SliceError
 from ..formulas import transform
 from ..formulas.algebra import length
 from ..formulas.box import Box
-from ..formulas.parameters import REQUIRED, Vector, settle
+from ..formulas.parameters import REQUIRED, Vector, validate
 from ..formulas.registry import Node
 from ..kernel import Compilable
 from ..printing import printable
@@ -41,7 +41,7 @@ class SliceJob:
     printing: Print = field(default_factory=Print)
 
     def __post_init__(self) -> None:
-        settle(self, _KINDS, SceneError)
+        validate(self, _KINDS, SceneError)
         if self.layer >= self.size:
             raise SliceError(f"a layer of {self.layer:g} mm is as high as the object: {self.size:g} mm")
         if max(self.pixel) >= self.size:

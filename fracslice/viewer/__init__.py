@@ -1,8 +1,8 @@
 """Windows and pictures of meshes and scenes; the only importer of pyvista."""
 
-from fracslice.viewer.cockpit import fly
 from fracslice.viewer.picture import need_pyvista, picture
 from fracslice.viewer.screen import need_screen
+from fracslice.viewer.viewer import fly
 from fracslice.viewer.window import show
 
 __all__ = ["fly", "need_pyvista", "need_screen", "picture", "show"]

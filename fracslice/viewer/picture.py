@@ -14,9 +14,9 @@ import numpy as np
 from fracslice.errors import RenderError
 from fracslice.export import replacing
 from fracslice.extras import lacking
-from fracslice.formulas.parameters import Choice, Vector, settled
+from fracslice.formulas.parameters import Choice, Vector, validated
 from fracslice.mesh.model import Mesh
-from fracslice.viewer import stage
+from fracslice.viewer import lighting
 
 SOFTWARE = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow"}
 SECONDS = 600
@@ -35,8 +35,8 @@ def picture(
     Raises RenderError for a size that cannot be, when pyvista is not installed, the machine cannot draw or
     the mesh is empty, ExportError when the file cannot be written.
     """
-    size = settled("size", size, SIZE, RenderError)
-    settled("background", background, Choice("light", "", tuple(stage.BACKGROUNDS)), RenderError)
+    size = validated("size", size, SIZE, RenderError)
+    validated("background", background, Choice("light", "", tuple(lighting.BACKGROUNDS)), RenderError)
     if not len(mesh.triangles):
         raise RenderError("the mesh has no triangles to draw")
     need_pyvista()
@@ -56,7 +56,7 @@ def need_pyvista() -> None:
 
 def _draw(arguments: list[str]) -> None:
     """Draw in another process, first as the machine is set up, then with OSMesa."""
-    command = [sys.executable, "-P", stage.__file__, *arguments]
+    command = [sys.executable, "-P", lighting.__file__, *arguments]
     for extra in ({}, SOFTWARE):
         try:
             run = subprocess.run(

@@ -8,8 +8,8 @@ from typing import Any
 
 from fracslice.mesh.model import Mesh
 from fracslice.mesh.reading import read_mesh
+from fracslice.viewer.lighting import body, set_lighting
 from fracslice.viewer.screen import need_screen
-from fracslice.viewer.stage import body, set_stage
 
 INK = "#303438"
 HELP = "drag: turn   wheel: zoom   W, S: wires, surface   C: cut open   V: first view   Q: close"
@@ -24,7 +24,7 @@ def show(mesh: Mesh | str | Path) -> None:
     name = "" if isinstance(mesh, Mesh) else f"{Path(mesh).name}: "
     model = mesh if isinstance(mesh, Mesh) else read_mesh(mesh)
     need_screen()
-    Window(model, name).plotter.show()
+    ViewerWindow(model, name).plotter.show()
 
 
 def caption(mesh: Mesh) -> str:
@@ -39,7 +39,7 @@ def _plotter(title: str) -> Any:
     return pyvista.Plotter(title=title, window_size=[1280, 960], off_screen=False)
 
 
-class Window:
+class ViewerWindow:
     """A pyvista window with its keys."""
 
     def __init__(self, mesh: Mesh, name: str) -> None:
@@ -47,7 +47,7 @@ class Window:
         self.cutting = False
         title = name + caption(mesh)
         self.plotter = _plotter(f"fracslice  {title}")
-        self.actor = set_stage(self.plotter, self.surface, "light", brightness=0.72)
+        self.actor = set_lighting(self.plotter, self.surface, "light", brightness=0.72)
         self.view, self.angle = self.plotter.camera_position, self.plotter.camera.view_angle
         self.plotter.add_text(title, position="upper_left", font_size=10, color=INK)
         self.plotter.add_text(HELP, position="lower_left", font_size=8, color=INK)

@@ -9,9 +9,9 @@ from typing import TypeVar
 import numpy as np
 
 from ..formulas.box import Box
-from ..formulas.registry import Facts, Node
+from ..formulas.registry import Bounds, Node
 from ..kernel import Compilable, Kernel
-from ..kernel.depth import resolve_depths, told_depths, visible
+from ..kernel.depth import depth_notes, resolve_depths, visible
 from ..kernel.devices import compile_for
 from ..store import Arrays, stored
 from ..work import Work
@@ -77,7 +77,7 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
     found = extent(known, resolution, work)
     voxel = max(found.box.size) / resolution
     shown, notes = visible(known, voxel)
-    return Plan(shown, found.box, found.outer, found.tips, voxel, notes, told_depths(root, known))
+    return Plan(shown, found.box, found.outer, found.tips, voxel, notes, depth_notes(root, known))
 
 
 def with_depths(root: Node, work: Work | None = None) -> Node:
@@ -86,9 +86,9 @@ def with_depths(root: Node, work: Work | None = None) -> Node:
     The depths follow from the object alone, whatever it is sampled for: a mesh, layers and what checks them
     are of the same solid. Raises `VolumeError`.
     """
-    if not root.facts.box.finite:
+    if not root.bounds.box.finite:
         return root
-    size = max(root.facts.box.size)
+    size = max(root.bounds.box.size)
     known = resolve_depths(root, size / DETAIL)
     # A deeper solid is smaller, so that finer detail counts, until no depth changes any more.
     while known is not root:
@@ -120,8 +120,8 @@ def _sampled(
     lattice, fresh = planned.lattice, list[AnyBricks]()
 
     def made() -> Arrays:
-        kernel, facts, guard = _fields(planned, work)
-        bricks = take(kernel, facts, lattice, work, guard)
+        kernel, bounds, conservative = _fields(planned, work)
+        bricks = take(kernel, bounds, lattice, work, conservative)
         fresh.append(bricks)
         return {name: getattr(bricks, name) for name in ("ijk", held, "index")}
 
@@ -129,8 +129,8 @@ def _sampled(
     return fresh[0] if fresh else kind(lattice.origin, lattice.voxel, kept["ijk"], kept[held], kept["index"])
 
 
-def _fields(planned: Plan, work: Work) -> tuple[Kernel, Facts, Kernel]:
+def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:
     """What is sampled, the facts of what is pruned by, and what is pruned by: mostly the same."""
     root = planned.root
-    guard = root.guard()
-    return compile_for(work.device, root), guard.facts, compile_for(work.device, guard)
+    conservative = root.conservative()
+    return compile_for(work.device, root), conservative.bounds, compile_for(work.device, conservative)

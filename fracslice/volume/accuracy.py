@@ -40,7 +40,7 @@ def surface_points(
     rng = np.random.default_rng(0)
     p = rng.uniform(np.array(box.lo)[:, None], np.array(box.hi)[:, None], (3, STARTS))
     h = REACH * voxel
-    if root.facts.weak:
+    if root.bounds.exterior_only:
         p = p[:, ~(kernel.points(*p) < 0)]
     for _ in range(STEPS):
         work.check()

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..formulas import Box
 from ..formulas.algebra import length
-from ..formulas.registry import Facts, Node
+from ..formulas.registry import Bounds, Node
 from ..kernel import Compilable, Kernel, compile_scene
 from ..kernel.cells import possible_cells
 from ..work import Work
@@ -35,7 +35,7 @@ MARGIN = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Amount:
+class VolumeEstimate:
     """An object's volume and its standard error, scene units^3. inside: the points [3, n] that were inside of
     it, in cells that are not wholly.
     """
@@ -52,29 +52,31 @@ class Amount:
         return made / self.volume - 1 if sure and self.volume else 0.0
 
 
-def amount(root: Node | Compilable, boxes: list[Box], work: Work | None = None) -> Amount:
+def amount(root: Node | Compilable, boxes: list[Box], work: Work | None = None) -> VolumeEstimate:
     """The volume of what is inside boxes that do not overlap: stratified random points, always the same.
 
     Of each box the cells that are proven empty are left out, and where the field bounds distances inside,
     too, those that are proven full are counted (Cochran 1977, "Sampling Techniques", chapter 5). Raises
     `Cancelled`.
     """
-    work, guard = work or Work(), root.guard()
-    kernel, bound = compile_scene(root), compile_scene(guard)
-    parts = [_part(kernel, bound, guard.facts, box, len(boxes), work) for box in boxes]
-    return Amount(
+    work, conservative = work or Work(), root.conservative()
+    kernel, bound = compile_scene(root), compile_scene(conservative)
+    parts = [_part(kernel, bound, conservative.bounds, box, len(boxes), work) for box in boxes]
+    return VolumeEstimate(
         sum(part.volume for part in parts),
         math.hypot(*(part.error for part in parts)),
         np.concatenate([part.inside for part in parts], axis=1),
     )
 
 
-def _part(kernel: Kernel, guard: Kernel, facts: Facts, box: Box, boxes: int, work: Work) -> Amount:
+def _part(
+    kernel: Kernel, conservative: Kernel, bounds: Bounds, box: Box, boxes: int, work: Work
+) -> VolumeEstimate:
     """One box' share."""
     cells, values, step = possible_cells(
-        lambda p: values_at(guard, p, work), facts.lipschitz, box, CELLS // boxes
+        lambda p: values_at(conservative, p, work), bounds.lipschitz, box, CELLS // boxes
     )
-    full = (values < -facts.lipschitz * length(step) / 2) & (not facts.weak)
+    full = (values < -bounds.lipschitz * length(step) / 2) & (not bounds.exterior_only)
     cells, whole = cells[:, ~full], int(full.sum())
     each = min(max(POINTS // boxes // max(cells.shape[1], 1), 2), MOST_EACH)
     rng = np.random.default_rng(0)
@@ -82,12 +84,12 @@ def _part(kernel: Kernel, guard: Kernel, facts: Facts, box: Box, boxes: int, wor
     inside = (values_at(kernel, points.reshape(3, -1), work) < 0).reshape(-1, each)
     share, room = inside.mean(axis=1), float(step.prod())
     error = math.sqrt(float((share * (1 - share)).sum()) / (each - 1))
-    return Amount(room * (whole + float(share.sum())), room * error, points[:, inside])
+    return VolumeEstimate(room * (whole + float(share.sum())), room * error, points[:, inside])
 
 
 def finer(
     root: Node | Compilable,
-    found: Amount,
+    found: VolumeEstimate,
     off: float,
     origin: tuple[float, float, float],
     spacing: tuple[float, float, float],

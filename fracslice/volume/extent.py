@@ -66,13 +66,13 @@ def extent(root: Node | Compilable, resolution: float, work: Work | None = None)
     union of a field that underestimates distances can). Raises `VolumeError` if nothing is inside, or the
     object has no end.
     """
-    box, found = root.facts.box, None
+    box, found = root.bounds.box, None
     if box.empty:
         raise VolumeError("the scene is empty: its elements have no point in common")
     if not box.finite:
         *axes, last = (a for a, s in zip("xyz", box.size, strict=True) if not np.isfinite(s))
         along = f"{', '.join(axes)} and {last}" if axes else last
-        state = "".join(f", or state the box of {n} with @{n}.bounds" for n in root.facts.boxless[:1])
+        state = "".join(f", or state the box of {n} with @{n}.bounds" for n in root.bounds.boxless[:1])
         raise VolumeError(f"the scene has no end along {along}; put <bounds> around it{state}")
     field = _field(root, work or Work())
     for _ in range(TURNS):
@@ -106,9 +106,11 @@ def reached(root: Node | Compilable, points: np.ndarray, voxel: float, work: Wor
 
 
 def _field(root: Node | Compilable, work: Work) -> Field:
-    guard = root.guard()
-    facts = guard.facts
-    return Field(compile_scene(root), compile_scene(guard), facts.lipschitz, not facts.weak, work)
+    conservative = root.conservative()
+    bounds = conservative.bounds
+    return Field(
+        compile_scene(root), compile_scene(conservative), bounds.lipschitz, not bounds.exterior_only, work
+    )
 
 
 def _sides(field: Field, region: Box) -> list[Side]:

@@ -85,11 +85,11 @@ class Roots:
         self._functions["aim"](self._frame, segments, out)
         return out[0], out[1]
 
-    def lead(self, rooms: np.ndarray) -> np.ndarray:
-        """The ways, [3, n], from points to the surface. rooms: [15, n]: the points, the room below and above
-        them, and the ways to somewhere of the other sign and to the middle, NaN if there is none."""
-        ways = np.empty((3, rooms.shape[1]), self.dtype)
-        self._functions["lead"](self._frame, rooms, ways)
+    def lead(self, trust_regions: np.ndarray) -> np.ndarray:
+        """The ways, [3, n], from points to the surface. trust_regions: [15, n]: the points, the space
+        below and above them, the ways to somewhere of the other sign and to the middle, or NaN."""
+        ways = np.empty((3, trust_regions.shape[1]), self.dtype)
+        self._functions["lead"](self._frame, trust_regions, ways)
         return ways
 
 

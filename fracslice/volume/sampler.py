@@ -22,7 +22,7 @@ from functools import partial
 import numpy as np
 
 from ..errors import VolumeError
-from ..formulas.registry import Facts
+from ..formulas.registry import Bounds
 from ..kernel import Kernel
 from ..work import Work, chunks
 from .bricks import INSIDE, OUTSIDE, Bricks, SignBricks
@@ -39,20 +39,24 @@ FAR_AUDITS = 1 << 15
 
 
 def sample(
-    kernel: Kernel, facts: Facts, lattice: Lattice, work: Work | None = None, guard: Kernel | None = None
+    kernel: Kernel,
+    bounds: Bounds,
+    lattice: Lattice,
+    work: Work | None = None,
+    conservative: Kernel | None = None,
 ) -> Bricks:
     """Samples a scene's field around its surface.
 
-    kernel: the scene's float32 kernel. facts: the scene's facts, whose Lipschitz bound prunes. guard: the
-    kernel that is pruned by, where it is another; then facts are its own (`Node.guard`). Raises `VolumeError`
-    if there is no surface, or if it leaves the lattice; `Cancelled`.
+    kernel: the scene's float32 kernel. bounds: the scene's, whose Lipschitz bound prunes. conservative: the
+    kernel to prune by, where it is another; then bounds are its own (`Node.conservative`). Raises
+    `VolumeError` if there is no surface, or if it leaves the lattice; `Cancelled`.
     """
     values: list[np.ndarray] = []
 
     def keep(wave: np.ndarray) -> None:
         values.append(wave)
 
-    run = _Run(kernel, guard or kernel, facts, lattice, work or Work(), keep)
+    run = _Run(kernel, conservative or kernel, bounds, lattice, work or Work(), keep)
     signs, order = run.signs()
     return Bricks(
         signs.origin,
@@ -67,18 +71,22 @@ def sample(
 
 
 def sample_signs(
-    kernel: Kernel, facts: Facts, lattice: Lattice, work: Work | None = None, guard: Kernel | None = None
+    kernel: Kernel,
+    bounds: Bounds,
+    lattice: Lattice,
+    work: Work | None = None,
+    conservative: Kernel | None = None,
 ) -> SignBricks:
     """The same bricks, in a 32nd of the memory: of each sample only its sign is kept."""
-    signs, _ = _Run(kernel, guard or kernel, facts, lattice, work or Work(), None).signs()
+    signs, _ = _Run(kernel, conservative or kernel, bounds, lattice, work or Work(), None).signs()
     return signs
 
 
 @dataclass
 class _Run:
     kernel: Kernel
-    guard: Kernel
-    facts: Facts
+    conservative: Kernel
+    bounds: Bounds
     lattice: Lattice
     work: Work
     keep: Callable[[np.ndarray], None] | None
@@ -107,8 +115,8 @@ class _Run:
         grid = np.full([-(-n // size) for n in self.lattice.bricks], CANDIDATE, np.uint8)
         while True:
             cells = np.nonzero(grid == CANDIDATE)
-            f, reach = self.centres(cells, size, self.guard), self.reach(size * BRICK)
-            full = (f < -reach) & (not self.facts.weak)
+            f, reach = self.centres(cells, size, self.conservative), self.reach(size * BRICK)
+            full = (f < -reach) & (not self.bounds.exterior_only)
             near = ~((f > reach) | full)
             grid[cells] = np.where(near, CANDIDATE, np.where(full, FULL, EMPTY))
             if size == 1:
@@ -116,7 +124,7 @@ class _Run:
             size //= 2
             shape = tuple(slice(-(-n // size)) for n in self.lattice.bricks)
             grid = grid.repeat(2, 0).repeat(2, 1).repeat(2, 2)[shape]
-        if self.guard is self.kernel:
+        if self.conservative is self.kernel:
             own = f[near]
         else:
             own = self.centres(tuple(c[near] for c in cells), 1, self.kernel)
@@ -142,7 +150,7 @@ class _Run:
         flat = states.flat
         candidates = np.flatnonzero(flat == CANDIDATE)
         edge = states.beside((flat == EMPTY) | (flat == BORDER))
-        if self.facts.weak:
+        if self.bounds.exterior_only:
             candidates = candidates[edge[candidates] | outside]
         # Said to be full next to what is said to be empty: the bound is wrong there.
         wrong = np.flatnonzero((flat == FULL) & edge)
@@ -170,7 +178,7 @@ class _Run:
         """Which bricks are empty after all, looked at in eight cells: 8 evaluations to save 512."""
         size = BRICK // 2
         middle = np.indices((2, 2, 2)).reshape(3, 8, 1) * size + (size - 1) / 2
-        f = self.values_at((places[:, None] * BRICK + middle).reshape(3, -1), self.guard)
+        f = self.values_at((places[:, None] * BRICK + middle).reshape(3, -1), self.conservative)
         empty: np.ndarray = f.reshape(8, -1).min(0) > self.reach(size)
         return empty
 
@@ -178,7 +186,7 @@ class _Run:
         """The least |f| at the centre of a cell of `size` samples that leaves no sign change within a voxel
         of it.
         """
-        return self.facts.lipschitz * float(np.sqrt(3)) * self.lattice.voxel * (size + 1) / 2
+        return self.bounds.lipschitz * float(np.sqrt(3)) * self.lattice.voxel * (size + 1) / 2
 
     def sampled(self, places: np.ndarray) -> np.ndarray:
         """Samples bricks; returns their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set where inside."""

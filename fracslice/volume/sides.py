@@ -41,12 +41,12 @@ ROUNDING = 4 * float(np.finfo(np.float32).eps)
 
 @dataclass(frozen=True)
 class Field:
-    """kernel: of the scene; its signs count. guard: by which space is skipped, its values over `lipschitz`
-    being radii of free balls. far: these are nearly as large as can be, from far away too.
+    """kernel: of the scene; its signs count. conservative: to skip space by; its values over `lipschitz` are
+    radii of free balls. far: these are nearly as large as can be, from far away too.
     """
 
     kernel: Kernel
-    guard: Kernel
+    conservative: Kernel
     lipschitz: float
     far: bool
     work: Work
@@ -58,7 +58,7 @@ class Field:
 
     def free(self, points: np.ndarray) -> np.ndarray:
         """The radius of a ball around each that nothing is in; at most zero if there may be none."""
-        f = values_at(self.guard, points, self.work).astype(np.float64)
+        f = values_at(self.conservative, points, self.work).astype(np.float64)
         rounding = ROUNDING * np.abs(points).max(initial=0.0)
         return np.where(f > 0, f / self.lipschitz - rounding, 0.0)
 

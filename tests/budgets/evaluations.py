@@ -31,8 +31,8 @@ def evaluations() -> dict[str, float]:
 
 
 def per_sample(root: Node) -> float:
-    box = root.facts.box
-    bricks = sample(compile_scene(root), root.facts, Lattice.around(box, max(box.size) / VOXELS))
+    box = root.bounds.box
+    bricks = sample(compile_scene(root), root.bounds, Lattice.around(box, max(box.size) / VOXELS))
     return bricks.evaluations / bricks.values.size
 
 

@@ -93,7 +93,7 @@ SCENES = {
 @pytest.mark.parametrize("command", COMMANDS)
 def test_files_that_are_no_scenes(command: str, wrong: Path, capfd, monkeypatch) -> None:
     monkeypatch.chdir(wrong)
-    monkeypatch.setattr("fracslice.viewer.cockpit.need_screen", lambda: None)
+    monkeypatch.setattr("fracslice.viewer.viewer.need_screen", lambda: None)
     for name, message in SCENES.items():
         if not (name.startswith("whole") and command.split()[0] in TAKE_MODELS):
             line = refused(wrong, COMMANDS[command].format(name), capfd)

@@ -15,9 +15,9 @@ import pytest
 from fracslice.errors import ExportError, MeshError
 from fracslice.export import FORMATS, application, write
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check
+from fracslice.mesh.check import check_mesh
+from fracslice.mesh.quantisation import quantised
 from fracslice.mesh.reading import joined, read_mesh
-from fracslice.mesh.rounding import rounded
 from tests.mesh.shapes import cube, inverted, sphere
 
 METADATA = {"Title": 'A <sphere> & "more" é', "scene_hash": "ab12"}
@@ -26,7 +26,7 @@ METADATA = {"Title": 'A <sphere> & "more" é', "scene_hash": "ab12"}
 @pytest.fixture
 def mesh() -> Mesh:
     """A hollow sphere with coordinates that need all their digits."""
-    return rounded(joined([sphere(10, at=(0.1, 1 / 3, 7)), inverted(sphere(4, at=(0.1, 1 / 3, 7)))]))
+    return quantised(joined([sphere(10, at=(0.1, 1 / 3, 7)), inverted(sphere(4, at=(0.1, 1 / 3, 7)))]))
 
 
 @pytest.mark.parametrize("ending", FORMATS)
@@ -34,7 +34,7 @@ def test_comes_back_bit_by_bit(tmp_path: Path, mesh: Mesh, ending: str) -> None:
     path = write(mesh, tmp_path / f"model{ending}", METADATA)
     back = read_mesh(path)
     assert np.array_equal(back.corners, mesh.corners)
-    assert check(back) == check(mesh)
+    assert check_mesh(back) == check_mesh(mesh)
 
 
 @pytest.mark.parametrize("ending", FORMATS)
@@ -126,7 +126,7 @@ def test_a_file_cut_off_is_one_clear_line(tmp_path: Path, mesh: Mesh, ending: st
     cut = tmp_path / f"cut{ending}"
     cut.write_bytes(whole[: int(part * len(whole))])
     if ending == ".obj" and part > 0:  # text without an end: what is there is a mesh, but not a closed one
-        assert not check(read_mesh(cut)).printable if part > 0.5 else True
+        assert not check_mesh(read_mesh(cut)).printable if part > 0.5 else True
         return
     with pytest.raises(MeshError) as failure:
         read_mesh(cut)

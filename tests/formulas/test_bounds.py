@@ -35,7 +35,7 @@ from fracslice.formulas import (
 from fracslice.kernel import reference
 from tests.examples import EXAMPLES
 
-ESCAPE_TIME = {k for k, n in EXAMPLES.items() if n.facts.weak}
+ESCAPE_TIME = {k for k, n in EXAMPLES.items() if n.bounds.exterior_only}
 
 
 def test_every_formula_has_an_example() -> None:
@@ -48,7 +48,7 @@ def test_inside_is_within_the_box(name: str) -> None:
     root = EXAMPLES[name]
     points = np.random.default_rng(1).uniform(-3, 3, (3, 40_000))
     inside = points[:, reference(root)(*points) < 0]
-    lo, hi = np.array(root.facts.box.lo)[:, None], np.array(root.facts.box.hi)[:, None]
+    lo, hi = np.array(root.bounds.box.lo)[:, None], np.array(root.bounds.box.hi)[:, None]
     assert ((inside >= lo) & (inside <= hi)).all()
     assert inside.size or name == "bounds"
 
@@ -65,7 +65,7 @@ def pairs(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
 def worst_slope(root: Node, seed: int = 0, count: int = 20_000) -> float:
     """The largest |f(a) - f(b)| / |a - b| found, in units of the promised bound."""
     f, (a, b) = reference(root), pairs(seed, count)
-    return float((np.abs(f(*a) - f(*b)) / np.linalg.norm(a - b, axis=0)).max() / root.facts.lipschitz)
+    return float((np.abs(f(*a) - f(*b)) / np.linalg.norm(a - b, axis=0)).max() / root.bounds.lipschitz)
 
 
 @pytest.mark.parametrize("name", sorted(set(EXAMPLES) - ESCAPE_TIME))
@@ -84,7 +84,7 @@ def test_distance_bound_of_escape_time_fractals(name: str) -> None:
     for _ in range(30):
         direction = rng.normal(size=a.shape)
         direction /= np.linalg.norm(direction, axis=0)
-        reach = fa / root.facts.lipschitz * rng.uniform(0, 1, len(fa))
+        reach = fa / root.bounds.lipschitz * rng.uniform(0, 1, len(fa))
         assert (f(*(a + direction * reach)) >= 0).all()
 
 
@@ -151,7 +151,7 @@ def test_random_trees_keep_their_bounds(root: Node) -> None:
     from fracslice.errors import SceneError
 
     try:
-        promised = root.facts
+        promised = root.bounds
     except SceneError:
         return  # a repetition denser than it may be
     assert worst_slope(root, count=2000) <= 1 + 1e-9

@@ -48,13 +48,13 @@ class TestAgainstTheReference:
         far = np.random.default_rng(1).normal(size=(3, 64)) * np.logspace(1, 18, 64)
         outside = compile_scene(root, precision).points(*far) > 0  # type: ignore[arg-type]
         assert (outside == (reference(root)(*far) > 0)).all()
-        assert outside.all() or not root.facts.box.finite
+        assert outside.all() or not root.bounds.box.finite
 
     def test_nan_and_infinity_are_never_inside(self, name: str, precision: str) -> None:
         kernel = compile_scene(EXAMPLES[name], precision)  # type: ignore[arg-type]
         bad = np.array([(np.nan, 0, 0), (0, np.nan, 0), (0, 0, np.nan), (np.nan,) * 3], float).T
         assert np.isnan(kernel.points(*bad)).all()
-        if EXAMPLES[name].facts.box.finite:
+        if EXAMPLES[name].bounds.box.finite:
             endless = np.array(
                 [(np.inf, 0, 0), (0, -np.inf, 0), (0, 0, np.inf), (np.inf, np.inf, -np.inf)], float
             ).T

@@ -124,10 +124,10 @@ def test_facts_and_texts_of_a_deep_tree_need_no_deep_recursion() -> None:
     root = sphere(radius=0.1)
     for _ in range(48):
         root = offset(repeat(root, period=(9, 9, 9), count=(1, 1, 1)), distance=0.001)
-    assert root.facts.box.finite
+    assert root.bounds.box.finite
     assert hash(root) == hash(root.changed()) and root == root.changed()
     assert "sphere" in repr(root)
-    assert root.guard().guarded
+    assert root.conservative().is_conservative
     assert len(list(root.walk())) == 97
 
 

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check
-from fracslice.mesh.crossings import crossing_triangles
-from fracslice.mesh.links import links, parts, shell_volumes
+from fracslice.mesh.check import check_mesh
 from fracslice.mesh.nesting import nesting
 from fracslice.mesh.predicates import side_of_line, side_of_plane
 from fracslice.mesh.reading import joined
+from fracslice.mesh.self_intersections import self_intersecting_triangles
+from fracslice.mesh.topology import connected_components, edge_topology, shell_volumes
 from fracslice.mesh.tree import build
 
 from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved
@@ -28,7 +28,7 @@ from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved
 
 @pytest.mark.parametrize("name", GOOD)
 def test_good_meshes_are_accepted(name: str) -> None:
-    report = check(GOOD[name]())
+    report = check_mesh(GOOD[name]())
     assert report.problems == ()
     assert report.printable
     assert report.watertight
@@ -39,13 +39,13 @@ def test_good_meshes_are_accepted(name: str) -> None:
 @pytest.mark.parametrize("name", BAD)
 def test_bad_meshes_are_refused_for_the_right_reason(name: str) -> None:
     make, reason = BAD[name]
-    report = check(make())
+    report = check_mesh(make())
     assert not report.printable
     assert any(reason in problem for problem in report.problems), report.problems
 
 
 def test_numbers_of_a_cube() -> None:
-    report = check(cube(10, at=(1, 2, 3)))
+    report = check_mesh(cube(10, at=(1, 2, 3)))
     assert (report.triangles, report.vertices, report.components, report.cavities, report.genus) == (
         12,
         8,
@@ -59,14 +59,14 @@ def test_numbers_of_a_cube() -> None:
 
 
 def test_bodies_cavities_and_handles_are_counted() -> None:
-    report = check(
+    report = check_mesh(
         joined([sphere(), inverted(sphere(8)), sphere(3), torus(at=(40, 0, 0)), torus(at=(80, 0, 0))])
     )
     assert (report.components, report.cavities, report.genus) == (4, 1, 2)
 
 
 def test_report_is_json_with_the_verdict() -> None:
-    text = json.loads(json.dumps(check(cube()).as_dict()))
+    text = json.loads(json.dumps(check_mesh(cube()).as_dict()))
     assert text["printable"] is True
     assert text["problems"] == []
     assert text["bbox_mm"] == [[0, 0, 0], [10, 10, 10]]
@@ -74,29 +74,29 @@ def test_report_is_json_with_the_verdict() -> None:
 
 def test_unwelded_copies_are_seen_as_a_slicer_sees_them() -> None:
     apart = cube().corners.reshape(-1, 3)
-    report = check(Mesh(apart, np.arange(len(apart), dtype=np.int32).reshape(-1, 3)))
+    report = check_mesh(Mesh(apart, np.arange(len(apart), dtype=np.int32).reshape(-1, 3)))
     assert report.printable
     assert report.vertices == 8
 
 
 def test_thread_count_does_not_matter() -> None:
     crossed = joined([sphere(level=5), sphere(at=(8, 0, 0), level=5)])
-    assert check(crossed, threads=1) == check(crossed, threads=4)
+    assert check_mesh(crossed, threads=1) == check_mesh(crossed, threads=4)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e300])
 def test_coordinates_that_no_file_can_hold(value: float) -> None:
     with pytest.raises(MeshError, match="not a finite number"):
-        check(with_moved(cube(), 0, (value, 0, 0)))
+        check_mesh(with_moved(cube(), 0, (value, 0, 0)))
 
 
 def test_empty_and_nonsense_meshes() -> None:
     with pytest.raises(MeshError, match="no triangles"):
-        check(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)))
+        check_mesh(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)))
     with pytest.raises(MeshError, match="does not exist"):
-        check(Mesh(cube().vertices, np.array([[0, 1, 8]], np.int32)))
+        check_mesh(Mesh(cube().vertices, np.array([[0, 1, 8]], np.int32)))
     with pytest.raises(MeshError, match="without area"):
-        check(Mesh(cube().vertices, np.array([[0, 1, 1]], np.int32)))
+        check_mesh(Mesh(cube().vertices, np.array([[0, 1, 1]], np.int32)))
 
 
 def test_arrays_that_contradict_each_other_are_refused() -> None:
@@ -104,12 +104,12 @@ def test_arrays_that_contradict_each_other_are_refused() -> None:
     mesh, beyond = cube(), np.array([[0, 1, 8]], np.int32)
     tree, labels = build(mesh), np.zeros(12, np.int32)
     calls: list[Callable[[], object]] = [
-        lambda: links(beyond, 8),
-        lambda: parts(-beyond, 9),
+        lambda: edge_topology(beyond, 8),
+        lambda: connected_components(-beyond, 9),
         lambda: shell_volumes(mesh.vertices, mesh.triangles, labels + 1, 1),
         lambda: build(Mesh(mesh.vertices, beyond)),
-        lambda: crossing_triangles(mesh, tree._replace(order=tree.order + 1)),
-        lambda: crossing_triangles(sphere(), tree),
+        lambda: self_intersecting_triangles(mesh, tree._replace(order=tree.order + 1)),
+        lambda: self_intersecting_triangles(sphere(), tree),
         lambda: nesting(mesh, labels[1:], np.ones(2), tree, np.array([-1, 0])),
         lambda: nesting(mesh, labels, np.ones(2), tree, np.array([-2, 0])),
     ]
@@ -148,7 +148,7 @@ def test_pairs_of_triangles_meet_as_integers_say(shared: int) -> None:
         mesh = Mesh(points * 0.5, triangles)
         if len(np.unique(points, axis=0)) == len(points) and np.linalg.norm(mesh.normals, axis=1).all():
             found.append(meet(points, shared))
-            assert crossing_triangles(mesh).tolist() == [found[-1]] * 2, points.tolist()
+            assert self_intersecting_triangles(mesh).tolist() == [found[-1]] * 2, points.tolist()
     assert 10 < sum(found) < len(found) - 10
 
 
@@ -164,7 +164,7 @@ def test_self_intersections_agree_with_meshlab() -> None:
     meshes.compute_selection_by_self_intersections_per_face()
     expected = meshes.current_mesh().selected_face_number()
     assert expected > 100
-    assert check(mesh).self_intersections == expected
+    assert check_mesh(mesh).self_intersections == expected
 
 
 GRID = st.integers(-3, 3).map(

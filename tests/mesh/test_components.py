@@ -9,7 +9,7 @@ import pytest
 
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check
+from fracslice.mesh.check import check_mesh
 from fracslice.mesh.components import Removed, select, shells
 from fracslice.mesh.extract import Piece
 from fracslice.mesh.pieces import Pieces
@@ -52,7 +52,7 @@ def test_the_largest_keeps_its_cavity() -> None:
     assert removed.bodies == 3
     assert removed.bodies_mm3 == pytest.approx(124 + 0.125 + 0.001)
     assert (removed.cavities, removed.filled_mm3) == (1, 0)
-    assert check(kept).printable
+    assert check_mesh(kept).printable
 
 
 def test_filling_drops_the_inner_shells() -> None:
@@ -64,7 +64,7 @@ def test_filling_drops_the_inner_shells() -> None:
 
 def test_filling_swallows_the_bodies_in_a_cavity() -> None:
     kept, removed = select(hollow_and_dust(), cavities="fill")
-    assert check(kept).printable
+    assert check_mesh(kept).printable
     assert kept.volume == pytest.approx(1000 + 125 + 0.125)
     assert removed.bodies == 1
 

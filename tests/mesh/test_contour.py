@@ -28,11 +28,11 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.registry import Facts
+from fracslice.formulas.registry import Bounds
 from fracslice.kernel import Kernel, compile_scene, reference
 from fracslice.kernel.cpu import Precision
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check
+from fracslice.mesh.check import check_mesh
 from fracslice.mesh.extract import Piece, contour, contour_pieces, extract
 from fracslice.volume import Bricks, plan, sample_scene
 from fracslice.volume.accuracy import surface_error
@@ -45,7 +45,7 @@ def made(root: Node, resolution: float) -> Mesh:
 
 
 def assert_solid(mesh: Mesh) -> None:
-    report = check(mesh)
+    report = check_mesh(mesh)
     assert report.watertight and report.manifold and report.self_intersections == 0, report
 
 
@@ -156,10 +156,10 @@ class InPython:
     fails: bool = False
 
     @property
-    def facts(self) -> Facts:
-        return self.root.facts
+    def bounds(self) -> Bounds:
+        return self.root.bounds
 
-    def guard(self) -> InPython:
+    def conservative(self) -> InPython:
         return self
 
     def compiled(self, precision: Precision) -> Called:

@@ -13,8 +13,8 @@ import pytest
 from fracslice._native import Cells, marching_cubes, open_edges
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.crossings import crossing_triangles
-from fracslice.mesh.extract import clamp, extract
+from fracslice.mesh.extract import extract, minimum_edge_parameter
+from fracslice.mesh.self_intersections import self_intersecting_triangles
 from fracslice.volume.bricks import INSIDE, OUTSIDE, Bricks
 from tests.fields import blobs, bricks_of, grid_points, noise
 
@@ -69,10 +69,10 @@ def test_noise_gives_a_closed_manifold(side: int) -> None:
 @pytest.mark.parametrize("seed", range(12))
 def test_noise_does_not_cross_itself_even_in_float32(seed: int) -> None:
     mesh = extract(bricks_of(noise(seed, 16, spread=seed), origin=(3, -5, 7), voxel=0.01))
-    rounded = dataclasses.replace(mesh, vertices=mesh.vertices.astype(np.float32).astype(float))
-    assert not crossing_triangles(mesh).any()
-    assert not crossing_triangles(rounded).any()
-    assert len(np.unique(rounded.vertices, axis=0)) == len(mesh.vertices)
+    quantised = dataclasses.replace(mesh, vertices=mesh.vertices.astype(np.float32).astype(float))
+    assert not self_intersecting_triangles(mesh).any()
+    assert not self_intersecting_triangles(quantised).any()
+    assert len(np.unique(quantised.vertices, axis=0)) == len(mesh.vertices)
 
 
 @pytest.mark.parametrize("seed", [*range(18), 19])
@@ -186,9 +186,9 @@ def test_arrays_that_contradict_each_other_are_refused() -> None:
 
 def test_clamp_follows_the_spacing_of_float32() -> None:
     field = blobs(1)
-    assert clamp(bricks_of(field)) == 1e-4
+    assert minimum_edge_parameter(bricks_of(field)) == 1e-4
     far = bricks_of(field, origin=(4000, 0, 0), voxel=0.25)
-    assert clamp(far) == pytest.approx(4 * 2**-12 / 0.25)
+    assert minimum_edge_parameter(far) == pytest.approx(4 * 2**-12 / 0.25)
     assert len(np.unique(extract(far).vertices.astype(np.float32), axis=0)) == len(extract(far).vertices)
     with pytest.raises(MeshError, match="too fine for float32"):
         extract(bricks_of(field, origin=(1e6, 0, 0), voxel=0.1))

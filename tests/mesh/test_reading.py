@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import MeshError
-from fracslice.mesh.check import check
+from fracslice.mesh.check import check_mesh
 from fracslice.mesh.reading import read_mesh
 
 from .shapes import cube
@@ -55,14 +55,14 @@ def test_3mf_transforms_and_components(tmp_path: Path) -> None:
     item = '<item objectid="2" transform="0 1 0 -1 0 0 0 0 2 5 6 7"/>'
     mesh = read_mesh(box(tmp_path / "pair.3mf", build=item, more=pair))
     assert mesh.bounds.tolist() == [[-5, 6, 7], [5, 36, 27]]
-    report = check(mesh)
+    report = check_mesh(mesh)
     assert report.printable
     assert (report.components, report.volume_mm3) == (2, pytest.approx(4000))
 
 
 def test_3mf_mirror_images_are_not_inside_out(tmp_path: Path) -> None:
     item = '<item objectid="1" transform="-1 0 0 0 1 0 0 0 1 0 0 0"/>'
-    assert check(read_mesh(box(tmp_path / "mirror.3mf", build=item))).printable
+    assert check_mesh(read_mesh(box(tmp_path / "mirror.3mf", build=item))).printable
 
 
 def second(content: str) -> dict[str, str]:

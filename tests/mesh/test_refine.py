@@ -23,7 +23,7 @@ from fracslice.formulas import (
 )
 from fracslice.kernel import reference
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check
+from fracslice.mesh.check import check_mesh
 from fracslice.mesh.extract import contour
 from fracslice.mesh.refine import refine
 from fracslice.scene import scene
@@ -41,7 +41,7 @@ def made(root: Node, resolution: float) -> tuple[Plan, Mesh]:
 def test_a_smooth_surface_is_as_near_as_asked(root: Node, volume: float) -> None:
     planned, coarse = made(root, 48)
     fine, done = refine(planned.root, coarse, 1e-3 * planned.voxel, planned.voxel)
-    assert check(fine).printable and done.left == 0 and done.from_triangles == len(coarse.triangles)
+    assert check_mesh(fine).printable and done.left == 0 and done.from_triangles == len(coarse.triangles)
     assert abs(fine.volume - volume) < abs(coarse.volume - volume) / 8
     middles = (fine.corners + np.roll(fine.corners, 1, axis=1)).reshape(-1, 3) / 2
     f = np.linalg.norm(middles, axis=1) - 1 if root.formula.name == "sphere" else _torus(middles)
@@ -57,10 +57,14 @@ def _rows(points: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(points).view("V24").ravel()
 
 
-def off(mesh: Mesh, distance: Callable[[np.ndarray], np.ndarray], parts: int = 8) -> float:
+def off(mesh: Mesh, distance: Callable[[np.ndarray], np.ndarray], connected_components: int = 8) -> float:
     """How far points all over the triangles are from the surface, at most."""
-    shares = [(i, j, parts - i - j) for i in range(parts + 1) for j in range(parts + 1 - i)]
-    points = np.array(shares) / parts @ mesh.corners
+    shares = [
+        (i, j, connected_components - i - j)
+        for i in range(connected_components + 1)
+        for j in range(connected_components + 1 - i)
+    ]
+    points = np.array(shares) / connected_components @ mesh.corners
     return float(np.abs(distance(points.reshape(-1, 3))).max())
 
 
@@ -89,7 +93,7 @@ def test_a_thin_torus_is_near_everywhere() -> None:
     assert off(coarse, distance) > 5 * chord
     assert off(fine, distance) < chord and done.left == 0
     assert turned_away(planned.root, fine, planned.voxel) <= turned_away(planned.root, coarse, planned.voxel)
-    assert check(fine).printable
+    assert check_mesh(fine).printable
 
 
 def test_no_triangle_turns_away_at_round_edges() -> None:
@@ -98,7 +102,7 @@ def test_no_triangle_turns_away_at_round_edges() -> None:
     fine, done = refine(planned.root, coarse, chord, planned.voxel)
     assert done.left == 0 and done.off_mm <= chord
     assert turned_away(planned.root, fine, planned.voxel) <= turned_away(planned.root, coarse, planned.voxel)
-    assert check(fine).printable
+    assert check_mesh(fine).printable
 
 
 def test_curved_sharp_edges_are_followed() -> None:
@@ -111,7 +115,7 @@ def test_curved_sharp_edges_are_followed() -> None:
     assert (
         turned_away(planned.root, fine, planned.voxel) < turned_away(planned.root, coarse, planned.voxel) / 2
     )
-    assert check(fine).printable
+    assert check_mesh(fine).printable
 
 
 def test_what_is_left_is_told() -> None:
@@ -131,7 +135,7 @@ def test_a_rough_surface_stays_a_solid() -> None:
     planned, mesh = made(mandelbulb(iterations=6), 64)
     fine, _ = refine(planned.root, mesh, 0.02 * planned.voxel, planned.voxel)
     assert len(fine.triangles) > len(mesh.triangles)
-    assert check(fine).printable
+    assert check_mesh(fine).printable
 
 
 def test_the_job_takes_it_in_mm() -> None:

@@ -10,14 +10,14 @@ import pytest
 from fracslice.errors import Cancelled, MeshError
 from fracslice.formulas import box, cylinder, difference, mandelbulb, menger, transform, union
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check
+from fracslice.mesh.check import check_mesh
 from fracslice.mesh.collapse import Collapse
-from fracslice.mesh.crossings import crossing_triangles
 from fracslice.mesh.extract import contour
-from fracslice.mesh.links import links
 from fracslice.mesh.nearest import Nearest
-from fracslice.mesh.rounding import rounded
+from fracslice.mesh.quantisation import quantised
+from fracslice.mesh.self_intersections import self_intersecting_triangles
 from fracslice.mesh.simplify import simplify
+from fracslice.mesh.topology import edge_topology
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 
@@ -26,7 +26,7 @@ from . import shapes
 
 def fine(root, resolution: float) -> Mesh:
     planned = plan(root, resolution)
-    return rounded(contour(planned.root, sample_scene(planned)).scaled(10))
+    return quantised(contour(planned.root, sample_scene(planned)).scaled(10))
 
 
 def divided(mesh: Mesh, times: int) -> Mesh:
@@ -43,7 +43,7 @@ def test_a_sphere_keeps_its_tolerance_to_the_sphere():
     sagitta = 10 - np.linalg.norm(ball.corners.mean(axis=1), axis=1).min()
     few, done = simplify(ball, 0.2)
     assert len(few.triangles) < len(ball.triangles) / 10
-    assert check(few).printable
+    assert check_mesh(few).printable
     assert 0 < done.bound_mm <= 0.2
     assert np.abs(np.linalg.norm(few.vertices, axis=1) - 10).max() < 1e-5, "the original's own vertices"
     middles = np.linalg.norm(few.corners.mean(axis=1), axis=1)
@@ -66,7 +66,7 @@ def test_flat_faces_come_to_few_triangles_however_small_the_tolerance(tolerance)
     few, done = simplify(bracket, tolerance)
     assert len(bracket.triangles) > 10000 and len(few.triangles) < 700
     assert max(done.bound_mm, done.back_mm) <= tolerance
-    assert check(few).printable
+    assert check_mesh(few).printable
 
 
 def test_a_menger_sponge_keeps_its_edges_and_its_closed_forms():
@@ -78,14 +78,14 @@ def test_a_menger_sponge_keeps_its_edges_and_its_closed_forms():
     assert few.volume == pytest.approx((2 * scale) ** 3 * (20 / 27) ** 2, rel=1e-6)
     assert few.area == pytest.approx(scale**2 * (8 * (20 / 9) ** 2 + 16 * (8 / 9) ** 2), rel=1e-6)
     assert len(few.triangles) < len(sponge.triangles) / 20
-    assert check(few).printable and check(few).genus == check(sponge).genus
+    assert check_mesh(few).printable and check_mesh(few).genus == check_mesh(sponge).genus
 
 
 def test_a_rough_fractal_stays_a_solid_without_crossings():
     bulb = fine(mandelbulb(iterations=5), 48)
     few, done = simplify(bulb, 0.1)
     assert len(few.triangles) < 0.8 * len(bulb.triangles)
-    before, after = check(bulb), check(few)
+    before, after = check_mesh(bulb), check_mesh(few)
     assert (after.problems, after.genus, after.components) == ((), before.genus, before.components)
     assert Nearest(few).bounds(bulb, 0.1, Work())[0].max() <= 0.1, "proved once more, from nothing"
     edge = np.median(np.linalg.norm(bulb.corners[:, 0] - bulb.corners[:, 1], axis=1))
@@ -151,7 +151,7 @@ def test_what_is_taken_out_can_be_put_back_in_any_order():
         collapse.undo(found.changed & (rng.uniform(size=len(found.gone)) < 0.1))
         found, rounds = collapse.found(), rounds + 1
         left = found.triangles[~found.gone]
-        _, *defects = links(left, len(ball.vertices))
+        _, *defects = edge_topology(left, len(ball.vertices))
         assert not any(defects) and len(np.unique(left)) == len(left) // 2, "a torus"
     assert rounds > 3, "not all at once"
     assert np.array_equal(found.triangles, ball.triangles)
@@ -166,9 +166,9 @@ def test_crossings_can_be_asked_for_among_some():
         vertices, np.concatenate([cube.triangles + 8 * i for i, cube in enumerate(cubes)]).astype(np.int32)
     )
     of = np.arange(len(mesh.triangles)) // 12
-    whole = crossing_triangles(mesh)
-    assert np.array_equal(crossing_triangles(mesh, among=of == 0), whole & (of < 2))
-    assert not crossing_triangles(mesh, among=of < 0).any()
+    whole = self_intersecting_triangles(mesh)
+    assert np.array_equal(self_intersecting_triangles(mesh, among=of == 0), whole & (of < 2))
+    assert not self_intersecting_triangles(mesh, among=of < 0).any()
 
 
 def test_the_result_is_the_same_for_any_number_of_threads():

@@ -7,9 +7,9 @@ import pytest
 
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check
+from fracslice.mesh.check import check_mesh
 from fracslice.mesh.clean import clean
-from fracslice.mesh.rounding import rounded
+from fracslice.mesh.quantisation import quantised
 from fracslice.mesh.solid import to_manifold
 
 from .shapes import GOOD, cube, sphere, with_flipped, without
@@ -30,8 +30,8 @@ def test_manifold3d_refuses_in_plain_words(spoil) -> None:  # type: ignore[no-un
 
 def test_rounding_is_done_once() -> None:
     mesh = sphere(level=4)
-    once = rounded(mesh.translated((0.1, 0.2, 0.3)))
-    twice = rounded(once)
+    once = quantised(mesh.translated((0.1, 0.2, 0.3)))
+    twice = quantised(once)
     assert np.array_equal(once.vertices, once.vertices.astype(np.float32))
     assert np.array_equal(once.vertices, twice.vertices)
     assert np.array_equal(once.triangles, twice.triangles)
@@ -54,14 +54,14 @@ def slivered(mesh: Mesh, seed: int) -> Mesh:
 @pytest.mark.parametrize("seed", range(8))
 def test_cleaning_takes_out_what_rounding_flattens(seed: int) -> None:
     mesh = slivered(sphere(20, at=(50, 50, 50)), seed)
-    assert check(mesh).degenerate_triangles > 20
+    assert check_mesh(mesh).degenerate_triangles > 20
     cleaned = clean(mesh)
-    report = check(cleaned)
+    report = check_mesh(cleaned)
     assert report.problems == ()
     assert report.volume_mm3 == pytest.approx(mesh.volume, rel=1e-3)
     assert report.vertices >= 600
 
 
 def test_cleaning_leaves_good_meshes_alone() -> None:
-    mesh = rounded(cube())
+    mesh = quantised(cube())
     assert np.array_equal(clean(mesh).corners, mesh.corners)

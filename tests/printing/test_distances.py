@@ -35,7 +35,7 @@ def test_walls_of_a_fractal_are_as_swept() -> None:
     bricks, root = sampled(mandelbulb(iterations=5), 64), mandelbulb(iterations=5)
     limit = 6 * bricks.voxel
     swept = Samples(from_grid(to_grid(bricks).redistance()))
-    near = lengths(bricks, root.facts, limit)
+    near = lengths(bricks, root.bounds, limit)
     found = near.bricks.values
     reach = np.abs(found).max()
     assert reach == pytest.approx(limit / 2 + bricks.voxel)

@@ -35,7 +35,7 @@ from fracslice.formulas import (
 from fracslice.kernel import compile_scene
 from fracslice.printing import printable
 from fracslice.printing.checks import Limits, SolidReport, check_object
-from fracslice.printing.parts import parts_of
+from fracslice.printing.components import components_of
 from fracslice.printing.samples import Samples
 from fracslice.printing.walls import walls
 from fracslice.printing.widths import Widths
@@ -113,9 +113,9 @@ def test_what_is_thick_enough_stays_as_it_is() -> None:
 def test_gaps_up_to_the_limit_are_closed(gap: float, bodies: int) -> None:
     """They are 2 mm wide."""
     solid, scale = made(TWO, gap=gap)
-    parts = parts_of(solid.bricks)
-    assert len(parts.bodies) == bodies
-    volume = parts.count[parts.inside].sum() * (solid.bricks.voxel * scale) ** 3
+    components = components_of(solid.bricks)
+    assert len(components.bodies) == bodies
+    volume = components.count[components.inside].sum() * (solid.bricks.voxel * scale) ** 3
     assert volume == pytest.approx(8000 if bodies == 1 else 7200, rel=0.03)
 
 
@@ -123,7 +123,7 @@ def test_loose_bodies_are_joined_by_struts_across_the_middle() -> None:
     after = measured(TWO, bridge=1.5)
     assert np.median(after) == pytest.approx(1.5, abs=0.2)
     solid, _ = made(union(TWO, at(sphere(radius=0.1), 0, 0, 0.8)), bridge=1.5)
-    assert len(parts_of(solid.bricks).bodies) == 1
+    assert len(components_of(solid.bricks).bodies) == 1
 
 
 def test_dust_is_dropped_where_one_body_is_asked_for() -> None:
@@ -131,8 +131,8 @@ def test_dust_is_dropped_where_one_body_is_asked_for() -> None:
     dusty = union(TWO, at(sphere(radius=0.0115), 0, 0, 0.8))
     thing, _ = printable(plan(dusty, 100), SIZE, Print(bridge=1.5))
     before, after = (
-        parts_of(sample_scene(plan(dusty, 200))),
-        parts_of(sample_scene(replace(thing, voxel=0.005))),
+        components_of(sample_scene(plan(dusty, 200))),
+        components_of(sample_scene(replace(thing, voxel=0.005))),
     )
     assert (len(before.bodies), len(after.bodies)) == (3, 1)
 
@@ -141,10 +141,10 @@ def test_cavities_are_filled_and_bodies_dropped() -> None:
     holed = union(
         difference(box(), at(sphere(radius=0.2), 0.1, 0, 0)), at(box(size=(0.2, 0.2, 0.2)), 0.8, 0, 0)
     )
-    before = parts_of(made(holed)[0].bricks)
+    before = components_of(made(holed)[0].bricks)
     assert (len(before.bodies), len(before.cavities)) == (2, 1)
     solid, scale = made(holed, cavities="fill", keep="largest")
-    after = parts_of(solid.bricks)
+    after = components_of(solid.bricks)
     assert (len(after.bodies), len(after.cavities)) == (1, 0)
     assert scale == pytest.approx(20, rel=0.01)
     assert after.count[after.bodies[0]] * (solid.bricks.voxel * scale) ** 3 == pytest.approx(8000, rel=0.03)
@@ -310,7 +310,7 @@ def test_time_is_linear_in_the_holes() -> None:
         plate = difference(box(size=(2, 2, 0.1)), bounds(rods, min=(-1, -1, -1), max=(1, 1, 1)))
         solid = distances(plan(plate, 300))
         begin = time.process_time()
-        assert len(parts_of(solid.bricks).bodies) == 1
+        assert len(components_of(solid.bricks).bodies) == 1
         assert len(walls(solid, 0.02, Work(), gaps=True).width) > 0 or side < 100
         return time.process_time() - begin
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
-from fracslice.render.live import Live, Stick
+from fracslice.render.live import CameraInput, Live
 from fracslice.scene.view import Camera
 from fracslice.work import Work
 
@@ -50,25 +50,25 @@ def sharp(live: Live, camera: Camera) -> np.ndarray:
 
 
 def test_a_flight_never_gets_there() -> None:
-    camera, ahead = Camera(eye=(3, 0, 0), target=(0, 0, 0)), Stick(forward=1, pace=40)
+    camera, ahead = Camera(eye=(3, 0, 0), target=(0, 0, 0)), CameraInput(forward=1, pace=40)
     ways = [3.0]
     for _ in range(30):
         camera = ahead.flown(camera, np.hypot.reduce(camera.eye) - 1, 0.1)
         ways.append(camera.eye[0])
     assert 1 < min(ways) < 1 + 1e-6
     assert all(a > b for a, b in pairwise(ways))
-    aside = Stick(1, 1, 1, pace=1e3).flown(Camera(eye=(3, 0, 0), target=(0, 0, 0)), 2.0, 1.0)
+    aside = CameraInput(1, 1, 1, pace=1e3).flown(Camera(eye=(3, 0, 0), target=(0, 0, 0)), 2.0, 1.0)
     assert np.hypot.reduce(np.subtract(aside.eye, (3, 0, 0))) == pytest.approx(1.0)
-    assert Stick(pace=3).idle and not ahead.idle
+    assert CameraInput(pace=3).idle and not ahead.idle
 
 
 def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
     before = live.camera
     first = sharp(live, before)
     assert first.shape == (32, 48, 3) and np.ptp(first) > 50
-    live.steer(Stick(forward=1, pace=5))
+    live.steer(CameraInput(forward=1, pace=5))
     within(lambda: 0 < live.shown.room < 0.1)
-    live.steer(Stick())
+    live.steer(CameraInput())
     assert np.linalg.norm(np.cross(live.camera.forward, before.forward)) < 1e-9, "straight ahead"
     within(lambda: live.shown.done.samples == 4)  # it has come to rest
     near = live.shown.pixels

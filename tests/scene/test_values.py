@@ -44,7 +44,7 @@ def test_one_node_used_twice_is_two_elements():
 
 
 @pytest.mark.parametrize(
-    ("setting", "message"),
+    ("override", "message"),
     [
         (
             "mandelblub.power=6",
@@ -67,9 +67,9 @@ def test_one_node_used_twice_is_two_elements():
         ("", "expected ELEMENT.ATTRIBUTE=VALUE"),
     ],
 )
-def test_bad_settings_say_what_is_expected(setting, message):
+def test_bad_settings_say_what_is_expected(override, message):
     with pytest.raises(SceneError, match=message) as caught:
-        SCENE.with_values([setting])
+        SCENE.with_values([override])
     assert "\n" not in str(caught.value)
 
 

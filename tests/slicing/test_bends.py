@@ -38,7 +38,7 @@ def test_small_circles(radius: float) -> None:
     0.001 pixels of the circle and all between them within 0.003.
     """
     root = rods(radius, 44.1373, 6)
-    contours, covered = middle(stack_of(root, max(root.facts.box.size), 0.1))
+    contours, covered = middle(stack_of(root, max(root.bounds.box.size), 0.1))
     assert len(contours) == 36
     np.testing.assert_allclose(contours.areas, np.pi * (radius * PIXEL) ** 2, rtol=5e-4)
     assert covered == pytest.approx(36 * np.pi * (radius * PIXEL) ** 2, rel=2e-4)
@@ -56,7 +56,7 @@ def test_pixels_of_the_smallest_circles(radius: float, off: float) -> None:
     the area would be lost.
     """
     root = rods(radius, 11.1373, 20)
-    _, covered = middle(stack_of(root, max(root.facts.box.size), 0.1))
+    _, covered = middle(stack_of(root, max(root.bounds.box.size), 0.1))
     assert covered == pytest.approx(400 * np.pi * (radius * PIXEL) ** 2, rel=off)
 
 

@@ -13,7 +13,7 @@ from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.checks import PrintReport, check_layers
 from fracslice.slicing.graph import Graph
 from fracslice.slicing.printers import PRINTERS
-from fracslice.slicing.runs import Runs, overlaps, parts_of, unsupported
+from fracslice.slicing.runs import Runs, components_of, overlaps, unsupported
 from fracslice.slicing.thickness import widths
 
 
@@ -185,11 +185,11 @@ def test_parts_by_hand() -> None:
     image = 255 * np.array(
         [[0, 0, 0, 0, 0], [0, 1, 1, 0, 0], [0, 1, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 0]], np.uint8
     )
-    solid, empty = parts_of(runs_of(image))
+    solid, empty = components_of(runs_of(image))
     assert solid.area.tolist() == [5]
     assert sorted(empty.area.tolist()) == [1, 19]
     assert empty.open[np.argsort(empty.area)].tolist() == [False, True]
-    other, _ = parts_of(runs_of(np.roll(image, 1, 1)))
+    other, _ = components_of(runs_of(np.roll(image, 1, 1)))
     assert overlaps(solid, other).tolist() == [[0, 0]]
     assert unsupported(solid, other, 0.0, 5) == 5 - (image & np.roll(image, 1, 1) > 0).sum()
     assert unsupported(solid, other, 1.0, 5) == 0
@@ -207,7 +207,7 @@ def test_time_is_linear_in_the_holes() -> None:
         image[2:-2, 2:-2][(y % side < side // 2) & (x % side < side // 2)] = 0
         begin, graph = time.perf_counter(), Graph()
         for _ in range(3):
-            graph.add(parts_of(runs_of(image))[1])
+            graph.add(components_of(runs_of(image))[1])
         assert len(graph.nodes().grouped(~graph.nodes().open, np.ones(3), (1, 1), image.shape)) == holes**2
         return time.perf_counter() - begin
 

@@ -26,7 +26,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.registry import Facts
+from fracslice.formulas.registry import Bounds
 from fracslice.kernel import compile_scene
 from fracslice.scene import scene
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
@@ -34,7 +34,7 @@ from fracslice.slicing.slab import Sampler
 from fracslice.work import Work
 from tests.examples import EXAMPLES
 
-FINITE = [name for name, root in EXAMPLES.items() if root.facts.box.finite]
+FINITE = [name for name, root in EXAMPLES.items() if root.bounds.box.finite]
 
 
 def stack_of(root: Node, pixels: int = 96, layer: float = 0.8, **job: Any) -> Stack:
@@ -45,9 +45,9 @@ def all_of(stack: Stack, make: Callable[[Layer], Any], threads: int = 2) -> list
     return list(Slicer(stack, Work(threads=threads)).map(make))
 
 
-def sampler_of(stack: Stack, facts: Facts | None = None) -> Sampler:
+def sampler_of(stack: Stack, bounds: Bounds | None = None) -> Sampler:
     shape = (stack.shape[0] + 1, stack.shape[1] + 1)
-    return Sampler(compile_scene(stack.root), stack.root, facts or stack.root.facts, stack.frame, shape)
+    return Sampler(compile_scene(stack.root), stack.root, bounds or stack.root.bounds, stack.frame, shape)
 
 
 def signs(sampler: Sampler, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,7 +81,7 @@ def test_closed_and_equal_to_dense_sampling(name: str) -> None:
     assert open_edges(inside, known) == 0
     differing = int((inside != dense(stack, z, inside)).sum())
     # What differs can only be specks of a fractal, smaller than what its layers are probed for.
-    assert differing == 0 or (stack.root.facts.weak and differing < 0.02 * known.sum())
+    assert differing == 0 or (stack.root.bounds.exterior_only and differing < 0.02 * known.sum())
 
 
 @pytest.mark.parametrize("root", [mandelbulb(), julia(), mandelbulb(iterations=4)])
@@ -132,7 +132,7 @@ def test_a_bound_that_lies_leaves_no_open_contour() -> None:
     root = union(sphere(radius=0.7), box(size=(2.0, 0.2, 0.2)))
     stack = stack_of(root)
     z = stack.z[8:16]
-    inside, known = signs(sampler_of(stack, Facts(root.facts.box, 1 / 3, False)), z)
+    inside, known = signs(sampler_of(stack, Bounds(root.bounds.box, 1 / 3, False)), z)
     assert open_edges(inside, known) == 0
 
 

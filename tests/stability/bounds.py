@@ -47,13 +47,13 @@ def verdict(root: Node, count: int, seed: int = 0, bound: float | None = None) -
     escape-time fractal in it, which only promises a ball of radius f / L around an outside point: whether the
     ball is free, along the gradient towards the surface, near it, and anywhere.
     """
-    guard, rng = root.guard(), np.random.default_rng(seed)
-    field, guarded = (compile_scene(r, "float64").points for r in (root, guard))
-    bound, found = bound or guard.facts.lipschitz, Verdict()
+    conservative, rng = root.conservative(), np.random.default_rng(seed)
+    field, is_conservative = (compile_scene(r, "float64").points for r in (root, conservative))
+    bound, found = bound or conservative.bounds.lipschitz, Verdict()
     for start in range(0, count, CHUNK):
         p = points(root, min(CHUNK, count - start), rng)
-        if root.facts.weak:
-            found = found | _free_ball(field, guarded, p, bound, rng)
+        if root.bounds.exterior_only:
+            found = found | _free_ball(field, is_conservative, p, bound, rng)
         else:
             found = found | _slopes(field, p, bound, rng)
     return found
@@ -74,11 +74,11 @@ def _slopes(field: Field, a: np.ndarray, bound: float, rng: np.random.Generator)
 
 
 def _free_ball(
-    field: Field, guarded: Field, a: np.ndarray, bound: float, rng: np.random.Generator
+    field: Field, is_conservative: Field, a: np.ndarray, bound: float, rng: np.random.Generator
 ) -> Verdict:
     fa = field(*a)
     a, fa = a[:, fa > 0], fa[fa > 0]
-    free = guarded(*a) / bound
+    free = is_conservative(*a) / bound
     free = np.where(free > NEAREST * np.abs(a).max(0), free, 0)
     outward = _gradient(field, a, fa, 1e-7)
     worst = np.zeros(a.shape[1])

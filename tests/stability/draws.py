@@ -27,7 +27,7 @@ def drawn(root: Node, rng: np.random.Generator, spread: float = 1.0) -> Node:
     for _ in range(TRIES):
         try:
             found = _drawn(root, rng, spread)
-            _ = [(node.facts, node.changed(**_known(node)).arguments) for node in found.walk()]
+            _ = [(node.bounds, node.changed(**_known(node)).arguments) for node in found.walk()]
             return found
         except (FracsliceError, ArithmeticError):
             continue

@@ -38,7 +38,7 @@ def extreme_versions(root: Node) -> Iterator[tuple[str, Node]]:
         for value in ends(kind):
             try:
                 node = root.changed(**{name: value})
-                _ = node.facts, node.arguments
+                _ = node.bounds, node.arguments
             except (SceneError, ZeroDivisionError):
                 continue
             yield f"{name}={value}", node

@@ -22,7 +22,7 @@ def borders(root: Node) -> np.ndarray:
     """Coordinates where fields fold: zero, the faces of boxes, Menger's cells, borders between copies."""
     found = [0.0]
     for node in root.walk():
-        ends = [v for v in (*node.facts.box.lo, *node.facts.box.hi) if np.isfinite(v)]
+        ends = [v for v in (*node.bounds.box.lo, *node.bounds.box.hi) if np.isfinite(v)]
         found += ends
         if node.formula.name == "menger":
             found += (np.arange(-27, 28) / 27).tolist()
@@ -33,7 +33,7 @@ def borders(root: Node) -> np.ndarray:
 
 def points(root: Node, count: int, rng: np.random.Generator) -> np.ndarray:
     """Points [3, count] in and around a scene: a third anywhere, the rest at or very near special places."""
-    lo, hi = _frame(root.facts.box)
+    lo, hi = _frame(root.bounds.box)
     p = rng.uniform(lo[:, None], hi[:, None], (3, count))
     near = rng.choice([-1.0, 0.0, 1.0], (3, count)) * 10 ** rng.uniform(-12, -2, (3, count))
     kind = rng.integers(0, 6, count)

@@ -58,13 +58,13 @@ def random_scene(tree: int, numbers: int) -> Node:
 
 def _ended(root: Node) -> Node:
     """The scene, cut off where it has no end."""
-    return root if root.facts.box.finite else bounds(root, min=(-1.1, -1.0, -0.9), max=(1.0, 1.2, 0.8))
+    return root if root.bounds.box.finite else bounds(root, min=(-1.1, -1.0, -0.9), max=(1.0, 1.2, 0.8))
 
 
 def _inside(root: Node) -> bool:
     """Whether a point of some at random is inside."""
     known = _shallow(root)
-    lo, hi = (np.array(corner)[:, None] for corner in (known.facts.box.lo, known.facts.box.hi))
+    lo, hi = (np.array(corner)[:, None] for corner in (known.bounds.box.lo, known.bounds.box.hi))
     points = np.random.default_rng(0).uniform(lo, np.maximum(lo, hi), (3, LOOKED))
     return bool((reference(known)(*points) < 0).any())
 
@@ -85,7 +85,7 @@ def _tree(dice: _Dice, depth: int) -> Node:
 
 
 def _made(formula: Formula, children: tuple[Node, ...], dice: _Dice) -> Node:
-    size = max(children[0].facts.box.size) if children else 1.0
+    size = max(children[0].bounds.box.size) if children else 1.0
     size = size if np.isfinite(size) and size > 0 else 2.0
     known = KNOWN.get(formula.name, {})
     values = {

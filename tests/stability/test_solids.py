@@ -19,11 +19,11 @@ def test_other_numbers_make_a_solid(name: str) -> None:
     assert found == Outcome() or "there is no surface" in found.refused
 
 
-@pytest.mark.parametrize(("name", "setting"), [("raspberry", 20), ("spinning-top", 7), ("spinning-top", 12)])
-def test_nothing_to_repair_where_there_was(name: str, setting: int) -> None:
+@pytest.mark.parametrize(("name", "setup"), [("raspberry", 20), ("spinning-top", 7), ("spinning-top", 12)])
+def test_nothing_to_repair_where_there_was(name: str, setup: int) -> None:
     """Dust of powers 18 and 27, and torn dust of power 7.5: 22, 92 and 34 violations once."""
-    root = settings(name, setting)[setting]
-    shown = resolve_depths(root, max(root.facts.box.size) / 48)  # a deeper solid is finer than these voxels
+    root = settings(name, setup)[setup]
+    shown = resolve_depths(root, max(root.bounds.box.size) / 48)  # a deeper solid is finer than these voxels
     assert outcome(shown, 48, threads=2) == Outcome()
 
 

@@ -68,12 +68,12 @@ def volumes(root: Node, resolution: float) -> Volumes:
     of_stack, note = layers_amount(stack, work)
     if stack.root != made.root:
         faults.append(f"the mesh is of {made.root}, the layers are of {stack.root}")
-    rounded = tuple(line for line in stack.notes if line.startswith("whole layers"))
-    lacks = bool(of_stack.off or rounded)
+    quantised = tuple(line for line in stack.notes if line.startswith("whole layers"))
+    lacks = bool(of_stack.off or quantised)
     for name, is_, told in (("mesh", of_mesh, amount.off), ("layers", of_layers, lacks)):
         if abs(is_ - volume) > max(TOLERANCE * volume, 5 * error) and not told:
             faults.append(f"the volume of the {name} is {is_:.4g}, not {volume:.4g} +- {error:.2g}")
-    told = tuple(line for line in (*report.notes, *note) if line not in stack.notes) + rounded
+    told = tuple(line for line in (*report.notes, *note) if line not in stack.notes) + quantised
     if abs(of_layers / of_mesh - 1) > BETWEEN and not told:
         faults.append(f"the volume of the layers is {of_layers:.4g}, of the mesh {of_mesh:.4g}")
     return Volumes(tuple(faults), told, of_mesh / volume - 1, of_layers / volume - 1)

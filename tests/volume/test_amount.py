@@ -8,13 +8,13 @@ import pytest
 
 from fracslice.formulas import Box, Node, box, difference, julia, menger, sphere, transform, union
 from fracslice.volume import extent
-from fracslice.volume.amount import Amount, amount, finer
+from fracslice.volume.amount import VolumeEstimate, amount, finer
 
 BALL = 4 / 3 * math.pi
 PLATE = transform(box(size=(2, 2, 0.02)), translate=(0, 0, 0.0123), rotate=(1, 0.3, 0, 10))
 
 
-def of(root: Node) -> Amount:
+def of(root: Node) -> VolumeEstimate:
     return amount(root, [extent(root, 64).outer])
 
 
@@ -42,9 +42,9 @@ def test_the_volume_is_always_the_same_and_that_of_its_parts():
 
 
 def test_a_difference_is_told_where_it_is_sure_and_a_hundredth():
-    found = Amount(2.0, 0.01, of(sphere()).inside)
+    found = VolumeEstimate(2.0, 0.01, of(sphere()).inside)
     assert found.off(1.9) == pytest.approx(-0.05) and found.off(2.2) == pytest.approx(0.1)
-    assert found.off(1.985) == found.off(2.015) == Amount(2.0, 0.05, found.inside).off(1.9) == 0
+    assert found.off(1.985) == found.off(2.015) == VolumeEstimate(2.0, 0.05, found.inside).off(1.9) == 0
 
 
 @pytest.mark.parametrize(("spacing", "times"), [(0.1, 8), (0.039, 4), (2.0, None)])

@@ -53,7 +53,7 @@ def test_walls_rods_and_plates_at_random_places(seed: int) -> None:
     found = extent(root, VOXELS)
     longest = max(found.box.size)
     if seed % 3 != 1:  # of boxes, the box that formulas promise is exact, however they are turned
-        assert errors(found.box, root.facts.box).max() < 2e-5 * longest
+        assert errors(found.box, root.bounds.box).max() < 2e-5 * longest
     assert (np.array(found.outer.lo) <= found.box.lo).all() and (
         np.array(found.outer.hi) >= found.box.hi
     ).all()
@@ -87,7 +87,7 @@ def test_tips_are_found_exactly(root: Node, turn: float) -> None:
     assert errors(found.outer, found.box).max() < 1e-3
     assert (np.abs(field.points(*found.tips)) < 2e-5).all()
     if not turn:
-        assert errors(found.box, root.facts.box).max() < 1e-5
+        assert errors(found.box, root.bounds.box).max() < 1e-5
 
 
 def test_an_offset_of_a_fractal_is_found_beyond_the_box_that_is_promised() -> None:

@@ -23,14 +23,14 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.registry import Facts
+from fracslice.formulas.registry import Bounds
 from fracslice.kernel import compile_scene
 from fracslice.volume import Bricks, Lattice, extent, plan, sample, sample_scene
 from fracslice.volume.bricks import INSIDE, OUTSIDE
 from fracslice.work import Work
 from tests.examples import EXAMPLES
 
-FINITE = [name for name, root in EXAMPLES.items() if root.facts.box.finite]
+FINITE = [name for name, root in EXAMPLES.items() if root.bounds.box.finite]
 
 
 def dense(root: Node, lattice: Lattice) -> np.ndarray:
@@ -74,7 +74,9 @@ def test_closed_and_equal_to_dense_sampling(name: str) -> None:
     # What differs can only be pockets sealed in the inside of an escape-time fractal, which are filled.
     differing = inside != truth
     assert not (differing & ~inside).any()
-    assert not differing.any() or (planned.root.facts.weak and differing.sum() < 1e-3 * inside.sum())
+    assert not differing.any() or (
+        planned.root.bounds.exterior_only and differing.sum() < 1e-3 * inside.sum()
+    )
 
 
 @pytest.mark.parametrize("name", ["mandelbulb", "menger", "twist"])
@@ -99,17 +101,17 @@ def test_rows_are_in_order_and_numbered() -> None:
 def test_a_wrong_lipschitz_bound_is_repaired() -> None:
     """A field that grows three times as fast as it says: the closure rule finds what pruning lost."""
     root = union(sphere(radius=0.7), box(size=(2.0, 0.2, 0.2)))
-    kernel, facts = compile_scene(transform(root)), Facts(root.facts.box, 1 / 3, False)
-    bricks = sample(kernel, facts, Lattice.around(root.facts.box, 2 / 64))
+    kernel, bounds = compile_scene(transform(root)), Bounds(root.bounds.box, 1 / 3, False)
+    bricks = sample(kernel, bounds, Lattice.around(root.bounds.box, 2 / 64))
     assert open_edges(bricks) == 0 and bricks.repaired > 0
 
 
 def test_the_audit_finds_what_nothing_leads_to() -> None:
     """A ball that a wrong bound hides, far from all that is sampled."""
     root = union(box(size=(0.4, 0.4, 0.4)), transform(sphere(radius=0.3), translate=(2, 0, 0)))
-    lattice, kernel = Lattice.around(root.facts.box, 2.5 / 96), compile_scene(root)
-    truthful = sample(kernel, root.facts, lattice)
-    lying = sample(kernel, Facts(root.facts.box, 0.05, False), lattice)
+    lattice, kernel = Lattice.around(root.bounds.box, 2.5 / 96), compile_scene(root)
+    truthful = sample(kernel, root.bounds, lattice)
+    lying = sample(kernel, Bounds(root.bounds.box, 0.05, False), lattice)
     assert truthful.repaired == 0 and lying.repaired > 0 and truthful.audited > 0
     assert len(lying) == len(truthful) and open_edges(lying) == 0
 
@@ -119,7 +121,7 @@ def test_a_pocket_breaks_no_bound() -> None:
     bubbles = repeat(sphere(radius=0.03), period=(0.16, 0.16, 0.16), count=(5, 5, 5))
     root, voxel = difference(box(size=(1.6, 1.6, 1.6)), bubbles), 0.02
     lattice = Lattice((-0.89, -0.89, -0.89), voxel, (11, 11, 11))
-    bricks = sample(compile_scene(root), Facts(root.facts.box, 1.0, True), lattice)
+    bricks = sample(compile_scene(root), Bounds(root.bounds.box, 1.0, True), lattice)
     inside, _ = unfolded(bricks)
     assert bricks.repaired == 0 and not inside[10:78, 10:78, 10:78].all()
 
@@ -168,7 +170,7 @@ def test_what_is_too_thin_for_any_sample_says_so() -> None:
 
 def test_too_fine_a_voxel_is_refused_before_starting() -> None:
     with pytest.raises(VolumeError, match="finest that fits"):
-        Lattice.around(sphere().facts.box, 1e-5)
+        Lattice.around(sphere().bounds.box, 1e-5)
 
 
 def test_cancelled() -> None:

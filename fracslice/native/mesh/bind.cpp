@@ -93,7 +93,7 @@ nb::object bind_crossings(const Rows<double>& vertices, const Rows<int32_t>& tri
     Array<bool> marks = unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
         if (among && among->size() != mesh.count) throw std::invalid_argument("triangles and among differ in length");
-        return crossing_triangles(mesh, tree_of(mesh, order, low, high), among ? among->data() : nullptr);
+        return self_intersecting_triangles(mesh, tree_of(mesh, order, low, high), among ? among->data() : nullptr);
     });
     return to_numpy(std::move(marks), {triangles.shape(0)});
 }
@@ -120,9 +120,9 @@ int bind_side_of_plane(const Point& a, const Point& b, const Point& c, const Poi
 
 void bind_mesh(nb::module_& module) {
     using namespace nanobind::literals;
-    module.def("links", &bind_links, "triangles"_a, "counted"_a);
+    module.def("edge_topology", &bind_links, "triangles"_a, "counted"_a);
     module.def("corners_by_vertex", &bind_corners, "triangles"_a, "vertices"_a);
-    module.def("parts", &bind_parts, "triangles"_a, "vertices"_a);
+    module.def("connected_components", &bind_parts, "triangles"_a, "vertices"_a);
     module.def("shell_volumes", &bind_volumes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a);
     module.def("measures", &bind_measures, "vertices"_a, "triangles"_a, "point"_a);
     module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "points"_a);
@@ -130,7 +130,7 @@ void bind_mesh(nb::module_& module) {
     module.def("bounds", &bind_bounds, "points"_a);
     module.def("weld", &bind_weld, "points"_a);
     module.def("tree", &bind_tree, "vertices"_a, "triangles"_a);
-    module.def("crossing_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,
+    module.def("self_intersecting_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,
                "threads"_a = 0, "among"_a = nb::none());
     module.def("nesting", &bind_nesting, "vertices"_a, "triangles"_a, "labels"_a, "sizes"_a, "first"_a, "order"_a,
                "low"_a, "high"_a);

@@ -153,7 +153,7 @@ Array<bool> Pairs::run() {
 
 }  // namespace
 
-Array<bool> crossing_triangles(const MeshView& mesh, const TreeView& tree, const bool* among) {
+Array<bool> self_intersecting_triangles(const MeshView& mesh, const TreeView& tree, const bool* among) {
     return Pairs(mesh, tree, among).run();
 }
 

@@ -7,6 +7,6 @@ namespace fracslice {
 
 // For each triangle whether it meets another one in more than what the vertices both have by index span. Triangles without
 // area are passed over. among: only pairs with one of these are looked at, [count]; all if null.
-Array<bool> crossing_triangles(const MeshView& mesh, const TreeView& tree, const bool* among = nullptr);
+Array<bool> self_intersecting_triangles(const MeshView& mesh, const TreeView& tree, const bool* among = nullptr);
 
 }  // namespace fracslice

@@ -147,7 +147,7 @@ NB_MODULE(_slices, module) {
     nb::class_<Field>(module, "Field");
     nb::class_<Compiled, Field>(module, "Compiled").def(nb::init<nb::tuple>(), "entry"_a);
     nb::class_<Called, Field>(module, "Called").def(nb::init<nb::callable>(), "function"_a);
-    nb::class_<Bounds>(module, "Bounds")
+    nb::class_<Bounds>(module, "ProbeBounds")
         .def(nb::init<double, double, double, int, int, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
              "stop_inside"_a, "even"_a);
     module.def("deflated", &bind_deflated, "image"_a);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...formulas.vocabulary import any_of, maximum, minimum, sqrt, where
-from .words import field
+from .intrinsics import field
 
 
 def span(ox, oy, oz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped-def]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...formulas.vocabulary import maximum, rsqrt
-from .words import field
+from .intrinsics import field
 
 
 def normalised(x, y, z):  # type: ignore[no-untyped-def]

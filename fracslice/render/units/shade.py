@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...formulas.vocabulary import absolute, exp, log, maximum, minimum, sqrt, where
+from .intrinsics import field
 from .normal import normalised
-from .words import field
 
 
 def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):  # type: ignore[no-untyped-def]

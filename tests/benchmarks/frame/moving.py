@@ -28,7 +28,7 @@ SIZE, WITHIN = (640, 360), 0.03
 
 def main(name: str = "mandelbulb", steps: str = "40") -> None:
     scene = read(library.path(name))
-    start = Camera.around(scene.root.facts.box)
+    start = Camera.around(scene.root.bounds.box)
     of = Renderer(scene.root, replace(scene.view, camera=start), SIZE, device="cpu")
     list(of.passes(1))
     cameras = [start.orbited(360 * k / int(steps)) for k in range(int(steps))]

@@ -42,8 +42,8 @@ def surface(root: Node, count: int = 4000) -> np.ndarray:
     t, f = np.zeros(count), np.zeros(count)
     for _ in range(600):
         f = field(*(o + t[:, None] * d).T)
-        t += np.where(f / root.facts.lipschitz > HALF, f / root.facts.lipschitz, 0)
-    return (o + t[:, None] * d)[(f / root.facts.lipschitz <= HALF) & (t < 6)]
+        t += np.where(f / root.bounds.lipschitz > HALF, f / root.bounds.lipschitz, 0)
+    return (o + t[:, None] * d)[(f / root.bounds.lipschitz <= HALF) & (t < 6)]
 
 
 def gradient(root: Node, points: np.ndarray, offsets: np.ndarray, centre: bool = False) -> np.ndarray:

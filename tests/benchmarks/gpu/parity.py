@@ -38,7 +38,7 @@ def checks(root: Node, precision: str) -> Iterator[tuple[str, float]]:
     yield "far", holds(kernel.points(*far) > 0, expected(*far) > 0)
     bad = np.array([(np.nan, 0, 0), (0, np.nan, 0), (0, 0, np.nan), (np.nan,) * 3]).T
     yield "NaN", holds(np.isnan(kernel.points(*bad)), True)
-    if root.facts.box.finite:
+    if root.bounds.box.finite:
         endless = np.array([(np.inf, 0, 0), (0, -np.inf, 0), (0, 0, np.inf), (np.inf, np.inf, -np.inf)]).T
         yield "infinity", holds(kernel.points(*endless) < 0, False)
     yield "bricks", bricks(kernel)

@@ -32,7 +32,7 @@ def dense() -> np.ndarray:
 
 def surface(root: Node) -> np.ndarray:
     """The corners of the bricks that the surface passes through, in that cube."""
-    return sample(cuda.compile_scene(root), root.facts, LATTICE).ijk  # type: ignore[arg-type]
+    return sample(cuda.compile_scene(root), root.bounds, LATTICE).ijk  # type: ignore[arg-type]
 
 
 def best(run: Callable[[], None], rounds: int = 10) -> float:
@@ -74,9 +74,9 @@ def main() -> None:
             for back_end, (rate, inside) in rates(root, corners).items():
                 print(f"{name} {part:<8} {back_end:<20} {rate:8.2f} G evaluations/s, {inside} inside")
         for back_end, kernel in {"CPU": cpu.compile_scene(root), "CUDA": cuda.compile_scene(root)}.items():
-            sample(kernel, root.facts, LATTICE)  # type: ignore[arg-type]
+            sample(kernel, root.bounds, LATTICE)  # type: ignore[arg-type]
             start = time.perf_counter()
-            bricks = sample(kernel, root.facts, LATTICE)  # type: ignore[arg-type]
+            bricks = sample(kernel, root.bounds, LATTICE)  # type: ignore[arg-type]
             took = time.perf_counter() - start
             counts = f"{len(bricks)} bricks, {bricks.evaluations} evaluations"
             print(f"{name} sampler on {back_end}: {took:.3f} s, {counts}")

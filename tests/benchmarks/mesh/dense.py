@@ -59,10 +59,10 @@ def main() -> None:
         f"{'dense / sparse':>16}{'/ exact':>9}"
     )
     for name, root in SCENES.items():
-        half = 1.05 * max(root.facts.box.hi)
+        half = 1.05 * max(root.bounds.box.hi)
         kernel, lattice = compile_scene(root), Lattice.around(Box.centred(half), 2 * half / (n - 1))
-        plain = seconds(lambda k=kernel, r=root, la=lattice: extract(sample(k, r.facts, la)))
-        exact = seconds(lambda k=kernel, r=root, la=lattice: contour(r, sample(k, r.facts, la)))
+        plain = seconds(lambda k=kernel, r=root, la=lattice: extract(sample(k, r.bounds, la)))
+        exact = seconds(lambda k=kernel, r=root, la=lattice: contour(r, sample(k, r.bounds, la)))
         slow = seconds(dense(root, half, n))
         print(
             f"{name + f' at {n}^3':30}{plain:9.3f}{exact:9.3f}{slow:9.3f}"

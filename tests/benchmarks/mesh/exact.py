@@ -17,7 +17,7 @@ import numpy as np
 from fracslice._native import Cells, Contouring
 from fracslice.formulas import Node
 from fracslice.kernel import compile_scene
-from fracslice.mesh.extract import clamp, contour, extract
+from fracslice.mesh.extract import contour, extract, minimum_edge_parameter
 from fracslice.scene.reader import read
 from fracslice.volume import plan, sample_scene
 from fracslice.volume.crossings import Crossings, Refiner
@@ -90,7 +90,7 @@ def main() -> None:
                 partial(extract, bricks),
                 partial(contour, planned.root, bricks),
                 refining,
-                partial(triangles, cells, last, found, *place, clamp(signs)),
+                partial(triangles, cells, last, found, *place, minimum_edge_parameter(signs)),
             ]
         )
         samples, plain, exact = seconds[:, :3].T

@@ -13,10 +13,10 @@ import numpy as np
 
 from fracslice.formulas import julia, mandelbulb, menger, sphere
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check
+from fracslice.mesh.check import check_mesh
 from fracslice.mesh.extract import contour
 from fracslice.mesh.nearest import Nearest
-from fracslice.mesh.rounding import rounded
+from fracslice.mesh.quantisation import quantised
 from fracslice.mesh.simplify import simplify
 from fracslice.mesh.solid import to_manifold
 from fracslice.volume import plan, sample_scene
@@ -55,18 +55,18 @@ def by_us(mesh: Mesh, tolerance: float, count: int) -> Mesh:
 
 def main() -> None:
     ways: tuple[Callable[[Mesh, float, int], Mesh], ...] = (by_us, by_manifold3d, by_pymeshlab)
-    simplify(rounded(contour(sphere(), sample_scene(plan(sphere(), 16)))), 0.01)
+    simplify(quantised(contour(sphere(), sample_scene(plan(sphere(), 16)))), 0.01)
     print(f"{'':22}{'':15}{'triangles':>10}{'of all':>8}{'off':>8}{'CPU s':>8}  defects")
     for name, (root, resolution) in SCENES.items():
         planned, count = plan(root, resolution), 0
-        mesh, tolerance = rounded(contour(root, sample_scene(planned))), TOLERANCE * planned.voxel
+        mesh, tolerance = quantised(contour(root, sample_scene(planned))), TOLERANCE * planned.voxel
         for way in ways:
             start = time.process_time()
             few = way(mesh, tolerance, count)
             spent, count = time.process_time() - start, count or len(few.triangles)
             off = Nearest(few).samples(mesh, 10 * planned.voxel, Work()).max() / tolerance
             share = len(few.triangles) / len(mesh.triangles)
-            defects = ", ".join(check(few).problems) or "none"
+            defects = ", ".join(check_mesh(few).problems) or "none"
             numbers = f"{len(few.triangles):10}{share:8.1%}{off:8.2f}{spent:8.1f}"
             print(f"{name:22}{way.__name__[3:]:15}{numbers}  {defects}", flush=True)
 

@@ -48,7 +48,7 @@ def by_sdf(what: Workload, resolution: int) -> Told:
     """sdf (Fogleman): batches skipped by |f|, which is taken for a distance: f / L is one."""
     import sdf
 
-    kernel, bound, count = compile_scene(what.root), what.root.facts.lipschitz, 0
+    kernel, bound, count = compile_scene(what.root), what.root.bounds.lipschitz, 0
 
     def field(p: np.ndarray) -> np.ndarray:
         nonlocal count

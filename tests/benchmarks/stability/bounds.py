@@ -42,9 +42,9 @@ def rows(tries: int, wanted: str) -> Iterator[list[str]]:
     for name, root in SCENES.items():
         if wanted in name:
             found = tried(name, tries)
-            kind = "free ball" if root.facts.weak else "slope"
+            kind = "free ball" if root.bounds.exterior_only else "slope"
             points = f"{found.points:.2g}".replace("e+0", "e")
-            bound = f"{root.guard().facts.lipschitz:.3g}"
+            bound = f"{root.conservative().bounds.lipschitz:.3g}"
             worst = f"{found.worst:.6f}" if found.worst else "< 0.5"
             yield [name, kind, bound, points, str(found.violations), worst]
 

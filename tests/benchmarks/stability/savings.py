@@ -29,8 +29,8 @@ BULB = mandelbulb(iterations=8)
 
 
 def sampled(root: Node) -> Bricks:
-    box = root.facts.box
-    return sample(compile_scene(root), root.facts, Lattice.around(box, max(box.size) / VOXELS))
+    box = root.bounds.box
+    return sample(compile_scene(root), root.bounds, Lattice.around(box, max(box.size) / VOXELS))
 
 
 def bricks() -> Iterator[list[str]]:

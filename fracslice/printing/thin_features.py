@@ -24,7 +24,7 @@ from ..work import Work
 from .faces import slopes
 from .samples import Samples
 from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, walls
-from .wrapped import Raised
+from .wrapped import OffsetField
 
 NEAR = 0.9
 """Voxels: more than from any point to the nearest sample, half the diagonal."""
@@ -48,7 +48,7 @@ RAYS = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
-class Slender:
+class ThinFeatures:
     """Walls, or gaps, that are thin, right within a hundredth of a voxel. replaces: below which width (scene
     units) they stand for what the samples tell; 0 where the samples are right, and these are what they miss.
     """
@@ -64,7 +64,7 @@ class Slender:
         return sampled.chosen(sampled.width >= self.replaces) + mine.chosen(mine.width < limit)
 
 
-def slender(root: Node | Compilable, seen: Samples, work: Work) -> tuple[Slender, Slender]:
+def thin_features(root: Node | Compilable, seen: Samples, work: Work) -> tuple[ThinFeatures, ThinFeatures]:
     """The thin walls and gaps of an object, also those that its samples miss.
 
     root: all depths known. seen: the distances that were sampled of it. The values of escape-time fractals
@@ -109,9 +109,9 @@ class _Look:
     def voxel(self) -> float:
         return self.seen.bricks.voxel
 
-    def told(self, found: Walls) -> Slender:
+    def told(self, found: Walls) -> ThinFeatures:
         """Walls or gaps that were found, and what they are better than."""
-        return Slender(found, 0.0 if self.root.facts.weak else self.most)
+        return ThinFeatures(found, 0.0 if self.root.bounds.exterior_only else self.most)
 
     @cached_property
     def inwards(self) -> _Rays:
@@ -156,11 +156,11 @@ class _Look:
 
     def rays(self, sign: float) -> _Rays:
         """Through all thin walls (sign 1), or from within all others through thin gaps (-1)."""
-        reach = NEAR * self.voxel * self.root.facts.lipschitz
-        raised = self.raised(sign * reach)
+        reach = NEAR * self.voxel * self.root.bounds.lipschitz
+        offset_field = self.offset_field(sign * reach)
 
         def look(rows: slice) -> _Rays:
-            start, normals, area = crossed(raised, rows)
+            start, normals, area = crossed(offset_field, rows)
             rays = self.narrow(_Rays(start, -sign * normals, area, 0 * area, 0 * area), sign)
             far, none = 2 * (reach + self.voxel), np.zeros(len(rays.start))
             rays = replace(rays, enter=self.first(rays, none, none + far, sign))
@@ -168,7 +168,7 @@ class _Look:
             rays = self.missed(rays, rays.enter)
             return self.stretch(rays, rays.enter, -sign)
 
-        return gathered(look, len(raised.bricks), AT_ONCE, self.work)
+        return gathered(look, len(offset_field.bricks), AT_ONCE, self.work)
 
     def narrow(self, rays: _Rays, sign: float) -> _Rays:
         """Those that may leave within `most` what they enter, `NEAR` voxels from where they begin at least:
@@ -177,23 +177,23 @@ class _Look:
         half = self.most / 2
         middle = np.full(len(rays.start), (NEAR + SLACK) * self.voxel + half)
         f = sign * self.field(rays.points(middle))
-        return rays.chosen(~(f <= -half * self.root.facts.lipschitz))
+        return rays.chosen(~(f <= -half * self.root.bounds.lipschitz))
 
     def missed(self, rays: _Rays, s: np.ndarray) -> _Rays:
         """Those that are to be looked at so far along: of a fractal, at what its samples miss."""
-        if not self.root.facts.weak:
+        if not self.root.bounds.exterior_only:
             return rays
         known = np.abs(self.seen.points(*rays.points(s))) <= AWAY * self.voxel
         return rays.chosen(~known)
 
-    def raised(self, by: float) -> Samples:
+    def offset_field(self, by: float) -> Samples:
         """Samples of the field less `by`: the flatter it is, the farther its inside reaches from the box."""
         for times in (2, 8, 32):
             try:
-                box = (self.root.facts.box | self.seen.box).grown(times * abs(by))
-                facts = replace(self.root.facts, box=box)
+                box = (self.root.bounds.box | self.seen.box).grown(times * abs(by))
+                bounds = replace(self.root.bounds, box=box)
                 return Samples(
-                    sample(Raised(self.kernel, by), facts, Lattice.around(box, self.voxel), self.work)
+                    sample(OffsetField(self.kernel, by), bounds, Lattice.around(box, self.voxel), self.work)
                 )
             except VolumeError as error:
                 failure = error
@@ -207,7 +207,7 @@ class _Look:
         def field(which: np.ndarray, s: np.ndarray) -> np.ndarray:
             return sign * self.field(_points(rays.start, rays.ways, which, s))
 
-        return _first(field, begin, end, self.root.facts.lipschitz, STEP * self.voxel)
+        return _first(field, begin, end, self.root.bounds.lipschitz, STEP * self.voxel)
 
     def field(self, points: np.ndarray) -> np.ndarray:
         """At points [3, n]."""
@@ -234,10 +234,10 @@ def all_walls(
     root: Node | Compilable, seen: Samples, limit: float, work: Work, *, gaps: bool = False
 ) -> Walls:
     """The walls or gaps up to `limit` scene units, whether the samples tell of them or the field alone."""
-    weak, most = root.facts.weak, THIN * seen.bricks.voxel
-    look = _Look(root, seen, most if weak else max(most, limit), work)
+    exterior_only, most = root.bounds.exterior_only, THIN * seen.bricks.voxel
+    look = _Look(root, seen, most if exterior_only else max(most, limit), work)
     found = look.gaps() if gaps else look.walls()
-    if weak:
+    if exterior_only:
         found = walls(seen, limit, work, gaps=gaps) + found
     return found.chosen(found.width < limit)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fracslice.render.live import Live, Shown, Stick
+from fracslice.render.live import CameraInput, Live, Shown
 from fracslice.scene.view import Camera
 from fracslice.viewer.screen import need_screen
 from fracslice.work import Work
@@ -50,23 +50,23 @@ def fly(
     work = work or Work()
     live = Live(path, settings, size, work, device)
     try:
-        Cockpit(live, size, work.cancel.is_set).open()
+        Viewer(live, size, work.cancel.is_set).open()
     finally:
         live.close()
     work.check()
     return live.camera
 
 
-def steered(held: Iterable[str], pace: float) -> Stick:
+def steered(held: Iterable[str], pace: float) -> CameraInput:
     """What the keys that are held down ask for."""
     ways = {"forward": 0.0, "right": 0.0, "up": 0.0}
     for key in held:
         axis, way = AXES[key]
         ways[axis] += way
-    return Stick(**ways, pace=pace)
+    return CameraInput(**ways, pace=pace)
 
 
-class Cockpit:
+class Viewer:
     """A pyvista window with its keys. stopped: whether somebody outside wants it closed."""
 
     def __init__(self, live: Live, size: tuple[int, int], stopped: Callable[[], bool]) -> None:

@@ -19,7 +19,7 @@ BAND = 2.0
 NONE = -1
 
 
-def strokes(start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Samples:
+def capsules(start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Samples:
     """The field of round-ended strokes from start to end, float64 [n, 3], scene units; balls where they are
     the same. Sampled on the grid of `like`, in bricks of its own.
     """

@@ -11,7 +11,7 @@ from ..volume import Bricks, Lattice, sample
 from ..volume.lattice import BRICK
 from ..work import Work
 from .samples import Samples
-from .slender import slender
+from .thin_features import thin_features
 from .walls import Walls
 
 FINEST = 768
@@ -30,7 +30,7 @@ def shown(root: Node | Compilable, outer: Box, longest: float, samples: float, w
     """
     while True:
         try:
-            return sample(compile_scene(root), root.facts, Lattice.around(outer, longest / samples), work)
+            return sample(compile_scene(root), root.bounds, Lattice.around(outer, longest / samples), work)
         except VolumeError:
             samples *= 2
             if samples > FINEST:
@@ -49,15 +49,15 @@ def resolved(
     `VolumeError`, `Cancelled`.
     """
     times = AGAIN if loose else 1.0
-    if not root.facts.weak:
+    if not root.bounds.exterior_only:
         if thin is None:
-            walls, gaps = slender(root, Samples(bricks), work)
+            walls, gaps = thin_features(root, Samples(bricks), work)
             thin = walls.walls + gaps.walls
         times = _times(bricks, thin, least)
     if times <= 1:
         return bricks
     lattice = Lattice.around(Samples(bricks).box, bricks.voxel / times)
-    return sample(compile_scene(root), root.facts, lattice, work)
+    return sample(compile_scene(root), root.bounds, lattice, work)
 
 
 def _times(bricks: Bricks, thin: Walls, least: float) -> float:

@@ -37,7 +37,7 @@ kernel = cuda.jit(cache=True)
 Instruction = str | Callable[..., Any]
 
 
-def _word(arity: int, single: Instruction, double: Instruction) -> Any:
+def _intrinsic(arity: int, single: Instruction, double: Instruction) -> Any:
     """A function of reals, in float32 and float64.
 
     Each is a PTX instruction, a function of NVIDIA's libdevice where the name begins with ``__nv_``, or a
@@ -79,12 +79,12 @@ if SIMULATED:
 else:
     intrinsic = import_module("numba.cuda.extending").intrinsic
     LOG_2 = float32(math.log(2))
-    _log2 = _word(1, "lg2.approx.ftz.f32", "__nv_log2")
+    _log2 = _intrinsic(1, "lg2.approx.ftz.f32", "__nv_log2")
 
     def _log(a):  # type: ignore[no-untyped-def]
         return _log2(a) * LOG_2
 
-    _inverse = _word(1, "rcp.approx.ftz.f32", "rcp.approx.ftz.f64")
+    _inverse = _intrinsic(1, "rcp.approx.ftz.f32", "rcp.approx.ftz.f64")
 
     def _ratio(a, b):  # type: ignore[no-untyped-def]
         return a * _inverse(b)
@@ -128,19 +128,19 @@ else:
         """Whether the GPU is new enough for min.NaN; also where there is none, and code is only looked at."""
         return not cuda.is_available() or cuda.get_current_device().compute_capability >= (8, 0)
 
-    sqrt = _word(1, "sqrt.approx.ftz.f32", "sqrt.rn.f64")
-    rsqrt = _word(1, "rsqrt.approx.ftz.f32", "__nv_rsqrt")
-    ratio = _word(2, _ratio, _ratio_in_double)
-    divide = _word(2, "div.full.ftz.f32", "div.rn.f64")
-    log = _word(1, _log, "__nv_log")
-    exp = _word(1, "__nv_expf", "__nv_exp")
-    sin = _word(1, _sin, "__nv_sin")
-    cos = _word(1, _cos, "__nv_cos")
-    atan2 = _word(2, "__nv_atan2f", "__nv_atan2")
-    floor = _word(1, "__nv_floorf", "__nv_floor")
-    minimum = _word(2, "min.NaN.f32" if _ampere() else _minimum, _minimum)
-    maximum = _word(2, "max.NaN.f32" if _ampere() else _maximum, _maximum)
-    absolute = _word(1, "__nv_fabsf", "__nv_fabs")
+    sqrt = _intrinsic(1, "sqrt.approx.ftz.f32", "sqrt.rn.f64")
+    rsqrt = _intrinsic(1, "rsqrt.approx.ftz.f32", "__nv_rsqrt")
+    ratio = _intrinsic(2, _ratio, _ratio_in_double)
+    divide = _intrinsic(2, "div.full.ftz.f32", "div.rn.f64")
+    log = _intrinsic(1, _log, "__nv_log")
+    exp = _intrinsic(1, "__nv_expf", "__nv_exp")
+    sin = _intrinsic(1, _sin, "__nv_sin")
+    cos = _intrinsic(1, _cos, "__nv_cos")
+    atan2 = _intrinsic(2, "__nv_atan2f", "__nv_atan2")
+    floor = _intrinsic(1, "__nv_floorf", "__nv_floor")
+    minimum = _intrinsic(2, "min.NaN.f32" if _ampere() else _minimum, _minimum)
+    maximum = _intrinsic(2, "max.NaN.f32" if _ampere() else _maximum, _maximum)
+    absolute = _intrinsic(1, "__nv_fabsf", "__nv_fabs")
 
     @device
     def where(mask, a, b):  # type: ignore[no-untyped-def]

@@ -26,7 +26,7 @@ ulp."""
 
 
 @dataclass(frozen=True)
-class Setting:
+class RenderSetup:
     """A scene with nothing left open. roots: with the depths of the first passes and, last, of all later
     ones."""
 
@@ -41,7 +41,7 @@ class Setting:
         return self.roots[min(index, len(self.roots) - 1)]
 
 
-def settle(root: Node, view: View, size: tuple[int, int]) -> Setting:
+def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     """Chooses what is open. Raises `SceneError` for a view that shows nothing: from inside the solid, say."""
     camera = view.camera or _whole(root)
     lights = view.lights or (SUN, SKY)
@@ -53,13 +53,13 @@ def settle(root: Node, view: View, size: tuple[int, int]) -> Setting:
     precision = "float32" if pixel * near > 4 * ROUNDING["float32"] * scale else "float64"
     roots = tuple(resolve_depths(root, detail * pixel * near) for detail in DETAIL)
     seen = optics(camera, size, root, ROUNDING[precision] * scale)
-    return Setting(roots, replace(view, lights=lights), camera, seen, precision)
+    return RenderSetup(roots, replace(view, lights=lights), camera, seen, precision)
 
 
 def _whole(root: Node) -> Camera:
-    if not root.facts.box.finite:
+    if not root.bounds.box.finite:
         raise SceneError("<camera> is missing: expected one in a scene without an end")
-    return Camera.around(root.facts.box)
+    return Camera.around(root.bounds.box)
 
 
 def clearance(root: Node, camera: Camera) -> float:
@@ -70,7 +70,7 @@ def clearance(root: Node, camera: Camera) -> float:
     f = float(compile_scene(root, "float64").points(*(np.array([c]) for c in camera.eye))[0])
     if not f > 0:
         raise camera.fail("eye: expected a place outside the solid")
-    nearest = f / root.facts.lipschitz
-    box = root.facts.box
+    nearest = f / root.bounds.lipschitz
+    box = root.bounds.box
     gaps = [max(a - e, e - b, 0.0) for a, e, b in zip(box.lo, camera.eye, box.hi, strict=True)]
     return max(nearest, math.hypot(*gaps))

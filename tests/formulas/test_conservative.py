@@ -31,47 +31,47 @@ def anywhere(count: int = 40_000) -> np.ndarray:
 @pytest.mark.parametrize("name", SAME)
 def test_most_scenes_are_their_own_guard(name: str) -> None:
     """The same code and numbers: nothing is compiled for it."""
-    own, guard = link(EXAMPLES[name]), link(EXAMPLES[name].guard())
-    assert own.source == guard.source and np.array_equal(own.parameters, guard.parameters)
+    own, conservative = link(EXAMPLES[name]), link(EXAMPLES[name].conservative())
+    assert own.source == conservative.source and np.array_equal(own.parameters, conservative.parameters)
 
 
 @pytest.mark.parametrize("name", DIFFERENT)
 def test_a_guard_is_less_where_it_differs(name: str) -> None:
     points, root = anywhere(), DIFFERENT[name]
-    own, guard = reference(root)(*points), reference(root.guard())(*points)
-    assert (own[guard > 0] >= 0).all()
-    assert (guard <= own + 1e-12)[own > 0].all() and (guard < own - 1e-3)[own > 0].any()
+    own, conservative = reference(root)(*points), reference(root.conservative())(*points)
+    assert (own[conservative > 0] >= 0).all()
+    assert (conservative <= own + 1e-12)[own > 0].all() and (conservative < own - 1e-3)[own > 0].any()
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 @pytest.mark.parametrize("name", DIFFERENT)
 def test_the_kernel_is_the_reference(name: str, precision: Precision) -> None:
-    points, guard = anywhere(5000), DIFFERENT[name].guard()
-    got = compile_scene(guard, precision).points(*points)
+    points, conservative = anywhere(5000), DIFFERENT[name].conservative()
+    got = compile_scene(conservative, precision).points(*points)
     limit = 1e-4 if precision == "float32" else 1e-11
-    np.testing.assert_allclose(got, reference(guard)(*points), rtol=limit, atol=limit)
+    np.testing.assert_allclose(got, reference(conservative)(*points), rtol=limit, atol=limit)
 
 
 def test_a_guard_vanishes_on_the_tear() -> None:
     """The half plane y = 0, x < 0: the solid goes on elsewhere on the other side."""
     x, z = np.random.default_rng(0).uniform((-1.1, -0.5), (-0.7, 0.5), (500, 2)).T
-    own, guard = (reference(r)(x, np.full_like(x, 1e-7), z) for r in (TORN, TORN.guard()))
-    assert own.max() > 0.01 and 0 < guard[own > 0].max() < 1e-6
+    own, conservative = (reference(r)(x, np.full_like(x, 1e-7), z) for r in (TORN, TORN.conservative()))
+    assert own.max() > 0.01 and 0 < conservative[own > 0].max() < 1e-6
 
 
 def test_a_seam_costs_nothing_elsewhere() -> None:
     """Far from one of the two, L is what it is without a seam, not 1.25 times that."""
-    far = union(mandelbulb(iterations=4), transform(sphere(), translate=(4, 0, 0)), smooth=0.1).guard()
+    far = union(mandelbulb(iterations=4), transform(sphere(), translate=(4, 0, 0)), smooth=0.1).conservative()
     points = anywhere()
     own, alone = reference(far)(*points), reference(mandelbulb(iterations=4))(*points)
-    assert far.facts.lipschitz == 2.0
+    assert far.bounds.lipschitz == 2.0
     np.testing.assert_array_equal(own[alone > 0], alone[alone > 0])
 
 
 def test_the_highest_power_steepens() -> None:
-    assert sphere().facts.steepening == 0 and julia().facts.steepening == 2
+    assert sphere().bounds.steepening == 0 and julia().bounds.steepening == 2
     half = transform(mandelbulb(power=5), scale=(0.5,))
-    assert union(half, julia()).facts.steepening == 5
+    assert union(half, julia()).bounds.steepening == 5
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])

@@ -14,7 +14,7 @@ from ..volume.bricks import INSIDE, OUTSIDE
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class Components:
     """Parts numbered from 0; number 0 is the space that reaches beyond the samples.
 
     labels: int32 [n, 512], the part of each sample. tiles: int32 [bx, by, bz], that of each brick without
@@ -52,12 +52,12 @@ class Connected:
     """Samples of a solid, and its parts."""
 
     solid: Bricks
-    parts: Parts
+    components: Components
 
     def filled(self) -> Connected:
         """As they are once the cavities are solid: what floats in one is of the body around it."""
-        solid = self._turned(self.parts.cavities, -1.0, INSIDE)
-        return Connected(solid, parts_of(solid))
+        solid = self._turned(self.components.cavities, -1.0, INSIDE)
+        return Connected(solid, components_of(solid))
 
     def without(self, bodies: np.ndarray) -> Bricks:
         """The samples of the solid without some bodies."""
@@ -65,12 +65,12 @@ class Connected:
 
     def _turned(self, numbers: np.ndarray, sign: float, side: int) -> Bricks:
         """With parts on the other side, a voxel from the surface."""
-        samples, tiles = self.parts.masks(numbers)
+        samples, tiles = self.components.masks(numbers)
         values = np.where(samples, np.float32(sign * self.solid.voxel), self.solid.values)
         return replace(self.solid, values=values, index=np.where(tiles, np.int32(side), self.solid.index))
 
 
-def parts_of(bricks: Bricks) -> Parts:
+def components_of(bricks: Bricks) -> Components:
     """The parts of a sampled solid, in time linear in the samples.
 
     Samples are connected along the grid's edges: what touches only along a line is not joined. Each brick is
@@ -93,7 +93,7 @@ def parts_of(bricks: Bricks) -> Parts:
     count = np.bincount(number[labels.ravel()], minlength=len(names))
     count += 512 * np.bincount(number[tiles[empty]], minlength=len(names))
     found = np.where(empty, number[tiles], -1).astype(np.int32)
-    return Parts(number.astype(np.int32)[labels], found, inside[names], count)
+    return Components(number.astype(np.int32)[labels], found, inside[names], count)
 
 
 @compiled

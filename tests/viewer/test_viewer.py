@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from fracslice.errors import RenderError
-from fracslice.render.live import Stick
+from fracslice.render.live import CameraInput
 from fracslice.scene.view import Camera
-from fracslice.viewer import cockpit, fly, screen
+from fracslice.viewer import fly, screen, viewer
 
 pyvista = pytest.importorskip("pyvista")
 
@@ -23,42 +23,42 @@ def shown(level: int) -> SimpleNamespace:
 
 
 @pytest.fixture
-def window(monkeypatch: pytest.MonkeyPatch) -> cockpit.Cockpit:
+def window(monkeypatch: pytest.MonkeyPatch) -> viewer.Viewer:
     monkeypatch.setattr(pyvista, "Plotter", lambda **_: MagicMock(window_size=(6, 40)))
     live = MagicMock(camera=Camera(fov=40.0), running=True, shown=shown(10))
-    return cockpit.Cockpit(live, (6, 4), lambda: False)
+    return viewer.Viewer(live, (6, 4), lambda: False)
 
 
-def stick(window: cockpit.Cockpit) -> Stick:
-    steered: Stick = window.live.steer.call_args.args[0]  # type: ignore[attr-defined]
+def camera_input(window: viewer.Viewer) -> CameraInput:
+    steered: CameraInput = window.live.steer.call_args.args[0]  # type: ignore[attr-defined]
     return steered
 
 
-def test_keys_that_are_held_steer(window: cockpit.Cockpit, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_keys_that_are_held_steer(window: viewer.Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr("time.monotonic", lambda: now)
     for key in ("w", "d"):
         window.press(key)
-    assert (stick(window).forward, stick(window).right, stick(window).up) == (1, 1, 0)
+    assert (camera_input(window).forward, camera_input(window).right, camera_input(window).up) == (1, 1, 0)
     window.press("s")
-    assert stick(window).forward == 0
+    assert camera_input(window).forward == 0
     window.lift("s")
     window.press("s")  # that is how a key repeats itself
     now += 1
     window.tick()
-    assert stick(window).forward == 0
+    assert camera_input(window).forward == 0
     window.lift("s")
     window.lift("d")
     now += 1
     window.tick()
-    assert (stick(window).forward, stick(window).right) == (1, 0)
+    assert (camera_input(window).forward, camera_input(window).right) == (1, 0)
     window.hurry(2.0)
-    assert (stick(window).forward, stick(window).pace) == (1, 2)
+    assert (camera_input(window).forward, camera_input(window).pace) == (1, 2)
     window.press("v")
     window.live.look.assert_called_once_with(window.live.first)  # type: ignore[attr-defined]
 
 
-def test_what_is_grasped_follows_the_pointer(window: cockpit.Cockpit) -> None:
+def test_what_is_grasped_follows_the_pointer(window: viewer.Viewer) -> None:
     window.drag((9, 9))
     window.live.turn.assert_not_called()  # type: ignore[attr-defined]
     window.grasp((10, 20))
@@ -66,7 +66,7 @@ def test_what_is_grasped_follows_the_pointer(window: cockpit.Cockpit) -> None:
     window.live.turn.assert_called_once_with(-3, 2)  # type: ignore[attr-defined]
 
 
-def test_the_newest_picture_is_shown_upright(window: cockpit.Cockpit) -> None:
+def test_the_newest_picture_is_shown_upright(window: viewer.Viewer) -> None:
     window.live.shown = shown(20)
     window.tick()
     rows = np.asarray(window.image.point_data["picture"]).reshape(4, 6, 3)
@@ -78,7 +78,7 @@ def test_the_newest_picture_is_shown_upright(window: cockpit.Cockpit) -> None:
 
 
 @pytest.mark.parametrize("how", ["key", "outside", "failure"])
-def test_it_closes(window: cockpit.Cockpit, how: str) -> None:
+def test_it_closes(window: viewer.Viewer, how: str) -> None:
     window.tick()
     close = window.plotter.iren.interactor.TerminateApp
     close.assert_not_called()

@@ -7,36 +7,36 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice._native import connected_components as _connected_components
 from fracslice._native import corners_by_vertex as _corners_by_vertex
-from fracslice._native import links as _links
-from fracslice._native import parts as _parts
+from fracslice._native import edge_topology as _edge_topology
 from fracslice._native import shell_volumes as _shell_volumes
 
 
-class Links(NamedTuple):
+class EdgeTopology(NamedTuple):
     """Counts over a mesh; all but `edges` are zero for a closed, oriented 2-manifold."""
 
     edges: int
     open_edges: int
-    crowded_edges: int
+    non_manifold_edges: int
     misoriented_edges: int
-    extra_fans: int
+    non_manifold_vertices: int
 
 
-def links(triangles: NDArray[np.int32], vertices: int) -> Links:
+def edge_topology(triangles: NDArray[np.int32], vertices: int) -> EdgeTopology:
     """Edges of one triangle, of more than two, of two that run the same way; vertices that join fans.
 
     triangles: int32 [m, 3], each with three different indices below `vertices`. O(m), or O(m log d) at
     vertices of degree d. Raises ValueError for other indices, as everything here does.
     """
     ends = edge_ends(triangles, np.ones(vertices, dtype=np.bool_))
-    edges, opened, crowded, misoriented = (n // 2 for n in ends[:4])
-    return Links(edges, opened, crowded, misoriented, ends.extra_fans)
+    edges, opened, non_manifold, misoriented = (n // 2 for n in ends[:4])
+    return EdgeTopology(edges, opened, non_manifold, misoriented, ends.non_manifold_vertices)
 
 
-def edge_ends(triangles: NDArray[np.int32], counted: NDArray[np.bool_]) -> Links:
+def edge_ends(triangles: NDArray[np.int32], counted: NDArray[np.bool_]) -> EdgeTopology:
     """The same counts at some vertices only, bool [vertices]; of edges, their ends there."""
-    return Links(*_links(triangles, counted))
+    return EdgeTopology(*_edge_topology(triangles, counted))
 
 
 def corners_by_vertex(
@@ -46,13 +46,13 @@ def corners_by_vertex(
     return _corners_by_vertex(triangles, vertices)
 
 
-def parts(triangles: NDArray[np.int32], vertices: int) -> tuple[NDArray[np.int32], int]:
+def connected_components(triangles: NDArray[np.int32], vertices: int) -> tuple[NDArray[np.int32], int]:
     """The connected part of each triangle (int32 [m], numbered by first appearance), and how many there are.
 
     Triangles with a common vertex are connected. Union by lowest index with path halving (Tarjan, van
     Leeuwen, 1984).
     """
-    return _parts(triangles, vertices)
+    return _connected_components(triangles, vertices)
 
 
 def shell_volumes(

@@ -6,7 +6,7 @@ from functools import reduce
 
 from .box import Box
 from .parameters import REQUIRED, SMALLEST, Number
-from .registry import Node, blend
+from .registry import Node, csg_operator
 from .vocabulary import absolute, maximum, minimum
 
 SMOOTH = Number(
@@ -16,24 +16,24 @@ SMOOTH = Number(
 )
 
 
-@blend((1, None), smooth=SMOOTH)
+@csg_operator((1, None), smooth=SMOOTH)
 def union(a, b, smooth):  # type: ignore[no-untyped-def]
     """All that is in any of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
     quadratic).
 
     The seam weighs the gradients of the two with weights whose sum is 1, so L = max of theirs; a seam with an
-    escape-time fractal has 1.25 times that, one between several 3 times (measured; `guarded_union` does
+    escape-time fractal has 1.25 times that, one between several 3 times (measured; `conservative_union` does
     better).
     """
     h = maximum(smooth - absolute(a - b), 0.0)
     return minimum(a, b) - h * h / (4.0 * smooth)
 
 
-def guarded_union(a, b, smooth, steepest):  # type: ignore[no-untyped-def]
+def conservative_union(a, b, smooth, steepest):  # type: ignore[no-untyped-def]
     """What bounds the distance to a union with a seam, of fields that bound distances to their own surfaces.
 
     The seam lies on other level sets than the surfaces: where both are below 5/4 of its width. Fields of
-    escape-time fractals are steeper there (`Facts.steepening`), by about the factor `steepest`; elsewhere
+    escape-time fractals are steeper there (`Bounds.steepening`), by about the factor `steepest`; elsewhere
     they need not be trusted less for the sake of a seam. L = max of theirs.
     """
     h = maximum(smooth - absolute(a - b), 0.0)
@@ -45,7 +45,7 @@ def hard_union(a, b):  # type: ignore[no-untyped-def]
     return minimum(a, b)
 
 
-@blend((1, None), smooth=SMOOTH)
+@csg_operator((1, None), smooth=SMOOTH)
 def intersection(a, b, smooth):  # type: ignore[no-untyped-def]
     """What is in all of the elements. L = max of theirs, as of a union."""
     h = maximum(smooth - absolute(a - b), 0.0)
@@ -56,7 +56,7 @@ def hard_intersection(a, b):  # type: ignore[no-untyped-def]
     return maximum(a, b)
 
 
-@blend((1, None), smooth=SMOOTH)
+@csg_operator((1, None), smooth=SMOOTH)
 def difference(a, b, smooth):  # type: ignore[no-untyped-def]
     """The first element without the others. L = max of theirs, as of a union."""
     h = maximum(smooth - absolute(a + b), 0.0)
@@ -67,7 +67,7 @@ def hard_difference(a, b):  # type: ignore[no-untyped-def]
     return maximum(a, -b)
 
 
-def guarded_difference(a, b):  # type: ignore[no-untyped-def]
+def conservative_difference(a, b):  # type: ignore[no-untyped-def]
     """What bounds the distance to a difference where the inside of what is taken away bounds nothing."""
     return maximum(a, minimum(-b, 0.0))
 
@@ -76,9 +76,13 @@ def _is_sharp(node: Node) -> bool:
     return bool(node["smooth"] < SMALLEST)
 
 
-def _is_guarded(node: Node) -> bool:
+def _needs_conservative(node: Node) -> bool:
     """Whether it is a seam with an escape-time fractal, and space is to be skipped by it."""
-    return node.guarded and not _is_sharp(node) and any(child.facts.weak for child in node.children)
+    return (
+        node.is_conservative
+        and not _is_sharp(node)
+        and any(child.bounds.exterior_only for child in node.children)
+    )
 
 
 @union.unordered
@@ -90,15 +94,17 @@ def _(node: Node) -> bool:
 
 @union.select
 def _(node: Node):  # type: ignore[no-untyped-def]
-    return hard_union if _is_sharp(node) else guarded_union if _is_guarded(node) else union.function
+    return (
+        hard_union if _is_sharp(node) else conservative_union if _needs_conservative(node) else union.function
+    )
 
 
 @union.arguments
 def _(node: Node) -> dict[str, object]:
     if _is_sharp(node):
         return {}
-    steepest = 1 + node.facts.steepening / 8
-    return {"smooth": node["smooth"], **({"steepest": steepest} if _is_guarded(node) else {})}
+    steepest = 1 + node.bounds.steepening / 8
+    return {"smooth": node["smooth"], **({"steepest": steepest} if _needs_conservative(node) else {})}
 
 
 @intersection.select
@@ -108,14 +114,14 @@ def _(node: Node):  # type: ignore[no-untyped-def]
 
 @difference.select
 def _(node: Node):  # type: ignore[no-untyped-def]
-    if node.guarded and any(child.facts.weak for child in node.children[1:]):
-        return guarded_difference
+    if node.is_conservative and any(child.bounds.exterior_only for child in node.children[1:]):
+        return conservative_difference
     return hard_difference if _is_cut_sharp(node) else difference.function
 
 
 def _is_cut_sharp(node: Node) -> bool:
     """A seam only takes away from the sharp solid: a ball that is free of that one is free."""
-    return _is_sharp(node) or _is_guarded(node)
+    return _is_sharp(node) or _needs_conservative(node)
 
 
 def _cut_arguments(node: Node) -> dict[str, object]:
@@ -132,9 +138,11 @@ def _slope(node: Node) -> float:
     A seam follows level sets other than the surface, where the field of an escape-time fractal is steeper
     than its bound says. How much is measured (`docs/accuracy.md`): for one such field, and for several.
     """
-    fields = [child.facts for child in node.children]
-    weak = 0 if _is_sharp(node) or _is_guarded(node) else sum(f.weak for f in fields)
-    return max(f.lipschitz for f in fields) * (1.0, 1.25, 3.0)[min(weak, 2)]
+    fields = [child.bounds for child in node.children]
+    exterior_only = (
+        0 if _is_sharp(node) or _needs_conservative(node) else sum(f.exterior_only for f in fields)
+    )
+    return max(f.lipschitz for f in fields) * (1.0, 1.25, 3.0)[min(exterior_only, 2)]
 
 
 for _blend in (union, intersection, difference):
@@ -144,20 +152,20 @@ for _blend in (union, intersection, difference):
 @union.bounds
 def _(node: Node) -> Box:
     seams = len(node.children) - 1
-    return reduce(Box.__or__, (c.facts.box for c in node.children)).grown(seams * node["smooth"] / 4)
+    return reduce(Box.__or__, (c.bounds.box for c in node.children)).grown(seams * node["smooth"] / 4)
 
 
 @intersection.bounds
 def _(node: Node) -> Box:
-    return reduce(Box.__and__, (c.facts.box for c in node.children))
+    return reduce(Box.__and__, (c.bounds.box for c in node.children))
 
 
 @difference.bounds
 def _(node: Node) -> Box:
-    return node.children[0].facts.box
+    return node.children[0].bounds.box
 
 
-@blend(
+@csg_operator(
     (1, 1),
     thickness=Number(
         REQUIRED, "of the wall, in scene units; its outer face is the element's surface", above=0
@@ -168,16 +176,16 @@ def shell(a, thickness):  # type: ignore[no-untyped-def]
     return maximum(a, -(a + thickness))
 
 
-def guarded_shell(a, thickness):  # type: ignore[no-untyped-def]
+def conservative_shell(a, thickness):  # type: ignore[no-untyped-def]
     """What bounds the distance to a wall of an element whose inside bounds nothing."""
     return maximum(a, minimum(-(a + thickness), 0.0))
 
 
 @shell.select
 def _(node: Node):  # type: ignore[no-untyped-def]
-    return guarded_shell if node.guarded and node.facts.weak else shell.function
+    return conservative_shell if node.is_conservative and node.bounds.exterior_only else shell.function
 
 
 @shell.bounds
 def _(node: Node) -> Box:
-    return node.children[0].facts.box
+    return node.children[0].bounds.box

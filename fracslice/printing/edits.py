@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ..formulas import Box, Node, difference, intersection, union
-from ..formulas.registry import Facts
+from ..formulas.registry import Bounds
 from ..kernel import Compilable, Kernel, compile_scene, field_key
 from ..kernel.cpu import Precision
 from ..keys import key
@@ -35,7 +35,7 @@ class Term:
 
 
 @dataclass(frozen=True, eq=False)
-class Altered:
+class EditedField:
     """A field, and what is done to it, one after the other.
 
     It stands where a root does: it has facts, and `compile_scene` makes a kernel of it.
@@ -45,15 +45,15 @@ class Altered:
     terms: tuple[Term, ...]
 
     @cached_property
-    def facts(self) -> Facts:
+    def bounds(self) -> Bounds:
         """Of all together; the box encloses what is added."""
         added = [_box(term) for term in self.terms if term.does == "add"]
         slopes = [
-            t.shape.facts.lipschitz if isinstance(t.shape, Node) else t.shape.lipschitz for t in self.terms
+            t.shape.bounds.lipschitz if isinstance(t.shape, Node) else t.shape.lipschitz for t in self.terms
         ]
-        own = self.root.facts
+        own = self.root.bounds
         box = reduce(Box.__or__, added, own.box)
-        return Facts(box, max(own.lipschitz, *slopes), own.weak)
+        return Bounds(box, max(own.lipschitz, *slopes), own.exterior_only)
 
     @property
     def key(self) -> str:
@@ -61,26 +61,26 @@ class Altered:
         shapes = [field_key(t.shape) if isinstance(t.shape, Node) else t.shape.key for t in self.terms]
         return key(field_key(self.root), *((t.does, s) for t, s in zip(self.terms, shapes, strict=True)))
 
-    def guard(self) -> Altered:
-        """What space is skipped by, as `Node.guard`. What is cut away is not: less of it is more of all."""
-        terms = tuple(t if t.does == "cut" else _guarded(t) for t in self.terms)
-        return Altered(self.root.guard(), terms)
+    def conservative(self) -> EditedField:
+        """The field to skip space by, as `Node.conservative`. Cuts stay: a smaller cut is a larger solid."""
+        terms = tuple(t if t.does == "cut" else _conservative(t) for t in self.terms)
+        return EditedField(self.root.conservative(), terms)
 
     def compiled(self, precision: Precision) -> Composite:
         """Its kernel."""
-        parts = [
+        components = [
             compile_scene(t.shape, precision) if isinstance(t.shape, Node) else t.shape for t in self.terms
         ]
-        steps = tuple(zip(parts, (t.does for t in self.terms), strict=True))
+        steps = tuple(zip(components, (t.does for t in self.terms), strict=True))
         return Composite(compile_scene(self.root, precision), steps)
 
 
-def _guarded(term: Term) -> Term:
-    return Term(term.shape.guard(), term.does) if isinstance(term.shape, Node) else term
+def _conservative(term: Term) -> Term:
+    return Term(term.shape.conservative(), term.does) if isinstance(term.shape, Node) else term
 
 
 def _box(term: Term) -> Box:
-    return term.shape.facts.box if isinstance(term.shape, Node) else term.shape.box
+    return term.shape.bounds.box if isinstance(term.shape, Node) else term.shape.box
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +106,10 @@ class Composite(Wrapped):
         out[:] = self.points(*at)
 
 
-def altered(thing: Node | Compilable, does: Does, shape: Node | Samples) -> Node | Compilable:
+def edited(thing: Node | Compilable, does: Does, shape: Node | Samples) -> Node | Compilable:
     """One more change. A formula is made part of a tree that has no sampled fields yet."""
     if isinstance(thing, Node) and isinstance(shape, Node):
         return _FOLDED[does](thing, shape)
-    if isinstance(thing, Altered):
-        return Altered(thing.root, (*thing.terms, Term(shape, does)))
-    return Altered(thing, (Term(shape, does),))
+    if isinstance(thing, EditedField):
+        return EditedField(thing.root, (*thing.terms, Term(shape, does)))
+    return EditedField(thing, (Term(shape, does),))

@@ -33,7 +33,7 @@ def body(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Any:
     )
 
 
-def set_stage(plotter: Any, surface: Any, background: str, brightness: float = 1.0) -> Any:
+def set_lighting(plotter: Any, surface: Any, background: str, brightness: float = 1.0) -> Any:
     """The mesh in matte clay under a key, a fill and a rim light, in a three-quarter view; returns its actor.
 
     brightness: 1 where ambient occlusion darkens the picture, less without.
@@ -82,7 +82,7 @@ def draw(source: str, target: str, width: int, height: int, background: str) -> 
     with np.load(source) as arrays:
         surface = body(arrays["vertices"], arrays["triangles"])
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=[width, height])
-    set_stage(plotter, surface, background)
+    set_lighting(plotter, surface, background)
     plotter.enable_ssao(radius=surface.length / 25, bias=surface.length / 2000, kernel_size=64, blur=True)
     plotter.enable_anti_aliasing("ssaa")
     plotter.screenshot(target)

@@ -7,12 +7,14 @@ import pytest
 
 from fracslice.formulas import sphere
 from fracslice.kernel import compile_scene
+from fracslice.printing.capsules import capsules
 from fracslice.printing.samples import positions
-from fracslice.printing.strokes import strokes
 from fracslice.volume import Bricks, Lattice, sample
 
 VOXEL = 0.05
-LIKE = sample(compile_scene(sphere()), sphere().facts, Lattice.around(sphere().facts.box.grown(VOXEL), VOXEL))
+LIKE = sample(
+    compile_scene(sphere()), sphere().bounds, Lattice.around(sphere().bounds.box.grown(VOXEL), VOXEL)
+)
 
 
 def distance(start: np.ndarray, end: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -42,7 +44,7 @@ def on_sphere(radius: float, count: int) -> np.ndarray:
 @pytest.mark.parametrize("radius", [0.7, 3.0])
 def test_every_sample_knows_the_nearest_stroke(start: np.ndarray, end: np.ndarray, radius: float) -> None:
     """Within a thousandth of a voxel on average and a tenth anywhere, beside the surface."""
-    made = strokes(start, end, radius * VOXEL, LIKE).bricks
+    made = capsules(start, end, radius * VOXEL, LIKE).bricks
     rows, offsets = np.nonzero(np.abs(made.values) < 0.99 * VOXEL)
     points = np.array(made.origin) + VOXEL * positions(made, rows, offsets)
     error = (made.values[rows, offsets] - distance(start, end, points)) / VOXEL + radius

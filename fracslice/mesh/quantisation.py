@@ -9,7 +9,7 @@ from fracslice.errors import MeshError
 from fracslice.mesh.model import Mesh
 
 
-def rounded(mesh: Mesh) -> Mesh:
+def quantised(mesh: Mesh) -> Mesh:
     """The mesh as a reader of its STL will see it: rounded to float32, equal positions made one vertex.
 
     Keeps every triangle, in order; unused vertices go. Do it once, before the check and the export, so that
@@ -26,7 +26,7 @@ def rounded(mesh: Mesh) -> Mesh:
 
 
 def float32_points(mesh: Mesh) -> NDArray[np.float32]:
-    """The vertices as float32 [n, 3], without negative zeros. Raises MeshError as `rounded` does."""
+    """The vertices as float32 [n, 3], without negative zeros. Raises MeshError as `quantised` does."""
     with np.errstate(over="ignore"):
         points = mesh.vertices.astype(np.float32) + np.float32(0)  # -0 becomes 0
     if len(mesh.triangles) and not 0 <= mesh.triangles.min() <= mesh.triangles.max() < len(points):

@@ -8,10 +8,10 @@ import pytest
 from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
 from fracslice.kernel import compile_scene
 from fracslice.volume.accuracy import surface_error
-from fracslice.volume.settling import Rooms, settle
+from fracslice.volume.projection import TrustRegions, project
 
 
-def settled(
+def projected(
     root: Node,
     points: np.ndarray,
     low: np.ndarray,
@@ -21,12 +21,12 @@ def settled(
 ) -> np.ndarray:
     """ends: for each point one inside and one outside."""
 
-    def rooms(which: np.ndarray, inside: np.ndarray) -> Rooms:
+    def trust_regions(which: np.ndarray, inside: np.ndarray) -> TrustRegions:
         other = np.where(inside, ends[1][which].T, ends[0][which].T) if ends else None
-        return Rooms(low[which].T, high[which].T, other, None if middle is None else middle[which].T)
+        return TrustRegions(low[which].T, high[which].T, other, None if middle is None else middle[which].T)
 
     moved = points.copy()
-    which, there = settle(root, points, rooms, 0.1)
+    which, there = project(root, points, trust_regions, 0.1)
     moved[which] = there
     return moved
 
@@ -36,17 +36,17 @@ def test_points_reach_the_surface_and_stay_in_their_boxes() -> None:
     points = rng.normal(size=(500, 3))
     points *= 1.02 / np.linalg.norm(points, axis=1, keepdims=True)
     low, high = points - 0.05, points + 0.05
-    there = settled(sphere(), points, low, high)
+    there = projected(sphere(), points, low, high)
     assert np.abs(np.linalg.norm(there, axis=1) - 1).max() < 1e-9
     assert (there >= low).all() and (there <= high).all()
 
 
 def test_a_flat_box_holds_its_coordinate_and_a_narrow_one_its_point() -> None:
     points = np.array([[0.9, 0.3, 0.2], [0.9, 0.0, 0.0]])
-    room = np.array([0, 0.3, 0.3])
-    low, high = points - room, points + room
+    region = np.array([0, 0.3, 0.3])
+    low, high = points - region, points + region
     high[1] = points[1] + np.array([0.01, 0, 0])
-    there = settled(sphere(), points, low, high)
+    there = projected(sphere(), points, low, high)
     assert there[0, 0] == 0.9 and abs(np.linalg.norm(there[0]) - 1) < 1e-6
     assert np.allclose(there[1], [0.91, 0, 0], atol=1e-5)
 
@@ -60,7 +60,7 @@ def test_where_no_gradient_leads_a_point_is_drawn_to_the_other_sign() -> None:
     signs = kernel.points(*np.moveaxis(ends, 2, 0)) < 0
     inside, outside = ends[0, signs[0] & ~signs[1]], ends[1, signs[0] & ~signs[1]]
     low, high = np.minimum(inside, outside), np.maximum(inside, outside)
-    there = settled(root, rng.uniform(low, high), low, high, inside, outside)
+    there = projected(root, rng.uniform(low, high), low, high, inside, outside)
     assert len(there) > 500 and (there >= low).all() and (there <= high).all()
     assert np.abs(kernel.points(*there.T)).max() < 1e-6
 
@@ -69,7 +69,7 @@ def test_where_the_field_is_smooth_a_point_moves_towards_the_middle() -> None:
     """0.3 voxels beyond a sphere of ten; the middle is inside, or beyond too, where there is no root."""
     points = np.full((2, 3), [1.03, 0, 0])
     middle = np.array([[0.95, 0.04, 0], [1.03, 0.04, 0]])
-    there = settled(sphere(), points, points - 0.1, points + 0.1, middle=middle)
+    there = projected(sphere(), points, points - 0.1, points + 0.1, middle=middle)
     assert np.abs(np.linalg.norm(there, axis=1) - 1).max() < 1e-9
     assert there[0, 1] == pytest.approx((1.03 - there[0, 0]) / 2, abs=1e-9)
     assert np.allclose(there[1], [1, 0, 0], atol=1e-9)
@@ -78,13 +78,13 @@ def test_where_the_field_is_smooth_a_point_moves_towards_the_middle() -> None:
 def test_beside_an_edge_a_point_does_not_slide_along_a_face() -> None:
     """A hundredth of a voxel beyond it; the middle lies below one of the faces."""
     points, middle = np.array([[0.501, 0.501, 0.1]]), np.array([[0.4, 0.499, 0.1]])
-    there = settled(box(), points, points - 0.1, points + 0.1, middle=middle)
+    there = projected(box(), points, points - 0.1, points + 0.1, middle=middle)
     assert np.abs(there - [0.5, 0.5, 0.1]).max() < 1e-6
 
 
 def test_what_lies_on_the_surface_stays() -> None:
     corner = np.array([[0.5, 0.5, 0.5]])
-    assert (settled(box(), corner, corner - 0.1, corner + 0.1) == corner).all()
+    assert (projected(box(), corner, corner - 0.1, corner + 0.1) == corner).all()
 
 
 def test_surface_error_is_a_distance_also_at_an_edge() -> None:

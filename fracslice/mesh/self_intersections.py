@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._native import crossing_triangles as _crossing_triangles
+from fracslice._native import self_intersecting_triangles as _self_intersecting_triangles
 from fracslice.mesh.model import Mesh
 from fracslice.mesh.tree import Tree, build
 
 
-def crossing_triangles(
+def self_intersecting_triangles(
     mesh: Mesh,
     tree: Tree | None = None,
     threads: int | None = None,
@@ -27,4 +27,6 @@ def crossing_triangles(
     threads: all cores if None; the result is the same for any number. among: bool [m], only pairs with one of
     these are looked at. Raises ValueError for indices out of range and for the tree of another mesh.
     """
-    return _crossing_triangles(mesh.vertices, mesh.triangles, *(tree or build(mesh)), threads or 0, among)
+    return _self_intersecting_triangles(
+        mesh.vertices, mesh.triangles, *(tree or build(mesh)), threads or 0, among
+    )

@@ -8,12 +8,12 @@ import pytest
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, julia, mandelbulb, shell, sphere, transform, union
 from fracslice.kernel import compile_scene
-from fracslice.printing import apart, printable
-from fracslice.printing.altered import Altered
-from fracslice.printing.apart import resolved
+from fracslice.printing import connectivity, printable
+from fracslice.printing.components import Components, components_of
+from fracslice.printing.connectivity import resolved
+from fracslice.printing.edits import EditedField
 from fracslice.printing.make import COARSE
-from fracslice.printing.parts import Parts, parts_of
-from fracslice.printing.slender import slender
+from fracslice.printing.thin_features import thin_features
 from fracslice.scene import Print, scene
 from fracslice.volume import Lattice, Plan, plan, sample
 from fracslice.work import Work
@@ -40,11 +40,11 @@ def on_sphere(radius: float) -> np.ndarray:
     return np.asarray(radius * ways / np.linalg.norm(ways, axis=1)[:, None])
 
 
-def parts(made: Plan, voxels: float) -> tuple[Parts, float]:
+def components(made: Plan, voxels: float) -> tuple[Components, float]:
     """On samples that are finer."""
     voxel = max(made.box.size) / COARSE * voxels
     lattice = Lattice.around(made.outer, voxel)
-    return parts_of(sample(compile_scene(made.root), made.root.facts, lattice)), voxel
+    return components_of(sample(compile_scene(made.root), made.root.bounds, lattice)), voxel
 
 
 def plates(thick: float, gap: float) -> Node:
@@ -90,7 +90,9 @@ def test_cavities_and_bodies_are_told_by_the_same_samples(
     then: dict[str, float | str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     looks = []
-    monkeypatch.setattr(apart, "slender", lambda *those: looks.append(those) or slender(*those))
+    monkeypatch.setattr(
+        connectivity, "thin_features", lambda *those: looks.append(those) or thin_features(*those)
+    )
     root = union(shell(sphere(), thickness=0.1), BALL)
     for how in ({"cavities": "fill"}, {"cavities": "fill", **then}):
         made(root, **how)  # type: ignore[arg-type]
@@ -99,7 +101,7 @@ def test_cavities_and_bodies_are_told_by_the_same_samples(
 
 def test_a_thin_shell_is_not_bridged_to_itself() -> None:
     thin = shell(sphere(), thickness=0.4 * VOXEL)
-    assert not isinstance(made(thin, bridge=1).root, Altered)
+    assert not isinstance(made(thin, bridge=1).root, EditedField)
     joined = made(union(thin, BALL), bridge=1)
     assert inside(joined, np.array([[1.1, 0, 0]])).all()
     assert not inside(joined, on_sphere(0.8)).any()
@@ -110,18 +112,18 @@ def test_a_thin_shell_is_not_bridged_to_itself() -> None:
 def test_plates_however_near_stay_two(thick: float, gap: float) -> None:
     """Only the larger one is kept, whole; and both are joined by a strut."""
     root = plates(thick, gap)
-    both, voxel = parts(plan(root, COARSE), 0.2)
+    both, voxel = components(plan(root, COARSE), 0.2)
     assert len(both.bodies) == 2
     volumes = both.count[both.bodies] * voxel**3
-    one, voxel = parts(made(root, keep="largest"), 0.2)
+    one, voxel = components(made(root, keep="largest"), 0.2)
     assert one.count[one.bodies] * voxel**3 == pytest.approx(volumes[:1], rel=0.01)
-    assert len(parts(made(root, bridge=1), 0.2)[0].bodies) == 1
+    assert len(components(made(root, bridge=1), 0.2)[0].bodies) == 1
 
 
 def test_what_is_thick_is_not_looked_at_again() -> None:
     for root, loose in ((box(), True), (mandelbulb(iterations=4), False)):
         planned = plan(root, 48)
-        bricks = sample(compile_scene(planned.root), planned.root.facts, planned.lattice)
+        bricks = sample(compile_scene(planned.root), planned.root.bounds, planned.lattice)
         assert resolved(planned.root, bricks, 1e-3, loose, Work()) is bricks
 
 
