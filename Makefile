@@ -1,6 +1,6 @@
 # make demo: a shipped scene becomes a printable mesh. make test: tests and linters. make wheel: a wheel that needs no OpenVDB.
 # make nightly: 500 random scenes, an hour or two.
-# make sanitize: the native code under GCC's sanitizers, some minutes.
+# make native-tests: unit tests of the native code. make sanitize: all of it under GCC's sanitizers, some minutes.
 # All of them set up what is missing first: Debian packages (as root or with sudo) and an own .venv. Debian 12, Ubuntu 24.04.
 # Another Python, in a venv of its own: make test PYTHON=python3.13 VENV=.venv-3.13
 PYTHON ?= python3
@@ -9,12 +9,12 @@ BIN := $(VENV)/bin
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 # The compiler and OpenVDB's headers (they include Boost's); Python's headers; what draws without a screen.
-PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb-dev libimath-dev libboost-dev zlib1g-dev \
+PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb-dev libimath-dev libboost-dev zlib1g-dev doctest-dev \
 	libgl1 libegl1 libgl1-mesa-dri libopenvdb-tools
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
 NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
 
-.PHONY: demo test suite nightly sanitize lint wheel peers setup packages clean
+.PHONY: demo test suite native-tests nightly sanitize lint wheel peers setup packages clean
 
 demo: setup
 	mkdir -p out
@@ -22,10 +22,15 @@ demo: setup
 	$(BIN)/fracslice mesh scenes/mandelbulb.xml -o out/mandelbulb.stl --quiet
 	@ls -l out/mandelbulb.*
 
-test: lint suite
+test: lint native-tests suite
 
 suite: setup
 	$(BIN)/python -m pytest -n 2 $(SELECT)
+
+native-tests: packages
+	cmake -S tests/native -B build/native-tests -G Ninja
+	cmake --build build/native-tests
+	cd build/native-tests && ctest --output-on-failure
 
 nightly: setup
 	$(BIN)/python -m tests.benchmarks.stability.random_scenes

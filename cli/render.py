@@ -15,7 +15,7 @@ from .options import NAME, Whole, device_option, quiet_option, set_option, sourc
 from .working import working
 
 if TYPE_CHECKING:
-    from fracslice.render import Pass, Renderer
+    from fracslice.rendering import Pass, Renderer
     from fracslice.scene import Scene
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
@@ -98,7 +98,7 @@ def render(
 ) -> None:
     """Render a picture of SCENE, as its camera, lights and materials say."""
     from fracslice.export.images import check_image
-    from fracslice.render import Renderer
+    from fracslice.rendering import Renderer
 
     check_image(output)
     check_targets(source, output, state)
@@ -151,7 +151,7 @@ def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:
     """Writes a picture with what it is of."""
     from fracslice.export import application
     from fracslice.export.images import write_image
-    from fracslice.render import develop
+    from fracslice.rendering import develop
 
     text = {
         "Title": scene.name,

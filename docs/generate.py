@@ -1,12 +1,14 @@
-"""Writes docs/scenes.md and fracslice/scene/scene.rng from the registry: run it after adding a formula."""
+"""Writes docs/reference/elements.md, the schema and the stub of the formulas: run it for a new formula."""
 
 from pathlib import Path
 
+from fracslice.formulas.signatures import stub
 from fracslice.scene.manual import markdown
 from fracslice.scene.schema import relaxng
 
 ROOT = Path(__file__).parents[1]
 
 if __name__ == "__main__":
-    (ROOT / "docs/scenes.md").write_text(markdown(), encoding="utf-8")
+    (ROOT / "docs/reference/elements.md").write_text(markdown(), encoding="utf-8")
     (ROOT / "fracslice/scene/scene.rng").write_text(relaxng(), encoding="utf-8")
+    (ROOT / "fracslice/formulas/__init__.pyi").write_text(stub(), encoding="utf-8")

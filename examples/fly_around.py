@@ -1,6 +1,8 @@
-"""A camera carried around an object: one picture a step, ready to be made a film of.
+"""
+A flight around the Mandelbulb
+==============================
 
-python examples/fly_around.py [FOLDER] [STEPS] [WIDTHxHEIGHT]
+One picture a step, ready for a film: ``python examples/fly_around.py [FOLDER] [STEPS] [WIDTHxHEIGHT]``.
 """
 
 import sys
@@ -9,19 +11,21 @@ from pathlib import Path
 
 from fracslice import read
 from fracslice.export.images import write_image
-from fracslice.render import Renderer, develop
+from fracslice.rendering import Renderer, develop
 from fracslice.scene import library
 from fracslice.scene.view import Camera
 
-if __name__ == "__main__":
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    steps = int(sys.argv[2]) if len(sys.argv) > 2 else 24
-    width, height = map(int, (sys.argv[3] if len(sys.argv) > 3 else "480x300").split("x"))
-    scene = read(library.path("mandelbulb"))
-    start = Camera.around(scene.root.bounds.box)
-    for step in range(steps):
-        view = replace(scene.view, camera=start.orbited(360 * step / steps))
-        *_, picture = Renderer(scene.root, view, (width, height)).passes(samples=16)
-        shown = develop(picture.image, view.film)
-        write_image(folder / f"step{step:03}.png", shown, picture.image)
-        print(f"step {step}: {picture.samples:.1f} samples a pixel, error {picture.error:.3f}")
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+steps = int(sys.argv[2]) if len(sys.argv) > 2 else 24
+width, height = map(int, (sys.argv[3] if len(sys.argv) > 3 else "480x300").split("x"))
+
+# %%
+# The camera starts where the whole object is in view. ``passes`` yields better and better pictures; the last is kept.
+
+scene = read(library.path("mandelbulb"))
+start = Camera.around(scene.root.bounds.box)
+for step in range(steps):
+    view = replace(scene.view, camera=start.orbited(360 * step / steps))
+    *_, picture = Renderer(scene.root, view, (width, height)).passes(samples=16)
+    write_image(folder / f"step{step:03}.png", develop(picture.image, view.film), picture.image)
+    print(f"step {step}: {picture.samples:.1f} samples a pixel, error {picture.error:.3f}")

@@ -46,42 +46,130 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .api.meshing import Result, make_mesh
+    from .api.pictures import Picture, render
+    from .api.slices import Slices, slice_layers
     from .errors import FracsliceError
     from .export import write
-    from .job import Result, make_mesh
+    from .formulas import (
+        Node,
+        bend,
+        bounds,
+        box,
+        capsule,
+        cone,
+        cylinder,
+        difference,
+        intersection,
+        julia,
+        mandelbulb,
+        material,
+        menger,
+        mirror,
+        octahedron,
+        offset,
+        plane,
+        repeat,
+        shell,
+        sphere,
+        torus,
+        transform,
+        twist,
+        union,
+    )
     from .mesh import Mesh
     from .meshjob import MeshJob
     from .report import Report
     from .scene import Scene, read, reads, to_xml
     from .work import Work
 
+_FORMULAS = (
+    "bend",
+    "bounds",
+    "box",
+    "capsule",
+    "cone",
+    "cylinder",
+    "difference",
+    "intersection",
+    "julia",
+    "mandelbulb",
+    "material",
+    "menger",
+    "mirror",
+    "octahedron",
+    "offset",
+    "plane",
+    "repeat",
+    "shell",
+    "sphere",
+    "torus",
+    "transform",
+    "twist",
+    "union",
+)
+
 _WHERE = {
     "FracsliceError": "errors",
     "Mesh": "mesh",
     "MeshJob": "meshjob",
+    "Node": "formulas",
+    "Picture": "api.pictures",
     "Report": "report",
-    "Result": "job",
+    "Result": "api.meshing",
     "Scene": "scene",
+    "Slices": "api.slices",
     "Work": "work",
-    "make_mesh": "job",
+    "make_mesh": "api.meshing",
     "read": "scene",
     "reads": "scene",
+    "render": "api.pictures",
+    "slice_layers": "api.slices",
     "to_xml": "scene",
     "write": "export",
+    **dict.fromkeys(_FORMULAS, "formulas"),
 }
 
 __all__ = [
     "FracsliceError",
     "Mesh",
     "MeshJob",
+    "Node",
+    "Picture",
     "Report",
     "Result",
     "Scene",
+    "Slices",
     "Work",
+    "bend",
+    "bounds",
+    "box",
+    "capsule",
+    "cone",
+    "cylinder",
+    "difference",
+    "intersection",
+    "julia",
     "make_mesh",
+    "mandelbulb",
+    "material",
+    "menger",
+    "mirror",
+    "octahedron",
+    "offset",
+    "plane",
     "read",
     "reads",
+    "render",
+    "repeat",
+    "shell",
+    "slice_layers",
+    "sphere",
     "to_xml",
+    "torus",
+    "transform",
+    "twist",
+    "union",
     "write",
 ]
 

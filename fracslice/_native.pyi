@@ -24,14 +24,14 @@ def marching_cubes(
     index: NDArray[int32],
     origin: Point,
     voxel: float,
-    clamp: float,
+    minimum_edge_parameter: float,
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[int32]]:
     """The surface between the samples < 0 and the others: closed, an oriented 2-manifold, free of
     self-crossings.
 
-    clamp: how near a grid point a vertex may come, as a share of the edge. threads: 0 for all cores; the
-    result is the same for any number.
+    minimum_edge_parameter: how near a grid point a vertex may come, as a share of the edge. threads: 0 for
+    all cores; the result is the same for any number.
 
     Returns vertices float64 [n, 3] at origin + voxel * (grid position); triangles int32 [m, 3],
     counter-clockwise seen from outside. Marching cubes after Lorensen and Cline (1987), with a table that
@@ -45,9 +45,9 @@ def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
     """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) set where < 0."""
 
 class RootLoops:
-    """The loops of `fracslice.volume.root_loops` that find crossings: FIND in float32 and in float64, and
-    POLISH. field: the same float64 field, `CpuKernel.entry` or a function of points [3, n] and of [1, n] for
-    their values. Holds all of them. lanes: segments and points come in multiples of it. batch: how many
+    """The loops of `fracslice.volume.root_loops` that find crossings: `find` in float32 and in float64, and
+    `polish`. field: the same float64 field, `CpuKernel.entry` or a function of points [3, n] and of [1, n]
+    for their values. Holds all of them. lanes: segments and points come in multiples of it. batch: how many
     segments are worth a call. steps: that all segments are given, and those that then are left. sure: a root
     is exact where it moved less."""
 
@@ -103,7 +103,13 @@ class Contouring:
     """
 
     def __init__(
-        self, cells: Cells, first: int, last: int, origin: Point, voxel: float, clamp: float
+        self,
+        cells: Cells,
+        first: int,
+        last: int,
+        origin: Point,
+        voxel: float,
+        minimum_edge_parameter: float,
     ) -> None: ...
     def advance(self, end: int, first: int, t: NDArray[float64], normals: NDArray[float32]) -> None:
         """Goes on to the layer before `end`. t: where on its edge the surface crosses each of those numbered
@@ -167,30 +173,66 @@ class Grid:
 # On triangle meshes: vertices [n, 3], triangles [m, 3]. All raise ValueError for an index out of range and
 # for arrays that contradict each other; results are the same for any number of threads.
 
-def edge_topology(triangles: NDArray[int32], counted: NDArray[bool_]) -> tuple[int, int, int, int, int]:
+def edge_topology(
+    triangles: NDArray[int32], counted: NDArray[bool_], threads: int = 0
+) -> tuple[int, int, int, int, int]:
     """`fracslice.mesh.links.edge_ends`."""
 
-def corners_by_vertex(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int64], NDArray[int64]]: ...
-def connected_components(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int32], int]: ...
-def shell_volumes(
-    vertices: NDArray[float64], triangles: NDArray[int32], labels: NDArray[int32], count: int
-) -> NDArray[float64]: ...
-def measures(vertices: NDArray[float64], triangles: NDArray[int32], point: Point) -> tuple[float, float, int]:
+def corners_by_vertex(
+    triangles: NDArray[int32], vertices: int, threads: int = 0
+) -> tuple[NDArray[int64], NDArray[int64]]: ...
+def connected_components(
+    triangles: NDArray[int32], vertices: int, threads: int = 0
+) -> tuple[NDArray[int32], int]: ...
+def component_sizes(
+    vertices: NDArray[float64],
+    triangles: NDArray[int32],
+    labels: NDArray[int32],
+    count: int,
+    threads: int = 0,
+) -> tuple[NDArray[float64], NDArray[float64]]:
+    """`fracslice.mesh.links.component_sizes`."""
+
+def measures(
+    vertices: NDArray[float64], triangles: NDArray[int32], point: Point, threads: int = 0
+) -> tuple[float, float, int]:
     """The triangles' area, the signed volume between them and a point, and how many have no area."""
 
-def turned(vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64]) -> NDArray[int64]:
+def turned(
+    vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64], threads: int = 0
+) -> NDArray[int64]:
     """The triangles, ascending, that are flat or turn by a right angle or more when the vertices move to
     `points`."""
 
-def pointed(vertices: NDArray[float64], triangles: NDArray[int32], sine: float) -> NDArray[int64]:
+def pointed(
+    vertices: NDArray[float64], triangles: NDArray[int32], sine: float, threads: int = 0
+) -> NDArray[int64]:
     """The vertices, ascending, from which all edges fall off, at an angle of at least that sine."""
 
-def bounds(points: NDArray[float64]) -> tuple[Point, Point]:
+def bounds(points: NDArray[float64], threads: int = 0) -> tuple[Point, Point]:
     """Low and high corner of the box around points, float64 [n, 3]. Raises ValueError if there are none."""
+
+def quantise(
+    points: NDArray[float64], planes: NDArray[float64], threads: int = 0
+) -> tuple[NDArray[float64], NDArray[bool_]]:
+    """`fracslice.mesh.rounding.quantise`. Raises ValueError for a coordinate that is not finite."""
+
+def selected(
+    vertices: NDArray[float64], triangles: NDArray[int32], keep: NDArray[bool_], threads: int = 0
+) -> tuple[NDArray[float64], NDArray[int32]] | None:
+    """`fracslice.mesh.model.Mesh.selected`; None if nothing goes."""
+
+def touching(triangles: NDArray[int32], vertices: NDArray[bool_], threads: int = 0) -> NDArray[int64]:
+    """The triangles, ascending, with a corner among some vertices, bool [n]."""
+
+def surroundings(
+    vertices: NDArray[float64], triangles: NDArray[int32], of: NDArray[bool_], threads: int = 0
+) -> NDArray[int64]:
+    """The triangles, ascending, that may meet one of some, bool [m], and these."""
 
 def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]: ...
 def tree(
-    vertices: NDArray[float64], triangles: NDArray[int32]
+    vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0
 ) -> tuple[NDArray[int64], NDArray[float64], NDArray[float64]]:
     """`fracslice.mesh.tree.Tree`."""
 
@@ -256,9 +298,7 @@ def nesting(
     labels: NDArray[int32],
     sizes: NDArray[float64],
     first: NDArray[int64],
-    order: NDArray[int64],
-    low: NDArray[float64],
-    high: NDArray[float64],
+    threads: int = 0,
 ) -> tuple[NDArray[int64], NDArray[int64]]:
     """winding, parent."""
 

@@ -14,31 +14,15 @@ from .kernel.machine import Function
 class BorderError(ValueError):
     """The solid reaches the rim of the lattice."""
 
-class Field:
-    """What is sampled."""
-
-class Compiled(Field):
-    """Machine code: `loops.POINTS` for float32 and its parameters, which it holds."""
-
-    def __init__(self, entry: tuple[Function, NDArray[float32]]) -> None: ...
-
-class Called(Field):
-    """A function of x, y, z, float32 [n], that returns values float32 [n]."""
-
-    def __init__(
-        self,
-        function: Callable[[NDArray[float32], NDArray[float32], NDArray[float32]], NDArray[float32]],
-    ) -> None: ...
-
 class ProbeBounds:
     """How far values reach: a block is decided where |f| exceeds a bound times the distance from its middle
     to its farthest sample.
 
     proven: for blocks over all layers. outside, inside: for finer ones, by the sign of the middle.
-    stop_outside, stop_inside: blocks of so many pixels are not cut any more. even: inside values are of
-    another scale than outside ones, but of one everywhere, so that a part of the crossings tells for all, and
-    the bound outside follows the steepness of the field, from `outside` up to `proven`. In a field that is
-    not even every crossing is settled on the field, and so are corners within pixels.
+    stop_outside, stop_inside: blocks of so many pixels are not cut any more. escape_time_only: inside values
+    are of another scale than outside ones, but of one everywhere, so that a part of the crossings tells for
+    all, and the bound outside follows the steepness of the field, from `outside` up to `proven`. In other
+    fields every crossing is projected to the surface, and so are corners within pixels.
     """
 
     def __init__(
@@ -48,7 +32,7 @@ class ProbeBounds:
         inside: float,
         stop_outside: int,
         stop_inside: int,
-        even: bool,
+        escape_time_only: bool,
     ) -> None: ...
 
 class Memory:
@@ -57,14 +41,15 @@ class Memory:
 class Slab:
     """The samples of one layer after the other, on a lattice of ny x nx points at (x0 + dx i, y0 + dy j).
 
-    memory: shared by slabs of one job. frame: (x0, y0, dx, dy). z: heights of neighbouring layers. All in
-    scene units. What is read of a layer is read before the next one is sampled; a ValueError else.
+    memory: shared by slabs of one job. entry: of the field's float32 kernel (`Kernel.entry`). frame: (x0,
+    y0, dx, dy). z: heights of neighbouring layers. All in scene units. What is read of a layer is read before
+    the next one is sampled; a ValueError else.
     """
 
     def __init__(
         self,
         memory: Memory,
-        field: Field,
+        entry: tuple[Function, NDArray[float32]] | Callable[[NDArray[float32], NDArray[float32]], None],
         bounds: ProbeBounds,
         frame: tuple[float, float, float, float],
         z: list[float],

@@ -15,12 +15,11 @@ from .work import Clock
 if TYPE_CHECKING:
     from .formulas import Box
     from .mesh import Mesh
+    from .mesh.certificate import Certificate
     from .mesh.check import MeshReport
     from .mesh.components import Removed
-    from .mesh.pieces import Pieces
-    from .mesh.survey import WholeShells
     from .mesh.window import Finished
-    from .volume import Plan
+    from .surfaces import Surface
 
 MOST_ERRORS = 1 << 22
 """Vertices whose distance from the surface is measured, about, evenly spread over it."""
@@ -59,20 +58,20 @@ class Finish:
 
     def __init__(
         self,
-        planned: Plan,
-        pieces: Pieces,
-        shells: WholeShells,
+        surface: Surface,
         how: Print,
         dust: Callable[[float], float],
         size: float,
         scale: float | None,
         clock: Clock,
     ) -> None:
+        from .mesh.certificate import Certificate
         from .mesh.components import choose
 
+        planned, pieces, shells = surface.planned, surface.pieces, surface.shells
         self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
         unit = (scale or size / max(planned.box.size)) ** 3
-        nested, self.misplaced = shells.nested(pieces)
+        nested, self.misplaced = shells.nested(pieces, clock.work.threads)
         sized = replace(nested, volumes=nested.volumes * unit)
         limit = dust(float(sized.volumes.sum()))
         self.stays, removed = choose(sized, keep=how.keep, dust_mm3=limit, cavities=how.cavities)
@@ -84,6 +83,8 @@ class Finish:
         self.volume = float(nested.volumes[self.stays].sum()) * exact**3
         """mm3, of all bodies, those that were dropped included."""
         self.volume += removed.bodies_mm3 - removed.filled_mm3
+        grid = Certificate.of(surface.signs, 0)
+        self._grid = replace(grid, planes=self.place.mm(grid.planes))
         self._flat = FLAT * exact * float(np.ptp(rest, axis=0).max())
 
     def _box(self) -> Box:
@@ -99,33 +100,44 @@ class Finish:
         kept = map(self._kept, range(len(self.pieces)))
         return np.concatenate([outermost(mesh.vertices) for mesh in kept if len(mesh.vertices)])
 
+    def _stay(self, number: int) -> NDArray[np.bool_]:
+        """Which triangles of a piece stay, bool [m]."""
+        found: NDArray[np.bool_] = self.stays[self.shells.of_label[self.pieces.labels(number)]]
+        return found
+
     def _kept(self, number: int) -> Mesh:
         """What stays of a piece, scene units."""
         mesh = self.pieces.mesh(number)
-        if self.stays.all():
-            return mesh
-        return mesh.selected(self.stays[self.shells.of_label[self.pieces.labels(number)]])
+        return mesh if self.stays.all() else mesh.selected(self._stay(number), self.clock.work.threads)
 
     def finished(self) -> Iterator[Finished]:
         """What is finished by each piece, mm; pieces held in memory are let go."""
         from .mesh.window import Window
 
-        window, count = Window(self.planned.voxel * self.place.scale), len(self.pieces)
+        voxel, threads = self.planned.voxel * self.place.scale, self.clock.work.threads
+        window, count = Window(voxel, threads), len(self.pieces)
         for number in range(count):
             with self.clock("finishing"):
                 self.clock.work.progress("finishing", number / count)
-                mesh = self._placed(self._kept(number))
+                mesh, known = self._placed(number)
                 self.pieces.drop(number)
                 end = self.place.scale * self.pieces.ends[number] + self.place.offset[0]
-                made = window.add(mesh, end)
+                made = window.add(mesh, end, known)
                 del mesh  # it would stay while what was made of it is checked
             self.clock.work.progress("finishing", (number + 1) / count)
             yield made
 
-    def _placed(self, mesh: Mesh) -> Mesh:
+    def _placed(self, number: int) -> tuple[Mesh, Certificate]:
+        """What stays of a piece, mm, and what is certified of it: nothing of what is moved to the bed."""
+        mesh = self._kept(number)
         points = self.place.mm(mesh.vertices)
         points[points[:, 2] < self._flat, 2] = 0
-        return replace(mesh, vertices=points)
+        stay = self._stay(number)
+        holds = (np.arange(len(stay)) < len(stay) - self.pieces.fresh[number])[stay]
+        planes = self._grid.planes[:, 2]
+        if ((planes >= 0) & (planes < self._flat)).any():  # some vertices are below it now
+            holds &= (points[:, 2] > 0)[mesh.triangles].all(axis=1)
+        return replace(mesh, vertices=points), replace(self._grid, holds=holds)
 
 
 class Check:

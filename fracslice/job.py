@@ -22,8 +22,7 @@ from .scene import Print, Scene
 from .work import Clock, Work
 
 if TYPE_CHECKING:
-    from .formulas import Node
-    from .kernel import Compilable
+    from .kernel import Field
     from .mesh import Mesh
     from .mesh.simplify import Simplified
     from .surfaces import Surface
@@ -55,7 +54,7 @@ class Result:
         return self.whole
 
     @property
-    def root(self) -> Node | Compilable:
+    def root(self) -> Field:
         """The field that was meshed."""
         return self.planned.root
 
@@ -210,8 +209,7 @@ class _Job:
             surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)
             refined = done.scaled(unit)
         with clock("finishing"):
-            chosen = surface.pieces, surface.shells, sized.left, what.dust
-            finish = Finish(planned, *chosen, size, sized.scale, clock)
+            finish = Finish(surface, sized.left, what.dust, size, sized.scale, clock)
         scale = finish.place.scale
         with clock("checking"):
             back = surface_to_mesh(planned, surface.pieces.meshes, scale, clock.work)

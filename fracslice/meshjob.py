@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .errors import SceneError
-from .formulas.parameters import Number, project
+from .formulas.parameters import Number, validate
 from .scene import Print, Scene
 from .scene.lengths import Length
 
@@ -40,7 +40,7 @@ class MeshJob:
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:
             raise SceneError("voxel and resolution: expected one of them")
-        project(self, _KINDS, SceneError)
+        validate(self, _KINDS, SceneError)
 
     def size(self, scene: Scene) -> float:
         """The longest side in mm."""

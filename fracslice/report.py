@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,13 +75,16 @@ class Report:
     surface_to_mesh_mm: SurfaceToMesh
     evaluations: int
     bricks: int
-    seconds: dict[str, float]
+    seconds: Mapping[str, float]
     peak_rss_mb: float
     amount_mm3: Amount | None = None
     refined: Refined | None = None
     simplified: Simplified | None = None
     notes: tuple[str, ...] = ()
     depths: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -88,8 +93,15 @@ class Report:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON, the mesh's numbers beside the others."""
-        own = {name: value for name, value in asdict(self).items() if name != "mesh"}
+        own = {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name != "mesh"}
         return {**own, **self.mesh.as_dict()}
+
+
+def _plain(value: Any) -> Any:
+    """A record or a mapping as a dictionary."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
 
 
 def version() -> str:

@@ -16,8 +16,7 @@ from .volume.amount import FINER, amount, finer
 from .work import Work
 
 if TYPE_CHECKING:
-    from .formulas import Node
-    from .kernel import Compilable
+    from .kernel import Field
     from .slicing import Stack
 
 Grid = tuple[Triple, Triple, Callable[[float], str]]
@@ -64,7 +63,7 @@ def layers_amount(stack: Stack, work: Work) -> tuple[Amount, tuple[str, ...]]:
 
 
 def _compared(
-    root: Node | Compilable,
+    root: Field,
     boxes: list[Box],
     made: float,
     scale: float,

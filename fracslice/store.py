@@ -14,9 +14,7 @@ import numpy as np
 
 from .errors import VolumeError
 from .files import Kept
-from .formulas.registry import Node
-from .kernel import Compilable
-from .kernel.identity import field_key
+from .kernel import Field
 from .kernel.objects import toolchain
 from .keys import key, program
 
@@ -51,11 +49,9 @@ class Store:
         return made
 
 
-def stored(
-    store: Store | None, parts: tuple[object, ...], root: Node | Compilable, make: Callable[[], Arrays]
-) -> Arrays:
+def stored(store: Store | None, parts: tuple[object, ...], root: Field, make: Callable[[], Arrays]) -> Arrays:
     """What `make` makes of a field and other parts, kept in the store if there is one."""
-    return make() if store is None else store.get((*parts, field_key(root)), make)
+    return make() if store is None else store.get((*parts, root.key), make)
 
 
 def _read(file: BinaryIO) -> Arrays | None:

@@ -44,7 +44,7 @@ class Surface:
     @property
     def thin(self) -> str:
         """What walls came to that are thinner than a voxel, in words; empty where all are thicker."""
-        return self.shells.thin_walls(self.pieces, self.planned.voxel)
+        return self.shells.thin_walls(self.planned.voxel)
 
 
 def sampled(planned: Plan, clock: Clock) -> SignBricks:
@@ -83,7 +83,8 @@ def made(planned: Plan, signs: SignBricks, most: int, folder: Path | None, clock
     from .mesh.survey import survey
     from .mesh.tips import Pointed, with_tips
 
-    work, pieces, pointed = clock.work, Pieces(folder), Pointed(planned.voxel)
+    work, pieces = clock.work, Pieces(folder)
+    pointed = Pointed(planned.voxel, work.threads)
     with clock("meshing"):
         if most >= len(signs):
             made = iter([Piece(contour(planned.root, signs, work), np.inf)])
@@ -94,7 +95,7 @@ def made(planned: Plan, signs: SignBricks, most: int, folder: Path | None, clock
             pointed.add(piece)
             work.progress("meshing", min((piece.end - planned.outer.lo[0]) / planned.outer.size[0], 1.0))
         pieces, tips = with_tips(planned, pieces, pointed.points, work)
-        return Surface(planned, signs, pieces, survey(pieces, planned.voxel), tips)
+        return Surface(planned, signs, pieces, survey(pieces, planned.voxel, work.threads), tips)
 
 
 def refined(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refined]:
@@ -107,6 +108,6 @@ def refined(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refi
     planned, pieces = surface.planned, Pieces()
     with clock("refining"):
         mesh, done = refine(planned.root, surface.pieces.mesh(0), chord, planned.voxel, clock.work)
-        pieces.add(Piece(mesh, np.inf))
-        shells = survey(pieces, planned.voxel)
+        pieces.add(Piece(mesh, np.inf), fresh=len(mesh.triangles))
+        shells = survey(pieces, planned.voxel, clock.work.threads)
         return Surface(planned, surface.signs, pieces, shells, surface.tips), done

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 from .errors import Cancelled, SceneError
 
 if TYPE_CHECKING:
-    from .kernel.devices import Device
+    from .formulas.field import Device
     from .store import Store
 
 T = TypeVar("T")

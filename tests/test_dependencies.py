@@ -75,7 +75,7 @@ def without(modules: str, *commands: str, cwd: Path) -> subprocess.CompletedProc
     """Commands one after the other, until one fails, where modules cannot be imported."""
     code = (
         f"import sys; sys.modules.update(dict.fromkeys({modules.split()!r}))\n"
-        "from fracslice_cli.main import run\n"
+        "from fracslice.cli.main import run\n"
         "for command in sys.argv[1:]:\n"
         "    if status := run(command.split()): sys.exit(status)"
     )

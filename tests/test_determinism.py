@@ -21,9 +21,9 @@ from fracslice.formulas import difference, julia, sphere, transform, union
 from fracslice.kernel import CpuKernel, compile_scene, cpu, link
 from fracslice.mesh.extract import contour
 from fracslice.printing.walls import Walls
-from fracslice.render import Renderer
-from fracslice.render import cpu as tiles
-from fracslice.render.film import reinhard
+from fracslice.rendering import Renderer
+from fracslice.rendering import cpu as tiles
+from fracslice.rendering.film import reinhard
 from fracslice.scene.view import View
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.volume import Lattice, roots, sample

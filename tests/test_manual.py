@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 
 import pytest
-from fracslice_cli.main import commands, run
+from fracslice.cli.main import commands, run
 
 from fracslice.export import write
 
@@ -59,7 +59,7 @@ def test_what_is_told_to_type_is_understood(line: str, folder: Path, monkeypatch
     for work in (
         "job.make_mesh",
         "slicing.plan_stack",
-        "render.Renderer",
+        "rendering.Renderer",
         "bench.runs.measure",
         "viewer.fly",
     ):

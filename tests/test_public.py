@@ -16,7 +16,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 @pytest.mark.parametrize(
-    "name", ["fracslice", "fracslice.scene.lengths", "fracslice.scene.model", "fracslice.scene.nearest"]
+    "name", ["fracslice", "fracslice.scene.lengths", "fracslice.scene.model", "fracslice.nearest"]
 )
 def test_docstrings_say_what_happens(name):
     tested = doctest.testmod(importlib.import_module(name))

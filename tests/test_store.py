@@ -11,8 +11,8 @@ import pytest
 from fracslice import MeshJob, Work, keys, make_mesh
 from fracslice.errors import FracsliceWarning, VolumeError
 from fracslice.formulas import Box, Node, mandelbulb, offset, sphere
-from fracslice.kernel import Compilable, compile_scene, field_key
-from fracslice.printing.edits import EditedField, Term
+from fracslice.kernel import Field, compile_scene
+from fracslice.printing.edits import EditedField
 from fracslice.printing.samples import Samples
 from fracslice.scene import scene
 from fracslice.store import Store
@@ -51,7 +51,7 @@ def sampled(work: Work, *roots: Node) -> list[int]:
     return [sample_scene(planned(root), work).evaluations for root in roots]
 
 
-def planned(root: Node | Compilable) -> Plan:
+def planned(root: Field) -> Plan:
     """To be sampled in the same places, whatever its bounds."""
     return Plan(root=root, box=BOX, outer=BOX, tips=np.zeros((3, 6)), voxel=0.1)
 
@@ -105,10 +105,8 @@ def test_keys_tell_arrays_of_other_shapes_and_types_apart() -> None:
 def test_what_is_altered_is_kept_and_known_by_all_its_parts(tmp_path: Path) -> None:
     work, near = Work(store=Store(tmp_path)), Lattice.around(BOX, 0.2)
     inner = [sample(compile_scene(s), s.bounds, near) for s in (sphere(radius=0.5), sphere(radius=0.6))]
-    roots = [
-        EditedField(sphere(), (Term(Samples(bricks), does),)) for bricks in inner for does in ("cut", "add")
-    ]
-    assert len({field_key(root) for root in roots}) == len(roots)
+    roots = [EditedField(sphere(), does, Samples(bricks)) for bricks in inner for does in ("cut", "add")]
+    assert len({root.key for root in roots}) == len(roots)
     found = [sample_scene(planned(roots[0]), work) for _ in range(2)]
     assert found[0].evaluations > 0 == found[1].evaluations
     assert found[0].values.tobytes() == found[1].values.tobytes()

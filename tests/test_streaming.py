@@ -178,7 +178,7 @@ def test_cancelled_leaves_nothing(stage: str, pieces: None, tmp_path: Path) -> N
 
     how = replace(work, progress=stop)
     with pytest.raises(Cancelled):
-        make_mesh(SCENES["fractal"], MeshJob(resolution=64), how, tmp_path / "x.stl")
+        make_mesh(SCENES["fractal"], MeshJob(resolution=64), how, path=tmp_path / "x.stl")
     assert not list(tmp_path.iterdir())
 
 

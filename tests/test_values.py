@@ -23,7 +23,7 @@ from fracslice.formulas.registry import Formula
 from fracslice.kernel.devices import chosen
 from fracslice.mesh.simplify import simplify
 from fracslice.printing.checks import Limits
-from fracslice.render import Renderer
+from fracslice.rendering import Renderer
 from fracslice.scene import Print, parse_length, scene
 from fracslice.scene.view import PARTS, Camera, Film, View
 from fracslice.slicing import SliceJob, adapted, plan_stack

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..kernel import compile_scene
 from ..mesh import Mesh
 from ..mesh.extract import contour, extract
 from ..mesh.simplify import simplify
@@ -23,14 +22,14 @@ Made = tuple[Mesh, int, int]
 
 def plain(what: Workload, resolution: int, work: Work) -> Made:
     """Sparse float32 samples and marching cubes."""
-    kernel = compile_scene(what.root)
+    kernel = what.root.kernel()
     bricks = sample(kernel, what.root.bounds, what.lattice(resolution), work)
     return extract(bricks, work.threads), bricks.evaluations, bricks.values.size
 
 
 def exact(what: Workload, resolution: int, work: Work) -> Made:
     """Sparse float32 samples; vertices on roots of the float64 field, whose evaluations are not told."""
-    kernel = compile_scene(what.root)
+    kernel = what.root.kernel()
     bricks = sample(kernel, what.root.bounds, what.lattice(resolution), work)
     return contour(what.root, bricks, work), bricks.evaluations, bricks.values.size
 
@@ -54,7 +53,7 @@ def dense(what: Workload, resolution: int, work: Work) -> Made:
 
 def grid(what: Workload, resolution: int, work: Work) -> np.ndarray:
     """The field at every point of the cube, float32 [resolution + 1] * 3, by axes x, y, z."""
-    kernel, axis = compile_scene(what.root), np.linspace(-what.half, what.half, resolution + 1)
+    kernel, axis = what.root.kernel(), np.linspace(-what.half, what.half, resolution + 1)
     values = np.empty((len(axis),) * 3, np.float32)
     y, z = (a.ravel().astype(np.float32) for a in np.meshgrid(axis, axis, indexing="ij"))
 

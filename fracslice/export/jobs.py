@@ -17,7 +17,6 @@ from fracslice.errors import ExportError
 from fracslice.export.files import into_place
 from fracslice.export.resuming import remainder
 from fracslice.formulas.parameters import Vector, validate
-from fracslice.kernel import field_key
 from fracslice.kernel.objects import toolchain
 from fracslice.keys import key, program
 from fracslice.slicing import Slicer, Stack
@@ -56,7 +55,7 @@ class SliceRun:
         """The key of all that the bytes of the layers follow from. form: of the file."""
         stack = [getattr(self.stack, f.name) for f in fields(self.stack) if f.name != "root"]
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
-        field = field_key(self.stack.root)
+        field = self.stack.root.key
         return key(
             program(), toolchain(), form, field, *stack, *screen, self.exposure, sorted(self.metadata.items())
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from .box import Box
+from .field import Bounds
 from .parameters import REQUIRED, Number, Vector
 from .registry import Fixed, Node, domain_operator
 from .vocabulary import absolute, any_of, floor, maximum, minimum
@@ -87,11 +88,14 @@ def _(node: Node) -> Box:
 
 @offset.slope
 def _(node: Node) -> float:
-    inner = node.children[0].bounds
+    return max(1.0, offset_slope(node.children[0].bounds, node["distance"]))
+
+
+def offset_slope(inner: Bounds, distance: float) -> float:
+    """The Lipschitz bound of a field less a constant."""
     n = inner.steepening
     # By how steeply the stretch along circles of latitude ends: within 1/n, in narrow rings within 3/n^2.
-    steeper = 2 + n / 4 + n * n / 128 if inner.exterior_only and node["distance"] > 0 else 1.0
-    return max(1.0, inner.lipschitz * steeper)
+    return inner.lipschitz * (2 + n / 4 + n * n / 128 if inner.exterior_only and distance > 0 else 1.0)
 
 
 @offset.identity

@@ -10,14 +10,16 @@ of a scene tree.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from inspect import Signature
 from types import MappingProxyType
 from typing import Any, Literal
 
 from ..errors import SceneError
+from . import signatures
 from .box import Box
+from .node import Node as Node
 from .parameters import REQUIRED, Parameter, validated
 
 Kind = Literal["shape", "csg", "domain"]
@@ -37,32 +39,10 @@ class Fixed:
     value: Any
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """What is known of a field without evaluating it.
-
-    box: encloses all points where the field is negative, in the node's own coordinates.
-    lipschitz: L such that ``|f(p) - f(q)| <= L |p - q|``. With `exterior_only`: a point outside is at
-    least ``f(p) / L`` away from the surface.
-    exterior_only: an escape-time fractal is part of the field. Its inside values bound no distance: the
-    inside cannot be recognised from afar.
-    steepening: of such a field, the highest power n in it. Along circles of latitude the derivative changes
-    n times within 2/n of the poles; so level sets other than the surface are steeper: how much is measured
-    (`docs/accuracy.md`).
-    boxless: the names of the formulas in it that state no box.
-    """
-
-    box: Box
-    lipschitz: float
-    exterior_only: bool
-    steepening: float = 0.0
-    boxless: tuple[str, ...] = ()
-
-
 Hook = Callable[..., Any]
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Formula:
     """A registered formula. Its hooks take a `Node` and tell what the kernel and the sampler need to know."""
 
@@ -75,13 +55,26 @@ class Formula:
     exterior_only: bool = False
     hooks: dict[str, Hook] = field(default_factory=dict)
 
-    def __call__(self, *children: Node, place: str | None = None, **values: Any) -> Node:
-        """A scene node. Raises `SceneError` if a value or the number of children is not possible."""
-        unknown = sorted(set(values) - set(self.parameters))
-        if unknown:
-            raise SceneError(f"<{self.name}> has no attribute {unknown[0]!r}")
+    def __post_init__(self) -> None:
+        self.__name__ = self.__qualname__ = self.name
+        self.__module__ = self.function.__module__
+        self.__doc__ = signatures.docstring(self)
+
+    def __repr__(self) -> str:
+        return f"<{self.kind} {self.name}{signatures.signature(self)}>"
+
+    @property
+    def __signature__(self) -> Signature:
+        return signatures.signature(self)
+
+    def __call__(self, *arguments: Any, place: str | None = None, **keywords: Any) -> Node:
+        """A scene node. Raises `SceneError` if a value or the number of elements is not possible.
+
+        arguments: the elements inside it, or a shape's values in order.
+        """
+        elements, values = signatures.bound(self, arguments, keywords)
         checked = {name: self._value(name, values.get(name)) for name in self.parameters}
-        node = Node(self, MappingProxyType(checked), self._grouped(children), place)
+        node = Node(self, MappingProxyType(checked), self._grouped(elements), place)
         if node.depth > DEEPEST:
             raise node.fail(TOO_DEEP)
         self.hooks.get("check", lambda _: None)(node)
@@ -153,111 +146,6 @@ class Formula:
     @property
     def doc(self) -> str:
         return (self.function.__doc__ or "").strip()
-
-
-@dataclass(frozen=True)
-class Node:
-    """A formula with its parameters and children: one element of a scene. `place` is "file:line";
-    `is_conservative` is set by `conservative`; `depth` counts nested elements, this one included.
-    """
-
-    formula: Formula
-    values: Mapping[str, Any]
-    children: tuple[Node, ...] = ()
-    place: str | None = field(default=None, compare=False)
-    is_conservative: bool = False
-    depth: int = field(init=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "depth", 1 + max((child.depth for child in self.children), default=0))
-
-    def __getitem__(self, parameter: str) -> Any:
-        return self.values[parameter]
-
-    def __repr__(self) -> str:
-        changed = [f"{k}={v!r}" for k, v in self.values.items() if v != self.formula.parameters[k].default]
-        return f"{self.formula.name}({', '.join([*map(repr, self.children), *changed])})"
-
-    def __hash__(self) -> int:
-        return hash((self.formula.name, tuple(self.values.items()), self.children))
-
-    def walk(self) -> Iterator[Node]:
-        """This node and all below it, parents first."""
-        left = [self]
-        while left:
-            node = left.pop()
-            yield node
-            left += reversed(node.children)
-
-    def changed(self, children: tuple[Node, ...] | None = None, **values: Any) -> Node:
-        """A copy with other values or children."""
-        kept = self.children if children is None else children
-        return self.formula(*kept, place=self.place, **{**_given(self), **values})
-
-    def conservative(self) -> Node:
-        """The scene by whose field space may be skipped, where its own exceeds its bound: beside the tears of
-        powers that are not whole, and at seams with an escape-time fractal. Only its positive values say
-        something: as much, divided by its own Lipschitz bound, is the distance from the surface at least.
-        """
-        return replace(
-            self, is_conservative=True, children=tuple(child.conservative() for child in self.children)
-        )
-
-    def fail(self, message: str) -> SceneError:
-        """The error to raise about this node: file, line and element, then `message`."""
-        return SceneError(f"{self.place + ': ' if self.place else ''}<{self.formula.name}> {message}")
-
-    @cached_property
-    def bounds(self) -> Bounds:
-        """Box, Lipschitz bound and weakness of this field."""
-        hooks, below = self.formula.hooks, [child.bounds for child in self.children]
-        box = hooks["bounds"](self) if "bounds" in hooks else Box.everywhere()
-        slope = (
-            hooks["slope"](self)
-            if "slope" in hooks
-            else max([self.formula.lipschitz, *(b.lipschitz for b in below)])
-        )
-        steepening = (
-            hooks["steepening"](self)
-            if "steepening" in hooks
-            else max((b.steepening for b in below), default=0.0)
-        )
-        names = [*(n for b in below for n in b.boxless), *([] if "bounds" in hooks else [self.formula.name])]
-        exterior_only = self.formula.exterior_only or any(b.exterior_only for b in below)
-        return Bounds(box, slope, exterior_only, steepening, tuple(dict.fromkeys(names)))
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """What the kernel's function is called with: numbers, tuples of numbers, or `Fixed`."""
-        hook = self.formula.hooks.get("arguments")
-        return hook(self) if hook else dict(self.values)
-
-    @property
-    def function(self) -> Callable[..., Any]:
-        """The function to compile for this node."""
-        hook = self.formula.hooks.get("select")
-        return hook(self) if hook else self.formula.function
-
-    def visible(self, voxel: float) -> Node:
-        """This node without detail that a voxel, in its own units, is too large for; its children as they
-        are.
-        """
-        hook = self.formula.hooks.get("visible")
-        return hook(self, voxel) if hook else self
-
-    @property
-    def is_identity(self) -> bool:
-        hook = self.formula.hooks.get("identity")
-        return bool(hook and hook(self))
-
-    @property
-    def is_unordered(self) -> bool:
-        hook = self.formula.hooks.get("unordered")
-        return bool(hook and hook(self))
-
-
-def _given(node: Node) -> dict[str, Any]:
-    return {name: value for name, value in node.values.items() if value is not None}
 
 
 _REGISTRY: dict[str, Formula] = {}

@@ -14,6 +14,7 @@ from llvmlite import ir
 from . import lanes_math
 from .emitter import Emitter
 from .linker import CALLED, Linked
+from .loop_linker import link_loops
 from .loops import Loop
 from .values import DOUBLE, FLOAT, WHOLE, Lanes
 
@@ -46,11 +47,12 @@ def _text(linked: Linked, target: Target, loops: Sequence[Loop]) -> str:
     Their stack is aligned to whole registers: those that are kept there would lie across two cache lines
     else.
     """
-    source = "\n".join([linked.source, *(loop.source for loop in loops)])
-    trees = [tree for tree in ast.parse(source).body if isinstance(tree, ast.FunctionDef)]
+    trees = [tree for tree in ast.parse(linked.source).body if isinstance(tree, ast.FunctionDef)]
     called = frozenset(tree.name for tree in trees if CALLED in map(ast.unparse, tree.decorator_list))
     lanes = Lanes(target.bits, target.width, target.registers)
-    emitter = Emitter(lanes, {tree.name: tree for tree in trees}, called)
+    own = link_loops(tuple(loops))
+    functions = {tree.name: tree for tree in (*trees, *(linked.tree for linked in own.values()))}
+    emitter = Emitter(lanes, functions, called, {name: linked.file for name, linked in own.items()})
     real = FLOAT if target.bits == 32 else DOUBLE
     kinds = {"r": real.as_pointer(), "i": ir.IntType(32).as_pointer(), "n": WHOLE}
     for tree in trees:  # those of the innermost elements stand first, so that nothing is as deep as the scene

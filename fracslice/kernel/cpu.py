@@ -7,76 +7,41 @@ threads scale.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, Protocol, overload
 
 import numpy as np
 
-from ..formulas.registry import Bounds, Node
+from ..formulas.field import Kernel, Loops, Precision
+from ..formulas.registry import Node
 from .host import lane_count
 from .linker import Linked, link
-from .loops import BRICKS, POINTS, Loop
+from .loops import Loop, bricks, points
 from .machine import Function, constant, loaded
 from .objects import object_code
 
-Precision = Literal["float32", "float64"]
+BATCH = 1 << 10
+"""Points that a loop is run on together: they stay in the fastest memory."""
 
 
-class Kernel(Protocol):
-    """A field that can be evaluated, with the methods of `CpuKernel`."""
-
-    @property
-    def dtype(self) -> np.dtype: ...
-
-    @property
-    def batch(self) -> int:
-        """How many samples are worth a call."""
-
-    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray, /) -> np.ndarray: ...
-
-    def bricks(
-        self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray, /
-    ) -> None: ...
-
-
-class Compilable(Protocol):
-    """What stands where the root of a scene does, though it is more than a tree of formulas."""
-
-    @property
-    def bounds(self) -> Bounds: ...
-
-    @property
-    def key(self) -> str:
-        """As `identity.field_key`."""
-
-    def conservative(self) -> Compilable: ...
-
-    def compiled(self, precision: Precision, /) -> Kernel: ...
-
-
-class CpuKernel:
-    """The compiled field of one scene. Safe to call from many threads at once.
-
-    entry: `loops.POINTS` as compiled, and its parameters, for native code.
-    """
-
-    batch = 1 << 17
+class CpuKernel(Kernel):
+    """The compiled field of one scene."""
 
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
-        self.dtype: np.dtype = np.dtype(precision)
+        self.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
-        functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (POINTS, BRICKS))
+        functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
         self._parameters = constant(linked.parameters, self.dtype)
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
-        self.entry = self._points, self._parameters
+
+    @property
+    def entry(self) -> tuple[Function, np.ndarray]:
+        """`loops.points` as compiled, and its parameters."""
+        return self._points, self._parameters
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Field values at points.
-
-        x, y, z: arrays of one shape, any float type, scene units. Returns that shape in the kernel's dtype. A
-        point with a NaN gives NaN.
-        """
+        """`Kernel.points`."""
         shape, n = np.shape(x), np.size(x)
         padded = -(-max(n, 1) // self.width) * self.width
         coordinates = np.empty((4, padded), self.dtype)
@@ -90,12 +55,7 @@ class CpuKernel:
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """Field values on bricks of 8 x 8 x 8 grid points.
-
-        corners: int32 [n, 3], C-contiguous, the grid index of each brick's first sample. out: [n, 512] of the
-        kernel's dtype, C-contiguous, offset x*64 + y*8 + z. A grid point lies at ``origin + voxel * index``;
-        its value depends on nothing else.
-        """
+        """`Kernel.bricks`."""
         assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
         frame = np.array([*origin, voxel], self.dtype)
         self._bricks(self._parameters, frame, *self._offsets, corners, out, len(corners))
@@ -106,16 +66,34 @@ def _kernel(source: str, parameters: bytes, precision: Precision) -> CpuKernel:
     return CpuKernel(Linked(source, np.frombuffer(parameters)), precision)
 
 
-@overload
-def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel: ...
-@overload
-def compile_scene(root: Node | Compilable, precision: Precision = "float32") -> Kernel: ...
-def compile_scene(root: Node | Compilable, precision: Precision = "float32") -> Kernel:
-    """The kernel of a scene tree whose depths are resolved, or of another field. Raises `KernelError`."""
-    if not isinstance(root, Node):
-        return root.compiled(precision)
+def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
+    """The kernel of a scene tree whose depths are resolved. Raises `KernelError`."""
     linked = link(root)
     return _kernel(linked.source, linked.parameters.tobytes(), precision)
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledLoop:
+    """A `formulas.field.Run` in machine code."""
+
+    function: Function
+    parameters: np.ndarray
+
+    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
+        self.function(self.parameters, frame, *rows, *out, *numbers, rows.shape[1])
+
+    def native(self, frame: np.ndarray) -> tuple[Function, np.ndarray, np.ndarray]:
+        return self.function, self.parameters, frame
+
+
+@lru_cache(maxsize=32)
+def compile_loops(source: str, numbers: bytes, loops: tuple[Loop, ...], precision: Precision) -> Loops:
+    """Loops over a linked scene, given as its text and its parameters. Raises `KernelError`."""
+    parameters = constant(np.frombuffer(numbers), precision)
+    bits = parameters.dtype.itemsize * 8
+    width = lane_count(bits)
+    functions = load_functions(Linked(source, parameters), bits, width, loops)
+    return Loops(width, BATCH, {name: CompiledLoop(f, parameters) for name, f in functions.items()})
 
 
 def load_functions(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:

@@ -16,6 +16,7 @@ import shutil
 import sys
 import tempfile
 import threading
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import version
@@ -28,11 +29,13 @@ import numpy as np
 from ..errors import KernelError
 from ..extras import lacking
 from ..files import Kept
+from ..formulas.field import Kernel, Precision
 from ..formulas.registry import Node
 from ..keys import key, texts
 from . import cuda_source
-from .cpu import Precision
+from .cuda_loops import bricks, points
 from .linker import Linked, link
+from .loops import Loop
 from .objects import cache_folder
 
 BLOCK = 128
@@ -41,8 +44,7 @@ BLOCK = 128
 _LAUNCH = threading.Lock()
 """Numba's first launch of a kernel may happen once only, and launching holds the interpreter anyway."""
 
-LOOPS = cuda_source.POINTS + cuda_source.BRICKS
-
+LOOPS = points, bricks
 
 NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
 
@@ -84,8 +86,8 @@ def require() -> Any:
     return cuda_intrinsics.cuda
 
 
-class CudaKernel:
-    """The compiled field of one scene on the GPU, with the face of `CpuKernel`. Many threads may call it."""
+class CudaKernel(Kernel):
+    """The compiled field of one scene on the GPU."""
 
     batch = 1 << 22
 
@@ -96,10 +98,7 @@ class CudaKernel:
         self._parameters = parameters(linked, precision)
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Field values at points.
-
-        x, y, z: arrays of one shape, any float type, scene units. Returns that shape in the kernel's dtype.
-        A point with a NaN gives NaN."""
+        """`Kernel.points`."""
         shape = np.shape(x)
         if np.size(x) == 0:
             return np.empty(shape, self.dtype)
@@ -116,12 +115,7 @@ class CudaKernel:
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """Field values on bricks of 8 x 8 x 8 grid points.
-
-        corners: int32 [n, 3], C-contiguous, the grid index of each brick's first sample. out: [n, 512] of
-        the kernel's dtype, C-contiguous, offset x*64 + y*8 + z. A grid point lies at ``origin + voxel *
-        index``; its value depends on nothing else, and can differ from that of `points` in the last place.
-        """
+        """`Kernel.bricks`, whose values can differ from those of `points` in the last place."""
         assert corners.dtype == np.int32 and corners.flags.c_contiguous and out.flags.c_contiguous
         assert out.dtype == self.dtype and out.shape == (len(corners), 512)
         if len(corners):
@@ -164,11 +158,11 @@ def parameters(linked: Linked, precision: Precision) -> Any:
     return require().to_device(linked.parameters.astype(precision))
 
 
-def load_loops(linked: Linked, precision: Precision, loops: str) -> ModuleType:
+def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> ModuleType:
     """Loops over a linked scene, as attributes of a module; each is compiled for the types of its first
     call's arguments.
 
-    loops: as `cuda_source.module` takes them. Raises `KernelError` if there is no GPU.
+    Raises `KernelError` if there is no GPU.
     """
     require()
     text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)

@@ -34,6 +34,13 @@ device = cuda.jit(device=True) if SIMULATED else cuda.jit(device=True, forceinli
 called = cuda.jit(device=True)
 kernel = cuda.jit(cache=True)
 
+
+@device
+def thread():  # type: ignore[no-untyped-def]
+    """The number of this thread, of all that were started."""
+    return cuda.grid(1)
+
+
 Instruction = str | Callable[..., Any]
 
 

@@ -7,47 +7,22 @@ does up to 64 times slower. So the module that it compiles says ``real(2.0)`` wh
 from __future__ import annotations
 
 import ast
+from collections.abc import Sequence
 from typing import Any
 
 from ..errors import KernelError
 from ..formulas.vocabulary import NAMES
 from .linker import CALLED, Linked
+from .loop_linker import link_loops
+from .loops import Loop
 
 INTRINSICS = "fracslice.kernel.cuda_intrinsics"
 
-POINTS = """
-@kernel
-def points(P, X, Y, Z, F):
-    i = cuda.grid(1)
-    if i < F.size:
-        x = X[i]
-        y = Y[i]
-        z = Z[i]
-        f = field(x, y, z, P)
-        F[i] = where((x == x) & (y == y) & (z == z), f, x + y + z)
-"""
-"""Field values at points; a point with a NaN gives NaN."""
 
-BRICKS = """
-@kernel
-def bricks(P, ox, oy, oz, h, corners, F):
-    i = cuda.grid(1)
-    b = i >> 9
-    s = i & 511
-    if b < F.shape[0]:
-        x = real(whole(corners[b, 0] + (s >> 6))) * h + ox
-        y = real(whole(corners[b, 1] + (s >> 3 & 7))) * h + oy
-        z = real(whole(corners[b, 2] + (s & 7))) * h + oz
-        F[b, s] = field(x, y, z, P)
-"""
-"""512 samples of each brick, at ``(ox, oy, oz) + h * (corner + offset)``."""
-
-
-def module(linked: Linked, bits: int, loops: str) -> str:
+def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
     """The text of a Python module that Numba compiles for CUDA (and its simulator runs).
 
-    loops: functions marked ``@kernel`` that may call ``field(x, y, z, P)``. In them numbers are typed by
-    hand: ``real(0.5)``, ``whole(3)``.
+    loops: those marked ``@kernel``. In them and in what is marked ``@device`` numbers are typed by hand.
     """
     words = [
         *sorted(NAMES),
@@ -57,10 +32,14 @@ def module(linked: Linked, bits: int, loops: str) -> str:
         f"float{bits} as real",
         "int32 as whole",
         "kernel",
+        "thread",
         "together",
     ]
-    header = f"from numba import cuda\nfrom {INTRINSICS} import {', '.join(words)}\n"
-    return "\n".join([header, typed(linked.source), loops])
+    header = f"from {INTRINSICS} import {', '.join(words)}\n"
+    trees = [function.tree for function in link_loops(tuple(loops)).values()]
+    units = [ast.unparse(tree) for tree in trees if not tree.decorator_list]
+    by_hand = [ast.unparse(tree) for tree in trees if tree.decorator_list]
+    return "\n\n".join([header, typed("\n\n".join([linked.source, *units])), *by_hand]) + "\n"
 
 
 def typed(source: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +13,6 @@ from ..formulas.registry import Node
 from ..formulas.transforms import affine
 from .cells import possible_cells
 from .cpu import compile_scene
-from .identity import Known
 
 DEEPEST = 60
 PROBES = 1 << 12, 1 << 15, 1 << 18
@@ -21,6 +21,17 @@ PROBES = 1 << 12, 1 << 15, 1 << 18
 ENOUGH = 256
 CELLS = 1 << 13
 BISECTIONS = 24
+
+
+@dataclass(frozen=True)
+class Known:
+    """A tree, equal to those with its key."""
+
+    node: Node = field(compare=False)
+    key: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "key", self.node.key)
 
 
 def resolve_depths(root: Node, detail: float) -> Node:

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from ..errors import DeviceError
+from ..formulas.field import Device
 from ..formulas.parameters import Choice, validated
-from ..formulas.registry import Node
-from .cpu import Compilable, Kernel
-from .cpu import compile_scene as compile_for_cpu
 
-Device = Literal["cpu", "cuda"]
 DEVICES = Choice("auto", "what computes", ("cpu", "cuda", "auto"))
 
 
@@ -27,15 +22,3 @@ def chosen(device: str) -> Device:
     if reason and device == "cuda":
         raise DeviceError(f"device cuda: {reason}")
     return "cpu" if reason else "cuda"
-
-
-def compile_for(device: Device, root: Node | Compilable) -> Kernel:
-    """The float32 kernel of a scene on a device; of a field that is no tree of formulas, on the CPU.
-
-    Raises `KernelError`.
-    """
-    if device == "cpu" or not isinstance(root, Node):
-        return compile_for_cpu(root)
-    from .cuda import compile_scene
-
-    return compile_scene(root)

@@ -38,11 +38,14 @@ Names = dict[str, Value]
 
 @dataclass
 class Emitter:
-    """A module that is being written. functions: those of the text. called: which are not inlined."""
+    """A module that is being written. functions: those of the text. called: which are not inlined. files:
+    where the lines of loops and of what they call are.
+    """
 
     lanes: Lanes
     functions: Mapping[str, ast.FunctionDef]
     called: frozenset[str]
+    files: Mapping[str, str]
     module: ir.Module = field(default_factory=ir.Module)
     made: dict[tuple[str, str], tuple[ir.Function, Kind]] = field(default_factory=dict)
 
@@ -119,9 +122,10 @@ class Body(Expressions):
         function.return_value.type = result
 
     def fail(self, node: ast.AST, message: str) -> KernelError:
-        line = ast.unparse(node).splitlines()[0]
-        name = self.name.removeprefix("f_")
-        return KernelError(f"formula {name}: {line!r} cannot be compiled: {message}")
+        line, file = ast.unparse(node).splitlines()[0], self.emitter.files.get(self.name)
+        name = self.name.removeprefix("f_").removeprefix("l_")
+        where = f"{file}:{getattr(node, 'lineno', 1)}: loop" if file else "formula"
+        return KernelError(f"{where} {name}: {line!r} cannot be compiled: {message}")
 
     # --- statements: each says whether what follows it is reached ---
     def statements(self, body: Sequence[ast.stmt]) -> bool:

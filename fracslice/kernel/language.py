@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 
 from ..errors import KernelError
 from ..formulas import vocabulary
-from ..scene.nearest import hint
+from ..nearest import hint
 from .seen import seen
 
 CHILD = "child"

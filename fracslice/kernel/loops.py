@@ -1,12 +1,17 @@
-"""Loops around a field: what a compiled kernel does with it, as source text beside the scene's.
+"""Loops around a field: what a compiled kernel does with it.
 
-A loop is a Python function in the words of the formulas, which may also call ``field(x, y, z, P)``,
-``load(array, i)`` and ``store(array, i, lanes)``. WIDTH is the number of lanes. It becomes a C function.
+A loop is a Python function in the words of the formulas and in `intrinsics`, which may also use ``while``,
+elements of arrays, and the numbers and functions that its module sees. It becomes a C function.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..formulas.vocabulary import where
+from .intrinsics import WIDTH, field, load, store
 
 
 @dataclass(frozen=True)
@@ -14,19 +19,31 @@ class Loop:
     """A C function over a field.
 
     arguments: one letter each: "r" a pointer to the kernel's float type, "i" to int32, "n" a whole number.
-    The first argument is P by convention.
+    The first argument is P by convention. fixed: arguments beside these, by name, that are known when it is
+    compiled: functions, and records of numbers.
     """
 
-    name: str
-    arguments: str
-    source: str
+    function: Callable[..., None]
+    arguments: str = ""
+    fixed: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def name(self) -> str:
+        return self.function.__name__
+
+    def fix(self, **fixed: Any) -> Loop:
+        """The loop with arguments that are known when it is compiled."""
+        return replace(self, fixed=tuple(fixed.items()))
 
 
-POINTS = Loop(
-    "points",
-    "rrrrrn",
-    """
+def loop(arguments: str) -> Callable[[Callable[..., None]], Loop]:
+    """Decorates a function that is a `Loop` with these arguments."""
+    return lambda function: Loop(function, arguments)
+
+
+@loop("rrrrrn")
 def points(P, X, Y, Z, F, n):
+    """Field values at n points, n a multiple of WIDTH; a point with a NaN gives NaN."""
     for i in range(0, n, WIDTH):
         x = load(X, i)
         y = load(Y, i)
@@ -34,25 +51,18 @@ def points(P, X, Y, Z, F, n):
         f = field(x, y, z, P)
         s = x + y + z
         store(F, i, where(s == s, f, s))
-""",
-)
-"""Field values at n points, n a multiple of WIDTH; a point with a NaN gives NaN."""
 
-BRICKS = Loop(
-    "bricks",
-    "rrrrrirn",
-    """
-def bricks(P, FRAME, I, J, K, corners, F, n):
+
+@loop("rrrrrirn")
+def bricks(P, FRAME, IX, IY, IZ, corners, F, n):
+    """512 samples of each of n bricks, at ``FRAME[:3] + FRAME[3] * (corner + (IX, IY, IZ))``."""
     h = FRAME[3]
     for b in range(n):
         x0 = corners[3 * b]
         y0 = corners[3 * b + 1]
         z0 = corners[3 * b + 2]
         for s in range(0, 512, WIDTH):
-            x = (load(I, s) + x0) * h + FRAME[0]
-            y = (load(J, s) + y0) * h + FRAME[1]
-            z = (load(K, s) + z0) * h + FRAME[2]
+            x = (load(IX, s) + x0) * h + FRAME[0]
+            y = (load(IY, s) + y0) * h + FRAME[1]
+            z = (load(IZ, s) + z0) * h + FRAME[2]
             store(F, 512 * b + s, field(x, y, z, P))
-""",
-)
-"""512 samples of each of n bricks, at ``FRAME[:3] + FRAME[3] * (corner + (I, J, K))``."""

@@ -16,6 +16,7 @@ from ..formulas import vocabulary
 from ..keys import key, texts
 from .host import REGISTERS, host
 from .linker import Linked
+from .loop_linker import loop_source
 from .loops import Loop
 
 DIGEST = hashlib.sha256().digest_size
@@ -26,7 +27,8 @@ def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) ->
 
     One that others could have written is not used. Raises `KernelError`.
     """
-    kept, name = Kept(cache_folder()), f"{key(linked.source, tuple(loops), bits, width, toolchain())}.o"
+    texts_of_all = linked.source, loop_source(loops), [loop.arguments for loop in loops]
+    kept, name = Kept(cache_folder()), f"{key(*texts_of_all, bits, width, toolchain())}.o"
     code = kept.get(name, _read)
     if code is None:
         from .compiler import Target, compile_object

@@ -19,9 +19,10 @@ class MeshReport:
 
     watertight: every edge has two or more triangles; manifold: exactly two, and each vertex one fan;
     oriented: neighbours run the same way round and every shell looks out of the material. self_intersections
-    counts the triangles that cut, touch or cover another. components counts outer bodies, cavities sealed
-    shells inside them. genus is the sum over all shells, None where the surface is not a closed 2-manifold.
-    bbox_mm is (low corner, high corner).
+    counts the triangles that cut, touch or cover another; it was looked for at `searched_triangles`, and at
+    the others it is excluded by construction. components counts outer bodies, cavities sealed shells inside
+    them. genus is the sum over all shells, None where the surface is not a closed 2-manifold. bbox_mm is (low
+    corner, high corner).
     """
 
     triangles: int
@@ -30,6 +31,7 @@ class MeshReport:
     manifold: bool
     oriented: bool
     self_intersections: int
+    searched_triangles: int
     degenerate_triangles: int
     duplicate_triangles: int
     open_edges: int
@@ -76,26 +78,35 @@ def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
     All counts are exact. Self-intersections take most of the time. Raises MeshError for a mesh without
     triangles, with an index out of range or a coordinate that is not finite.
     """
-    from fracslice.mesh.self_intersections import self_intersecting_triangles
-    from fracslice.mesh.topology import connected_components, edge_topology, shell_volumes
-    from fracslice.mesh.tree import build
-
     if not len(mesh.triangles):
         raise MeshError("the mesh has no triangles")
-    mesh = quantised(mesh)
-    a, b, c = mesh.triangles.T
-    distinct = (a != b) & (b != c) & (c != a)
-    whole = mesh if distinct.all() else mesh.selected(distinct)
+    return check_quantised(quantised(mesh, threads or 0), None, threads or 0)
+
+
+def check_quantised(mesh: Mesh, proved: NDArray[np.bool_] | None = None, threads: int = 0) -> MeshReport:
+    """Examine a mesh that is quantised and welded, as `clean` makes it.
+
+    proved: triangles of which no two intersect, bool [m]; none if nothing is known. Self-intersections are
+    searched for at the others. Raises MeshError if no triangle has an area.
+    """
+    from fracslice.mesh.self_intersections import self_intersecting_triangles
+    from fracslice.mesh.topology import component_sizes, connected_components, edge_topology
+
+    area, _, flat = mesh.measured(threads)
+    whole, searched = mesh, None if proved is None else ~proved
+    if flat:
+        a, b, c = mesh.triangles.T
+        distinct = (a != b) & (b != c) & (c != a)
+        whole = mesh.selected(distinct, threads)
+        searched = None if searched is None else searched[distinct]
     if not len(whole.triangles):
         raise MeshError("the mesh has only triangles without area")
-    link = edge_topology(whole.triangles, len(whole.vertices))
-    labels, shells = connected_components(whole.triangles, len(whole.vertices))
-    volumes = shell_volumes(whole.vertices, whole.triangles, labels, shells)
-    tree = build(whole)
+    link = edge_topology(whole.triangles, len(whole.vertices), threads)
+    labels, shells = connected_components(whole.triangles, len(whole.vertices), threads)
+    volumes, _ = component_sizes(whole.vertices, whole.triangles, labels, shells, threads)
     closed = not (link.open_edges or link.misoriented_edges)
-    misplaced = _misplaced(whole, labels, volumes, tree) if closed else 0
-    crossing = self_intersecting_triangles(whole, tree, threads)
-    area, _, flat = mesh.measures
+    misplaced = _misplaced(whole, labels, volumes, threads) if closed else 0
+    crossing = self_intersecting_triangles(whole, threads=threads, among=searched)
     cavities = int((volumes < 0).sum()) if closed else 0
     return MeshReport(
         triangles=len(mesh.triangles),
@@ -104,6 +115,7 @@ def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
         manifold=not (link.open_edges or link.non_manifold_edges or link.non_manifold_vertices),
         oriented=not (link.misoriented_edges or misplaced),
         self_intersections=int(crossing.sum()),
+        searched_triangles=len(whole.triangles) if searched is None else int(searched.sum()),
         degenerate_triangles=flat,
         duplicate_triangles=duplicates(whole.triangles[crossing]),
         open_edges=link.open_edges,
@@ -122,11 +134,11 @@ def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
     )
 
 
-def _misplaced(mesh: Mesh, labels: NDArray[np.int32], volumes: NDArray[np.float64], tree: Any) -> int:
+def _misplaced(mesh: Mesh, labels: NDArray[np.int32], volumes: NDArray[np.float64], threads: int) -> int:
     """Shells whose outside is not empty space, or, for a cavity, not the material of one body."""
     from fracslice.mesh.nesting import nesting
 
-    return int((nesting(mesh, labels, volumes, tree).winding != (volumes < 0)).sum())
+    return int((nesting(mesh, labels, volumes, threads=threads).winding != (volumes < 0)).sum())
 
 
 def duplicates(triangles: NDArray[np.int32]) -> int:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice._native import touching, turned
 from fracslice.formulas.algebra import dot, length
+from fracslice.mesh.certificate import Certificate
 from fracslice.mesh.model import Mesh
-from fracslice.mesh.quantisation import float32_points, quantised
+from fracslice.mesh.quantisation import quantise, welded
 
 PASSES = 8
 
@@ -22,47 +27,85 @@ def clean(mesh: Mesh) -> Mesh:
     1999). What cannot be helped stays, for `check` to report. Equal positions are welded last. Raises
     MeshError as `quantised` does.
     """
-    return quantised(mended(mesh))
+    return cleaned(mesh, Certificate.none(len(mesh.triangles))).mesh
 
 
-def mended(mesh: Mesh, low: float = -np.inf, high: float = np.inf) -> Mesh:
-    """The mesh before it is rounded, with the triangles taken out that rounding would flatten or turn over.
-
-    Only those whose largest x is in [low, high): elsewhere the surface may be cut open.
+class Cleaned(NamedTuple):
+    """mesh: quantised and welded. proved: which of its triangles do not intersect one another, bool [m].
+    exact: the same triangles before, with what is certified of them.
     """
-    from fracslice._native import turned
 
-    points = float32_points(mesh).astype(np.float64)
-    suspects = turned(mesh.vertices, mesh.triangles, points)
-    top = mesh.vertices[mesh.triangles[suspects], 0].max(axis=1)
+    mesh: Mesh
+    proved: NDArray[np.bool_]
+    exact: Mesh
+    certificate: Certificate
+
+
+def cleaned(
+    mesh: Mesh, certificate: Certificate, low: float = -np.inf, high: float = np.inf, threads: int = 0
+) -> Cleaned:
+    """Does what `clean` does, and keeps account of what is proved.
+
+    Only triangles whose largest x is in [low, high) are taken out: elsewhere the surface may be cut open.
+    """
+    points, displaced = quantise(mesh, certificate.planes, threads)
+    if not certificate.holds.all():
+        displaced[mesh.triangles[~certificate.holds]] = True
+    exact, certificate = _mended(mesh, points, certificate, low, high, threads)
+    proved, final = certificate.holds, Mesh(points, exact.triangles)
+    if not displaced.any():  # only such a vertex can be where another one is
+        return Cleaned(final.selected(np.ones(len(proved), bool), threads), proved, exact, certificate)
+    proved = proved & ~displaced[exact.triangles].any(axis=1)
+    return Cleaned(welded(final, threads), proved, exact, certificate)
+
+
+def _mended(
+    mesh: Mesh,
+    points: NDArray[np.float64],
+    certificate: Certificate,
+    low: float,
+    high: float,
+    threads: int,
+) -> tuple[Mesh, Certificate]:
+    """Takes out triangles that are flattened or turned over where the vertices move to `points`."""
+    suspects = turned(mesh.vertices, mesh.triangles, points, threads)
+    top = mesh.vertices[mesh.triangles[suspects], 0].max(axis=1, initial=-np.inf)
     bad = set(suspects[(low <= top) & (top < high)].tolist())
     if not bad:
-        return mesh
-    surface = _Surface(points, mesh.triangles, bad)
+        return mesh, certificate
+    surface = _Surface(points, mesh.triangles, bad, threads)
     for _ in range(PASSES):
         for triangle in sorted(bad):
             surface.mend(triangle)
-    return Mesh(mesh.vertices, surface.triangles[surface.alive])
+    same = (surface.triangles == mesh.triangles).all(axis=1)
+    certificate = replace(certificate, holds=certificate.holds & same).selected(surface.alive)
+    return Mesh(mesh.vertices, surface.triangles[surface.alive]), certificate
 
 
 class _Surface:
-    """A mesh edited in few places: the triangles around a vertex are looked up when first asked for."""
+    """A mesh edited in few places: of each vertex at a bad triangle, and next to one, the triangles around it
+    are known.
+    """
 
-    def __init__(self, points: NDArray[np.float64], triangles: NDArray[np.int32], bad: set[int]) -> None:
-        from fracslice.mesh.topology import corners_by_vertex
-
+    def __init__(
+        self, points: NDArray[np.float64], triangles: NDArray[np.int32], bad: set[int], threads: int
+    ) -> None:
         self.points = points
         self.bad = bad
         self.triangles = triangles.copy()
         self.alive = np.ones(len(triangles), dtype=bool)
-        self.start, self.corner = corners_by_vertex(triangles, len(points))
         self.stars: dict[int, set[int]] = {}
+        near = np.array(sorted(bad))
+        for _ in range(2):
+            marked = np.zeros(len(points), bool)
+            marked[triangles[near]] = True
+            near = touching(triangles, marked, threads)
+        for triangle, corners in zip(near.tolist(), triangles[near].tolist(), strict=True):
+            for vertex in corners:
+                self.stars.setdefault(vertex, set()).add(triangle)
 
     def star(self, vertex: int) -> set[int]:
         """The triangles around a vertex."""
-        if vertex not in self.stars:
-            corners = self.corner[self.start[vertex] : self.start[vertex + 1]]
-            self.stars[vertex] = set((corners // 3).tolist())
         return self.stars[vertex]
 
     def ring(self, vertex: int) -> set[int]:

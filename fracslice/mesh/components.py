@@ -50,18 +50,18 @@ class Shells:
         return volumes
 
 
-def shells(mesh: Mesh) -> Shells:
-    """Find the shells of a closed, oriented mesh: triangles that share vertices, O(m log m)."""
-    from fracslice.mesh.topology import connected_components, shell_volumes
+def shells(mesh: Mesh, threads: int = 0) -> Shells:
+    """Find the shells of a closed, oriented mesh: triangles that share vertices, O(m)."""
+    from fracslice.mesh.topology import component_sizes, connected_components
 
-    labels, count = connected_components(mesh.triangles, len(mesh.vertices))
-    volumes = shell_volumes(mesh.vertices, mesh.triangles, labels, count)
+    labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
+    volumes, _ = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)
     hollow = volumes < 0
     parent = np.full(count, -1, dtype=np.int64)
     if hollow.any():
         from fracslice.mesh.nesting import nesting
 
-        parent = nesting(mesh, labels, volumes).parent
+        parent = nesting(mesh, labels, volumes, threads=threads).parent
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
     return Shells(labels, volumes, parent)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import MeshError
-from ..formulas.registry import Node
-from ..kernel import Compilable
+from ..kernel import Field
 from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
 from ..volume.crossings import Refiner
@@ -42,7 +41,7 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
     return Mesh(vertices, triangles)
 
 
-def contour(root: Node | Compilable, bricks: Bricks | SignBricks, work: Work | None = None) -> Mesh:
+def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) -> Mesh:
     """The exact surface of a scene, in scene units, its edges and corners sharp.
 
     root: the scene that `bricks` were sampled from. Every vertex on a grid edge is moved along it to the zero
@@ -74,7 +73,7 @@ class Piece:
 
 
 def contour_pieces(
-    root: Node | Compilable, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
+    root: Field, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
 ) -> Iterator[Piece]:
     """The same surface, piece after piece along x, each of about `most` bricks: memory for one at a time."""
     from .._native import Cells, Contouring

@@ -10,8 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formulas.registry import Node
-from ..kernel import Compilable, compile_scene
+from ..kernel import Field
 from ..work import Work, chunks
 from .model import Mesh
 
@@ -36,8 +35,8 @@ UPRIGHT, OFF = 3, 7
 class Fit:
     """Distances and normals of a scene's field. Lengths are scene units; reach: what counts as near."""
 
-    def __init__(self, root: Node | Compilable, reach: float, voxel: float, work: Work) -> None:
-        self._kernel = compile_scene(root, "float64")
+    def __init__(self, root: Field, reach: float, voxel: float, work: Work) -> None:
+        self._kernel = root.kernel("cpu", "float64")
         self.reach, self._voxel, self._work = reach, voxel, work
 
     def planes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:

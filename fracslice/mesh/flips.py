@@ -45,7 +45,8 @@ def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool
     An edge stays if a triangle's normal would be farther off, as at a sharp edge, or the triangle from the
     surface.
     """
-    mesh, measured = Mesh(state.mesh.vertices, state.mesh.triangles.copy()), state.measured.copy()
+    triangles, measured = state.mesh.triangles.copy(), state.measured.copy()
+    mesh = Mesh(state.mesh.vertices, triangles)
     changed = np.zeros(len(measured), bool)
     for _ in range(ROUNDS):
         flips, worth = _candidates(mesh, due, measured[:, UPRIGHT] < STEEP)
@@ -60,7 +61,7 @@ def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool
         good = np.where(was < STEEP, now > was + BETTER, now >= np.minimum(was, FINE))
         good &= after[..., OFF].max(axis=1) <= np.maximum(before[..., OFF].max(axis=1), state.fit.reach)
         flips = flips.some(good)
-        mesh.triangles[flips.old], measured[flips.old] = flips.new, after[good]
+        triangles[flips.old], measured[flips.old] = flips.new, after[good]
         due = np.zeros(len(measured), bool)
         changed[flips.old] = due[flips.old] = True
     return Fitted(mesh, state.fit, measured), changed

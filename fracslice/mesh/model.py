@@ -2,22 +2,58 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice.mesh.exchange import Exchange
 
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """Triangles over shared vertices.
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mesh(Exchange):
+    """Triangles over shared vertices. Both arrays are read-only.
 
     vertices: float64 [n, 3], in mm once in print space; triangles: int32 [m, 3], counter-clockwise seen from
     outside.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.vstack([np.zeros(3), np.eye(3)])
+    >>> mesh = Mesh(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> mesh
+    <Mesh of 4 triangles, 4 vertices, 1 x 1 x 1>
+    >>> mesh.is_watertight, round(mesh.volume, 6)
+    (True, 0.166667)
     """
 
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        for name, kind in (("vertices", np.float64), ("triangles", np.int32)):
+            array = np.asarray(getattr(self, name), kind).view()
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    def __repr__(self) -> str:
+        x, y, z = self.size
+        counts = f"{len(self.triangles)} triangles, {len(self.vertices)} vertices"
+        return f"<{type(self).__name__} of {counts}, {x:.6g} x {y:.6g} x {z:.6g}>"
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """The triangles, under the name that they have in trimesh and pyvista."""
+        return self.triangles
+
+    @property
+    def is_watertight(self) -> bool:
+        """Whether every edge joins exactly two triangles."""
+        from .topology import edge_topology
+
+        found = edge_topology(self.triangles, len(self.vertices))
+        return len(self.triangles) > 0 and not (found.open_edges or found.non_manifold_edges)
 
     @property
     def corners(self) -> NDArray[np.float64]:
@@ -31,7 +67,7 @@ class Mesh:
             return np.zeros((2, 3))
         from fracslice._native import bounds
 
-        return np.array(bounds(self.vertices))
+        return np.array(bounds(self.vertices, 1))
 
     @property
     def size(self) -> NDArray[np.float64]:
@@ -59,34 +95,39 @@ class Mesh:
     @property
     def measures(self) -> tuple[float, float, int]:
         """`area`, `volume`, and how many triangles have no area."""
-        x, y, z = self.bounds.mean(axis=0).tolist()
-        return self.measures_from((x, y, z))
+        return self.measured(1)
 
-    def measures_from(self, point: tuple[float, float, float]) -> tuple[float, float, int]:
+    def measured(self, threads: int) -> tuple[float, float, int]:
+        """`measures`, by several threads."""
+        x, y, z = self.bounds.mean(axis=0).tolist()
+        return self.measures_from((x, y, z), threads)
+
+    def measures_from(self, point: tuple[float, float, float], threads: int = 1) -> tuple[float, float, int]:
         """`measures`, with the signed volume between the triangles and a point: of an open mesh, a part of
         the whole one's.
         """
         from fracslice._native import measures
 
-        return measures(self.vertices, self.triangles, point)
+        return measures(self.vertices, self.triangles, point, threads)
 
     def translated(self, offset: tuple[float, float, float] | NDArray[np.float64]) -> Mesh:
         """A copy moved by `offset`."""
-        return replace(self, vertices=self.vertices + np.asarray(offset, dtype=np.float64))
+        return Mesh(self.vertices + np.asarray(offset, dtype=np.float64), self.triangles)
 
     def scaled(self, factor: float) -> Mesh:
         """A copy scaled about the origin; `factor` must be positive: a mirror image would be inside out."""
         if not factor > 0:
             raise ValueError(f"scale factor must be positive, not {factor}")
-        return replace(self, vertices=self.vertices * factor)
+        return Mesh(self.vertices * factor, self.triangles)
 
-    def selected(self, keep: NDArray[np.bool_]) -> Mesh:
-        """A copy with the triangles where `keep` (bool [m]) is true, and only the vertices that those use."""
-        triangles = self.triangles[keep]
-        used = np.zeros(len(self.vertices), dtype=bool)
-        used[triangles] = True
-        renumbered = np.cumsum(used, dtype=np.int32) - np.int32(1)
-        return Mesh(self.vertices[used], renumbered[triangles])
+    def selected(self, keep: NDArray[np.bool_], threads: int = 1) -> Mesh:
+        """The triangles where `keep` (bool [m]) is true, and only the vertices that those use: this mesh if
+        that is all of it.
+        """
+        from fracslice._native import selected
+
+        found = selected(self.vertices, self.triangles, keep, threads)
+        return Mesh(*found) if found else self
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from fracslice._native import nesting as _nesting
 from fracslice.mesh.model import Mesh
-from fracslice.mesh.tree import Tree, build
 
 
 class Nesting(NamedTuple):
@@ -23,8 +22,8 @@ def nesting(
     mesh: Mesh,
     labels: NDArray[np.int32],
     volumes: NDArray[np.float64],
-    tree: Tree | None = None,
     first: NDArray[np.int64] | None = None,
+    threads: int = 0,
 ) -> Nesting:
     """Where each closed shell of a mesh lies.
 
@@ -40,6 +39,4 @@ def nesting(
     if first is None:
         first = np.zeros(count, np.int64)
         first[labels[::-1]] = mesh.triangles[::-1, 0]
-    sizes = np.abs(volumes)
-    whole = tree or build(mesh)
-    return Nesting(*_nesting(mesh.vertices, mesh.triangles, labels, sizes, first, *whole))
+    return Nesting(*_nesting(mesh.vertices, mesh.triangles, labels, np.abs(volumes), first, threads))

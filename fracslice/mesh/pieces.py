@@ -19,22 +19,25 @@ class Pieces:
     """Pieces of a surface in turn, scene units, each with the labels of its triangles.
 
     They are held in memory if there is no folder, else in its files. ends: the x where each ends, infinite
-    for the last one. starts: the number of each one's first triangle.
+    for the last one. starts: the number of each one's first triangle. fresh: how many of each one's last
+    triangles contouring did not lay.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder, self.ends, self.starts = folder, list[float](), list[int]()
+        self.fresh = list[int]()
         self._count = 0
         self._held: dict[str, Arrays] = {}
 
     def __len__(self) -> int:
         return len(self.ends)
 
-    def add(self, piece: Piece) -> None:
-        """Append a piece."""
+    def add(self, piece: Piece, fresh: int = 0) -> None:
+        """Append a piece. fresh: how many of its last triangles contouring did not lay."""
         self._put(f"mesh{len(self)}", vertices=piece.mesh.vertices, triangles=piece.mesh.triangles)
         self.ends.append(piece.end)
         self.starts.append(self._count)
+        self.fresh.append(fresh)
         self._count += len(piece.mesh.triangles)
 
     def label(self, number: int, labels: NDArray[np.int64]) -> None:

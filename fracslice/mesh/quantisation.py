@@ -8,29 +8,43 @@ from numpy.typing import NDArray
 from fracslice.errors import MeshError
 from fracslice.mesh.model import Mesh
 
+NO_PLANES = np.empty((0, 3))
 
-def quantised(mesh: Mesh) -> Mesh:
+
+def quantised(mesh: Mesh, threads: int = 0) -> Mesh:
     """The mesh as a reader of its STL will see it: rounded to float32, equal positions made one vertex.
 
     Keeps every triangle, in order; unused vertices go. Do it once, before the check and the export, so that
     both speak of the same object. Raises MeshError if a coordinate is not finite or an index is out of range.
     """
+    points, _ = quantise(mesh, NO_PLANES, threads)
+    return welded(Mesh(points, mesh.triangles), threads)
+
+
+def quantise(
+    mesh: Mesh, planes: NDArray[np.float64] = NO_PLANES, threads: int = 0
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """The vertices rounded to float32, without negative zeros, float64 [n, 3], and which are displaced.
+
+    A vertex is displaced, bool [n], if it is not in the same planes and strictly between the same ones as
+    before. planes: of a grid, across each axis, float64 [k, 3], ascending; without them, all vertices are.
+    Raises MeshError as `quantised` does.
+    """
+    from fracslice._native import quantise
+
+    if len(mesh.triangles) and not 0 <= mesh.triangles.min() <= mesh.triangles.max() < len(mesh.vertices):
+        raise MeshError("a triangle names a vertex that does not exist")
+    try:
+        return quantise(mesh.vertices, planes, threads)
+    except ValueError as error:
+        raise MeshError(str(error)) from None
+
+
+def welded(mesh: Mesh, threads: int = 0) -> Mesh:
+    """A mesh of float32 coordinates with equal positions made one vertex, and no others than are used."""
     from fracslice.mesh.weld import weld
 
-    points = float32_points(mesh)
-    first, labels = weld(points)
-    welded = Mesh(points[first].astype(np.float64), labels[mesh.triangles])
-    used = np.zeros(len(first), dtype=bool)
-    used[welded.triangles] = True
-    return welded if used.all() else welded.selected(np.ones(len(welded.triangles), dtype=bool))
-
-
-def float32_points(mesh: Mesh) -> NDArray[np.float32]:
-    """The vertices as float32 [n, 3], without negative zeros. Raises MeshError as `quantised` does."""
-    with np.errstate(over="ignore"):
-        points = mesh.vertices.astype(np.float32) + np.float32(0)  # -0 becomes 0
-    if len(mesh.triangles) and not 0 <= mesh.triangles.min() <= mesh.triangles.max() < len(points):
-        raise MeshError("a triangle names a vertex that does not exist")
-    if not np.isfinite(points).all():
-        raise MeshError("the mesh has a coordinate that is not a finite number")
-    return points
+    first, labels = weld(mesh.vertices.astype(np.float32))
+    if len(first) < len(mesh.vertices):
+        mesh = Mesh(mesh.vertices[first], labels[mesh.triangles])
+    return mesh.selected(np.ones(len(mesh.triangles), bool), threads)

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formulas.registry import Node
-from ..kernel import Compilable
+from ..kernel import Field
 from ..volume.projection import anywhere, project
 from ..work import Work
 from .creases import on_creases
@@ -61,7 +60,7 @@ class Refined:
 
 
 def refine(
-    root: Node | Compilable, mesh: Mesh, chord: float, voxel: float, work: Work | None = None
+    root: Field, mesh: Mesh, chord: float, voxel: float, work: Work | None = None
 ) -> tuple[Mesh, Refined]:
     """Splits edges until no triangle is farther than `chord` from the surface.
 
@@ -96,7 +95,7 @@ def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _wanted(
-    root: Node | Compilable, state: Fitted, edges: Edges, free: NDArray[np.bool_], voxel: float, work: Work
+    root: Field, state: Fitted, edges: Edges, free: NDArray[np.bool_], voxel: float, work: Work
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """The edges to be split: those that are too far off, or the longest ones of triangles that are; and
     where."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fracslice._native import self_intersecting_triangles as _self_intersecting_triangles
+from fracslice._native import surroundings
 from fracslice.mesh.model import Mesh
 from fracslice.mesh.tree import Tree, build
 
@@ -27,6 +28,13 @@ def self_intersecting_triangles(
     threads: all cores if None; the result is the same for any number. among: bool [m], only pairs with one of
     these are looked at. Raises ValueError for indices out of range and for the tree of another mesh.
     """
-    return _self_intersecting_triangles(
-        mesh.vertices, mesh.triangles, *(tree or build(mesh)), threads or 0, among
-    )
+    vertices, triangles, threads = mesh.vertices, mesh.triangles, threads or 0
+    if among is None or tree is not None:
+        return _self_intersecting_triangles(
+            vertices, triangles, *(tree or build(mesh, threads)), threads, among
+        )
+    found, near = np.zeros(len(triangles), bool), surroundings(vertices, triangles, among, threads)
+    if len(near):
+        part = Mesh(vertices, triangles[near])
+        found[near] = self_intersecting_triangles(part, build(part, threads), threads, among[near])
+    return found

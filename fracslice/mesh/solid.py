@@ -32,7 +32,7 @@ def to_manifold(mesh: Mesh) -> Manifold:
 
     if not len(mesh.triangles):
         raise MeshError("the mesh has no triangles")
-    corners = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
+    corners = np.array(mesh.vertices, np.float64)  # a copy: manifold3d takes none that is read-only
     solid = manifold3d.Manifold(manifold3d.Mesh64(corners, mesh.triangles.astype(np.uint64)))
     status = solid.status().name
     if status != "NoError":

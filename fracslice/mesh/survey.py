@@ -13,9 +13,9 @@ from .model import Mesh
 from .pieces import Pieces, rows
 
 
-def survey(pieces: Pieces, voxel: float) -> WholeShells:
+def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
     """The shells of a surface, and the labels of its pieces: each connected component of a piece has one."""
-    found = _Survey(voxel)
+    found = _Survey(voxel, threads)
     for number, mesh in enumerate(pieces.meshes()):
         pieces.label(number, found.add(mesh, pieces.ends[number]))
     return found.shells()
@@ -24,8 +24,9 @@ def survey(pieces: Pieces, voxel: float) -> WholeShells:
 class _Survey:
     """Sums over pieces, in turn. Labels are numbered from the first piece on."""
 
-    def __init__(self, voxel: float) -> None:
-        self.voxel, self.count, self.end, self.area = voxel, 0, -np.inf, 0.0
+    def __init__(self, voxel: float, threads: int) -> None:
+        self.voxel, self.threads, self.count, self.end = voxel, threads, 0, -np.inf
+        self.sizes: list[NDArray[np.float64]] = []
         self.cones: list[NDArray[np.float64]] = []
         self.areas: list[NDArray[np.float64]] = []
         self.low: list[NDArray[np.float64]] = []
@@ -35,9 +36,9 @@ class _Survey:
 
     def add(self, mesh: Mesh, end: float) -> NDArray[np.int64]:
         """Take in a piece; return the label of each of its triangles, int64 [m]."""
-        from .topology import connected_components, shell_volumes
+        from .topology import component_sizes, connected_components
 
-        local, count = connected_components(mesh.triangles, len(mesh.vertices))
+        local, count = connected_components(mesh.triangles, len(mesh.vertices), self.threads)
         of_vertex = np.empty(len(mesh.vertices), np.int64)
         of_vertex[mesh.triangles] = local[:, None]
         low, high = _boxes(mesh.vertices, mesh.vertices, of_vertex, count)
@@ -46,12 +47,12 @@ class _Survey:
         # Cones over the first corner of a component, moved to the corner of its box: dust keeps its digits.
         first = np.searchsorted(np.maximum.accumulate(local), np.arange(count))
         tips = mesh.vertices[mesh.triangles[first, 0]]
-        cones = shell_volumes(mesh.vertices, mesh.triangles, local, count)
+        cones, sizes = component_sizes(mesh.vertices, mesh.triangles, local, count, self.threads)
         self.cones.append(cones + ((tips - low) * areas).sum(axis=1) / 3)
         self.areas.append(areas)
         self.low.append(low)
         self.high.append(high)
-        self.area += mesh.area
+        self.sizes.append(sizes)
         self._join_to_last(mesh, of_vertex + self.count, end)
         self.count += count
         return local + np.int64(self.count - count)
@@ -75,7 +76,8 @@ class _Survey:
         # Cones over the corner of a component, moved to the corner of its shell.
         cones = np.concatenate(self.cones) + np.einsum("ij,ij->i", lows - low[of_label], areas) / 3
         volumes = np.bincount(of_label, cones, minlength=count).astype(np.float64)
-        return WholeShells(of_label, volumes, low, high, self.area)
+        sizes = np.bincount(of_label, np.concatenate(self.sizes), minlength=count).astype(np.float64)
+        return WholeShells(of_label, volumes, sizes, low, high)
 
     def _united(self) -> tuple[NDArray[np.int32], int]:
         """The shell of each label."""
@@ -94,21 +96,21 @@ class _Survey:
 class WholeShells:
     """The shells of all pieces together.
 
-    of_label: int32, the shell of each label. volumes: float64 [s], signed. low, high: float64 [s, 3], the
-    corners of their bounding boxes. area: of all of them.
+    of_label: int32, the shell of each label. volumes: float64 [s], signed. areas: float64 [s]. low, high:
+    float64 [s, 3], the corners of their bounding boxes.
     """
 
     of_label: NDArray[np.int32]
     volumes: NDArray[np.float64]
+    areas: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    area: float
 
     def bounds(self, which: NDArray[np.bool_] | slice = slice(None)) -> NDArray[np.float64]:
         """The box around some shells, or all of them, [2, 3]."""
         return np.stack([self.low[which].min(axis=0), self.high[which].max(axis=0)])
 
-    def nested(self, pieces: Pieces) -> tuple[Shells, int]:
+    def nested(self, pieces: Pieces, threads: int = 0) -> tuple[Shells, int]:
         """Which shell is in which, and how many are where they should not be.
 
         Each shell is looked up from where its x is least: that point lies within a cell, so that a ray across
@@ -126,29 +128,22 @@ class WholeShells:
             here = np.flatnonzero(mesh.vertices[:, 0] == self.low[of_vertex, 0])
             first[of_vertex[here]] = here
             if (first >= 0).any():
-                found = nesting(mesh, shell, self.volumes, first=first)
+                found = nesting(mesh, shell, self.volumes, first, threads)
                 parent = np.where(first >= 0, found.parent, parent)
                 winding = np.where(first >= 0, found.winding, winding)
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
         return Shells(np.empty(0, np.int32), self.volumes, parent), int((winding != hollow).sum())
 
-    def thin_walls(self, pieces: Pieces, voxel: float) -> str:
+    def thin_walls(self, voxel: float) -> str:
         """What walls came to that are thinner than a voxel, in words; empty where all are thicker.
 
         Between samples such walls are missed: they have holes, or fall to pieces. A body counts if on average
         it is thinner than a voxel; the dust around a fractal is such, too, but less than `PIECES` of the
         material.
         """
-        whole, count = self.volumes.sum(), len(self.volumes)
-        if voxel * self.area < 2 * PIECES * whole:  # such bodies would have more surface
-            return ""
-        areas = np.zeros(count)
-        for mesh, labels in pieces.labelled():
-            sizes = np.linalg.norm(mesh.normals, axis=1) / 2
-            areas += np.bincount(self.of_label[labels], sizes, minlength=count)
-        bodies = self.volumes > 0
-        thin = bodies & (2 * self.volumes < voxel * areas)
+        whole, bodies = self.volumes.sum(), self.volumes > 0
+        thin = bodies & (2 * self.volumes < voxel * self.areas)
         share, many = float(self.volumes[thin].sum() / whole), int(bodies.sum())
         holes = "have holes" if many == 1 else f"fell to pieces: {thin.sum()} of {many} bodies"
         return f"walls thinner than a voxel {holes}, {share:.0%} of the material" if share >= PIECES else ""

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import pointed
-from ..kernel import compile_scene
 from ..volume import Plan
 from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
@@ -20,7 +19,7 @@ from .extract import Piece
 from .fit import Fit
 from .model import Mesh
 from .pieces import NOTHING, Pieces, joined
-from .quantisation import float32_points
+from .quantisation import quantise
 from .self_intersections import self_intersecting_triangles
 
 POINTED = 0.15
@@ -48,8 +47,8 @@ REACH = 8.0
 class Pointed:
     """The pointed vertices of a surface that comes in pieces."""
 
-    def __init__(self, voxel: float) -> None:
-        self._voxel, self._points = voxel, list[NDArray[np.float64]]()
+    def __init__(self, voxel: float, threads: int = 0) -> None:
+        self._voxel, self._threads, self._points = voxel, threads, list[NDArray[np.float64]]()
         self._near, self._seam = NOTHING, -np.inf
 
     def add(self, piece: Piece) -> None:
@@ -57,7 +56,7 @@ class Pointed:
         mesh, voxel = piece.mesh, self._voxel
         if len(self._near.triangles):
             mesh = joined(self._near, mesh, self._seam, voxel / 2)
-        at = mesh.vertices[pointed(mesh.vertices, mesh.triangles, POINTED)]
+        at = mesh.vertices[pointed(mesh.vertices, mesh.triangles, POINTED, self._threads)]
         low, high = self._seam - 2 * voxel, piece.end - 2 * voxel
         self._points.append(at[(low <= at[:, 0]) & (at[:, 0] < high)])
         self._seam = piece.end
@@ -91,7 +90,8 @@ def with_tips(
     for first, last in _spans(caps, pieces, near):
         mesh, start = pieces.together(first, last, near), pieces.starts[first]
         own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(mesh.triangles)]
-        made.add(Piece(capped(mesh, own) if own else mesh, pieces.ends[last - 1]))
+        fresh = sum(len(cap.fan) for cap in own)
+        made.add(Piece(capped(mesh, own) if own else mesh, pieces.ends[last - 1]), fresh)
     return made, np.array([cap.fan[0, 2] for cap in caps])
 
 
@@ -123,7 +123,7 @@ def _crossing(mesh: Mesh, caps: list[Cap], work: Work) -> set[int]:
     made = capped(mesh, caps)
     of_cap = np.repeat(np.arange(len(caps)), [len(cap.fan) for cap in caps])
     of_cap = np.concatenate([np.full(len(made.triangles) - len(of_cap), -1), of_cap])
-    as_written = Mesh(float32_points(made).astype(np.float64), made.triangles)
+    as_written = Mesh(quantise(made, threads=work.threads)[0], made.triangles)
     crossing = self_intersecting_triangles(as_written, threads=work.threads, among=of_cap >= 0)
     return set(of_cap[crossing].tolist()) - {-1}
 
@@ -151,7 +151,7 @@ class Tip(NamedTuple):
 
 def _found(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work) -> list[Tip]:
     """Tips beyond pointed vertices, the farthest one first."""
-    kernel, voxel = compile_scene(planned.root, "float64"), planned.voxel
+    kernel, voxel = planned.root.kernel("cpu", "float64"), planned.voxel
     exact = EXACT * max(planned.box.size)
 
     def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -26,6 +26,6 @@ class Tree(NamedTuple):
     high: NDArray[np.float64]
 
 
-def build(mesh: Mesh) -> Tree:
+def build(mesh: Mesh, threads: int = 0) -> Tree:
     """The tree of a mesh with at least one triangle; O(m)."""
-    return Tree(*_tree(mesh.vertices, mesh.triangles))
+    return Tree(*_tree(mesh.vertices, mesh.triangles, threads))

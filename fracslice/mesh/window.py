@@ -7,16 +7,16 @@ has its surroundings with it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .certificate import Certificate
 from .check import MeshReport, duplicates
-from .clean import mended
+from .clean import cleaned
 from .model import Mesh
 from .pieces import NOTHING, joined
-from .quantisation import quantised
 
 WAITS, COUNTS, MENDS = 7.5, 4.0, 3.0
 """Voxels before the end of a piece: triangles beyond wait for the next; vertices up to there are counted now;
@@ -29,17 +29,21 @@ class Finished:
     """Triangles as a file holds them, mm, amid others around them.
 
     done: bool [m], which triangles are finished with this piece: in the order of the pieces', none of them
-    twice. counted: bool [n], the vertices whose triangles are all here, each of them once.
+    twice. counted: bool [n], the vertices whose triangles are all here, each of them once. proved: bool [m],
+    triangles of which no two intersect.
     """
 
     mesh: Mesh
+    proved: NDArray[np.bool_]
     done: NDArray[np.bool_]
     counted: NDArray[np.bool_]
 
     @classmethod
-    def whole(cls, mesh: Mesh) -> Finished:
+    def whole(cls, mesh: Mesh, proved: NDArray[np.bool_] | None = None) -> Finished:
         """All of a mesh."""
-        return cls(mesh, np.ones(len(mesh.triangles), bool), np.ones(len(mesh.vertices), bool))
+        count = len(mesh.triangles)
+        known = np.zeros(count, bool) if proved is None else proved
+        return cls(mesh, known, np.ones(count, bool), np.ones(len(mesh.vertices), bool))
 
     @property
     def passed(self) -> Mesh:
@@ -50,30 +54,37 @@ class Finished:
 class Window:
     """Pieces of a mesh in mm go in, in turn along x; finished triangles come out, in the same order."""
 
-    def __init__(self, voxel: float) -> None:
-        self._voxel, self._waiting, self._end = voxel, NOTHING, -np.inf
+    def __init__(self, voxel: float, threads: int = 0) -> None:
+        self._voxel, self._threads = voxel, threads
+        self._waiting, self._holds, self._end = NOTHING, np.zeros(0, bool), -np.inf
 
-    def add(self, piece: Mesh, end: float) -> Finished:
-        """Take in the piece that ends at x = `end`, infinity for the last; return what is finished by it."""
+    def add(self, piece: Mesh, end: float, known: Certificate | None = None) -> Finished:
+        """Take in the piece that ends at x = `end`, infinity for the last; return what is finished by it.
+
+        known: what is certified of the piece; all pieces are of one grid.
+        """
         before, self._end, voxel = self._end, end, self._voxel
-        whole = joined(self._waiting, piece, before, voxel / 2) if len(self._waiting.triangles) else piece
-        whole = mended(whole, before - MENDS * voxel, end - MENDS * voxel)
-        final = quantised(whole)
+        known, whole = known or Certificate.none(len(piece.triangles)), piece
+        if len(self._waiting.triangles):
+            whole = joined(self._waiting, piece, before, voxel / 2)
+            known = replace(known, holds=np.concatenate([self._holds, known.holds]))
+        low, high = before - MENDS * voxel, end - MENDS * voxel
+        final, proved, whole, known = cleaned(whole, known, low, high, self._threads)
         if -before == end == np.inf:
-            return Finished.whole(final)
+            return Finished.whole(final, proved)
         x = final.vertices[:, 0]
         waits = x[final.triangles].max(axis=1, initial=-np.inf) >= end - WAITS * voxel
         done = np.logical_not(np.logical_or.accumulate(waits))
         counted = (x >= before - COUNTS * voxel) & (x < end - COUNTS * voxel)
-        self._waiting = whole.selected(~done)
-        return Finished(final, done, counted)
+        self._waiting, self._holds = whole.selected(~done), known.holds[~done]
+        return Finished(final, proved, done, counted)
 
 
 @dataclass
 class Tally:
     """Sums over finished pieces, as `MeshReport` has them, but of edges their ends: twice as many."""
 
-    threads: int | None = None
+    threads: int = 0
     triangles: int = 0
     vertices: int = 0
     open_edges: int = 0
@@ -81,6 +92,7 @@ class Tally:
     misoriented_edges: int = 0
     nonmanifold_vertices: int = 0
     self_intersections: int = 0
+    searched_triangles: int = 0
     degenerate_triangles: int = 0
     duplicate_triangles: int = 0
     volume: float = 0.0
@@ -97,8 +109,9 @@ class Tally:
         a, b, c = mesh.triangles.T
         distinct = (a != b) & (b != c) & (c != a)
         ends = edge_ends(mesh.triangles if distinct.all() else mesh.triangles[distinct], piece.counted)
-        crossing = self_intersecting_triangles(mesh, threads=self.threads) & piece.done
-        area, volume, flat = passed.measures_from((0.0, 0.0, 0.0))
+        searched = ~piece.proved
+        crossing = self_intersecting_triangles(mesh, threads=self.threads, among=searched) & piece.done
+        area, volume, flat = passed.measures_from((0.0, 0.0, 0.0), self.threads)
         self.triangles += len(passed.triangles)
         self.vertices += int(piece.counted.sum())
         self.open_edges += ends.open_edges
@@ -106,6 +119,7 @@ class Tally:
         self.misoriented_edges += ends.misoriented_edges
         self.nonmanifold_vertices += ends.non_manifold_vertices
         self.self_intersections += int(crossing.sum())
+        self.searched_triangles += int((searched & piece.done).sum())
         self.degenerate_triangles += flat
         self.duplicate_triangles += duplicates(mesh.triangles[crossing])
         self.volume += volume
@@ -127,6 +141,7 @@ class Tally:
             manifold=manifold,
             oriented=not (self.misoriented_edges or misplaced),
             self_intersections=self.self_intersections,
+            searched_triangles=self.searched_triangles,
             degenerate_triangles=self.degenerate_triangles,
             duplicate_triangles=self.duplicate_triangles,
             open_edges=self.open_edges // 2,

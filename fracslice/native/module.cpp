@@ -1,144 +1,21 @@
 // The extension module fracslice._native. Its Python face and its documentation are in ../_native.pyi.
-#include <algorithm>
+#include <nanobind/nanobind.h>
 
-#include "bind_roots.h"
-#include "contour.h"
-#include "numpy.h"
-#include "signs.h"
-#include "unlocked.h"
+namespace fracslice::volume {
+void bind_grid(nanobind::module_& module);
+void bind_signs(nanobind::module_& module);
+}  // namespace fracslice::volume
 
-namespace fracslice {
-namespace {
-
-nb::tuple bind_marching_cubes(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index,
-                              const std::array<double, 3>& origin, double voxel, double clamp, int threads) {
-    Bricks bricks = view(ijk, values, index);
-    Surface surface = unlocked(threads, [&] { return marching_cubes(bricks, {origin, voxel, clamp}); });
-    size_t n = surface.vertices.rows, m = surface.triangles.rows;
-    return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}));
-}
-
-// The cells of a surface, kept from one piece of it to the next together with the arrays they look into.
-class Cells {
-  public:
-    Cells(const IjkArray& ijk, const SignsArray& signs, const IndexArray& index, int threads)
-        : ijk_(ijk), index_(index), threads_(threads),
-          grid_(unlocked(threads, [&] { return CellGrid(layout(ijk, index), words(ijk, signs)); })) {}
-
-    nb::object segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel) const {
-        if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
-        size_t n = end - begin;
-        Array<double> rows(6, n);
-        {
-            nb::gil_scoped_release released;
-            GridEdges edges;
-            grid_.lay(begin, end, origin, voxel, edges);
-            for (size_t k = 0; k < 3; ++k) {
-                double* to = std::copy(edges.starts[k].begin(), edges.starts[k].end(), &rows.data[k * n]) + 2 * n;
-                for (size_t i = 0; i < n; ++i) to[i] = edges.axis(i) == k ? voxel : 0;
-            }
-        }
-        return to_numpy(std::move(rows), {6, n});
-    }
-
-    void find_crossings(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, const RootLoops& loops,
-                        const RootsOut& t, const NormalsOut& normals) const {
-        if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
-        if (t.shape(0) != end - begin || normals.shape(1) != end - begin) throw nb::value_error("as many rows as crossings");
-        unlocked(threads_, [&] {
-            fracslice::find_crossings(grid_, loops, begin, end, origin, voxel, t.data(), normals.data(),
-                                      size_t(normals.stride(0)));
-            return 0;
-        });
-    }
-
-    size_t crossings_before(int layer) const { return grid_.crossings_before(layer); }
-
-    const CellGrid& grid() const { return grid_; }
-    int threads() const { return threads_; }
-
-  private:
-    static std::vector<Signs> words(const IjkArray& ijk, const SignsArray& signs) {
-        if (ijk.shape(0) != signs.shape(0)) throw nb::value_error("ijk and signs differ in length");
-        std::vector<Signs> rows(signs.shape(0));
-        std::copy_n(signs.data(), signs.size(), reinterpret_cast<uint8_t*>(rows.data()));
-        return rows;
-    }
-
-    IjkArray ijk_;
-    IndexArray index_;
-    int threads_;
-    CellGrid grid_;
-};
-
-// The surface in some layers of cells, while it is made.
-class Surfacing {
-  public:
-    Surfacing(const Cells& cells, int first, int last, const std::array<double, 3>& origin, double voxel, double clamp)
-        : threads_(cells.threads()), clamp_(clamp), made_(cells.grid(), {first, last}, {origin, voxel, clamp}) {}
-
-    void advance(int end, size_t first, const RootsArray& t, const NormalsArray& normals) {
-        if (t.shape(0) != normals.shape(1)) throw nb::value_error("t and normals differ in length");
-        if (normals.stride(1) != 1) throw nb::value_error("each row of normals contiguous");
-        Hermite data{first, t.shape(0), size_t(normals.stride(0)), t.data(), normals.data(), clamp_};
-        unlocked(threads_, [&] { return made_.advance(end, data), 0; });
-    }
-
-    nb::tuple finish() {
-        Contour surface = made_.finish();
-        size_t n = surface.vertices.rows, m = surface.triangles.rows, k = surface.cases.rows;
-        return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
-                              surface.crossings, to_numpy(std::move(surface.cases), {k}),
-                              to_numpy(std::move(surface.to_means), {k, 3}));
-    }
-
-  private:
-    int threads_;
-    double clamp_;
-    Contouring made_;
-};
-
-nb::object bind_signs(const ValuesArray& values, int threads) {
-    Bricks bricks{{nullptr, values.shape(0), nullptr, {}}, values.data()};
-    std::vector<Signs> signs = unlocked(threads, [&] { return signs_of(bricks); });
-    Array<uint8_t> bytes(signs.size(), sizeof(Signs));
-    std::copy_n(reinterpret_cast<const uint8_t*>(signs.data()), signs.size() * sizeof(Signs), bytes.data.get());
-    return to_numpy(std::move(bytes), {signs.size(), kSide, kSide});
-}
-
-int64_t bind_open_edges(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index) {
-    Bricks bricks = view(ijk, values, index);
-    nb::gil_scoped_release released;
-    check(bricks);
-    return open_edges(bricks, signs_of(bricks));
-}
-
-}  // namespace
-}  // namespace fracslice
+namespace fracslice::mesh {
+void bind_contour(nanobind::module_& module);
+void bind_mesh(nanobind::module_& module);
+void bind_reduction(nanobind::module_& module);
+}  // namespace fracslice::mesh
 
 NB_MODULE(_native, module) {
-    using namespace nanobind::literals;
-    module.def("marching_cubes", &fracslice::bind_marching_cubes, "ijk"_a, "values"_a, "index"_a, "origin"_a, "voxel"_a,
-               "clamp"_a, "threads"_a = 0);
-    module.def("signs", &fracslice::bind_signs, "values"_a, "threads"_a = 0);
-    module.def("open_edges", &fracslice::bind_open_edges, "ijk"_a, "values"_a, "index"_a);
-    using fracslice::RootLoops;
-    nanobind::class_<RootLoops>(module, "RootLoops")
-        .def(nanobind::new_(&fracslice::root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "field"_a,
-             "steps"_a, "sure"_a);
-    using fracslice::Cells;
-    nanobind::class_<Cells>(module, "Cells")
-        .def(nanobind::init<const fracslice::IjkArray&, const fracslice::SignsArray&, const fracslice::IndexArray&, int>(),
-             "ijk"_a, "signs"_a, "index"_a, "threads"_a = 0)
-        .def("segments", &Cells::segments, "begin"_a, "end"_a, "origin"_a, "voxel"_a)
-        .def("find_crossings", &Cells::find_crossings, "begin"_a, "end"_a, "origin"_a, "voxel"_a, "loops"_a, "t"_a, "normals"_a)
-        .def("crossings_before", &Cells::crossings_before, "layer"_a);
-    using fracslice::Surfacing;
-    nanobind::class_<Surfacing>(module, "Contouring")
-        .def(nanobind::init<const Cells&, int, int, const std::array<double, 3>&, double, double>(),
-             nanobind::keep_alive<1, 2>(), "cells"_a, "first"_a, "last"_a, "origin"_a, "voxel"_a, "clamp"_a)
-        .def("advance", &Surfacing::advance, "end"_a, "first"_a, "t"_a, "normals"_a)
-        .def("finish", &Surfacing::finish);
-    fracslice::bind_grid(module);
-    fracslice::bind_mesh(module);
+    fracslice::volume::bind_grid(module);
+    fracslice::volume::bind_signs(module);
+    fracslice::mesh::bind_contour(module);
+    fracslice::mesh::bind_mesh(module);
+    fracslice::mesh::bind_reduction(module);
 }

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
-from ..formulas import Box, Node
+from ..formulas import Box
 from ..formulas.parameters import Number, validate
-from ..kernel import Compilable
+from ..kernel import Field
 from ..scene.lengths import Length
 from ..volume import Bricks
 from ..work import Work
@@ -97,7 +97,7 @@ class SolidReport:
 
 
 def check_object(
-    root: Node | Compilable,
+    root: Field,
     outer: Box,
     scale: float,
     limits: Limits | None = None,
@@ -116,7 +116,7 @@ def check_object(
 
 
 def check_solid(
-    root: Node | Compilable,
+    root: Field,
     bricks: Bricks,
     scale: float,
     limits: Limits | None = None,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import VolumeError
-from ..formulas import Box, Node
-from ..kernel import Compilable, compile_scene
+from ..formulas import Box
+from ..kernel import Field
 from ..volume import Bricks, Lattice, sample
 from ..volume.lattice import BRICK
 from ..work import Work
@@ -24,13 +24,13 @@ AGAIN = 3.0
 """How many times finer fractals are looked at that seem to be in pieces."""
 
 
-def shown(root: Node | Compilable, outer: Box, longest: float, samples: float, work: Work) -> Bricks:
+def shown(root: Field, outer: Box, longest: float, samples: float, work: Work) -> Bricks:
     """Samples of an object within the box `outer`, so many along `longest`, or more if those show nothing: a
     plate may lie between all of them. Raises `VolumeError`, `Cancelled`.
     """
     while True:
         try:
-            return sample(compile_scene(root), root.bounds, Lattice.around(outer, longest / samples), work)
+            return sample(root.kernel(), root.bounds, Lattice.around(outer, longest / samples), work)
         except VolumeError:
             samples *= 2
             if samples > FINEST:
@@ -38,7 +38,7 @@ def shown(root: Node | Compilable, outer: Box, longest: float, samples: float, w
 
 
 def resolved(
-    root: Node | Compilable, bricks: Bricks, least: float, loose: bool, work: Work, thin: Walls | None = None
+    root: Field, bricks: Bricks, least: float, loose: bool, work: Work, thin: Walls | None = None
 ) -> Bricks:
     """These samples of an object, or finer ones if it has walls or gaps that they may miss: two across the
     thinnest. A plate thicker than sqrt 3 samples is not pierced, whatever its tilt (Andres, Acharya and
@@ -56,8 +56,8 @@ def resolved(
         times = _times(bricks, thin, least)
     if times <= 1:
         return bricks
-    lattice = Lattice.around(Samples(bricks).box, bricks.voxel / times)
-    return sample(compile_scene(root), root.bounds, lattice, work)
+    lattice = Lattice.around(Samples(bricks).bounds.box, bricks.voxel / times)
+    return sample(root.kernel(), root.bounds, lattice, work)
 
 
 def _times(bricks: Bricks, thin: Walls, least: float) -> float:

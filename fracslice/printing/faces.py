@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..formulas import Node
-from ..kernel import Compilable, Kernel, compile_scene
+from ..kernel import Field, Kernel
 from ..volume.values import values_at
 from ..work import Work
 from .walls import OPPOSITE, Walls
@@ -27,14 +26,14 @@ def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple
     return length / (2 * step), slope / length
 
 
-def projected(root: Node | Compilable, found: Walls, voxel: float, work: Work) -> Walls:
+def projected(root: Field, found: Walls, voxel: float, work: Work) -> Walls:
     """Walls or gaps that samples a voxel apart told of, their ends moved along them to where the field itself
     is zero; without those whose faces do not look away from each other there: crumbs that samples made of
     what is thinner than a voxel. Of escape-time fractals samples tell more than values: all stay as they are.
     """
     if root.bounds.exterior_only or not len(found.width):
         return found
-    kernel, ways = compile_scene(root), ((found.end - found.start) / found.width[:, None]).T
+    kernel, ways = root.kernel(), ((found.end - found.start) / found.width[:, None]).T
     ends, normals = [], []
     for points in (found.start.T, found.end.T):
         steep, normal = slopes(kernel, points, STEP * voxel, work)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import VolumeError
-from ..formulas import Box, Node, box, cylinder, plane, transform
-from ..kernel import Compilable
+from ..formulas import Box, Node, box, cylinder, plane, transform, union
+from ..kernel import Field
 from ..scene import Print
 from ..volume import Bricks, Plan, extent
 from ..volume.grid import from_grid, to_grid
@@ -75,10 +75,10 @@ class _Run:
     """What is connected, once it was looked at."""
 
     @property
-    def thing(self) -> Node | Compilable:
+    def thing(self) -> Field:
         return self.planned.root
 
-    def put(self, thing: Node | Compilable) -> None:
+    def put(self, thing: Field) -> None:
         """The object is this now."""
         self.planned = replace(self.planned, root=thing)
 
@@ -92,7 +92,7 @@ class _Run:
         """Whether something is added to its outside."""
         return bool(self.how.bridge or self.how.thickness)
 
-    def changes(self) -> Iterator[tuple[str, Callable[[], Node | Compilable]]]:
+    def changes(self) -> Iterator[tuple[str, Callable[[], Field]]]:
         """What is asked for, in order."""
         how = self.how
         if how.cavities == "fill":
@@ -145,7 +145,7 @@ class _Run:
 
         return lengths(self.sampled(length), self.thing.bounds, length / self.scale)
 
-    def filled(self) -> Node | Compilable:
+    def filled(self) -> Field:
         """The space that nothing reaches becomes solid."""
         from .border import nearer
 
@@ -156,11 +156,11 @@ class _Run:
         self.known = found.filled() if self.how.chooses else None
         return edited(self.thing, "add", nearer(found, cavities, np.array([0])))
 
-    def largest(self) -> Node | Compilable:
+    def largest(self) -> Field:
         """Only the largest body stays."""
         return self.only(self.connected().components.bodies[:1])
 
-    def only(self, bodies: np.ndarray) -> Node | Compilable:
+    def only(self, bodies: np.ndarray) -> Field:
         """Only these bodies stay."""
         from .border import nearer
 
@@ -168,7 +168,7 @@ class _Run:
         others = np.setdiff1d(found.components.bodies, bodies)
         return edited(self.thing, "keep", nearer(found, bodies, others)) if len(others) else self.thing
 
-    def bridged(self) -> Node | Compilable:
+    def bridged(self) -> Field:
         """Struts between bodies, as few and as short as can be, and no dust."""
         from .bridges import struts
 
@@ -178,7 +178,7 @@ class _Run:
         self.put(self.only(large))
         return self.added(*ends, self.how.bridge / self.scale / 2, self.sampled())
 
-    def closed(self) -> Node | Compilable:
+    def closed(self) -> Field:
         """Gaps are filled from face to face."""
         from .thin_features import all_walls
 
@@ -187,7 +187,7 @@ class _Run:
         one = _apart(found.middle, solid.bricks.voxel)
         return self.added(found.start[one], found.end[one], solid.bricks.voxel, solid.bricks)
 
-    def thickened(self) -> Node | Compilable:
+    def thickened(self) -> Field:
         """Balls as wide as the least thickness along the middle of all walls that are thinner: what opening
         with such a ball would take away (Serra 1982), along the part of the medial axis between opposite
         faces.
@@ -199,14 +199,14 @@ class _Run:
         middle = middle[_apart(middle, solid.bricks.voxel)]
         return self.added(middle, middle, least / 2, solid.bricks)
 
-    def added(self, start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Node | Compilable:
+    def added(self, start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Field:
         """With strokes, if there are any."""
         from .capsules import capsules
 
         self.planned = replace(self.planned, outer=self.planned.outer.grown(2 * radius))
         return edited(self.thing, "add", capsules(start, end, radius, like)) if len(start) else self.thing
 
-    def hollowed(self) -> Node | Compilable:
+    def hollowed(self) -> Field:
         """Everything farther inside than the walls are thick is taken away, and two holes made into each part
         of that. With holes, parts under `POCKET` of the largest stay solid.
         """
@@ -221,14 +221,13 @@ class _Run:
             raise VolumeError(f"walls of {self.how.hollow:g} mm leave nothing to hollow out")
         if not self.how.drain:
             return edited(self.thing, "cut", Samples(hollow))
-        large = count[numbers] >= POCKET * count[numbers[0]]
+        large, holes = count[numbers] >= POCKET * count[numbers[0]], list[Node]()
         thing = edited(self.thing, "cut", Samples(found.without(numbers[~large])))
         for number in numbers[large]:
             at = (found.components.labels == number) & (hollow.values > -hollow.voxel)
             points = np.array(hollow.origin) + hollow.voxel * positions(hollow, *np.nonzero(at))
-            for hole in self.drains(points, -hollow.values[at]):
-                thing = edited(thing, "cut", hole)
-        return thing
+            holes += self.drains(points, -hollow.values[at])
+        return edited(thing, "cut", union(*holes))
 
     def drains(self, hollow: np.ndarray, depth: np.ndarray) -> Iterator[Node]:
         """From the hollow's lowest point to the nearer side along x: one downwards would be shut by the

@@ -9,7 +9,9 @@ import numpy as np
 
 from ..compiled import compiled
 from ..formulas.box import Box
-from ..formulas.registry import Bounds
+from ..formulas.field import Bounds, Device, Precision
+from ..kernel import Kernel
+from ..kernel.arrays import ArrayField
 from ..keys import key
 from ..volume import Bricks
 from ..volume.bricks import INSIDE
@@ -23,29 +25,31 @@ LIPSCHITZ = 1.8
 """
 
 
-class Samples:
+class Samples(ArrayField):
     """Bricks of samples as a field over all space: trilinear between samples, elsewhere a lower bound of the
     distance, with its sign, from how many bricks away the nearest samples are. May be used from many threads.
     """
-
-    lipschitz = LIPSCHITZ
 
     def __init__(self, bricks: Bricks) -> None:
         self.bricks = bricks
         self.brick_bounds = _brick_bounds(bricks)
 
-    @property
-    def box(self) -> Box:
-        """A box that encloses the inside."""
+    @cached_property
+    def bounds(self) -> Bounds:
+        """`Field.bounds`."""
         lo = np.asarray(self.bricks.origin)
         hi = lo + self.bricks.voxel * BRICK * np.array(self.bricks.index.shape)
-        return Box(tuple(lo.tolist()), tuple(hi.tolist()))
+        return Bounds(Box(tuple(lo.tolist()), tuple(hi.tolist())), LIPSCHITZ, False)
 
     @cached_property
     def key(self) -> str:
-        """What it is known by, as `kernel.field_key`."""
+        """`Field.key`."""
         b = self.bricks
         return key(b.origin, b.voxel, b.ijk, b.values, b.index)
+
+    def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
+        """`Field.kernel`, always on the CPU."""
+        return _Interpolated(self, np.dtype(precision))
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Values at points, float64 of their shape."""
@@ -53,6 +57,17 @@ class Samples:
         u, v, w = (np.ascontiguousarray(a, np.float64).ravel() for a in (x, y, z))
         _interpolate(u, v, w, *b.origin, b.voxel, b.index, self.brick_bounds, b.values, out.ravel())
         return out
+
+
+class _Interpolated(Kernel):
+    """The kernel of samples."""
+
+    def __init__(self, samples: Samples, dtype: np.dtype) -> None:
+        self._samples, self.dtype = samples, dtype
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """`Kernel.points`."""
+        return self._samples.points(x, y, z).astype(self.dtype, copy=False)
 
 
 def lengths(bricks: Bricks, bounds: Bounds, limit: float) -> Samples:

@@ -15,16 +15,15 @@ import numpy as np
 
 from ..compiled import compiled
 from ..errors import VolumeError
-from ..formulas import Node
-from ..kernel import Compilable, Kernel, compile_scene
+from ..kernel import Field, Kernel
 from ..rows import Rows
 from ..volume import Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
 from .faces import slopes
+from .offset_field import OffsetField
 from .samples import Samples
 from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, walls
-from .wrapped import OffsetField
 
 NEAR = 0.9
 """Voxels: more than from any point to the nearest sample, half the diagonal."""
@@ -64,7 +63,7 @@ class ThinFeatures:
         return sampled.chosen(sampled.width >= self.replaces) + mine.chosen(mine.width < limit)
 
 
-def thin_features(root: Node | Compilable, seen: Samples, work: Work) -> tuple[ThinFeatures, ThinFeatures]:
+def thin_features(root: Field, seen: Samples, work: Work) -> tuple[ThinFeatures, ThinFeatures]:
     """The thin walls and gaps of an object, also those that its samples miss.
 
     root: all depths known. seen: the distances that were sampled of it. The values of escape-time fractals
@@ -96,14 +95,14 @@ class _Rays(Rows):
 class _Look:
     """What is looked at, what its samples tell, and how thick walls and gaps are at most, scene units."""
 
-    root: Node | Compilable
+    root: Field
     seen: Samples
     most: float
     work: Work
 
     @cached_property
     def kernel(self) -> Kernel:
-        return compile_scene(self.root)
+        return self.root.kernel()
 
     @property
     def voxel(self) -> float:
@@ -190,11 +189,9 @@ class _Look:
         """Samples of the field less `by`: the flatter it is, the farther its inside reaches from the box."""
         for times in (2, 8, 32):
             try:
-                box = (self.root.bounds.box | self.seen.box).grown(times * abs(by))
-                bounds = replace(self.root.bounds, box=box)
-                return Samples(
-                    sample(OffsetField(self.kernel, by), bounds, Lattice.around(box, self.voxel), self.work)
-                )
+                box = (self.root.bounds.box | self.seen.bounds.box).grown(times * abs(by))
+                bounds, lattice = replace(self.root.bounds, box=box), Lattice.around(box, self.voxel)
+                return Samples(sample(OffsetField(self.root, by).kernel(), bounds, lattice, self.work))
             except VolumeError as error:
                 failure = error
         raise failure
@@ -230,9 +227,7 @@ class _Look:
         return slopes(self.kernel, points, STEP * self.voxel, self.work)[1]
 
 
-def all_walls(
-    root: Node | Compilable, seen: Samples, limit: float, work: Work, *, gaps: bool = False
-) -> Walls:
+def all_walls(root: Field, seen: Samples, limit: float, work: Work, *, gaps: bool = False) -> Walls:
     """The walls or gaps up to `limit` scene units, whether the samples tell of them or the field alone."""
     exterior_only, most = root.bounds.exterior_only, THIN * seen.bricks.voxel
     look = _Look(root, seen, most if exterior_only else max(most, limit), work)

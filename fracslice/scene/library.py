@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from ..errors import SceneError
-from .nearest import hint
+from ..nearest import hint
 
 _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
 

@@ -8,24 +8,24 @@ from typing import Any
 
 from ..errors import SceneError
 from ..formulas.parameters import REQUIRED
+from ..nearest import hint
 from .layout import SCENE, SECTIONS, Element, formulas
-from .nearest import hint
 
 _GROUPS = {
-    "shape": ("Shapes", "Solids of their own; they take no elements inside them."),
-    "csg": ("CSG operators", "One solid made of the elements inside."),
+    "shape": ("Shapes", "Solids. They contain no elements."),
+    "csg": ("CSG operators", "One solid from the elements inside."),
     "domain": (
         "Domain operators",
-        "The element inside, looked at elsewhere. Several elements inside are a union.",
+        "The element inside, moved, copied or deformed. Several elements are a union.",
     ),
 }
 
 _START = """\
-# Scene files
+# Elements
 
 *Made from the registry of formulas by `python docs/generate.py`; do not edit.*
 
-A scene file is XML. It says what the object is, in units of its own, and how large it is to be when finished:
+A scene file is XML. It says what the object is, in units of its own, and how large the finished object is:
 
 ```xml
 <scene version="1">
@@ -39,14 +39,12 @@ A scene file is XML. It says what the object is, in units of its own, and how la
 </scene>
 ```
 
-Numbers are separated by spaces; kernels compute in float32, so none is beyond 1e9, and no radius or size
-below 1e-15. Lengths in scene units have no unit; `size` takes `mm` (the default), `cm`, `m`, `in` or `um`.
-Comments may stand anywhere. Document types, entities and includes are not allowed. An editor completes and
-checks with the RELAX NG schema `fracslice/scene/scene.rng`, which ships with the package;
-`python -c "from fracslice.scene import schema; print(schema.PATH)"` says where it is.
-
-In Python every element is a function of the same name in `fracslice.formulas`, and
-`fracslice.scene.scene(...)` stands for `<scene>` and `<solid>`; `fracslice.scene.to_xml` writes the file.
+- Spaces separate numbers. No number is beyond 1e9, no radius or size below 1e-15: kernels compute in float32.
+- Lengths in scene units have no unit. `size` takes `mm` (the default), `cm`, `m`, `in` or `um`.
+- Comments may stand anywhere. Document types, entities and includes are refused.
+- An editor completes and checks a scene with the RELAX NG schema that ships with the package;
+  `python -c "from fracslice.scene import schema; print(schema.PATH)"` prints its path.
+- In Python every element is a function of the same name in `fracslice.formulas`.
 """
 
 

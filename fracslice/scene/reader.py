@@ -17,9 +17,9 @@ from ..errors import SceneError
 from ..formulas import Node
 from ..formulas.parameters import REQUIRED
 from ..formulas.registry import DEEPEST, TOO_DEEP
+from ..nearest import hint
 from .layout import SCENE, SECTIONS, SOLID, Element, TopElement, formulas
 from .model import Scene, computing, scene
-from .nearest import hint
 from .printing import Print
 from .view import Part, View
 

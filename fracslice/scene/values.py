@@ -10,9 +10,9 @@ from typing import Any
 
 from ..errors import SceneError
 from ..formulas import Node
+from ..nearest import hint
 from .layout import PICTURE, PRINT, SECTIONS, SOLID, Element
 from .model import Scene
-from .nearest import hint
 from .view import View
 
 FORM = "ELEMENT.ATTRIBUTE=VALUE, such as mandelbulb.power=6 or box[2].round=0.1"

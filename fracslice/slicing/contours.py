@@ -11,7 +11,6 @@ from ..kernel import Kernel
 from .bends import bends
 from .corners import corners
 from .section import CrossSection, Vertices
-from .slab import is_fractal
 from .stack import Stack
 
 ROUNDS = 20
@@ -68,7 +67,7 @@ def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Conto
     along = np.clip(along, PRECISE, 1 - PRECISE)
     points = edges[:, :2] + along[:, None] * np.eye(2)[edges[:, 2]]
     vertices = Vertices(points, np.arange(len(points)), np.zeros(len(points)))
-    if len(points) and not is_fractal(stack.root):
+    if len(points) and not stack.root.escape_time_only:
         vertices += _turns(points, edges, section)
     places = (vertices.points - np.array(stack.shape[::-1]) / 2) * stack.pixel
     return _nested(replace(vertices, points=places), order, starts, edges, ends[:, 0] < 0)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from .._slices import Slab
-from ..kernel import Kernel, compile_scene
+from ..kernel import Kernel
 from ..work import Work
 from .contours import Contours, contours
 from .slab import Sampler
@@ -135,9 +135,9 @@ class Slicer:
         raises.
         """
         root, shape = self.stack.root, self.stack.shape
-        exact = compile_scene(root, "float64")
+        exact = root.kernel("cpu", "float64")
         lattice = shape[0] + 1, shape[1] + 1
-        sampler = Sampler(compile_scene(root), root, root.bounds, self.stack.frame, lattice)
+        sampler = Sampler(root.kernel(), root, root.bounds, self.stack.frame, lattice)
         chosen = range(len(self.stack.z)) if layers is None else layers
 
         def slab(group: list[int]) -> list[T]:

@@ -22,10 +22,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._slices import BorderError, Called, Compiled, Field, Memory, ProbeBounds, Slab
+from .._slices import BorderError, Memory, ProbeBounds, Slab
 from ..errors import SliceError
-from ..formulas.registry import Bounds, Node
-from ..kernel import Compilable, CpuKernel, Kernel
+from ..formulas.field import Bounds
+from ..kernel import Field, Kernel
 
 LIKELY = 0.06, 0.015
 """The least bounds for small blocks of a fractal, outside and inside, as shares of its own."""
@@ -44,21 +44,19 @@ class Sampler:
     def __init__(
         self,
         kernel: Kernel,
-        root: Node | Compilable,
+        root: Field,
         bounds: Bounds,
         frame: np.ndarray,
         shape: tuple[int, int],
     ) -> None:
         self.frame, self.shape = frame, shape
         self._memory, self._probe_bounds = Memory(), _probe_bounds(root, bounds)
-        self._field: Field = (
-            Compiled(kernel.entry) if isinstance(kernel, CpuKernel) else Called(kernel.points)
-        )
+        self._entry = kernel.entry
 
     def slab(self, z: np.ndarray) -> Slab:
         """Neighbouring layers at heights `z` (scene units), none of them sampled."""
         x0, y0, dx, dy = self.frame.tolist()
-        return Slab(self._memory, self._field, self._probe_bounds, (x0, y0, dx, dy), z.tolist(), *self.shape)
+        return Slab(self._memory, self._entry, self._probe_bounds, (x0, y0, dx, dy), z.tolist(), *self.shape)
 
     def sample(self, slab: Slab, layer: int) -> None:
         """Samples a layer of a slab. Raises `SliceError` where the solid reaches the rim of the lattice."""
@@ -68,16 +66,9 @@ class Sampler:
             raise SliceError(f"{error}; give it finite <bounds>") from None
 
 
-def _probe_bounds(root: Node | Compilable, bounds: Bounds) -> ProbeBounds:
+def _probe_bounds(root: Field, bounds: Bounds) -> ProbeBounds:
     bound, exterior_only = bounds.lipschitz, bounds.exterior_only
-    escape_time_only = exterior_only and is_fractal(root)
-    if escape_time_only:
+    if exterior_only and root.escape_time_only:
         return ProbeBounds(bound, bound * LIKELY[0], bound * LIKELY[1], 1, 1, True)
     stop = STOP if exterior_only else (1, 1)
     return ProbeBounds(bound, bound, bound, *stop, False)
-
-
-def is_fractal(root: Node | Compilable) -> bool:
-    """Whether a scene is of nothing but escape-time fractals."""
-    shapes = [n.formula for n in root.walk() if n.formula.kind == "shape"] if isinstance(root, Node) else []
-    return bool(shapes) and all(shape.exterior_only for shape in shapes)

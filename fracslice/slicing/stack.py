@@ -13,7 +13,7 @@ from ..formulas.algebra import length
 from ..formulas.box import Box
 from ..formulas.parameters import REQUIRED, Vector, validate
 from ..formulas.registry import Node
-from ..kernel import Compilable
+from ..kernel import Field
 from ..printing import printable
 from ..scene import Print
 from ..scene.lengths import Length, Pair
@@ -68,7 +68,7 @@ class Stack:
     words.
     """
 
-    root: Node | Compilable
+    root: Field
     scale: float
     corner: tuple[float, float]
     pixel: tuple[float, float]

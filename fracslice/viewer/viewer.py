@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fracslice.render.live import CameraInput, Live, Shown
+from fracslice.rendering.live import CameraInput, Live, Shown
 from fracslice.scene.view import Camera
 from fracslice.viewer.screen import need_screen
 from fracslice.work import Work

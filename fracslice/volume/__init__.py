@@ -9,10 +9,10 @@ from typing import TypeVar
 import numpy as np
 
 from ..formulas.box import Box
-from ..formulas.registry import Bounds, Node
-from ..kernel import Compilable, Kernel
+from ..formulas.field import Bounds
+from ..formulas.registry import Node
+from ..kernel import Field, Kernel
 from ..kernel.depth import depth_notes, resolve_depths, visible
-from ..kernel.devices import compile_for
 from ..store import Arrays, stored
 from ..work import Work
 from .bricks import Bricks, SignBricks
@@ -54,7 +54,7 @@ class Plan:
     encloses it, its outermost points [3, 6], and the voxel, all in scene units. notes: what the voxel is too
     large for, in words. depths: those that were automatic, such as "mandelbulb 5"."""
 
-    root: Node | Compilable
+    root: Field
     box: Box
     outer: Box
     tips: np.ndarray
@@ -130,7 +130,7 @@ def _sampled(
 
 
 def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:
-    """What is sampled, the facts of what is pruned by, and what is pruned by: mostly the same."""
+    """What is sampled, the bounds of what is pruned by, and what is pruned by: mostly the same."""
     root = planned.root
     conservative = root.conservative()
-    return compile_for(work.device, root), conservative.bounds, compile_for(work.device, conservative)
+    return root.kernel(work.device), conservative.bounds, conservative.kernel(work.device)

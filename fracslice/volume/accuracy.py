@@ -8,8 +8,7 @@ import numpy as np
 
 from ..formulas.algebra import length
 from ..formulas.box import Box
-from ..formulas.registry import Node
-from ..kernel import Compilable, compile_scene
+from ..kernel import Field
 from ..work import Work, chunks
 
 REACH = 1e-4
@@ -28,15 +27,13 @@ NEAR = 1e-3
 """Voxels: a point that is moved no farther is on the surface."""
 
 
-def surface_points(
-    root: Node | Compilable, box: Box, voxel: float, count: int, work: Work | None = None
-) -> np.ndarray:
+def surface_points(root: Field, box: Box, voxel: float, count: int, work: Work | None = None) -> np.ndarray:
     """Points on the zero set, found without samples or a mesh: float64 [n, 3], scene units, at most `count`.
 
     Newton's method from random points of a box, always the same. Where a field is no distance inside, they
     come from outside. A part of the surface is found as often as it is the nearest one: a thin wire, too.
     """
-    kernel, work = compile_scene(root, "float64"), work or Work()
+    kernel, work = root.kernel("cpu", "float64"), work or Work()
     rng = np.random.default_rng(0)
     p = rng.uniform(np.array(box.lo)[:, None], np.array(box.hi)[:, None], (3, STARTS))
     h = REACH * voxel
@@ -54,9 +51,7 @@ def surface_points(
     return found
 
 
-def surface_error(
-    root: Node | Compilable, points: np.ndarray, voxel: float, work: Work | None = None
-) -> np.ndarray:
+def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | None = None) -> np.ndarray:
     """Distances of points from the zero set to first order, ``|f| / |grad f|``.
 
     points: float [n, 3], scene units; voxel: scene units. Returns float64 [n], scene units, at most a voxel
@@ -64,7 +59,7 @@ def surface_error(
     steeper of the two one-sided differences, because at an edge or a corner they cancel. Where two solids
     touch in an edge the axes lie in the surface: where they are flat, the steepest of all ways counts.
     """
-    kernel, h = compile_scene(root, "float64"), REACH * voxel
+    kernel, h = root.kernel("cpu", "float64"), REACH * voxel
     error = np.empty(len(points))
 
     def task(part: slice) -> None:

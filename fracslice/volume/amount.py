@@ -9,8 +9,8 @@ import numpy as np
 
 from ..formulas import Box
 from ..formulas.algebra import length
-from ..formulas.registry import Bounds, Node
-from ..kernel import Compilable, Kernel, compile_scene
+from ..formulas.field import Bounds
+from ..kernel import Field, Kernel
 from ..kernel.cells import possible_cells
 from ..work import Work
 from .values import values_at
@@ -52,7 +52,7 @@ class VolumeEstimate:
         return made / self.volume - 1 if sure and self.volume else 0.0
 
 
-def amount(root: Node | Compilable, boxes: list[Box], work: Work | None = None) -> VolumeEstimate:
+def amount(root: Field, boxes: list[Box], work: Work | None = None) -> VolumeEstimate:
     """The volume of what is inside boxes that do not overlap: stratified random points, always the same.
 
     Of each box the cells that are proven empty are left out, and where the field bounds distances inside,
@@ -60,7 +60,7 @@ def amount(root: Node | Compilable, boxes: list[Box], work: Work | None = None) 
     `Cancelled`.
     """
     work, conservative = work or Work(), root.conservative()
-    kernel, bound = compile_scene(root), compile_scene(conservative)
+    kernel, bound = root.kernel(), conservative.kernel()
     parts = [_part(kernel, bound, conservative.bounds, box, len(boxes), work) for box in boxes]
     return VolumeEstimate(
         sum(part.volume for part in parts),
@@ -88,7 +88,7 @@ def _part(
 
 
 def finer(
-    root: Node | Compilable,
+    root: Field,
     found: VolumeEstimate,
     off: float,
     origin: tuple[float, float, float],
@@ -102,7 +102,7 @@ def finer(
     in proportion to the inside points between eight outside samples; if there are hardly any, it is by
     facets, as the square of the spacing.
     """
-    kernel, rng = compile_scene(root), np.random.default_rng(1)
+    kernel, rng = root.kernel(), np.random.default_rng(1)
     points = found.inside[:, rng.integers(found.inside.shape[1], size=SEEN)]
 
     def lost(times: float) -> float:

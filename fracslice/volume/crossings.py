@@ -7,25 +7,17 @@ pierce a mesh whose triangles stay in their cells.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from .._native import Cells, RootLoops
-from ..formulas.registry import Node
-from ..kernel import Compilable, Kernel, compile_scene
-from ..kernel.cpu import CpuKernel
+from ..kernel import Field
 from ..work import Work
 from .roots import MOST, QUICK, Roots
 
 SURE = 1e-4
 """A root is exact where Newton's last step was shorter, as a share of a voxel: the error is of the order of
 its square."""
-
-
-BATCHES = 1 << 10, 1 << 14
-"""Crossings that are looked for together by a compiled field: they stay in the fastest memory; and by
-another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +41,16 @@ class Refiner:
 
     def __init__(
         self,
-        root: Node | Compilable,
+        root: Field,
         cells: Cells,
         origin: tuple[float, float, float],
         voxel: float,
         work: Work | None = None,
     ) -> None:
         fast, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
-        kernel = compile_scene(root, "float64")
-        field = kernel.entry if isinstance(kernel, CpuKernel) else partial(_evaluated, kernel)
-        loops = fast.native("find"), exact.native("find"), exact.native("polish"), field, (QUICK, MOST), SURE
-        self._loops = RootLoops(fast.width, BATCHES[not isinstance(root, Node)], *loops)
+        loops = fast.native("find"), exact.native("find"), exact.native("polish")
+        entry = root.kernel("cpu", "float64").entry
+        self._loops = RootLoops(fast.width, fast.batch, *loops, entry, (QUICK, MOST), SURE)
         self._placement = origin, voxel
         self._cells, self._work = cells, work or Work()
         self._memory: tuple[np.ndarray, np.ndarray] = np.empty(0), np.empty((3, 0), np.float32)
@@ -90,7 +81,3 @@ class Refiner:
             self._first, here = begin, 0
         t, normals = self._memory
         return t[here : here + size], normals[:, here : here + size]
-
-
-def _evaluated(kernel: Kernel, points: np.ndarray, out: np.ndarray) -> None:
-    out[0] = kernel.points(*points)

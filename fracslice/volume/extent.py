@@ -8,11 +8,10 @@ import numpy as np
 
 from ..errors import VolumeError
 from ..formulas.box import Box
-from ..formulas.registry import Node
-from ..kernel import Compilable, compile_scene
+from ..kernel import Field
 from ..work import Work
 from .climbing import SLANTS, climb
-from .sides import UNKNOWN, Field, Side
+from .sides import UNKNOWN, FreeSpace, Side
 
 TURNS = 8
 """How often what is searched is made larger, for the object goes on there, or smaller."""
@@ -56,7 +55,7 @@ class Extent:
     tips: np.ndarray
 
 
-def extent(root: Node | Compilable, resolution: float, work: Work | None = None) -> Extent:
+def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
     """The box of the points where a scene's field is negative.
 
     resolution: voxels along the longest side. Nothing is farther than a quarter of a voxel outside the box,
@@ -74,7 +73,7 @@ def extent(root: Node | Compilable, resolution: float, work: Work | None = None)
         along = f"{', '.join(axes)} and {last}" if axes else last
         state = "".join(f", or state the box of {n} with @{n}.bounds" for n in root.bounds.boxless[:1])
         raise VolumeError(f"the scene has no end along {along}; put <bounds> around it{state}")
-    field = _field(root, work or Work())
+    field = _free_space(root, work or Work())
     for _ in range(TURNS):
         found = _search(field, box, resolution)
         if found and max(found.outer.size) > max(box.size) / 2:
@@ -85,13 +84,13 @@ def extent(root: Node | Compilable, resolution: float, work: Work | None = None)
     return found
 
 
-def reached(root: Node | Compilable, points: np.ndarray, voxel: float, work: Work | None = None) -> Box:
+def reached(root: Field, points: np.ndarray, voxel: float, work: Work | None = None) -> Box:
     """The box of what is connected with points on or near an object's surface, as near as it was found.
 
     points: float64 [3, n], scene units. From those that are inside, or from half a voxel beneath those that
     are not, steps of less than a voxel go outwards.
     """
-    field = _field(root, work or Work())
+    field = _free_space(root, work or Work())
     found = _box(np.stack([points.min(1), points.max(1)]))
     exact = EXACT * max(found.size)
     sides = _sides(field, found)
@@ -105,20 +104,18 @@ def reached(root: Node | Compilable, points: np.ndarray, voxel: float, work: Wor
     return found | _box(OUTWARDS * np.reshape(known, (2, 3)))
 
 
-def _field(root: Node | Compilable, work: Work) -> Field:
+def _free_space(root: Field, work: Work) -> FreeSpace:
     conservative = root.conservative()
     bounds = conservative.bounds
-    return Field(
-        compile_scene(root), compile_scene(conservative), bounds.lipschitz, not bounds.exterior_only, work
-    )
+    return FreeSpace(root.kernel(), conservative.kernel(), bounds.lipschitz, not bounds.exterior_only, work)
 
 
-def _sides(field: Field, region: Box) -> list[Side]:
+def _sides(field: FreeSpace, region: Box) -> list[Side]:
     """In the order of an extent's tips."""
     return [Side(field, region, axis, sign, UNKNOWN) for sign in (-1, 1) for axis in range(3)]
 
 
-def _search(field: Field, box: Box, resolution: float) -> Extent | None:
+def _search(field: FreeSpace, box: Box, resolution: float) -> Extent | None:
     """The object's extent, if it is in `box`; None if it goes on beyond it."""
     longest = max(box.size) or 1.0
     sides = _sides(field, box.grown(MARGIN * longest))
@@ -156,7 +153,7 @@ def _learn(sides: list[Side], points: np.ndarray) -> None:
         side.learn(points)
 
 
-def _climb(field: Field, sides: list[Side], first: float, exact: float) -> None:
+def _climb(field: FreeSpace, sides: list[Side], first: float, exact: float) -> None:
     """Takes all sides' tips outwards as far as they go."""
     ways = np.stack([side.sign * np.roll(SLANTS, side.axis - 2, 0) for side in sides], 1)
     here = climb(field.inside, np.stack([side.best for side in sides], 1), ways, first, exact)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..formulas.registry import Node
-from ..kernel import Compilable, compile_scene
+from ..kernel import Field
 from ..work import Work, chunks
 from .roots import Roots
 
@@ -31,7 +30,7 @@ class TrustRegions:
 
 
 def project(
-    root: Node | Compilable,
+    root: Field,
     points: np.ndarray,
     trust_regions: Callable[[np.ndarray, np.ndarray], TrustRegions],
     voxel: float,
@@ -47,7 +46,7 @@ def project(
     comes no nearer stays, and so does what lies on the surface already, such as an exact corner. Returns the
     numbers of those that did not, int64 [k], and where they are now, float64 [k, 3].
     """
-    kernel, work = compile_scene(root, "float64"), work or Work()
+    kernel, work = root.kernel("cpu", "float64"), work or Work()
     guess, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
 
     def task(part: slice) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The loops over a compiled field that find its roots on segments, in the words of `kernel.loops`.
+"""The loops over a compiled field that find its roots on segments.
 
 FRAME, in all of them: one over a voxel; when a root is found, |f| in voxels and what is left of the segment;
 the differences' step and what room is none, scene units; how short a step is the last, as a share of the
@@ -7,24 +7,24 @@ segment.
 
 from __future__ import annotations
 
-from ..kernel.loops import Loop
+from ..formulas.vocabulary import absolute, any_of, maximum, minimum, rsqrt, where
+from ..kernel.intrinsics import WIDTH, field, load, store
+from ..kernel.loops import loop
 
-FIND = Loop(
-    "find",
-    "rrrrrrrrrnn",
-    """
+
+@loop("rrrrrrrrrnn")
 def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
-    over = FRAME[0]
-    small = FRAME[1]
-    near = FRAME[2]
-    close = FRAME[5]
+    """The root T on each of n segments, from X, Y, Z to as much further as DX, DY, DZ say, as a share of it;
+    where the ends have one sign, the end nearer to zero; 2 more where that takes more than so many steps.
+
+    Fields are steep on one side of their surface and flat on the other, so the secant goes through the last
+    two points on one side. Where it leaves the bracket that is halved, and every other time when many steps
+    are done.
+    """
+    over, small, near, close = FRAME[0], FRAME[1], FRAME[2], FRAME[5]
     for i in range(0, n, WIDTH):
-        x = load(X, i)
-        y = load(Y, i)
-        z = load(Z, i)
-        dx = load(DX, i)
-        dy = load(DY, i)
-        dz = load(DZ, i)
+        x, y, z = load(X, i), load(Y, i), load(Z, i)
+        dx, dy, dz = load(DX, i), load(DY, i), load(DZ, i)
         fa = 0.0 * x
         fb = fa
         for end in range(2):
@@ -58,26 +58,15 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
             if step > 8 and step % 2 > 0:
                 u = 0.5 + 0.0 * x
         store(T, i, where(open, t + 2.0, t))
-""",
-)
-"""The root T on each of n segments, from X, Y, Z to as much further as DX, DY, DZ say, as a share of it;
-where the ends have one sign, the end nearer to zero; 2 more where that takes more than so many steps.
 
-Fields are steep on one side of their surface and flat on the other, so the secant goes through the last two
-points on one side. Where it leaves the bracket that is halved, and every other time when many steps are done.
-"""
 
-POLISH = Loop(
-    "polish",
-    "rrrrrrrrrrrrrn",
-    """
+@loop("rrrrrrrrrrrrrn")
 def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
+    """One of Newton's steps along the segment from T, and how far it was; the unit normal where it
+    started."""
     e = FRAME[3]
     for i in range(0, n, WIDTH):
-        dx = load(DX, i)
-        dy = load(DY, i)
-        dz = load(DZ, i)
-        t = load(T, i)
+        dx, dy, dz, t = load(DX, i), load(DY, i), load(DZ, i), load(T, i)
         x = load(X, i) + t * dx
         y = load(Y, i) + t * dy
         z = load(Z, i) + t * dz
@@ -96,30 +85,22 @@ def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
         moved = minimum(maximum(t - e * f / (gx * dx + gy * dy + gz * dz), 0.0), 1.0)
         store(T, i, moved)
         store(MISS, i, absolute(moved - t))
-""",
-)
-"""One of Newton's steps along the segment from T, and how far it was; the unit normal where it started."""
 
-AIM = Loop(
-    "aim",
-    "rrrrrrrrrrn",
-    """
+
+@loop("rrrrrrrrrrn")
 def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
+    """One of Newton's steps along the segment from T, if it comes nearer to zero; and |f| where it ended, in
+    voxels."""
     over = FRAME[0]
     for i in range(0, n, WIDTH):
-        x = load(X, i)
-        y = load(Y, i)
-        z = load(Z, i)
-        dx = load(DX, i)
-        dy = load(DY, i)
-        dz = load(DZ, i)
-        t = load(T, i)
+        x, y, z = load(X, i), load(Y, i), load(Z, i)
+        dx, dy, dz, t = load(DX, i), load(DY, i), load(DZ, i), load(T, i)
         e = FRAME[3] * rsqrt(maximum(dx * dx + dy * dy + dz * dz, 1e-200))
         f = field(x + t * dx, y + t * dy, z + t * dz, P)
         best = t
         least = f
         s = t + e
-        for step in range(2):
+        for _ in range(2):
             there = field(x + s * dx, y + s * dy, z + s * dz, P)
             nearer = absolute(there) < absolute(least)
             best = where(nearer, s, best)
@@ -127,30 +108,27 @@ def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
             s = minimum(maximum(t - e * f / (there - f), 0.0), 1.0)
         store(T, i, best)
         store(MISS, i, over * absolute(least))
-""",
-)
-"""One of Newton's steps along the segment from T, if it comes nearer to zero; and |f| where it ended, in
-voxels.
-"""
 
-LEAD = Loop(
-    "lead",
-    "rrrrrrrrrrrrrrrrrrrrn",
-    """
+
+@loop("rrrrrrrrrrrrrrrrrrrrn")
 def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, DY, DZ, n):
-    e = FRAME[3]
-    tight = FRAME[4]
+    """Where to look for the surface from n points: the way to go, D.
+
+    Along the gradient, by central differences so that at an edge neither side is preferred, four of Newton's
+    steps or as far as L and H, the room below and above each point, allow; where that does not lead to the
+    surface (within rounding) or beyond it, O, if that is no NaN. A coordinate without room is kept; slopes
+    below 0.1 are taken for it, so that no step is longer than ten times |f|.
+
+    Where the slopes on both sides of a point differ little (by less than 25 degrees: their difference is then
+    2 tan(12.5 deg) of their mean, its square 0.05 of theirs) the field is smooth there, and no edge is near:
+    the planes that met in the point are of a bend that is rounder, or folded finer, than they say. The way is
+    then M, to the middle of what is known of the surface, if it leads through it.
+    """
+    e, tight = FRAME[3], FRAME[4]
     for i in range(0, n, WIDTH):
-        x = load(X, i)
-        y = load(Y, i)
-        z = load(Z, i)
+        x, y, z = load(X, i), load(Y, i), load(Z, i)
         gx = 0.0 * x
-        gy = gx
-        gz = gx
-        bx = gx
-        by = gx
-        bz = gx
-        f = gx
+        gy, gz, bx, by, bz, f = gx, gx, gx, gx, gx, gx
         for k in range(7):
             ex = (k == 0) - 1.0 * (k == 1)
             ey = (k == 2) - 1.0 * (k == 3)
@@ -190,23 +168,8 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, 
         gx = where(away, ox, gx)
         gy = where(away, load(OY, i), gy)
         gz = where(away, load(OZ, i), gz)
-        mx = load(MX, i)
-        my = load(MY, i)
-        mz = load(MZ, i)
+        mx, my, mz = load(MX, i), load(MY, i), load(MZ, i)
         between = smooth & (mx == mx) & (sign * field(x + mx, y + my, z + mz, P) > 0.0)
         store(DX, i, where(between, mx, gx))
         store(DY, i, where(between, my, gy))
         store(DZ, i, where(between, mz, gz))
-""",
-)
-"""Where to look for the surface from n points: the way to go, D. Along the gradient, by central differences
-so that at an edge neither side is preferred, four of Newton's steps or as far as L and H, the room below and
-above each point, allow; where that does not lead to the surface (within rounding) or beyond it, O, if that is
-no NaN. A coordinate without room is kept; slopes below 0.1 are taken for it, so that no step is longer than
-ten times |f|.
-
-Where the slopes on both sides of a point differ little (by less than 25 degrees: their difference is then
-2 tan(12.5 deg) of their mean, its square 0.05 of theirs) the field is smooth there, and no edge is near: the
-planes that met in the point are of a bend that is rounder, or folded finer, than they say. The way is then M,
-to the middle of what is known of the surface, if it leads through it.
-"""

@@ -22,7 +22,7 @@ from functools import partial
 import numpy as np
 
 from ..errors import VolumeError
-from ..formulas.registry import Bounds
+from ..formulas.field import Bounds
 from ..kernel import Kernel
 from ..work import Work, chunks
 from .bricks import INSIDE, OUTSIDE, Bricks, SignBricks

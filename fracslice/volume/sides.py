@@ -40,7 +40,7 @@ ROUNDING = 4 * float(np.finfo(np.float32).eps)
 
 
 @dataclass(frozen=True)
-class Field:
+class FreeSpace:
     """kernel: of the scene; its signs count. conservative: to skip space by; its values over `lipschitz` are
     radii of free balls. far: these are nearly as large as can be, from far away too.
     """
@@ -71,7 +71,7 @@ class Side:
     nothing is above. spent: how many columns were looked at.
     """
 
-    field: Field
+    field: FreeSpace
     region: Box
     axis: int
     sign: int

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fracslice_cli.main import run
+from fracslice.cli.main import run
 
 from fracslice.bench.measure import errors, spread
 from fracslice.bench.runs import Peer, Task, measure

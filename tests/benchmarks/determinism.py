@@ -18,7 +18,7 @@ from pathlib import Path
 
 from .tables import table
 
-COMMAND = [sys.executable, "-c", "from fracslice_cli import main; main()"]
+COMMAND = [sys.executable, "-c", "from fracslice.cli import main; main()"]
 JOBS = {
     "mesh.stl": ("mesh", "--resolution", "256"),
     "slices.sl1": ("slice", "--size", "30mm", "--layer", "0.2mm", "--printer", "sl1s"),

@@ -1,4 +1,4 @@
-"""Tables of measured numbers, printed and, with `--write`, put where docs/accuracy.md marks their place."""
+"""Tables of measured numbers, printed and, with `--write`, put where docs/measurements.md marks their place."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-PAGE = Path(__file__).parents[2] / "docs/accuracy.md"
+PAGE = Path(__file__).parents[2] / "docs/measurements.md"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from fracslice.formulas import Node
 from fracslice.kernel import compile_scene
-from fracslice.render import Renderer
+from fracslice.rendering import Renderer
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.volume import Lattice, sample

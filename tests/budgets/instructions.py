@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from fracslice.kernel.host import REGISTERS
 from fracslice.kernel.linker import Linked, link
-from fracslice.kernel.loops import POINTS, Loop
+from fracslice.kernel.loops import Loop, points
 
 from .workloads import WORKLOADS
 
@@ -33,7 +33,7 @@ def instructions() -> dict[str, int]:
     return found
 
 
-def assembly(linked: Linked, bits: int, loops: Sequence[Loop] = (POINTS,)) -> list[str]:
+def assembly(linked: Linked, bits: int, loops: Sequence[Loop] = (points,)) -> list[str]:
     """The lines of a scene's loops: labels and instructions."""
     from fracslice.kernel import compiler
 

@@ -44,7 +44,7 @@ def test_more_than_a_budget_is_told() -> None:
 def test_counts_grow_with_what_is_counted() -> None:
     """A bound twice as wide as it need be, as a careless change would make it."""
     wider = sphere(radius=1.0)
-    wider.__dict__["facts"] = replace(wider.bounds, lipschitz=2.0)
+    wider.__dict__["bounds"] = replace(wider.bounds, lipschitz=2.0)
     assert per_sample(wider) > 1.05 * per_sample(sphere())
 
 

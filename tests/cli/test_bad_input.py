@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from fracslice_cli.main import run
+from fracslice.cli.main import run
 
 BALL = '<scene version="1"><solid size="20mm"><sphere/></solid></scene>'
 LAUGHS = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 12))

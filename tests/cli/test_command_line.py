@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fracslice_cli.main import run
+from fracslice.cli.main import run
 
 from fracslice.scene import library
 from fracslice.volume.grid import read_vdb
 
-COMMAND = [sys.executable, "-c", "from fracslice_cli import main; main()"]
+COMMAND = [sys.executable, "-c", "from fracslice.cli import main; main()"]
 
 
 def fracslice(*arguments: object) -> int:
@@ -156,7 +156,7 @@ def test_help_is_quick():
 
 
 def test_heavy_packages_are_not_loaded_for_help():
-    code = "import sys; from fracslice_cli.main import run; run(['--help']); print(*sys.modules)"
+    code = "import sys; from fracslice.cli.main import run; run(['--help']); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     loaded = set(done.stdout.splitlines()[-1].split())
     heavy = "numpy numba trimesh manifold3d pymeshlab pyvista lxml rich fracslice.scene fracslice.volume"
@@ -164,7 +164,7 @@ def test_heavy_packages_are_not_loaded_for_help():
 
 
 def loads_numba(*arguments: object) -> bool:
-    code = "import sys; from fracslice_cli.main import run; print(run(sys.argv[1:]), 'numba' in sys.modules)"
+    code = "import sys; from fracslice.cli.main import run; print(run(sys.argv[1:]), 'numba' in sys.modules)"
     command = [sys.executable, "-c", code, *map(str, arguments)]
     done = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     assert done.split()[-2] == "0"

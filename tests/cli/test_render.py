@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fracslice_cli.main import run
+from fracslice.cli.main import run
 from PIL import Image
 
 SCENE = """<scene version="1">

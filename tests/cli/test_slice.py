@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from fracslice_cli.main import run
+from fracslice.cli.main import run
 
 from fracslice.export.jobs import Stored
 

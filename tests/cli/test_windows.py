@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fracslice_cli.main import run
+from fracslice.cli.main import run
 
 from fracslice.mesh import Mesh
 from fracslice.scene.view import Camera

@@ -7,7 +7,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from fracslice_cli.main import run
+from fracslice.cli.main import run
 
 from fracslice.export import FORMATS, write
 from tests.mesh import shapes

@@ -7,8 +7,8 @@ import pytest
 
 from fracslice.formulas import Node, julia, mandelbulb, sphere, transform, union
 from fracslice.formulas.escape import sure_distance
+from fracslice.formulas.field import Precision
 from fracslice.kernel import compile_scene, link, reference
-from fracslice.kernel.cpu import Precision
 from tests.examples import EXAMPLES
 
 TORN = mandelbulb(iterations=4, power=7.5)

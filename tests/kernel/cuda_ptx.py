@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from fracslice.kernel import Linked, cuda_source
+from fracslice.kernel.loops import Loop
 
 
-def compiled(linked: Linked, bits: int, loops: str, name: str, arguments: str, folder: Path) -> str:
+def compiled(
+    linked: Linked, bits: int, loops: Sequence[Loop], name: str, arguments: str, folder: Path
+) -> str:
     """The PTX of one loop for compute capability 9.0, an H100 or H200.
 
     arguments: a letter each: "r" a real, "n" a whole number; "R", "I" arrays of reals and int32, "M", "N"

@@ -16,7 +16,7 @@ import pytest
 
 from fracslice.errors import FracsliceWarning, KernelError
 from fracslice.formulas import Node, sphere
-from fracslice.kernel import cuda, cuda_source, link
+from fracslice.kernel import cuda, cuda_loops, cuda_source, link
 from tests.examples import EXAMPLES
 from tests.kernel.cuda_ptx import compiled
 
@@ -67,7 +67,7 @@ class TestMachineCode:
 
 def points_of(root: Node, bits: int, folder: Path) -> str:
     """The PTX of the loop over points."""
-    return compiled(link(root), bits, cuda_source.POINTS, "points", "RRRRR", folder)
+    return compiled(link(root), bits, [cuda_loops.points], "points", "RRRRR", folder)
 
 
 @installed

@@ -8,8 +8,7 @@ import pytest
 
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Box, Node, julia, mandelbulb, menger, sphere, transform, union
-from fracslice.kernel.depth import _step, _surface_points, resolve_depths, visible
-from fracslice.kernel.identity import Known
+from fracslice.kernel.depth import Known, _step, _surface_points, resolve_depths, visible
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.volume import plan, with_depths

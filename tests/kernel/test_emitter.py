@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from fracslice.errors import KernelError
-from fracslice.formulas import vocabulary
 from fracslice.kernel.host import lane_count
 from fracslice.kernel.linker import Linked
 from fracslice.kernel.loops import Loop
@@ -14,24 +15,34 @@ from fracslice.kernel.machine import loaded
 from fracslice.kernel.objects import object_code
 
 N = 7
+HEAD = """\
+from fracslice.formulas.vocabulary import any_of, minimum, where
+from fracslice.kernel.intrinsics import WIDTH, load, store
+from fracslice.kernel.loops import loop
+"""
 
 
-def compiled(body: str, extra: str = "") -> dict[str, np.ndarray]:
-    """What ``F`` and ``K`` hold after a text ran on numbers ``A`` and ``J``, by Python and compiled."""
-    text = "def run(A, J, F, K, n):\n" + "".join(f"    {line}\n" for line in body.splitlines())
-    rows = {}
+def made(folder: Path, body: str, extra: str = "") -> Loop:
+    """A loop ``run`` in a file of its own, on numbers ``A`` and ``J``, which writes ``F`` and ``K``."""
+    lines = "".join(f"    {line}\n" for line in body.splitlines())
+    path = folder / "written.py"
+    path.write_text(f'{HEAD}{extra}\n@loop("ririn")\ndef run(A, J, F, K, n):\n{lines}')
+    scope: dict[str, Loop] = {}
+    exec(compile(path.read_text(), path, "exec"), scope)
+    return scope["run"]
+
+
+def compiled(folder: Path, body: str, extra: str = "") -> dict[str, np.ndarray]:
+    """What ``F`` and ``K`` hold after a loop ran, as Python and compiled."""
+    loop, rows = made(folder, body, extra), {}
     for way in ("python", "compiled"):
         a = np.array([-2.5, -1.0, 0.0, 0.25, 1.0, 3.5, 100.0])
         j = np.array([-7, -3, -1, 0, 2, 5, 1 << 20], np.int32)
         f, k = np.zeros(64), np.zeros(64, np.int32)
         if way == "python":
-            scope = dict(vars(vocabulary))
-            exec(extra + "\n" + text, scope)
-            scope["run"](a, [int(v) for v in j], f, k, N)
+            loop.function(a, [int(v) for v in j], f, k, N)
         else:
-            loop = Loop("run", "ririn", text)
-            width = lane_count(64)
-            code = object_code(Linked(extra, np.zeros(1)), 64, width, [loop])
+            code = object_code(Linked("", np.zeros(1)), 64, lane_count(64), [loop])
             loaded(code, [loop], np.dtype(np.float64))["run"](a, j, f, k, N)
         rows[way] = np.concatenate([f, k])
     return rows
@@ -101,19 +112,19 @@ SAME = {
 
 
 @pytest.mark.parametrize("name", SAME)
-def test_a_loop_does_what_python_does(name: str) -> None:
-    rows = compiled(SAME[name])
+def test_a_loop_does_what_python_does(name: str, tmp_path: Path) -> None:
+    rows = compiled(tmp_path, SAME[name])
     np.testing.assert_array_equal(rows["compiled"], rows["python"])
     assert rows["python"].any()
 
 
-def test_functions_return_from_where_they_are() -> None:
+def test_functions_return_from_where_they_are(tmp_path: Path) -> None:
     extra = (
         "def sized(v, least):\n    if v < least:\n        return least, 0\n    return v, 1\n"
         "def count(v):\n    for i in range(10):\n        if v < i:\n            return i\n    return 99"
     )
     body = "for i in range(n):\n    v, w = sized(A[i], 1)\n    F[i] = v + w\n    K[i] = count(A[i])"
-    rows = compiled(body, extra)
+    rows = compiled(tmp_path, body, extra)
     np.testing.assert_array_equal(rows["compiled"], rows["python"])
 
 
@@ -134,8 +145,9 @@ WRONG = {
 
 
 @pytest.mark.parametrize("body", WRONG)
-def test_what_cannot_be_compiled_is_one_line(body: str) -> None:
-    text = "def run(A, J, F, K, n):\n" + "".join(f"    {line}\n" for line in body.splitlines())
-    with pytest.raises(KernelError, match=f"^formula run: .* cannot be compiled: .*{WRONG[body]}") as caught:
-        object_code(Linked("", np.zeros(1)), 64, lane_count(64), [Loop("run", "ririn", text)])
+def test_what_cannot_be_compiled_is_one_line_with_its_place(body: str, tmp_path: Path) -> None:
+    loop = made(tmp_path, body)
+    wrong = 7 if body.startswith("if load") else 6 + len(body.splitlines())
+    with pytest.raises(KernelError, match=rf"written.py:{wrong}: loop run: .*{WRONG[body]}") as caught:
+        object_code(Linked("", np.zeros(1)), 64, lane_count(64), [loop])
     assert "\n" not in str(caught.value)

@@ -13,12 +13,12 @@ import pytest
 
 from fracslice.errors import FracsliceError, SceneError
 from fracslice.formulas.registry import _REGISTRY
-from fracslice.kernel import compile_scene, cuda_source, link, reference
+from fracslice.kernel import compile_scene, cuda_loops, cuda_source, link, reference
 
 HEAD = """\
 import math
 import numpy as np
-from fracslice.formulas import Box, Number, blend, shape, warp
+from fracslice.formulas import Box, Number, csg_operator, domain_operator, shape
 TURN = 0.5
 @shape(radius=Number(1.0, "the radius", above=0))
 def mine(x, y, z, radius):
@@ -64,7 +64,7 @@ def test_pythons_own_words_are_those_of_the_vocabulary(module, body: str) -> Non
     root = module(HEAD + "    " + body).mine(radius=0.7)
     np.testing.assert_allclose(reference(root)(*P), SAME[body], rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose(compile_scene(root, "float64").points(*P), SAME[body], rtol=1e-12, atol=1e-12)
-    assert "**" not in cuda_source.module(link(root), 32, cuda_source.POINTS)
+    assert "**" not in cuda_source.module(link(root), 32, [cuda_loops.points])
 
 
 REFUSED = {

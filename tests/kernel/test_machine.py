@@ -16,7 +16,7 @@ from fracslice._native import RootLoops
 from fracslice._slices import Compiled
 from fracslice.formulas import box, sphere
 from fracslice.kernel import CpuKernel, link
-from fracslice.kernel.loops import BRICKS, POINTS
+from fracslice.kernel.loops import bricks, points
 from fracslice.volume.roots import Roots
 
 
@@ -55,7 +55,7 @@ def test_native_objects_refuse_other_loops() -> None:
         Compiled((kernel._bricks, kernel._parameters))
     with pytest.raises(RuntimeError):
         Compiled((kernel._points, kernel._parameters.astype(np.float64)))
-    assert (POINTS.arguments, BRICKS.arguments) == ("rrrrrn", "rrrrrirn")
+    assert (bricks.arguments, points.arguments) == ("rrrrrirn", "rrrrrn")
 
 
 def test_arrays_become_addresses_in_one_place() -> None:

@@ -16,7 +16,7 @@ from fracslice.errors import FracsliceWarning
 from fracslice.formulas import sphere
 from fracslice.kernel import compiler, objects
 from fracslice.kernel.linker import Linked, link
-from fracslice.kernel.loops import POINTS, Loop
+from fracslice.kernel.loops import Loop, points
 from fracslice.kernel.objects import object_code
 
 LINKED = link(sphere())
@@ -41,7 +41,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
     return made
 
 
-def code(linked: Linked = LINKED, bits: int = 32, loops: Sequence[Loop] = (POINTS,)) -> bytes:
+def code(linked: Linked = LINKED, bits: int = 32, loops: Sequence[Loop] = (points,)) -> bytes:
     return object_code(linked, bits, 16, loops)
 
 
@@ -58,7 +58,7 @@ def test_it_is_known_by_all_that_it_was_made_of(
 ) -> None:
     code()
     code(bits=64)
-    code(loops=[replace(POINTS, arguments="rrrrin")])
+    code(loops=[replace(points, arguments="rrrrin")])
     code(Linked(LINKED.source + "#", LINKED.parameters))
     monkeypatch.setattr(objects, "version", lambda _: "another")
     objects.toolchain.cache_clear()

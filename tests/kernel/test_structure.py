@@ -24,8 +24,9 @@ from fracslice.formulas import (
 )
 from fracslice.kernel import compile_scene, compiler, link, reference
 from fracslice.kernel.host import REGISTERS, host
-from fracslice.kernel.loops import POINTS
-from fracslice.render.linking import link_frame, optics
+from fracslice.kernel.loops import points
+from fracslice.rendering.linking import link_frame
+from fracslice.rendering.optics import optics
 from fracslice.scene.view import Camera, Light, View
 
 P = np.random.default_rng(2).uniform(-1.5, 1.5, (3, 500))
@@ -49,7 +50,7 @@ def nested(depth: int) -> Node:
 def instructions(root: Node) -> int:
     """Of LLVM's, in the kernel."""
     target = compiler.Target(32, 32, REGISTERS, *host())
-    module = llvm.parse_assembly(compiler._text(link(root), target, [POINTS]))
+    module = llvm.parse_assembly(compiler._text(link(root), target, [points]))
     compiler._optimise(module, compiler._target_machine(target))
     return sum(1 for f in module.functions for b in f.blocks for _ in b.instructions)
 

@@ -110,8 +110,8 @@ def test_arrays_that_contradict_each_other_are_refused() -> None:
         lambda: build(Mesh(mesh.vertices, beyond)),
         lambda: self_intersecting_triangles(mesh, tree._replace(order=tree.order + 1)),
         lambda: self_intersecting_triangles(sphere(), tree),
-        lambda: nesting(mesh, labels[1:], np.ones(2), tree, np.array([-1, 0])),
-        lambda: nesting(mesh, labels, np.ones(2), tree, np.array([-2, 0])),
+        lambda: nesting(mesh, labels[1:], np.ones(2), np.array([-1, 0])),
+        lambda: nesting(mesh, labels, np.ones(2), np.array([-2, 0])),
     ]
     for call in calls:
         with pytest.raises(ValueError, match=r"does not exist|differ in length|not of this mesh"):

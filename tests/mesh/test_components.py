@@ -98,7 +98,7 @@ def test_thousands_of_parts_take_no_time() -> None:
 def thin_walls(mesh: Mesh, voxel: float) -> str:
     pieces = Pieces()
     pieces.add(Piece(mesh, np.inf))
-    return survey(pieces, voxel).thin_walls(pieces, voxel)
+    return survey(pieces, voxel).thin_walls(voxel)
 
 
 def test_bodies_thinner_than_a_voxel_are_pieces_unless_they_are_dust() -> None:

@@ -28,9 +28,9 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.registry import Bounds
-from fracslice.kernel import Kernel, compile_scene, reference
-from fracslice.kernel.cpu import Precision
+from fracslice.formulas.field import Bounds, Device, Precision
+from fracslice.kernel import Kernel, reference
+from fracslice.kernel.arrays import ArrayField
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.extract import Piece, contour, contour_pieces, extract
@@ -135,12 +135,11 @@ def test_both_sides_of_a_step_in_one_cell() -> None:
     assert_solid(across)
 
 
-class Called:
+class Called(Kernel):
     """A kernel that is no machine code."""
 
     def __init__(self, kernel: Kernel, fails: bool) -> None:
-        self.kernel, self.fails = kernel, fails
-        self.dtype, self.batch, self.bricks = kernel.dtype, kernel.batch, kernel.bricks
+        self.kernel, self.fails, self.dtype = kernel, fails, kernel.dtype
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         if self.fails:
@@ -149,7 +148,7 @@ class Called:
 
 
 @dataclass
-class InPython:
+class InPython(ArrayField):
     """A scene whose field is called in Python."""
 
     root: Node
@@ -159,11 +158,12 @@ class InPython:
     def bounds(self) -> Bounds:
         return self.root.bounds
 
-    def conservative(self) -> InPython:
-        return self
+    @property
+    def key(self) -> str:
+        return f"{self.root.key} {self.fails}"
 
-    def compiled(self, precision: Precision) -> Called:
-        return Called(compile_scene(self.root, precision), self.fails)
+    def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Called:
+        return Called(self.root.kernel(device, precision), self.fails)
 
 
 def test_a_field_in_python_gives_the_same_surface() -> None:

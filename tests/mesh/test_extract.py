@@ -18,7 +18,7 @@ from fracslice.mesh.self_intersections import self_intersecting_triangles
 from fracslice.volume.bricks import INSIDE, OUTSIDE, Bricks
 from tests.fields import blobs, bricks_of, grid_points, noise
 
-NATIVE = Path(__file__).parents[2] / "fracslice" / "native"
+NATIVE = Path(__file__).parents[2] / "fracslice" / "native" / "mesh"
 
 
 def assert_closed_manifold(mesh: Mesh) -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, julia, mandelbulb, shell, sphere, transform, union
-from fracslice.kernel import compile_scene
 from fracslice.printing import connectivity, printable
 from fracslice.printing.components import Components, components_of
 from fracslice.printing.connectivity import resolved
@@ -32,7 +31,7 @@ def at(node: Node, x: float, y: float, z: float) -> Node:
 
 
 def inside(made: Plan, points: np.ndarray) -> np.ndarray:
-    return compile_scene(made.root, "float64").points(*points.T) < 0
+    return made.root.kernel("cpu", "float64").points(*points.T) < 0
 
 
 def on_sphere(radius: float) -> np.ndarray:
@@ -44,7 +43,7 @@ def components(made: Plan, voxels: float) -> tuple[Components, float]:
     """On samples that are finer."""
     voxel = max(made.box.size) / COARSE * voxels
     lattice = Lattice.around(made.outer, voxel)
-    return components_of(sample(compile_scene(made.root), made.root.bounds, lattice)), voxel
+    return components_of(sample(made.root.kernel(), made.root.bounds, lattice)), voxel
 
 
 def plates(thick: float, gap: float) -> Node:
@@ -123,7 +122,7 @@ def test_plates_however_near_stay_two(thick: float, gap: float) -> None:
 def test_what_is_thick_is_not_looked_at_again() -> None:
     for root, loose in ((box(), True), (mandelbulb(iterations=4), False)):
         planned = plan(root, 48)
-        bricks = sample(compile_scene(planned.root), planned.root.bounds, planned.lattice)
+        bricks = sample(planned.root.kernel(), planned.root.bounds, planned.lattice)
         assert resolved(planned.root, bricks, 1e-3, loose, Work()) is bricks
 
 

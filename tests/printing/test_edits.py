@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fracslice.formulas import mandelbulb, sphere, transform
-from fracslice.kernel import compile_scene
-from fracslice.printing.edits import EditedField, Term
+from fracslice.printing.edits import EditedField
 
 TORN = mandelbulb(iterations=4, power=7.5)
 
@@ -14,13 +13,13 @@ TORN = mandelbulb(iterations=4, power=7.5)
 def test_the_guard_of_a_changed_scene_is_less() -> None:
     """By a cut of something torn as well: guarding that would make more of the rest."""
     aside = transform(TORN, translate=(0.6, 0, 0))
-    changed = EditedField(TORN, (Term(sphere(radius=0.5), "add"), Term(aside, "cut")))
+    changed = EditedField(EditedField(TORN, "add", sphere(radius=0.5)), "cut", aside)
     points = np.random.default_rng(0).uniform(-1.3, 1.3, (3, 50_000))
     own, conservative = (
-        compile_scene(field, "float64").points(*points) for field in (changed, changed.conservative())
+        field.kernel("cpu", "float64").points(*points) for field in (changed, changed.conservative())
     )
     outside = own > 0
     assert (conservative <= own + 1e-12)[outside].all() and (conservative < own - 1e-3)[outside].any()
-    alone = EditedField(sphere(), (Term(aside, "cut"),))
-    same = (compile_scene(field, "float64").points(*points) for field in (alone, alone.conservative()))
+    alone = EditedField(sphere(), "cut", aside)
+    same = (field.kernel("cpu", "float64").points(*points) for field in (alone, alone.conservative()))
     np.testing.assert_array_equal(*same)

@@ -274,7 +274,7 @@ def test_gaps_thinner_than_the_samples_are_closed() -> None:
     """A gap of 0.1 mm where samples are 0.2 mm apart."""
     apart = union(at(box(size=(1, 1, 0.995)), 0, 0, 0.5025), at(box(size=(1, 1, 0.995)), 0, 0, -0.5025))
     thing, _ = printable(plan(apart, 96), SIZE, Print(gap=0.5))
-    middle = compile_scene(thing.root, "float64").points(
+    middle = thing.root.kernel("cpu", "float64").points(
         *np.array([[0.0, 0.2, -0.4], [0, 0.3, 0.1], [0, 0, 0]])
     )
     assert (middle < 0).all()
@@ -343,7 +343,7 @@ def test_a_millimetre_is_a_millimetre(root: Node) -> None:
 def holes(root: Node) -> tuple[Callable[..., bool], float]:
     """Hollowed to 2 mm, with holes of 3 mm: whether a point is solid; a millimetre."""
     thing, scale = printable(plan(root, 100), SIZE, Print(hollow=2, drain=3))
-    kernel = compile_scene(thing.root, "float64")
+    kernel = thing.root.kernel("cpu", "float64")
     return lambda *at: bool(kernel.points(*np.array(at)[:, None])[0] < 0), 1 / scale
 
 

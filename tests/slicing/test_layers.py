@@ -26,8 +26,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.registry import Bounds
-from fracslice.kernel import compile_scene
+from fracslice.formulas.field import Bounds
 from fracslice.scene import scene
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.slab import Sampler
@@ -47,7 +46,7 @@ def all_of(stack: Stack, make: Callable[[Layer], Any], threads: int = 2) -> list
 
 def sampler_of(stack: Stack, bounds: Bounds | None = None) -> Sampler:
     shape = (stack.shape[0] + 1, stack.shape[1] + 1)
-    return Sampler(compile_scene(stack.root), stack.root, bounds or stack.root.bounds, stack.frame, shape)
+    return Sampler(stack.root.kernel(), stack.root, bounds or stack.root.bounds, stack.frame, shape)
 
 
 def signs(sampler: Sampler, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -63,7 +62,7 @@ def signs(sampler: Sampler, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def dense(stack: Stack, z: np.ndarray, like: np.ndarray) -> np.ndarray:
     x0, y0, dx, dy = stack.frame
     y, x = np.mgrid[: like.shape[1], : like.shape[2]]
-    kernel = compile_scene(stack.root)
+    kernel = stack.root.kernel()
     return np.stack([kernel.points(x0 + dx * x, y0 + dy * y, np.full(x.shape, at)) < 0 for at in z])
 
 
@@ -105,7 +104,7 @@ def test_coverage_of_fractals_has_no_bias(root: Node) -> None:
     stack = stack_of(root, 256, 3.2)
     x0, y0, dx, dy = stack.frame
     y, x = ((np.arange(8 * n) + 0.5) / 8 for n in stack.shape)
-    kernel = compile_scene(stack.root)
+    kernel = stack.root.kernel()
     truth = 0.0
     for z in stack.z:
         at = np.meshgrid(x0 + dx * x, y0 + dy * y)
@@ -200,7 +199,7 @@ def test_corners_are_sharp(pixels: int) -> None:
     layers, raster = zip(*all_of(stack, lambda layer: (layer.contours, layer.area)), strict=True)
     np.testing.assert_allclose([layer.area for layer in layers], sponge(stack), rtol=5e-4)
     np.testing.assert_allclose(raster, sponge(stack), rtol=2e-5)
-    exact, middle = compile_scene(stack.root, "float64"), np.array(stack.shape[::-1]) / 2
+    exact, middle = stack.root.kernel("cpu", "float64"), np.array(stack.shape[::-1]) / 2
     for layer, z in zip(layers, stack.z, strict=True):
         x, y = stack.frame[:2, None] + stack.frame[2:, None] * (layer.points / stack.pixel + middle).T
         assert abs(exact.points(x, y, np.full(len(x), z))).max() < 0.01 * stack.frame[2]
@@ -232,7 +231,7 @@ def test_each_pixel_of_a_corner(root: Node) -> None:
     x0, y0, dx, dy = stack.frame
     y, x = ((np.arange(64 * n) + 0.5) / 64 for n in stack.shape)
     at = np.meshgrid(x0 + dx * x, y0 + dy * y)
-    inside = compile_scene(stack.root).points(*at, np.full(at[0].shape, stack.z[middle])) < 0
+    inside = stack.root.kernel().points(*at, np.full(at[0].shape, stack.z[middle])) < 0
     truth = inside.reshape(stack.shape[0], 64, stack.shape[1], 64).mean((1, 3))
     assert abs(coverage / 255 - truth).max() < 0.02
 
@@ -244,7 +243,7 @@ def test_vertices_lie_on_the_surface() -> None:
         radius = math.sqrt(1 - z * z) * stack.scale
         assert abs(np.hypot(*contours.points.T) - radius).max() < 0.01 * 0.2
     stack = stack_of(mandelbulb(iterations=4), 200)
-    exact = compile_scene(stack.root, "float64")
+    exact = stack.root.kernel("cpu", "float64")
     of = range(10, len(stack.z), 10)
     for index, points in zip(of, Slicer(stack).map(lambda layer: layer.contours.points, of), strict=True):
         x, y = (

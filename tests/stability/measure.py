@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from fracslice.formulas import Node
+from fracslice.formulas.field import Precision
 from fracslice.kernel import compile_scene, reference
-from fracslice.kernel.cpu import Precision
 
 from .extremes import extreme_versions, hostile_points
 from .scaling import WAYS

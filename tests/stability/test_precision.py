@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fracslice.formulas import names, sphere, transform
+from fracslice.formulas.field import Precision
 from fracslice.kernel import compile_scene
-from fracslice.kernel.cpu import Precision
 from tests.examples import EXAMPLES
 
 from .extremes import ends

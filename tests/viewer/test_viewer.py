@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import RenderError
-from fracslice.render.live import CameraInput
+from fracslice.rendering.live import CameraInput
 from fracslice.scene.view import Camera
 from fracslice.viewer import fly, screen, viewer
 

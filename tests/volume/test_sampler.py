@@ -23,7 +23,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.registry import Bounds
+from fracslice.formulas.field import Bounds
 from fracslice.kernel import compile_scene
 from fracslice.volume import Bricks, Lattice, extent, plan, sample, sample_scene
 from fracslice.volume.bricks import INSIDE, OUTSIDE

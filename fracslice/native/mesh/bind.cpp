@@ -2,53 +2,66 @@
 #include <nanobind/stl/optional.h>
 
 #include "../unlocked.h"
-#include "crossings.h"
+#include "components.h"
+#include "edge_topology.h"
 #include "input.h"
-#include "links.h"
 #include "measures.h"
 #include "nesting.h"
 #include "predicates.h"
+#include "quantise.h"
+#include "selection.h"
+#include "self_intersections.h"
 #include "tree.h"
 #include "weld.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 using Point = std::array<double, 3>;
 
-void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t parts) {
-    if (labels.size() != mesh.count) throw std::invalid_argument("triangles and labels differ in length");
-    require_below(labels.data(), labels.size(), parts, "a label names a part that does not exist");
+template <class T>
+std::span<const T> span_of(const Vector<T>& values) {
+    return {values.data(), values.size()};
 }
 
-nb::tuple bind_links(const Rows<int32_t>& triangles, const Vector<bool>& counted) {
-    Links found = unlocked(0, [&] { return links(triangles_of(triangles, counted.size()), counted.data()); });
+void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t components) {
+    if (labels.size() != mesh.count) throw std::invalid_argument("triangles and labels differ in length");
+    require_below(labels.data(), labels.size(), components, "a label names a component that does not exist");
+}
+
+std::span<const bool> marks_of(const Vector<bool>& marks, size_t count) {
+    if (marks.size() != count) throw std::invalid_argument("marks differ in length from what they mark");
+    return span_of(marks);
+}
+
+nb::tuple bind_links(const Rows<int32_t>& triangles, const Vector<bool>& counted, int threads) {
+    Links found = unlocked(threads, [&] { return links(triangles_of(triangles, counted.size()), counted.data()); });
     return nb::make_tuple(found.edges, found.open, found.crowded, found.misoriented, found.extra_fans);
 }
 
-nb::tuple bind_corners(const Rows<int32_t>& triangles, size_t vertices) {
-    CornersByVertex found = unlocked(0, [&] { return corners_by_vertex(triangles_of(triangles, vertices)); });
+nb::tuple bind_corners(const Rows<int32_t>& triangles, size_t vertices, int threads) {
+    CornersByVertex found = unlocked(threads, [&] { return corners_by_vertex(triangles_of(triangles, vertices)); });
     return nb::make_tuple(to_numpy(std::move(found.start), {vertices + 1}),
                           to_numpy(std::move(found.corner), {triangles.size()}));
 }
 
-nb::tuple bind_parts(const Rows<int32_t>& triangles, size_t vertices) {
-    Parts found = unlocked(0, [&] { return parts(triangles_of(triangles, vertices)); });
+nb::tuple bind_components(const Rows<int32_t>& triangles, size_t vertices, int threads) {
+    Components found = unlocked(threads, [&] { return connected_components(triangles_of(triangles, vertices)); });
     return nb::make_tuple(to_numpy(std::move(found.labels), {triangles.shape(0)}), found.count);
 }
 
-nb::object bind_volumes(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int32_t>& labels,
-                        size_t count) {
-    Array<double> volumes = unlocked(0, [&] {
+nb::tuple bind_sizes(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int32_t>& labels, size_t count,
+                     int threads) {
+    Sizes found = unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
         require_labels(mesh, labels, count);
-        return shell_volumes(mesh, labels.data(), count);
+        return component_sizes(mesh, span_of(labels), count);
     });
-    return to_numpy(std::move(volumes), {count});
+    return nb::make_tuple(to_numpy(std::move(found.volumes), {count}), to_numpy(std::move(found.areas), {count}));
 }
 
-nb::tuple bind_measures(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Point& point) {
-    Measures found = unlocked(0, [&] { return measures(mesh_of(vertices, triangles), point); });
+nb::tuple bind_measures(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Point& point, int threads) {
+    Measures found = unlocked(threads, [&] { return measures(mesh_of(vertices, triangles), point); });
     return nb::make_tuple(found.area, found.volume, found.flat);
 }
 
@@ -58,30 +71,58 @@ nb::object numbers(const std::vector<int64_t>& found) {
     return to_numpy(std::move(rows), {found.size()});
 }
 
-nb::object bind_turned(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<double>& points) {
+nb::object bind_turned(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<double>& points, int threads) {
     if (points.shape(0) != vertices.shape(0)) throw nb::value_error("vertices and points differ in length");
-    return numbers(unlocked(0, [&] { return turned(mesh_of(vertices, triangles), points.data()); }));
+    return numbers(unlocked(threads, [&] { return turned(mesh_of(vertices, triangles), points.data()); }));
 }
 
-nb::object bind_pointed(const Rows<double>& vertices, const Rows<int32_t>& triangles, double sine) {
-    return numbers(unlocked(0, [&] { return pointed(mesh_of(vertices, triangles), sine); }));
+nb::object bind_pointed(const Rows<double>& vertices, const Rows<int32_t>& triangles, double sine, int threads) {
+    return numbers(unlocked(threads, [&] { return pointed(mesh_of(vertices, triangles), sine); }));
 }
 
-nb::tuple bind_bounds(const Rows<double>& points) {
+nb::tuple bind_bounds(const Rows<double>& points, int threads) {
     if (!points.shape(0)) throw nb::value_error("no points");
-    Bounds found = unlocked(0, [&] { return bounds(points.data(), points.shape(0)); });
+    Bounds found = unlocked(threads, [&] { return bounds(points.data(), points.shape(0)); });
     return nb::make_tuple(found.low, found.high);
+}
+
+nb::object bind_quantise(const Rows<double>& points, const Rows<double>& planes, int threads) {
+    size_t count = points.shape(0);
+    Quantised found = unlocked(threads, [&] { return quantise(points.data(), count, {planes.data(), planes.shape(0)}); });
+    if (!found.finite) throw nb::value_error("the mesh has a coordinate that is not a finite number");
+    return nb::make_tuple(to_numpy(std::move(found.points), {count, 3}), to_numpy(std::move(found.displaced), {count}));
+}
+
+nb::object bind_selected(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<bool>& keep, int threads) {
+    Selection found = unlocked(threads, [&] {
+        MeshView mesh = mesh_of(vertices, triangles);
+        return selected(mesh, marks_of(keep, mesh.count));
+    });
+    size_t n = found.vertices.rows, m = found.triangles.rows;
+    if (n == vertices.shape(0) && m == triangles.shape(0)) return nb::none();
+    return nb::make_tuple(to_numpy(std::move(found.vertices), {n, 3}), to_numpy(std::move(found.triangles), {m, 3}));
+}
+
+nb::object bind_touching(const Rows<int32_t>& triangles, const Vector<bool>& vertices, int threads) {
+    return numbers(unlocked(threads, [&] { return touching(triangles_of(triangles, vertices.size()), span_of(vertices)); }));
+}
+
+nb::object bind_surroundings(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<bool>& of, int threads) {
+    return numbers(unlocked(threads, [&] {
+        MeshView mesh = mesh_of(vertices, triangles);
+        return surroundings(mesh, marks_of(of, mesh.count));
+    }));
 }
 
 nb::tuple bind_weld(const Rows<float>& points) {
     size_t count = points.shape(0);
-    Welded found = unlocked(0, [&] { return weld(reinterpret_cast<const uint32_t*>(points.data()), count); });
+    Welded found = unlocked(1, [&] { return weld(reinterpret_cast<const uint32_t*>(points.data()), count); });
     size_t sets = found.first.rows;
     return nb::make_tuple(to_numpy(std::move(found.first), {sets}), to_numpy(std::move(found.labels), {count}));
 }
 
-nb::tuple bind_tree(const Rows<double>& vertices, const Rows<int32_t>& triangles) {
-    Tree tree = unlocked(0, [&] { return build_tree(mesh_of(vertices, triangles)); });
+nb::tuple bind_tree(const Rows<double>& vertices, const Rows<int32_t>& triangles, int threads) {
+    Tree tree = unlocked(threads, [&] { return build_tree(mesh_of(vertices, triangles)); });
     size_t nodes = tree.low.rows;
     return nb::make_tuple(to_numpy(std::move(tree.order), {triangles.shape(0)}), to_numpy(std::move(tree.low), {nodes, 3}),
                           to_numpy(std::move(tree.high), {nodes, 3}));
@@ -99,15 +140,14 @@ nb::object bind_crossings(const Rows<double>& vertices, const Rows<int32_t>& tri
 }
 
 nb::tuple bind_nesting(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int32_t>& labels,
-                       const Vector<double>& sizes, const Vector<int64_t>& first, const Vector<int64_t>& order,
-                       const Rows<double>& low, const Rows<double>& high) {
+                       const Vector<double>& sizes, const Vector<int64_t>& first, int threads) {
     size_t shells = sizes.size();
-    Nesting found = unlocked(0, [&] {
+    Nesting found = unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
         require_labels(mesh, labels, shells);
         if (first.size() != shells) throw std::invalid_argument("sizes and first differ in length");
         require_below(first.data(), shells, mesh.vertices, "first names a vertex that does not exist", int64_t(-1));
-        return nesting(mesh, tree_of(mesh, order, low, high), labels.data(), sizes.data(), first.data(), shells);
+        return nesting(mesh, span_of(labels), span_of(sizes), span_of(first));
     });
     return nb::make_tuple(to_numpy(std::move(found.winding), {shells}), to_numpy(std::move(found.parent), {shells}));
 }
@@ -120,23 +160,25 @@ int bind_side_of_plane(const Point& a, const Point& b, const Point& c, const Poi
 
 void bind_mesh(nb::module_& module) {
     using namespace nanobind::literals;
-    module.def("edge_topology", &bind_links, "triangles"_a, "counted"_a);
-    module.def("corners_by_vertex", &bind_corners, "triangles"_a, "vertices"_a);
-    module.def("connected_components", &bind_parts, "triangles"_a, "vertices"_a);
-    module.def("shell_volumes", &bind_volumes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a);
-    module.def("measures", &bind_measures, "vertices"_a, "triangles"_a, "point"_a);
-    module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "points"_a);
-    module.def("pointed", &bind_pointed, "vertices"_a, "triangles"_a, "sine"_a);
-    module.def("bounds", &bind_bounds, "points"_a);
+    module.def("edge_topology", &bind_links, "triangles"_a, "counted"_a, "threads"_a = 0);
+    module.def("corners_by_vertex", &bind_corners, "triangles"_a, "vertices"_a, "threads"_a = 0);
+    module.def("connected_components", &bind_components, "triangles"_a, "vertices"_a, "threads"_a = 0);
+    module.def("component_sizes", &bind_sizes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a, "threads"_a = 0);
+    module.def("measures", &bind_measures, "vertices"_a, "triangles"_a, "point"_a, "threads"_a = 0);
+    module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "points"_a, "threads"_a = 0);
+    module.def("pointed", &bind_pointed, "vertices"_a, "triangles"_a, "sine"_a, "threads"_a = 0);
+    module.def("bounds", &bind_bounds, "points"_a, "threads"_a = 0);
+    module.def("quantise", &bind_quantise, "points"_a, "planes"_a, "threads"_a = 0);
+    module.def("selected", &bind_selected, "vertices"_a, "triangles"_a, "keep"_a, "threads"_a = 0);
+    module.def("touching", &bind_touching, "triangles"_a, "vertices"_a, "threads"_a = 0);
+    module.def("surroundings", &bind_surroundings, "vertices"_a, "triangles"_a, "of"_a, "threads"_a = 0);
     module.def("weld", &bind_weld, "points"_a);
-    module.def("tree", &bind_tree, "vertices"_a, "triangles"_a);
+    module.def("tree", &bind_tree, "vertices"_a, "triangles"_a, "threads"_a = 0);
     module.def("self_intersecting_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,
                "threads"_a = 0, "among"_a = nb::none());
-    module.def("nesting", &bind_nesting, "vertices"_a, "triangles"_a, "labels"_a, "sizes"_a, "first"_a, "order"_a,
-               "low"_a, "high"_a);
-    bind_reduction(module);
+    module.def("nesting", &bind_nesting, "vertices"_a, "triangles"_a, "labels"_a, "sizes"_a, "first"_a, "threads"_a = 0);
     module.def("side_of_line", &side_of_line, "ax"_a, "ay"_a, "bx"_a, "by"_a, "cx"_a, "cy"_a);
     module.def("side_of_plane", &bind_side_of_plane, "a"_a, "b"_a, "c"_a, "d"_a);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

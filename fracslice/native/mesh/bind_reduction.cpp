@@ -4,7 +4,7 @@
 #include "nearest.h"
 #include "reduction.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 class BoundReduction {
@@ -95,4 +95,4 @@ void bind_reduction(nb::module_& module) {
         .def("samples", &BoundNearest::samples, "vertices"_a, "triangles"_a, "spacing"_a, "enough"_a, "threads"_a = 0);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

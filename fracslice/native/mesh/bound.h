@@ -6,7 +6,7 @@
 
 #include "distance.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 // How often a triangle is cut before nothing is said of it, and how often before the nearest triangle is looked for again
 // though that of a neighbour is near, or what lies over a triangle is taken from what does not.
@@ -168,4 +168,4 @@ class Bound {
     std::vector<Piece> pieces_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -10,7 +10,7 @@
 #include <emmintrin.h>
 #endif
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 // Rounded to float32 and outwards: boxes that meet are told to meet, and for float32 coordinates no others.
 inline float below(double x) {
@@ -72,4 +72,4 @@ struct LeafBoxes {
     }
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

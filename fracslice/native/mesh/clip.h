@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 using Point = std::array<double, 3>;
 using Polygon = std::vector<Point>;  // its corners in order
@@ -35,4 +35,4 @@ inline Polygon taken_above(const Plane& plane, Polygon& polygon) {
     return above;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "links.h"
+#include "edge_topology.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 int32_t after(int32_t c) { return c % 3 == 2 ? c - 2 : c + 1; }
@@ -131,4 +131,4 @@ Star CornerTable::undo(int32_t step) {
     return star;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

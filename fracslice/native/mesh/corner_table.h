@@ -5,7 +5,7 @@
 
 #include "triangles.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 // Of each corner of a closed, oriented 2-manifold the one opposite, on the other side of the edge that it faces. Throws
 // std::invalid_argument if one has none.
@@ -76,4 +76,4 @@ class CornerTable {
     std::vector<int32_t> touched_, before_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -6,7 +6,7 @@
 #include "clip.h"
 #include "triangles.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 // What many points ask of one triangle is worked out once.
 class TriangleDistance {
@@ -82,4 +82,4 @@ class TriangleDistance {
     double a_[3], u_[3], v_[3], uu_, uv_, vv_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

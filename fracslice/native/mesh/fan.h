@@ -6,7 +6,7 @@
 #include "corner_table.h"
 #include "distance.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 class Fan {
   public:
@@ -91,4 +91,4 @@ class Fan {
     TriangleDistance before_[kDegree], after_[kDegree];
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -3,9 +3,10 @@
 #include <stdexcept>
 
 #include "../numpy.h"
+#include "blocks.h"
 #include "triangles.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 template <class T>
 using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
@@ -14,9 +15,13 @@ using Rows = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cp
 
 template <class T>
 void require_below(const T* values, size_t count, size_t end, const char* what, T least = 0) {
-    for (size_t i = 0; i < count; ++i) {
-        if (values[i] < least || (values[i] >= 0 && size_t(values[i]) >= end)) throw std::invalid_argument(what);
-    }
+    std::atomic<bool> found = false;
+    for_each_block(count, [&](size_t, size_t first, size_t last) {
+        bool beyond = false;
+        for (size_t i = first; i < last; ++i) beyond |= values[i] < least || (values[i] >= 0 && size_t(values[i]) >= end);
+        if (beyond) found.store(true, std::memory_order_relaxed);
+    });
+    if (found) throw std::invalid_argument(what);
 }
 
 inline Triangles triangles_of(const Rows<int32_t>& triangles, size_t vertices) {
@@ -39,6 +44,4 @@ inline TreeView tree_of(const MeshView& mesh, const Vector<int64_t>& order, cons
     return tree;
 }
 
-void bind_reduction(nb::module_& module);
-
-}  // namespace fracslice
+}  // namespace fracslice::mesh

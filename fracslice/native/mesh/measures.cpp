@@ -1,15 +1,12 @@
 #include "measures.h"
 
-#include <tbb/parallel_for.h>
-
 #include <cmath>
 
-#include "links.h"
+#include "blocks.h"
+#include "stars.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
-
-constexpr size_t kBlock = size_t(1) << 14;
 
 Vec3 at(const double* p) { return {p[0], p[1], p[2]}; }
 
@@ -17,33 +14,6 @@ Vec3 at(const double* p) { return {p[0], p[1], p[2]}; }
 Vec3 normal(const MeshView& mesh, size_t t) {
     Vec3 a = at(mesh.corner(t, 0));
     return cross(at(mesh.corner(t, 1)) - a, at(mesh.corner(t, 2)) - a);
-}
-
-// What act(first, last) returns for each block of `count` things.
-template <class Part, class Do>
-std::vector<Part> in_blocks(size_t count, const Do& act) {
-    std::vector<Part> parts((count + kBlock - 1) / kBlock);
-    tbb::parallel_for(size_t(0), parts.size(), [&](size_t k) {
-        parts[k] = act(k * kBlock, std::min(count, (k + 1) * kBlock));
-    });
-    return parts;
-}
-
-// What is found in blocks of `count` things, in order.
-template <class Do>
-std::vector<int64_t> chosen(size_t count, const Do& choose) {
-    using Found = std::vector<int64_t>;
-    Found all;
-    for (const Found& part : in_blocks<Found>(count, [&](size_t first, size_t last) {
-             Found found;
-             for (size_t i = first; i < last; ++i) {
-                 if (choose(i)) found.push_back(int64_t(i));
-             }
-             return found;
-         })) {
-        all.insert(all.end(), part.begin(), part.end());
-    }
-    return all;
 }
 
 }  // namespace
@@ -73,20 +43,24 @@ std::vector<int64_t> turned(const MeshView& mesh, const double* points) {
 }
 
 std::vector<int64_t> pointed(const MeshView& mesh, double sine) {
-    CornersByVertex around = corners_by_vertex(mesh);
-    const int64_t *start = around.start.data.get(), *corner = around.corner.data.get();
-    return chosen(mesh.vertices, [&](size_t v) {
+    auto falls_off = [&](size_t v, std::span<const int64_t> corners) {
         Vec3 up{0, 0, 0};
-        for (int64_t i = start[v]; i < start[v + 1]; ++i) up = up + normal(mesh, size_t(corner[i] / 3));
+        for (int64_t corner : corners) up = up + normal(mesh, size_t(corner / 3));
         double least = sine * std::sqrt(dot(up, up));
-        for (int64_t i = start[v]; i < start[v + 1]; ++i) {
-            size_t t = size_t(corner[i] / 3);
-            int k = int(corner[i] % 3);
-            Vec3 edge = at(mesh.corner(t, (k + 1) % 3)) - at(mesh.corner(t, k));
+        for (int64_t corner : corners) {
+            Vec3 edge = at(mesh.corner(size_t(corner / 3), int((corner + 1) % 3))) - at(mesh.point(int32_t(v)));
             if (!(-dot(edge, up) > least * std::sqrt(dot(edge, edge)))) return false;
         }
-        return start[v] < start[v + 1];
+        return !corners.empty();
+    };
+    Stars stars(mesh);
+    std::vector<std::vector<int64_t>> found(stars.blocks());
+    tbb::parallel_for(size_t(0), stars.blocks(), [&](size_t block) {
+        stars.for_each(block, [&](size_t v, std::span<const int64_t> corners) {
+            if (falls_off(v, corners)) found[block].push_back(int64_t(v));
+        });
     });
+    return joined(found);
 }
 
 Bounds bounds(const double* points, size_t count) {
@@ -104,4 +78,4 @@ Bounds bounds(const double* points, size_t count) {
     return all;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

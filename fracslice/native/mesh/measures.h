@@ -3,10 +3,10 @@
 #include <limits>
 #include <vector>
 
-#include "../vec3.h"
+#include "vec3.h"
 #include "triangles.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 struct Measures {
     double area = 0;
@@ -31,4 +31,4 @@ struct Bounds {
 
 Bounds bounds(const double* points, size_t count);
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -6,7 +6,7 @@
 
 #include "corner_table.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 // Triangles that one thread looks at in turn, each beginning where the one before was: always the same ones.
@@ -120,4 +120,4 @@ double Nearest::sampled(const MeshView& triangles, size_t t, double spacing, dou
     return std::sqrt(most);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -4,7 +4,7 @@
 
 #include "bound.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 class Nearest {
   public:
@@ -35,4 +35,4 @@ class Nearest {
     std::vector<int32_t> across_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -1,11 +1,14 @@
+// All rays go the same way, so that the triangles are gone through once: each is held against the rays below it.
 #include "nesting.h"
 
+#include <array>
+#include <cassert>
 #include <cmath>
-#include <vector>
 
+#include "blocks.h"
 #include "predicates.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 // 1 if the ray up from p leaves through the triangle, -1 if it enters, else 0.
@@ -22,75 +25,100 @@ int winding_of(const MeshView& mesh, size_t t, const double* p) {
     return side_of_plane(mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2), p) * turn > 0 ? turn : 0;
 }
 
-class Rays {
+// The starts of the rays, by cells of a grid across them.
+class Starts {
   public:
-    Rays(const MeshView& mesh, const TreeView& tree, const int32_t* labels, size_t shells)
-        : mesh_(mesh), tree_(tree), labels_(labels), around_(shells, 0), met_(shells, false) {}
-
-    // Calls found(shell, winding) for every shell about a point.
-    template <class Found>
-    void cast(const double* p, const Found& found) {
-        stack_.assign(1, 1);
-        while (!stack_.empty()) {
-            size_t node = stack_.back();
-            stack_.pop_back();
-            if (!passes(node, p)) continue;
-            if (node < tree_.leaves) {
-                stack_.insert(stack_.end(), {2 * node, 2 * node + 1});
-            } else {
-                add_leaf(node - tree_.leaves, p);
+    Starts(const MeshView& mesh, std::span<const int64_t> first) : mesh_(mesh), first_(first) {
+        std::vector<size_t> rays;
+        for (size_t shell = 0; shell < first.size(); ++shell) {
+            if (first[shell] < 0) continue;
+            rays.push_back(shell);
+            for (int k = 0; k < 2; ++k) {
+                low_[k] = std::min(low_[k], point(shell)[k]);
+                high_[k] = std::max(high_[k], point(shell)[k]);
             }
         }
-        for (int32_t shell : seen_) {
-            if (around_[shell] != 0) found(shell, around_[shell]);
-            around_[shell] = 0;
-            met_[shell] = false;
+        side_ = std::clamp(int(std::sqrt(double(rays.size()))), 1, kMostCells);
+        for (int k = 0; k < 2; ++k) scale_[k] = high_[k] > low_[k] ? side_ / (high_[k] - low_[k]) : 0;
+        rays_.resize(size_t(side_) * size_t(side_));
+        for (size_t shell : rays) rays_[cell(place(point(shell), 0), place(point(shell), 1))].push_back(shell);
+    }
+
+    const double* point(size_t shell) const { return mesh_.point(int32_t(first_[shell])); }
+
+    // Calls act(shell) for the rays that may pass a box: those that start in its cells below its top.
+    template <class Do>
+    void for_each_in(const double* low, const double* high, const Do& act) const {
+        if (low[0] > high_[0] || low[1] > high_[1] || high[0] < low_[0] || high[1] < low_[1]) return;
+        int x0 = place(low, 0), x1 = place(high, 0), y0 = place(low, 1), y1 = place(high, 1);
+        for (int x = x0; x <= x1; ++x) {
+            for (int y = y0; y <= y1; ++y) {
+                for (size_t shell : rays_[cell(x, y)]) {
+                    const double* p = point(shell);
+                    if (low[0] <= p[0] && p[0] <= high[0] && low[1] <= p[1] && p[1] <= high[1] && p[2] <= high[2]) act(shell);
+                }
+            }
         }
-        seen_.clear();
     }
 
   private:
-    bool passes(size_t node, const double* p) const {
-        const double *low = tree_.low + 3 * node, *high = tree_.high + 3 * node;
-        return low[0] <= p[0] && p[0] <= high[0] && low[1] <= p[1] && p[1] <= high[1] && p[2] <= high[2];
-    }
+    static constexpr int kMostCells = 512;
 
-    void add_leaf(size_t leaf, const double* p) {
-        for (size_t i = tree_.first(leaf); i < tree_.last(leaf); ++i) {
-            int turn = winding_of(mesh_, size_t(tree_.order[i]), p);
-            if (turn == 0) continue;
-            int32_t shell = labels_[tree_.order[i]];
-            if (!met_[shell]) seen_.push_back(shell);
-            met_[shell] = true;
-            around_[shell] += turn;
-        }
-    }
+    // Of the cell along an axis: the same or a higher one for a greater coordinate.
+    int place(const double* p, int k) const { return int(std::clamp((p[k] - low_[k]) * scale_[k], 0.0, side_ - 1.0)); }
+    size_t cell(int x, int y) const { return size_t(x) * size_t(side_) + size_t(y); }
 
     const MeshView& mesh_;
-    const TreeView& tree_;
-    const int32_t* labels_;
-    std::vector<int64_t> around_;
-    std::vector<bool> met_;
-    std::vector<int32_t> seen_;
-    std::vector<size_t> stack_;
+    std::span<const int64_t> first_;
+    std::array<double, 2> low_{HUGE_VAL, HUGE_VAL}, high_{-HUGE_VAL, -HUGE_VAL}, scale_{};
+    int side_ = 1;
+    std::vector<std::vector<size_t>> rays_;
 };
+
+// A triangle that a shell's ray passes.
+struct Hit {
+    size_t shell;
+    int32_t other;
+    int winding;
+};
+
+std::vector<Hit> hits(const MeshView& mesh, std::span<const int32_t> labels, const Starts& starts) {
+    return joined(in_blocks<std::vector<Hit>>(mesh.count, [&](size_t begin, size_t end) {
+        std::vector<Hit> found;
+        for (size_t t = begin; t < end; ++t) {
+            const double *a = mesh.corner(t, 0), *b = mesh.corner(t, 1), *c = mesh.corner(t, 2);
+            double low[2], high[3];
+            for (int k = 0; k < 2; ++k) low[k] = std::min({a[k], b[k], c[k]});
+            for (int k = 0; k < 3; ++k) high[k] = std::max({a[k], b[k], c[k]});
+            starts.for_each_in(low, high, [&](size_t shell) {
+                int winding = size_t(labels[t]) == shell ? 0 : winding_of(mesh, t, starts.point(shell));
+                if (winding != 0) found.push_back({shell, labels[t], winding});
+            });
+        }
+        return found;
+    }));
+}
 
 }  // namespace
 
-Nesting nesting(const MeshView& mesh, const TreeView& tree, const int32_t* labels, const double* sizes,
-                const int64_t* first, size_t shells) {
-    Nesting nested{{shells, 1}, {shells, 1}};
-    Rays rays(mesh, tree, labels, shells);
-    for (size_t shell = 0; shell < shells; ++shell) {
-        int64_t &winding = nested.winding.data[shell] = 0, &parent = nested.parent.data[shell] = -1;
-        if (first[shell] < 0) continue;
-        rays.cast(mesh.point(int32_t(first[shell])), [&](int32_t other, int64_t around) {
-            if (size_t(other) == shell) return;
-            winding += around;
-            if (parent < 0 || sizes[other] < sizes[parent]) parent = other;
-        });
+Nesting nesting(const MeshView& mesh, std::span<const int32_t> labels, std::span<const double> sizes,
+                std::span<const int64_t> first) {
+    assert(labels.size() == mesh.count && sizes.size() == first.size());
+    Nesting nested{{first.size(), 1}, {first.size(), 1}};
+    int64_t *winding = nested.winding.data.get(), *parent = nested.parent.data.get();
+    std::fill_n(winding, first.size(), 0), std::fill_n(parent, first.size(), -1);
+    std::vector<Hit> found = hits(mesh, labels, Starts(mesh, first));
+    auto before = [](const Hit& a, const Hit& b) { return a.shell != b.shell ? a.shell < b.shell : a.other < b.other; };
+    std::sort(found.begin(), found.end(), before);
+    for (size_t i = 0, j; i < found.size(); i = j) {  // one shell and one other after the other
+        int64_t around = 0;
+        for (j = i; j < found.size() && !before(found[i], found[j]); ++j) around += found[j].winding;
+        if (around == 0) continue;
+        size_t shell = found[i].shell;
+        winding[shell] += around;
+        if (parent[shell] < 0 || sizes[size_t(found[i].other)] < sizes[size_t(parent[shell])]) parent[shell] = found[i].other;
     }
     return nested;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

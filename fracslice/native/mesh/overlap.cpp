@@ -7,7 +7,7 @@
 
 #include "predicates.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 using Point = const double*;
@@ -218,4 +218,4 @@ bool overlap(const MeshView& mesh, const Facet& s, const Facet& t) {
     return shared == 1 ? overlap_at_corner(one, other) : strangers_overlap(one, other);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -4,7 +4,7 @@
 #pragma once
 #include "triangles.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 // How a triangle is seen along the axis along which it is broadest: its corners turn that way, 1 or -1. 0 for a triangle
 // without area.
@@ -22,4 +22,4 @@ struct Facet {
 // Different triangles with area.
 bool overlap(const MeshView& mesh, const Facet& s, const Facet& t);
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -1,9 +1,13 @@
 #include "predicates.h"
 
 #include <array>
+#include <cassert>
+#include <cfloat>
 
-namespace fracslice::exact {
+namespace fracslice::mesh::exact {
 namespace {
+
+static_assert(FLT_EVAL_METHOD == 0, "each operation must round to its own type");
 
 using Vec3 = std::array<double, 3>;
 
@@ -28,6 +32,7 @@ class Expansion {
             value = total;
             if (rest != 0) terms_[kept++] = rest;
         }
+        assert(kept < Size || value == 0);
         if (value != 0) terms_[kept++] = value;
         count_ = kept;
     }
@@ -105,4 +110,4 @@ int side_of_plane(const double* pa, const double* pb, const double* pc, const do
     return sum.sign();
 }
 
-}  // namespace fracslice::exact
+}  // namespace fracslice::mesh::exact

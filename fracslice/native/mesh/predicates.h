@@ -7,7 +7,7 @@
 #pragma once
 #include <cmath>
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 namespace exact {
 
@@ -42,4 +42,4 @@ inline int side_of_plane(const double* a, const double* b, const double* c, cons
     return bound == 0 ? 0 : exact::side_of_plane(a, b, c, d);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

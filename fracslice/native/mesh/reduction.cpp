@@ -1,6 +1,6 @@
 #include "reduction.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -159,4 +159,4 @@ Reduction::State Reduction::state() {
     return state;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

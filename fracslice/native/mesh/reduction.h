@@ -7,7 +7,7 @@
 #include "corner_table.h"
 #include "fan.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 class Reduction {
   public:
@@ -64,4 +64,4 @@ class Reduction {
     std::vector<Near> points_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -10,7 +10,7 @@
 
 #include "measures.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -102,4 +102,4 @@ Tree build_tree(const MeshView& mesh) {
     return tree;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -4,7 +4,7 @@
 #include "../array.h"
 #include "triangles.h"
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 struct Tree {
     Array<int64_t> order;
@@ -14,4 +14,4 @@ struct Tree {
 // For a mesh with at least one triangle, fewer than 2^32.
 Tree build_tree(const MeshView& mesh);
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 // Corner indices, each below `vertices`: the bindings see to that.
 struct Triangles {
@@ -35,4 +35,4 @@ struct TreeView {
     size_t last(size_t leaf) const { return std::min(count, first(leaf) + kLeaf); }
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

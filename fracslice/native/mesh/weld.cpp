@@ -4,7 +4,9 @@
 #include <stdexcept>
 #include <vector>
 
-namespace fracslice {
+#include "../compiler.h"
+
+namespace fracslice::mesh {
 namespace {
 
 // How many points ahead their slots are asked for: without, most of the time goes into waiting for memory.
@@ -27,7 +29,7 @@ Welded weld(const uint32_t* bits, size_t count) {
     int32_t sets = 0;
     for (size_t i = 0; i < count; ++i) {
         const uint32_t* point = bits + 3 * i;
-        if (i + kAhead < count) __builtin_prefetch(&table[mixed(point + 3 * kAhead) & (slots - 1)], 1);
+        if (i + kAhead < count) prefetch(&table[mixed(point + 3 * kAhead) & (slots - 1)]);
         size_t slot = mixed(point) & (slots - 1);
         while (table[slot] >= 0 && !std::equal(point, point + 3, bits + 3 * found.first.data[table[slot]])) {
             slot = (slot + 1) & (slots - 1);
@@ -42,4 +44,4 @@ Welded weld(const uint32_t* bits, size_t count) {
     return found;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

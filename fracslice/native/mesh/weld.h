@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-namespace fracslice {
+namespace fracslice::mesh {
 
 struct Welded {
     Array<int64_t> first;   // of each set of equal points
@@ -14,4 +14,4 @@ struct Welded {
 // bits: [count, 3], of float32 coordinates without negative zeros. Throws std::invalid_argument for more than 2^31 points.
 Welded weld(const uint32_t* bits, size_t count);
 
-}  // namespace fracslice
+}  // namespace fracslice::mesh

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <cstring>
 
-#include "wide.h"
+#include "avx512.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // Of the bytes of rows: the sum of all, of each times its column, and of each times how many rows there are from its own on.
 struct Sums {
@@ -81,4 +81,4 @@ class Adler {
     uint64_t sum_ = 0, weighted_ = 0;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

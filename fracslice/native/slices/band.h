@@ -7,10 +7,10 @@
 #include "adler.h"
 #include "coverage.h"
 #include "deflate.h"
-#include "turn.h"
-#include "wide.h"
+#include "orientation.h"
+#include "avx512.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // The numbers of bits that differ from the one before, of n words that are eight words apart; returns the end. Up to `kSlack`
 // numbers behind the end are written.
@@ -45,8 +45,8 @@ inline constexpr auto find_turns = turns_each;
 // after each of these. All else is as its left neighbour.
 class Band {
  public:
-    Band(const Turn& turn, int tiles, int first, int last)
-        : turn_(turn), first_(first), last_(last), room_(tiles / 8 * 8 + 16), column_(room_), tiles_(room_), cut_(room_),
+    Band(const Orientation& orientation, int tiles, int first, int last)
+        : orientation_(orientation), first_(first), last_(last), room_(tiles / 8 * 8 + 16), column_(room_), tiles_(room_), cut_(room_),
           cut_rows_(room_), levels_(size_t(kTile * stride())), ends_(kTile * room_ + 2 + kSlack) {}
 
     // Begins with eight rows of which those from `from` to before `to` are on the picture; `at`: the place of the first one's
@@ -58,7 +58,7 @@ class Band {
         return tiles_[on(tile) ? n_++ : room_ - 1];
     }
     // One that is not cut.
-    void even(int tile, bool inside) {
+    void uniform(int tile, bool inside) {
         if (!on(tile)) return;
         column_[n_] = kTile * tile, cut_[n_] = 0, tiles_[n_++].fill(inside ? 255 : 0);
     }
@@ -104,8 +104,8 @@ class Band {
     // Tiles as rows, in which zeros are what is not on the picture.
     void lay_out() {
         for (int i = n_; i < n_ + 8; ++i) cut_[i] = 0;
-        turn_(cut_.data(), n_ + 1, cut_rows_.data());
-        turn_(tiles_.data(), n_, levels_.data(), stride());
+        orientation_(cut_.data(), n_ + 1, cut_rows_.data());
+        orientation_(tiles_.data(), n_, levels_.data(), stride());
         const int before = std::max(first_ - column_[0], 0), after = std::max(column_[n_ - 1] + kTile - last_, 0);
         const int end = kTile * n_ - after;
         for (int row = 0; row < kTile; ++row) {
@@ -129,7 +129,7 @@ class Band {
         return sums;
     }
 
-    Turn turn_;
+    Orientation orientation_;
     int first_, last_, room_, n_ = 0;
     std::vector<int> column_;
     std::vector<Levels> tiles_;
@@ -141,4 +141,4 @@ class Band {
     Adler sum_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

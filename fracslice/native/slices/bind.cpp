@@ -13,10 +13,10 @@
 
 namespace nb = nanobind;
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
-// Machine code of a scene, `fracslice.kernel.loops.POINTS` on float.
+// Machine code of a scene, `fracslice.kernel.loops.points` on float.
 class Compiled : public Field {
  public:
     explicit Compiled(const nb::tuple& entry)
@@ -33,23 +33,29 @@ class Compiled : public Field {
     const float* parameters_;
 };
 
-// A Python function of three float32 arrays that returns one.
+// A Python function of points [3, n] that writes their values to [1, n].
 class Called : public Field {
  public:
-    explicit Called(nb::callable function) : function_(std::move(function)) {}
+    explicit Called(nb::object function) : function_(std::move(function)) {}
     void values(const float* x, const float* y, const float* z, float* f, size_t n) const override {
-        using In = nb::ndarray<nb::numpy, const float, nb::ndim<1>>;
+        std::vector<float> points;
+        for (const float* row : {x, y, z}) points.insert(points.end(), row, row + n);
         nb::gil_scoped_acquire locked;
-        auto view = [n](const float* p) { return nb::cast(In(p, {n}, nb::handle()), nb::rv_policy::copy); };
-        nb::object result = function_(view(x), view(y), view(z));
-        auto out = nb::cast<nb::ndarray<const float, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(result);
-        if (out.shape(0) != n) throw nb::value_error("as many values as points were expected");
-        std::copy(out.data(), out.data() + n, f);
+        auto view = [n](float* p, size_t rows) {
+            return nb::cast(nb::ndarray<nb::numpy, float, nb::ndim<2>>(p, {rows, n}, nb::handle()), nb::rv_policy::reference);
+        };
+        function_(view(points.data(), 3), view(f, 1));
     }
 
  private:
-    nb::callable function_;
+    nb::object function_;
 };
+
+// A kernel's entry: a tuple of machine code and parameters, or a Python function.
+std::shared_ptr<Field> field_of(const nb::object& entry) {
+    if (nb::isinstance<nb::tuple>(entry)) return std::make_shared<Compiled>(nb::cast<nb::tuple>(entry));
+    return std::make_shared<Called>(entry);
+}
 
 template <class T, class Row>
 nb::object owned(std::vector<Row>&& rows, std::initializer_list<size_t> shape) {
@@ -132,36 +138,33 @@ nb::tuple bind_signs(const Slab& slab) {
         for (size_t c = 0; c < columns; ++c) {
             const int y = int(r / kTile) + 1, x = int(c / kTile) + 1, bit = int(kTile * (r % kTile) + c % kTile);
             inside[r * columns + c] = slab.word(y, x) >> bit & 1;
-            known[r * columns + c] = slab.known[slab.at(y, x)] >> bit & 1;
+            known[r * columns + c] = slab.tiles().known[slab.at(y, x)] >> bit & 1;
         }
     return nb::make_tuple(owned<uint8_t>(std::move(inside), {rows, columns}), owned<uint8_t>(std::move(known), {rows, columns}));
 }
 
 }  // namespace
-}  // namespace fracslice
+}  // namespace fracslice::slices
 
 NB_MODULE(_slices, module) {
     using namespace nanobind::literals;
-    using namespace fracslice;
+    using namespace fracslice::slices;
     nb::exception<std::domain_error>(module, "BorderError", PyExc_ValueError);
-    nb::class_<Field>(module, "Field");
-    nb::class_<Compiled, Field>(module, "Compiled").def(nb::init<nb::tuple>(), "entry"_a);
-    nb::class_<Called, Field>(module, "Called").def(nb::init<nb::callable>(), "function"_a);
-    nb::class_<Bounds>(module, "ProbeBounds")
+    nb::class_<ProbeBounds>(module, "ProbeBounds")
         .def(nb::init<double, double, double, int, int, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
-             "stop_inside"_a, "even"_a);
+             "stop_inside"_a, "escape_time_only"_a);
     module.def("deflated", &bind_deflated, "image"_a);
     nb::class_<Memory>(module, "Memory").def(nb::init<>());
     nb::class_<Slab>(module, "Slab")
         .def("__init__",
-             [](Slab* self, std::shared_ptr<Memory> memory, std::shared_ptr<Field> field, const Bounds& bounds,
+             [](Slab* self, std::shared_ptr<Memory> memory, const nb::object& entry, const ProbeBounds& bounds,
                 std::array<double, 4> f, std::vector<double> z, int ny, int nx) {
                  const Frame frame{f[0], f[1], f[2], f[3]};
-                 new (self) Slab(std::move(memory), std::move(field), bounds, frame, std::move(z), ny, nx);
+                 new (self) Slab(std::move(memory), field_of(entry), bounds, frame, std::move(z), ny, nx);
              },
-             "memory"_a, "field"_a, "bounds"_a, "frame"_a, "z"_a, "ny"_a, "nx"_a)
+             "memory"_a, "entry"_a, "bounds"_a, "frame"_a, "z"_a, "ny"_a, "nx"_a)
         .def("sample", &Slab::sample, "layer"_a, nb::call_guard<nb::gil_scoped_release>())
-        .def_ro("evaluations", &Slab::evaluations)
+        .def_prop_ro("evaluations", &Slab::evaluations)
         .def("paint", &bind_paint, "layer"_a, "image"_a)
         .def("runs", &bind_runs, "layer"_a, "shape"_a)
         .def("picture", &bind_picture, "layer"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a)

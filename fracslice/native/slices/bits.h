@@ -1,13 +1,13 @@
 // Words of 64 signs: shifts that bring each sample's neighbour to its place.
 #pragma once
+#include <bit>
 #include <cstdint>
+#include <span>
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr uint64_t kFirstColumn = 0x0101010101010101, kLastColumn = 0x8080808080808080;
 constexpr uint64_t kFirstRow = 0xFF, kLastRow = 0xFF00000000000000;
-
-inline int lowest(uint64_t word) { return __builtin_ctzll(word); }
 
 // The sign of the sample to the right of each, to the left of it, above and below it; `beside`: the word of the tile there.
 inline uint64_t rights(uint64_t word, uint64_t beside) { return (word >> 1 & ~kLastColumn) | (beside << 7 & kLastColumn); }
@@ -18,7 +18,7 @@ inline uint64_t lowers(uint64_t word, uint64_t beside) { return word << 8 | besi
 // visit(bit) for each bit of a word, ascending.
 template <class Visit>
 inline void each(uint64_t word, const Visit& visit) {
-    for (; word; word &= word - 1) visit(lowest(word));
+    for (; word; word &= word - 1) visit(std::countr_zero(word));
 }
 
 // The word with each row's columns from right to left, and with rows as columns (Warren 2012, "Hacker's Delight", 7-3).
@@ -39,7 +39,7 @@ inline uint64_t transposed(uint64_t w) {
 }
 
 // Eight words of eight bytes: the first bytes of all become the first word, and so on.
-inline void swap_rows_and_columns(uint64_t* w) {
+inline void swap_rows_and_columns(std::span<uint64_t, 8> w) {
     auto swap = [&](int apart, uint64_t mask) {
         for (int i = 0; i < 8; ++i) {
             if (i & apart) continue;
@@ -81,4 +81,4 @@ constexpr uint64_t block(int size) {
     return word;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

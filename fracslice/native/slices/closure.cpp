@@ -1,10 +1,11 @@
 // Outside in, and inside out: until every edge that the contour crosses has two evaluated ends.
+#include <cassert>
 #include <numeric>
 #include <stdexcept>
 
 #include "evaluate.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 int32_t Slab::add(int y, int x) {
     int32_t* here = &where[size_t(y) * tx_ + x];
@@ -36,6 +37,22 @@ std::vector<Place> Slab::torn() const {
     }
     return found;
 }
+
+// The samples of a tile that differ from those to their right, left, above and below; and the tiles there.
+struct Slab::Differing {
+    std::array<int32_t, 4> beside;
+    uint64_t words[4];
+
+    Differing(const std::array<int32_t, 4>& beside, const uint64_t* inside, uint64_t s) : beside(beside) {
+        words[0] = s ^ rights(s, inside[beside[0]]), words[1] = s ^ lefts(s, inside[beside[1]]);
+        words[2] = s ^ uppers(s, inside[beside[2]]), words[3] = s ^ lowers(s, inside[beside[3]]);
+    }
+    // Those that differ from what has no tile.
+    uint64_t open(int side) const {
+        constexpr uint64_t faces[] = {kLastColumn, kFirstColumn, kLastRow, kFirstRow};
+        return words[side] & faces[side] & -uint64_t(beside[side] < kTiles);
+    }
+};
 
 // Whether anything is to be done for a tile is hard to foretell: everywhere here lists are written without asking, and what
 // does not belong to them is written over.
@@ -74,23 +91,16 @@ void Slab::close() {
         again.resize(marks);
         std::swap(active, again);
     }
+    assert(is_closed());
 }
 
-// The samples of a tile that differ from those to their right, left, above and below; and the tiles there.
-struct Slab::Differing {
-    std::array<int32_t, 4> beside;
-    uint64_t words[4];
-
-    Differing(const std::array<int32_t, 4>& beside, const uint64_t* inside, uint64_t s) : beside(beside) {
-        words[0] = s ^ rights(s, inside[beside[0]]), words[1] = s ^ lefts(s, inside[beside[1]]);
-        words[2] = s ^ uppers(s, inside[beside[2]]), words[3] = s ^ lowers(s, inside[beside[3]]);
+bool Slab::is_closed() const {
+    for (int32_t t = kTiles; t < int32_t(count()); ++t) {
+        const Differing d(beside[t], inside.data(), inside[t]);
+        if ((d.words[0] | d.words[1] | d.words[2] | d.words[3]) & ~known[t]) return false;
     }
-    // Those that differ from what has no tile.
-    uint64_t open(int side) const {
-        constexpr uint64_t faces[] = {kLastColumn, kFirstColumn, kLastRow, kFirstRow};
-        return words[side] & faces[side] & -uint64_t(beside[side] < kTiles);
-    }
-};
+    return true;
+}
 
 // One wave of the closure: the implied samples that differ from a neighbour. Tiles made on the way become active; tiles at
 // the rim that reach it are to be looked at again.
@@ -144,4 +154,4 @@ void Slab::corners() {
     }
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -2,9 +2,9 @@
 
 #include <cstring>
 
-#include "wide.h"
+#include "avx512.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr int kEnds = kTile + 1;  // samples along a row of cells
@@ -53,16 +53,16 @@ struct Weights {
 
 // Where the samples' values say that sides are crossed.
 void by_values(const Slab& slab, const Quad& tiles, float scale, Parts& parts) {
-    const float *own = slab.values[tiles.own].data(), *right = slab.values[tiles.right].data();
-    const uint64_t known = slab.known[tiles.own], within = slab.inside[tiles.own];
+    const float *own = slab.tiles().values[tiles.own].data(), *right = slab.tiles().values[tiles.right].data();
+    const uint64_t known = slab.tiles().known[tiles.own], within = slab.tiles().inside[tiles.own];
     Weights sample, beside;  // the latter: the column to the right, as two rows that are one after the other
     for (int r = 0; r < kTile; ++r) sample.set(r, own + kTile * r, known >> kTile * r, within >> kTile * r, scale);
-    sample.set(kTile, slab.values[tiles.upper].data(), slab.known[tiles.upper], slab.inside[tiles.upper], scale);
+    sample.set(kTile, slab.tiles().values[tiles.upper].data(), slab.tiles().known[tiles.upper], slab.tiles().inside[tiles.upper], scale);
     float column[kTile];
     for (int r = 0; r < kTile; ++r) column[r] = right[kTile * r];
-    beside.set(0, column, first_column(slab.known[tiles.right]), first_column(slab.inside[tiles.right]), scale);
-    column[0] = slab.values[tiles.beyond][0];
-    beside.set(1, column, slab.known[tiles.beyond] & 1, slab.inside[tiles.beyond] & 1, scale);
+    beside.set(0, column, first_column(slab.tiles().known[tiles.right]), first_column(slab.tiles().inside[tiles.right]), scale);
+    column[0] = slab.tiles().values[tiles.beyond][0];
+    beside.set(1, column, slab.tiles().known[tiles.beyond] & 1, slab.tiles().inside[tiles.beyond] & 1, scale);
     beside.all[0][kTile] = beside.all[1][0], beside.inside[0][kTile] = beside.inside[1][0];
     for (int r = 0; r < kEnds; ++r) sample.all[r][kTile] = beside.all[0][r], sample.inside[r][kTile] = beside.inside[0][r];
 
@@ -84,7 +84,7 @@ void by_values(const Slab& slab, const Quad& tiles, float scale, Parts& parts) {
 
 // Where they were found to be crossed.
 void by_crossings(const Slab& slab, const Quad& tiles, const Corners& corners, Parts& parts) {
-    const uint16_t *own = slab.cross[tiles.own].data(), *right = slab.cross[tiles.right].data();
+    const uint16_t *own = slab.tiles().cross[tiles.own].data(), *right = slab.tiles().cross[tiles.right].data();
     auto part = [](float share, bool first, bool second) {
         const float whole = first, inside = first ? share : kWhole - share;
         return first == second ? whole : inside * (1 / kWhole);
@@ -95,7 +95,7 @@ void by_crossings(const Slab& slab, const Quad& tiles, const Corners& corners, P
         parts.across[bit >> 3][bit & 7] = part(own[bit], here, is(corners.word[1], bit));
         parts.up[bit >> 3][bit & 7] = part(own[64 + bit], here, is(corners.word[3], bit));
     }
-    const uint16_t* upper = slab.cross[tiles.upper].data();
+    const uint16_t* upper = slab.tiles().cross[tiles.upper].data();
     for (int i = 0; i < kTile; ++i) {
         const int top = 56 + i, last = kTile * i + 7;
         parts.across[kTile][i] = part(upper[i], is(corners.word[3], top), is(corners.word[2], top));
@@ -155,19 +155,19 @@ FRACSLICE_WIDE __m512 between(__m512 lower, __m512 upper) {
 
 FRACSLICE_WIDE void cover_wide(const Slab& slab, float scale, const Quad& tiles, const Corners& corners, Levels& levels,
                                double* sums, float* areas) {
-    const float *own = slab.values[tiles.own].data(), *right = slab.values[tiles.right].data();
-    const uint64_t known = slab.known[tiles.own], *within = corners.word;
+    const float *own = slab.tiles().values[tiles.own].data(), *right = slab.tiles().values[tiles.right].data();
+    const uint64_t known = slab.tiles().known[tiles.own], *within = corners.word;
     const __m512 more = _mm512_set1_ps(scale);
     __m512 rows[5];
     for (int i = 0; i < 4; ++i) rows[i] = weight(_mm512_loadu_ps(own + 16 * i), known >> 16 * i, within[0] >> 16 * i, more);
     // The row above, then the column to the right.
     const __m256 column = _mm256_setr_ps(right[0], right[8], right[16], right[24], right[32], right[40], right[48], right[56]);
-    const __m512 upper = _mm512_maskz_loadu_ps(0xFF, slab.values[tiles.upper].data());
-    const uint64_t rim_known = (slab.known[tiles.upper] & kFirstRow) | first_column(slab.known[tiles.right]) << 8;
+    const __m512 upper = _mm512_maskz_loadu_ps(0xFF, slab.tiles().values[tiles.upper].data());
+    const uint64_t rim_known = (slab.tiles().known[tiles.upper] & kFirstRow) | first_column(slab.tiles().known[tiles.right]) << 8;
     const uint64_t rim_within = within[3] >> 56 | first_column(within[1] >> 7) << 8;
     const uint64_t over_within = within[2] >> 56 | first_column(within[2] >> 7) << 8;
     const __m512 rim = rows[4] = weight(_mm512_maskz_insertf32x8(0xFFFF, upper, column, 1), rim_known, rim_within, more);
-    const __m512 corner = weight(_mm512_set1_ps(slab.values[tiles.beyond][0]), slab.known[tiles.beyond] & 1 ? 0xFFFF : 0,
+    const __m512 corner = weight(_mm512_set1_ps(slab.tiles().values[tiles.beyond][0]), slab.tiles().known[tiles.beyond] & 1 ? 0xFFFF : 0,
                                  within[2] >> 63 ? 0xFFFF : 0, more);
 
     const __m512i next = _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 16, 9, 10, 11, 12, 13, 14, 15, 16);
@@ -211,7 +211,7 @@ FRACSLICE_WIDE void cover_wide(const Slab& slab, float scale, const Quad& tiles,
 
 void Coverage::operator()(const Quad& tiles, const Corners& corners, Levels& levels) {
     alignas(64) float areas[64];
-    const uint64_t alternating = corners.alternating(), special = alternating | slab_.sharp[tiles.own];
+    const uint64_t alternating = corners.alternating(), special = alternating | slab_.tiles().sharp[tiles.own];
 #if defined(FRACSLICE_WIDE)
     if (kWide && scale_ != 0)
         cover_wide(slab_, scale_, tiles, corners, levels, sums_.data(), special ? areas : nullptr);
@@ -227,4 +227,4 @@ void Coverage::operator()(const Quad& tiles, const Corners& corners, Levels& lev
     });
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -5,14 +5,14 @@
 
 #include "pixels.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // Of the cells of a tile, by their bits: 0 to 255, which are those wholly outside and inside.
 struct alignas(64) Levels : std::array<uint8_t, 64> {};
 
 class Coverage {
  public:
-    explicit Coverage(const Slab& slab) : slab_(slab), scale_(slab.scale) {}
+    explicit Coverage(const Slab& slab) : slab_(slab), scale_(slab.scale()) {}
 
     // Sets the levels of a tile.
     void operator()(const Quad& tiles, const Corners& corners, Levels& levels);
@@ -25,4 +25,4 @@ class Coverage {
     std::array<double, kTile> sums_{};  // by columns
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

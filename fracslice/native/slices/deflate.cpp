@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstring>
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr int kEnd = 256, kCodes = 286, kMostBits = 15;
@@ -54,7 +55,7 @@ Sizes sizes_of(Counts counts) {
         for (int i = 2 * n - 3; i >= 0; --i) depth[i] = depth[parent[i]] + 1;
         if (depth[0] <= kMostBits) {
             Sizes sizes{};
-            for (int i = 0; i < n; ++i) sizes[used[i] & 0xFFFF] = uint8_t(depth[i]);
+            for (int i = 0; i < n; ++i) sizes[used[i] & 0xFFFF] = uint8_t(std::max(depth[i], 1));  // one symbol takes a bit, too
             return sizes;
         }
         for (uint32_t& count : counts) count = count ? count / 2 + 1 : 0;
@@ -80,6 +81,7 @@ std::array<Code, kCodes> codes_of(const Sizes& sizes) {
     std::array<uint32_t, kMostBits + 2> next{};
     for (uint8_t size : sizes) next[size + 1] += size > 0;
     for (int size = 1; size <= kMostBits; ++size) next[size] = (next[size - 1] + next[size]) * 2;
+    assert(next[kMostBits] + next[kMostBits + 1] <= 1u << kMostBits);  // Kraft's inequality
     std::array<Code, kCodes> codes{};
     for (int s = 0; s < kCodes; ++s)
         if (const int size = sizes[s]) codes[s] = {reversed(next[size]++, size), size};
@@ -91,6 +93,7 @@ class Bits {
  public:
     explicit Bits(uint8_t* out) : out_(out) {}
     void put(const Code& code) {
+        assert(code.size <= 56);
         word_ |= code.bits << size_;
         size_ += unsigned(code.size);
         std::memcpy(out_, &word_, 8);
@@ -234,9 +237,10 @@ const Rows<uint8_t>& Runs::zlib(uint32_t checksum) {
     }
     out.put(codes[kEnd]);
     uint8_t* to = out.end();
+    assert(to + 4 <= data_.data() + data_.size());
     for (int shift = 24; shift >= 0; shift -= 8) *to++ = uint8_t(checksum >> shift);
     data_.resize(size_t(to - data_.data()));
     return data_;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

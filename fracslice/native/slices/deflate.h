@@ -1,11 +1,12 @@
 // Runs of equal bytes, deflated without ever being laid out.
 #pragma once
+#include <cassert>
 #include <cstdint>
 #include <cstring>
 
 #include "tiles.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr int kShortest = 3, kLongest = 258;  // bytes that a match repeats
 
@@ -40,7 +41,7 @@ class Runs {
             plain();
             Bytes bytes;
             std::memcpy(&bytes, from, sizeof bytes);
-            bytes = __builtin_shuffle(bytes, Bytes{}, Bytes{0, 16, 1, 16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16});
+            bytes = __builtin_shufflevector(bytes, Bytes{}, 0, 16, 1, 16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16);
             std::memcpy(symbol, &bytes, sizeof bytes);
             symbol += n;
         }
@@ -78,7 +79,10 @@ class Runs {
     void add(uint8_t value, uint64_t n);
     // Where so many symbols may be written, and longest matches of n bytes; then so far they were.
     End room(size_t symbols, uint64_t n);
-    void set(const End& end) { end_ = end; }
+    void set(const End& end) {
+        assert(end.symbol <= symbols_.data() + symbols_.size());
+        end_ = end;
+    }
     // Ends; checksum: of all bytes. The result stays until another is asked for.
     const Rows<uint8_t>& zlib(uint32_t checksum);
 
@@ -88,4 +92,4 @@ class Runs {
     End end_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

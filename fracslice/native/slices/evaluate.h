@@ -1,11 +1,12 @@
 // The field at many points at a time.
 #pragma once
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "slab.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr size_t kBatch = 2048;
 constexpr double kSurely = 0.99999;  // squared distances are rounded
@@ -33,7 +34,7 @@ struct Batch {
 template <class Where, class Take>
 void Slab::evaluate(size_t n, const Where& where, const Take& take) {
     Batch batch;
-    evaluations += int64_t(n);
+    evaluations_ += int64_t(n);
     for (size_t begin = 0; begin < n; begin += kBatch) {
         size_t m = std::min(kBatch, n - begin);
         for (size_t i = 0; i < m; ++i) where(begin + i, batch.x[i], batch.y[i], batch.z[i]);
@@ -50,13 +51,14 @@ void Slab::evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take) {
     std::fill(batch.z, batch.z + kBatch, float(z_[layer_]));
     for (size_t begin = 0, end = 0; begin < asks.size(); begin = end) {
         size_t n = 0;
-        for (; end < asks.size() && n + kTile * kTile <= kBatch; ++end) n += size_t(__builtin_popcountll(asks[end].samples));
-        gather(&asks[begin], end - begin, *this, x_.data(), y_.data(), batch.x, batch.y);
+        for (; end < asks.size() && n + kTile * kTile <= kBatch; ++end) n += size_t(std::popcount(asks[end].samples));
+        const std::span some(&asks[begin], end - begin);
+        gather(some, *this, x_.data(), y_.data(), batch.x, batch.y);
         batch.values(*field_, n);
-        evaluations += int64_t(n);
-        scatter(&asks[begin], end - begin, batch.f, rim, *this, found.data());
+        evaluations_ += int64_t(n);
+        scatter(some, batch.f, rim, *this, found.data());
         for (size_t i = begin; i < end; ++i) take(asks[i], found[i - begin]);
     }
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -1,13 +1,15 @@
 #include "picture.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <utility>
 
+#include "../compiler.h"
 #include "band.h"
-#include "in_rows.h"
+#include "tile_rows.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 // A tile of which some cells are cut, and where their levels go.
@@ -42,7 +44,7 @@ class Shown {
         : slab_(slab), view_(view),
           down_(side(view.transposed), view.shape[view.transposed], view.at[view.transposed], view.rows, true),
           across_(side(!view.transposed), view.shape[!view.transposed], view.at[!view.transposed], view.columns, view.backwards),
-          band_(Turn(view.transposed, view.backwards, view.levels), across_.tiles, across_.first, across_.last), coverage_(slab),
+          band_(Orientation(view.transposed, view.backwards, view.levels), across_.tiles, across_.first, across_.last), coverage_(slab),
           rows_(slab, view, down_.tiles, across_.tiles) {}
 
     Picture picture() {
@@ -69,7 +71,7 @@ class Shown {
 
     // Reads the tiles of eight rows; false if they are empty.
     bool read(int tile) {
-        using Spot = InRows::Spot;
+        using Spot = TileRows::Spot;
         const auto [begin, end] = rows_[tile];
         if (begin == end) return false;
         const int n = across_.tiles, along = down_.tiles - tile, beside = view_.backwards ? n : 1;
@@ -78,7 +80,7 @@ class Shown {
         // All between two tiles is as the one after the first is; the same is before the first tile and after the last.
         int next = across_.first / kTile;  // tile that the band may lack
         auto put_next = [&](int i) {
-            if (i == next && i < n) band_.even(i, slab_.inside[first[step * i]] & 1), ++next;
+            if (i == next && i < n) band_.uniform(i, slab_.tiles().inside[first[step * i]] & 1), ++next;
         };
         if (next < n && first[step * next] < kTiles) put_next(next);
         cut_.clear();
@@ -99,14 +101,14 @@ class Shown {
     bool put(int i, const int32_t* spot) {
         const Quad tiles(spot, slab_.columns());
         const Corners corners(slab_, tiles);
-        const uint64_t cut = corners.mixed() | slab_.sharp[tiles.own];
+        const uint64_t cut = corners.mixed() | slab_.tiles().sharp[tiles.own];
         if (!cut) {
-            painted_.area += __builtin_popcountll(corners.whole());
+            painted_.area += std::popcount(corners.whole());
             return false;
         }
-        const float* values = slab_.values[tiles.own].data();
-        for (int k = 0; k < 64; k += 16) __builtin_prefetch(values + k);
-        painted_.partly += __builtin_popcountll(cut);
+        const float* values = slab_.tiles().values[tiles.own].data();
+        for (int k = 0; k < 64; k += 16) prefetch(values + k);
+        painted_.partly += std::popcount(cut);
         cut_.push_back({tiles, corners, &band_.cut(i, cut)});
         return true;
     }
@@ -117,7 +119,7 @@ class Shown {
     Band band_;
     Coverage coverage_;
     Rows<Cut> cut_;
-    InRows rows_;
+    TileRows rows_;
     Runs& runs_ = runs_of_thread;
     Painted painted_{0, 0};
 };
@@ -144,4 +146,4 @@ const Rows<uint8_t>& deflated(const Canvas& image) {
     return runs.zlib(sum.value(uint64_t(stride) * uint64_t(image.rows)));
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

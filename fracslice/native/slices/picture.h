@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "squares.h"
+#include "marching_squares.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // How a screen shows a layer, its back up.
 struct View {
@@ -27,4 +27,4 @@ Picture picture(const Slab& slab, const View& view);
 // Until this thread makes another.
 const Rows<uint8_t>& deflated(const Canvas& image);
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

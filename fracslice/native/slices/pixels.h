@@ -2,7 +2,7 @@
 #pragma once
 #include "slab.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // A tile, and those to its right, above it, and to the right of that.
 struct Quad {
@@ -18,7 +18,7 @@ struct Corners {
     uint64_t word[4];
 
     Corners(const Slab& slab, const Quad& tiles) {
-        const uint64_t* inside = slab.inside.data();
+        const uint64_t* inside = slab.tiles().inside.data();
         const uint64_t s = inside[tiles.own], up = inside[tiles.upper];
         word[0] = s, word[1] = rights(s, inside[tiles.right]), word[3] = uppers(s, up);
         word[2] = uppers(word[1], rights(up, inside[tiles.beyond]));
@@ -49,11 +49,11 @@ class Cells {
         const int32_t right = last ? tiles_.right : tiles_.own, upper = top ? tiles_.upper : tiles_.own;
         if (scale_ == 0) {
             constexpr float unit = 1 / kWhole;
-            const auto &own = slab_.cross[tiles_.own], &next = slab_.cross[right], &over = slab_.cross[upper];
+            const auto &own = slab_.tiles().cross[tiles_.own], &next = slab_.tiles().cross[right], &over = slab_.tiles().cross[upper];
             return Sides{own[bit] * unit, next[64 + beside] * unit, over[above] * unit, own[64 + bit] * unit};
         }
         const int32_t across = last && top ? tiles_.beyond : last ? right : upper;
-        const auto& values = slab_.values;
+        const auto& values = slab_.tiles().values;
         Sides f = {values[tiles_.own][bit], values[right][beside], values[across][(above & 56) + (beside & 7)],
                    values[upper][above]};
         f = f < 0 ? scale_ * f : f;
@@ -83,4 +83,4 @@ class Cells {
     Quad tiles_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -1,7 +1,7 @@
 // One sample of each block of 2 of undecided tiles, and the others, as long as no value reaches them.
 #include "evaluate.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 // One sample of each block of 2, the last; every other sample.
@@ -17,7 +17,7 @@ uint64_t blocks(uint64_t last) { return (last >> kBack) * block(2); }
 
 void Slab::probe() {
     const int32_t end = int32_t(count());
-    if (bounds_.even) {
+    if (bounds_.escape_time_only) {
         twos();
         calm();
         rest();
@@ -70,7 +70,7 @@ void Slab::set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t wit
     known[ask.tile] = kept | ask.samples;
 }
 
-// --- in even fields ------------------------------------------------------------------------------------------------------
+// --- in escape-time fields ------------------------------------------------------------------------------------------------------
 // One sample of each block of 2, which decides all of it or nothing.
 void Slab::twos() {
     list({kTiles, int32_t(count())}, kTwos);
@@ -112,4 +112,4 @@ void Slab::rest() {
     evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) { set(ask, found.negative, 0, 0); });
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -1,9 +1,10 @@
 #include <algorithm>
+#include <bit>
 
 #include "coverage.h"
-#include "squares.h"
+#include "marching_squares.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr uint8_t kSolid = 128;  // the coverage from which a pixel is solid
@@ -17,7 +18,7 @@ class Turns {
         for (int row = 0; row < kTile; ++row) {
             uint8_t bits = uint8_t(solid >> kTile * row), before = uint8_t(within_ >> kTile * row);
             for (unsigned turns = (bits ^ (bits << 1 | before >> 7)) & 0xFF; turns; turns &= turns - 1)
-                columns_[row].push_back(column + __builtin_ctz(turns));
+                columns_[row].push_back(column + std::countr_zero(turns));
         }
         within_ = ((solid & kLastColumn) >> 7) * 0xFF;
     }
@@ -50,13 +51,13 @@ SolidRuns solid_runs(const Slab& slab, int rows, int columns) {
             const int32_t t = slab.at(y, x);
             const Quad tiles(slab, {y, x, kEmpty});
             const Corners corners(slab, tiles);
-            const uint64_t sharp = slab.sharp[t], cut = t < kTiles ? 0 : corners.mixed() | sharp;
+            const uint64_t sharp = slab.tiles().sharp[t], cut = t < kTiles ? 0 : corners.mixed() | sharp;
             const bool whole = t != kEmpty && corners.whole() == kAll && !sharp;
             uint64_t solid = whole ? kAll : 0;
             full += whole;
             if (cut) {
                 coverage(tiles, corners, levels);
-                found.painted.partly += __builtin_popcountll(cut);
+                found.painted.partly += std::popcount(cut);
                 each(cut | corners.whole(), [&](int bit) { solid |= uint64_t(levels[bit] >= kSolid) << bit; });
             }
             const int left = columns - kTile * (x - 1);
@@ -68,4 +69,4 @@ SolidRuns solid_runs(const Slab& slab, int rows, int columns) {
     return found;
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -2,22 +2,22 @@
 
 #include <cstdlib>
 
+#include "avx512.h"
 #include "bits.h"
-#include "wide.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
-void gather_each(const Ask* asks, size_t n, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y) {
-    for (const Ask* ask = asks; ask != asks + n; ++ask) {
-        const Place& p = tiles.place[ask->tile];
+void gather_each(std::span<const Ask> asks, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y) {
+    for (const Ask& ask : asks) {
+        const Place& p = tiles.place[ask.tile];
         const float *columns = x + kTile * (p.x - 1), *rows = y + kTile * (p.y - 1);
-        each(ask->samples, [&](int bit) { *to_x++ = columns[bit & 7], *to_y++ = rows[bit >> 3]; });
+        each(ask.samples, [&](int bit) { *to_x++ = columns[bit & 7], *to_y++ = rows[bit >> 3]; });
     }
 }
 
-void scatter_each(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
-    for (size_t i = 0; i < n; ++i) {
+void scatter_each(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
+    for (size_t i = 0; i < asks.size(); ++i) {
         float* kept = tiles.values[asks[i].tile].data();
         Found all{};
         const float factors[] = {rim ? rim->outside[asks[i].tile] : 0, rim ? rim->inside : 0};
@@ -39,13 +39,13 @@ void scatter_each(const Ask* asks, size_t n, const float* f, const Rim* rim, Til
 // With AVX-512 a list of samples is never walked one by one, which would take longer than the field of many.
 
 // Sixteen samples at a time, the chosen ones first brought together.
-FRACSLICE_WIDE void gather_wide(const Ask* asks, size_t n, const Tiles& tiles, const float* x, const float* y, float* to_x,
+FRACSLICE_WIDE void gather_wide(std::span<const Ask> asks, const Tiles& tiles, const float* x, const float* y, float* to_x,
                                 float* to_y) {
-    for (const Ask* ask = asks; ask != asks + n; ++ask) {
-        const Place& p = tiles.place[ask->tile];
+    for (const Ask& ask : asks) {
+        const Place& p = tiles.place[ask.tile];
         const __m512 columns = _mm512_castps256_ps512(_mm256_loadu_ps(x + kTile * (p.x - 1)));
         const __m512 rows = _mm512_castps256_ps512(_mm256_loadu_ps(y + kTile * (p.y - 1)));
-        const SetBits bits(ask->samples);
+        const SetBits bits(ask.samples);
         for (int at = 0; at < bits.count; at += 16) {
             const __m512i bit = bits.sixteen(at);
             const __m512i column = _mm512_and_si512(bit, _mm512_set1_epi32(7)), row = _mm512_maskz_srli_epi32(0xFFFF, bit, 3);
@@ -60,10 +60,10 @@ FRACSLICE_WIDE void gather_wide(const Ask* asks, size_t n, const Tiles& tiles, c
 FRACSLICE_WIDE inline int64_t before(uint64_t word, int q) { return _mm_popcnt_u64(word & ((uint64_t(1) << 16 * q) - 1)); }
 
 template <bool kBeyond>
-FRACSLICE_WIDE void scatter_wide(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
+FRACSLICE_WIDE void scatter_wide(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
     const __m512 inside = _mm512_set1_ps(kBeyond ? rim->inside : 0);
     const __m512 least = _mm512_set1_ps(kBeyond ? rim->least : 0), calm = _mm512_set1_ps(kBeyond ? rim->calm : 0);
-    for (size_t i = 0; i < n; ++i) {
+    for (size_t i = 0; i < asks.size(); ++i) {
         const uint64_t samples = asks[i].samples;
         const int64_t count = _mm_popcnt_u64(samples);
         float* kept = tiles.values[asks[i].tile].data();
@@ -102,18 +102,18 @@ bool has_wide() {
 #endif
 }
 
-void gather(const Ask* asks, size_t n, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y) {
+void gather(std::span<const Ask> asks, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y) {
 #if defined(FRACSLICE_WIDE)
-    if (kWide) return gather_wide(asks, n, tiles, x, y, to_x, to_y);
+    if (kWide) return gather_wide(asks, tiles, x, y, to_x, to_y);
 #endif
-    gather_each(asks, n, tiles, x, y, to_x, to_y);
+    gather_each(asks, tiles, x, y, to_x, to_y);
 }
 
-void scatter(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
+void scatter(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
 #if defined(FRACSLICE_WIDE)
-    if (kWide) return (rim ? scatter_wide<true> : scatter_wide<false>)(asks, n, f, rim, tiles, found);
+    if (kWide) return (rim ? scatter_wide<true> : scatter_wide<false>)(asks, f, rim, tiles, found);
 #endif
-    scatter_each(asks, n, f, rim, tiles, found);
+    scatter_each(asks, f, rim, tiles, found);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -1,10 +1,11 @@
 // Samples of tiles as a list, and what was found there back in the tiles.
 #pragma once
 #include <cstddef>
+#include <span>
 
 #include "tiles.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 // Samples of a tile.
 struct Ask {
@@ -28,9 +29,9 @@ struct Rim {
 constexpr size_t kSlack = 64;  // numbers that `gather` may write and `scatter` may read behind the last one
 
 // Where samples lie: x by columns and y by rows of the lattice, in the order of tiles and bits.
-void gather(const Ask* asks, size_t n, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y);
+void gather(std::span<const Ask> asks, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y);
 
 // The values `f` of the same samples, into the tiles. rim: null if none is beyond.
-void scatter(const Ask* asks, size_t n, const float* f, const Rim* rim, Tiles& tiles, Found* found);
+void scatter(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Found* found);
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

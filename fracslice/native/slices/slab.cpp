@@ -6,12 +6,12 @@
 
 #include "evaluate.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 namespace {
 
 constexpr int kCoarsest = 8;        // tiles along a block of the first level
 constexpr double kSteep = 0.7;
-constexpr double kHigh = 0.5, kDeep = 0.1;  // shares of the proven bound for blocks of 16 pixels of an even field, outside and inside
+constexpr double kHigh = 0.5, kDeep = 0.1;  // shares of the proven bound for blocks of 16 pixels of an escape-time field, outside and inside
 // Of a group of layers and of a pair: how much farther a likely bound must reach into them, and how many pixels it is from
 // their middle to the last one, at most.
 constexpr double kAside = 1.4, kThick = 2.2, kBeside = 1.2, kThin = 0.8;
@@ -21,7 +21,10 @@ constexpr double kMiddle = (kTile + 1) / 2.0;  // from the next tile's first sam
 constexpr uint64_t kQuarters[] = {block(4), block(4) << 4, block(4) << 32, block(4) << 36};
 
 // Places that are full: few, so that a call of `memset` would take longer.
-__attribute__((optimize("no-tree-loop-distribute-patterns"))) void fill(int32_t* place, int n) {
+#if defined(__GNUC__) && !defined(__clang__)
+__attribute__((optimize("no-tree-loop-distribute-patterns")))
+#endif
+void fill(int32_t* place, int n) {
     for (int i = 0; i < n; ++i) place[i] = kFull;
 }
 
@@ -39,16 +42,16 @@ void group(const std::vector<double>& z, int first, int last, double thick, std:
     }
 }
 
-// The bound for outside values around the middle of a tile in an even field: how steep it is between it and those beside it, a
+// The bound for outside values around the middle of a tile in an escape-time field: how steep it is between it and those beside it, a
 // part of that, for the steepest way is seldom the one to the contour; the proven one where none are beside it.
 class Likely {
  public:
-    Likely(const Bounds& bounds, const Frame& frame, int columns)
+    Likely(const ProbeBounds& bounds, const Frame& frame, int columns)
         : row_(columns), across_(float(kSteep / (kTile * frame.dx))), along_(float(kSteep / (kTile * frame.dy))),
           least_(float(bounds.outside)), most_(float(bounds.proven)) {}
     float operator()(const float* middle) const {
         const float x = across_ * most(middle, 1), y = along_ * most(middle, row_), steep = std::sqrt(x * x + y * y);
-        return (x > 0) & (y > 0) & (steep < most_) ? std::max(steep, least_) : most_;
+        return ((x > 0) & (y > 0) & (steep < most_)) ? std::max(steep, least_) : most_;
     }
 
  private:
@@ -61,7 +64,7 @@ class Likely {
 
 }  // namespace
 
-Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const Bounds& bounds, const Frame& frame,
+Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const ProbeBounds& bounds, const Frame& frame,
            std::vector<double> z, int ny, int nx)
     : memory_(std::move(memory)),
       field_(std::move(field)),
@@ -74,7 +77,7 @@ Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, c
     static_cast<Tiles&>(*this) = memory_->take(size_t(ty_) * tx_);
     group(z_, 0, layers() - 1, kThick * std::min(frame.dx, frame.dy), groups_);
     group(z_, 0, layers() - 1, kThin * std::min(frame.dx, frame.dy), pairs_);
-    if (!bounds_.even) discs_.emplace(frame.dx, frame.dy, 0), centres_.emplace(frame.dx, frame.dy, 0.5);
+    if (!bounds_.escape_time_only) discs_.emplace(frame.dx, frame.dy, 0), centres_.emplace(frame.dx, frame.dy, 0.5);
     for (int i = 0; i < kTile * (tx_ - 2); ++i) x_.push_back(float(frame.x0 + frame.dx * i));
     for (int i = 0; i < kTile * (ty_ - 2); ++i) y_.push_back(float(frame.y0 + frame.dy * i));
 }
@@ -97,10 +100,10 @@ void Slab::sample(int layer) {
     mend();
     close();
     corners();
-    if (bounds_.even) {
-        scale = inside_scale();
+    if (bounds_.escape_time_only) {
+        scale_ = inside_scale();
     } else {
-        settle(edges());
+        project(edges());
         sharpen();
     }
 }
@@ -123,7 +126,7 @@ std::vector<Slab::Block> Slab::coarse() {
     double width = length(frame_.dx, frame_.dy) * kTile / 2, height = (z_.back() - z_[0]) / 2;
     for (int size = kCoarsest; size > 1; size /= 2) {
         const double rim = bounds_.proven * length(width * size, height);
-        const bool likely = bounds_.even && size == 2;
+        const bool likely = bounds_.escape_time_only && size == 2;
         const double outside_rim = likely ? kHigh * rim : rim, inside_rim = likely ? kDeep * rim : rim;
         cut.clear(), cut.reserve(4 * blocks.size());
         auto middle = [&](size_t i, float& x, float& y, float& z) {
@@ -146,13 +149,13 @@ std::vector<Slab::Block> Slab::coarse() {
 
 void Slab::fill(const Block& block) {
     const int last = std::min(block.y + block.size, ty_ - 1), n = std::min(block.size, tx_ - 1 - block.x);
-    for (int y = block.y; y < last; ++y) fracslice::fill(&where[size_t(y) * tx_ + block.x], n);
+    for (int y = block.y; y < last; ++y) slices::fill(&where[size_t(y) * tx_ + block.x], n);
 }
 
 // The places whose middle, halfway between two layers, leaves open what is around it in them and between.
 void Slab::columns(int first, int last) {
     double height = (z_[last] - z_[first]) / 2;
-    const double margin = bounds_.even ? kAside : 1;
+    const double margin = bounds_.escape_time_only ? kAside : 1;
     double reach = margin * length(length(frame_.dx, frame_.dy) * (kTile - 1) / 2, height);
     middles_.resize(size_t(ty_) * tx_, NAN);
     auto middle = [&](const Block& b) { return &middles_[size_t(b.y) * tx_ + b.x]; };
@@ -169,7 +172,7 @@ void Slab::columns(int first, int last) {
         const float f = *middle(b);
         const bool full = -f > bounds_.inside * reach;
         this->where[size_t(b.y) * tx_ + b.x] = full ? kFull : kEmpty;
-        const float outside = bounds_.even ? likely(middle(b)) : float(bounds_.outside);
+        const float outside = bounds_.escape_time_only ? likely(middle(b)) : float(bounds_.outside);
         columns_[n] = {b.y, b.x, f, outside};
         n += !full & (f <= double(outside) * reach);
     }
@@ -193,7 +196,7 @@ void Slab::quarter(double height) {
 // The tiles of a pair of layers that are `height` from the middles of quarters; none where all of these say that it is empty,
 // unless one beside it is said to be full.
 void Slab::open(double height) {
-    const float aside = float(square(height)) * factor(1, frame_), least = aside + float(2.25 * diagonal_ * square(bounds_.even ? kBeside : 1));
+    const float aside = float(square(height)) * factor(1, frame_), least = aside + float(2.25 * diagonal_ * square(bounds_.escape_time_only ? kBeside : 1));
     // What is farther than its rim decides its quarter.
     const float outside_rim = bounds_.stop_outside < 4 ? least : -1, inside_rim = bounds_.stop_inside < 4 ? least : -1;
     const float inside_reach = factor(bounds_.inside, frame_);
@@ -208,7 +211,7 @@ void Slab::open(double height) {
         for (int q = 0; q < 4; ++q) {
             const uint64_t negative = -uint64_t(v[q] < 0);
             uint64_t near = kQuarters[q] & uint64_t(int64_t(far[q]));
-            if (!bounds_.even && d2[q] > aside) near |= (*centres_)(d2[q] - aside, 9 + 4 * (q & 1) + 16 * (q & 2));
+            if (!bounds_.escape_time_only && d2[q] > aside) near |= (*centres_)(d2[q] - aside, 9 + 4 * (q & 1) + 16 * (q & 2));
             now = (now & ~near) | (near & negative);
             reached |= near;
         }
@@ -233,4 +236,4 @@ void Slab::begin() {
     known.assign(count(), 0), sharp.assign(count(), 0);
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -12,7 +12,7 @@
 #include "bits.h"
 #include "samples.h"
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr float kWhole = 32768;
 
@@ -32,11 +32,11 @@ struct Frame {
 };
 
 // How far a value reaches: what is nearer than |f| over a bound has its sign.
-struct Bounds {
+struct ProbeBounds {
     double proven;           // for blocks of 16 pixels and more, and of 8 if nothing better is known
     double outside, inside;  // for smaller ones, by the value's sign
     int stop_outside, stop_inside;  // blocks of so many samples are not cut any more
-    bool even;  // a fractal: values inside are of another scale than outside, of one scale in a layer, see `inside_scale`
+    bool escape_time_only;  // values inside are of another scale than outside, of one scale in a layer, see `inside_scale`
 };
 
 // A place on the lattice.
@@ -47,13 +47,13 @@ struct Spot {
 // The samples of a layer, tile by tile; neighbouring layers share what is found out first.
 //
 // Top down, blocks of 64, 32 and 16 pixels over all layers, of 8 over groups of some and of 4 over pairs, then samples: one
-// of each block of 2, and the others. A value decides all samples within its reach; in an even field it is calm where all
+// of each block of 2, and the others. A value decides all samples within its reach; in an escape-time field it is calm where all
 // around has one sign, and less is enough. Then closure: where two neighbours differ in sign and one of them is only implied,
 // it is evaluated, until no such pair is left. So every edge that the contour crosses has two evaluated ends.
-class Slab : public Tiles {
+class Slab : private Tiles {
  public:
     // ny, nx: lattice points. z: of the layers, scene units.
-    Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const Bounds& bounds, const Frame& frame,
+    Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const ProbeBounds& bounds, const Frame& frame,
          std::vector<double> z, int ny, int nx);
     Slab(const Slab&) = delete;
     ~Slab() { memory_->give(std::move(*this)); }
@@ -84,13 +84,14 @@ class Slab : public Tiles {
         each(up & kLastRow, [&](int bit) { visit(64 + bit, own[bit], upper[bit - 56]); });
     }
 
+    const Tiles& tiles() const { return *this; }
     // How many times smaller inside values are than outside ones; 0 where `cross` says where edges are crossed.
-    float scale = 0;
+    float scale() const { return scale_; }
     // The inside area of a cell with the corner or bend that it has.
     float sharpened(int32_t tile, int bit, float area) const {
         return sharp[tile] >> bit & 1 ? std::clamp(area + tips[tile][bit], 0.f, 1.f) : area;
     }
-    int64_t evaluations = 0;
+    int64_t evaluations() const { return evaluations_; }  // of the field, so far
 
  private:
     struct Block {
@@ -148,6 +149,7 @@ class Slab : public Tiles {
     std::vector<Place> torn() const;
     void close();
     struct Differing;
+    bool is_closed() const;  // whether every edge that the contour crosses has two evaluated ends
     void ask(std::vector<int32_t>& active, std::vector<int32_t>& again);
     void enlarge(int32_t t, std::vector<int32_t>& active, std::vector<int32_t>& again);
     void corners();
@@ -155,18 +157,18 @@ class Slab : public Tiles {
     std::vector<Edge> edges() const;
     Middles middles(int32_t step) const;
     float inside_scale();
-    void settle(const std::vector<Edge>& edges);
+    void project(const std::vector<Edge>& edges);
     void sharpen();
     void put_tip(int row, int column, float area);
 
     std::shared_ptr<Memory> memory_;
     std::shared_ptr<const Field> field_;
-    Bounds bounds_;
+    ProbeBounds bounds_;
     Frame frame_;
     std::vector<double> z_;
     std::vector<std::array<int, 2>> groups_, pairs_;  // first and last of layers that share blocks of 8 pixels, or of 4
     std::vector<float> x_, y_;               // of lattice points
-    std::optional<Discs> discs_, centres_;  // in fields that are not even
+    std::optional<Discs> discs_, centres_;  // in fields that are not of escape time alone
     double diagonal_;  // of a pixel, squared, in lesser steps
     std::vector<Block> blocks_;  // of 16 pixels, that are not decided
     Rows<Column> columns_;         // of the group
@@ -177,11 +179,13 @@ class Slab : public Tiles {
     std::vector<float> middles_;   // values in the middles of places, NaN between uses
     std::vector<uint64_t> decided_;  // of opened tiles: what a value that reaches there implies, or what is known
     Rows<Ask> asks_;  // for use within a step
-    // Of tiles in an even field: the signs of blocks of 2, and of those in their rows; the blocks whose value is enough where
+    // Of tiles in an escape-time field: the signs of blocks of 2, and of those in their rows; the blocks whose value is enough where
     // it is calm.
     std::vector<uint32_t> halves_, rows_;
     std::vector<uint64_t> enough_;
     int ty_, tx_;
+    float scale_ = 0;
+    int64_t evaluations_ = 0;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace fracslice {
+namespace fracslice::slices {
 
 void Tiles::push(const Place& at, uint64_t signs) {
     place.push_back(at), beside.emplace_back(), inside.push_back(signs), known.push_back(0), sharp.push_back(0);
@@ -76,4 +76,4 @@ Discs::Discs(double dx, double dy, double aside) {
         }
 }
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace fracslice {
+namespace fracslice::slices {
 
 constexpr int kTile = 8;
 constexpr uint64_t kAll = ~uint64_t(0);
@@ -86,4 +86,4 @@ class Discs {
     std::array<std::array<uint64_t, 64>, kMost + 1> discs_;
 };
 
-}  // namespace fracslice
+}  // namespace fracslice::slices

@@ -19,9 +19,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
-from fracslice.render import Renderer, linking
-from fracslice.render.cpu import ordered
-from fracslice.render.units.random import hashed
+from fracslice.kernel.loop_linker import link_loops
+from fracslice.rendering import Renderer, packets
+from fracslice.rendering.cpu import ordered
+from fracslice.rendering.units.random import hashed
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work
 
@@ -94,10 +95,12 @@ def ours(root: Node, view: View, exact: np.ndarray) -> Curve:
 
 def random(root: Node, view: View, exact: np.ndarray) -> Curve:
     """By the same units, but for the two that make the numbers."""
-    kept, linking.sample, linking.centred = (linking.sample, linking.centred), sample, centred
+    kept, packets.sample, packets.centred = (packets.sample, packets.centred), sample, centred
+    link_loops.cache_clear()
     made = renderer(root, view)
     table = np.random.default_rng(1).integers(0, 2**32, (ROUNDS + 1, 64), np.uint32)
-    linking.sample, linking.centred = kept
+    packets.sample, packets.centred = kept
+    link_loops.cache_clear()
     made.tracer._points = np.ascontiguousarray(table[:, : made.tracer.frame.samples]).view(np.int32)
     curve, spent, start = [], 0.0, time.process_time()
     for n, mean in enumerate(rounds(made, ROUNDS), 1):

@@ -16,7 +16,7 @@ from fracslice.formulas import Node
 from fracslice.kernel import compile_scene
 from fracslice.scene.view import Camera
 from tests.examples import EXAMPLES
-from tests.render.rays import directions, distances
+from tests.rendering.rays import directions, distances
 
 SIDE, POINTS = 320, 500
 

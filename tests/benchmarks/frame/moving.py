@@ -17,9 +17,9 @@ from dataclasses import replace
 import numpy as np
 
 from fracslice import read
-from fracslice.render import Renderer
-from fracslice.render.cpu import ordered
-from fracslice.render.progressive import STEPS
+from fracslice.rendering import Renderer
+from fracslice.rendering.cpu import ordered
+from fracslice.rendering.progressive import STEPS
 from fracslice.scene import library
 from fracslice.scene.view import Camera
 

@@ -16,8 +16,9 @@ import time
 import numpy as np
 
 from fracslice.formulas import mandelbulb
-from fracslice.render.cpu import BLOCK, CpuTracer, ordered
-from fracslice.render.linking import link_frame, optics
+from fracslice.rendering.cpu import BLOCK, CpuTracer, ordered
+from fracslice.rendering.linking import link_frame
+from fracslice.rendering.optics import optics
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 

@@ -14,9 +14,10 @@ import numpy as np
 
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
-from fracslice.render.cpu import BLOCK, CpuTracer, ordered
-from fracslice.render.cuda import CudaTracer
-from fracslice.render.linking import Frame, link_frame, optics
+from fracslice.rendering.cpu import BLOCK, CpuTracer, ordered
+from fracslice.rendering.cuda import CudaTracer
+from fracslice.rendering.linking import Frame, link_frame
+from fracslice.rendering.optics import optics
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 

@@ -17,9 +17,9 @@ import numpy as np
 from fracslice.export.images import write_image
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
-from fracslice.render import Renderer
-from fracslice.render.cpu import ordered
-from fracslice.render.progressive import GROWTH, STEPS
+from fracslice.rendering import Renderer
+from fracslice.rendering.cpu import ordered
+from fracslice.rendering.progressive import GROWTH, STEPS
 from fracslice.scene.view import Camera, Film, Light, View
 
 VIEW = View(

@@ -10,7 +10,7 @@ import time
 from fracslice.formulas import Node, bounds, box, sphere, transform, union
 from fracslice.kernel import compiler, link
 from fracslice.kernel.host import REGISTERS, host, lane_count
-from fracslice.kernel.loops import BRICKS, POINTS
+from fracslice.kernel.loops import bricks, points
 
 
 def nested(depth: int) -> Node:
@@ -47,7 +47,7 @@ def cost(root: Node) -> float:
     for _ in range(5):
         start = time.process_time()
         target = compiler.Target(32, lane_count(32), REGISTERS, *host())
-        compiler.compile_object(link(root), target, (POINTS, BRICKS))
+        compiler.compile_object(link(root), target, (points, bricks))
         took.append(time.process_time() - start)
     return sorted(took)[2]
 

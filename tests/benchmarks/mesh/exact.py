@@ -16,7 +16,6 @@ import numpy as np
 
 from fracslice._native import Cells, Contouring
 from fracslice.formulas import Node
-from fracslice.kernel import compile_scene
 from fracslice.mesh.extract import contour, extract, minimum_edge_parameter
 from fracslice.scene.reader import read
 from fracslice.volume import plan, sample_scene
@@ -95,7 +94,7 @@ def main() -> None:
         )
         samples, plain, exact = seconds[:, :3].T
         mesh = contour(planned.root, bricks)
-        off = np.abs(compile_scene(planned.root, "float64").points(*mesh.vertices.T)) / planned.voxel
+        off = np.abs(planned.root.kernel("cpu", "float64").points(*mesh.vertices.T)) / planned.voxel
         row = (*seconds[0], *((samples + exact) / (samples + plain)))
         print(f"{name:18}" + " ".join(f"{x:9.3f}" for x in row), f"{off.mean():9.1e} {off.max():9.1e}")
 

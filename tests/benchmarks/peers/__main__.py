@@ -1,6 +1,6 @@
 """Run time against error, ours and all peers that are installed: ``python -m tests.benchmarks.peers``.
 
-The C++ programs are built first. With --write the table and the picture go where docs/accuracy.md shows them.
+The C++ programs are built first. With --write the table and the picture go where docs/measurements.md shows them.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         write_report(found, Path(folder))
         if given.write:
-            shutil.copyfile(Path(folder, "error.png"), PAGE.parent / "bench/error.png")
+            shutil.copyfile(Path(folder, "error.png"), PAGE.parent / "figures/error.png")
 
 
 if __name__ == "__main__":

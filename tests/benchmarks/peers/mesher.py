@@ -21,7 +21,6 @@ from fracslice.bench.measure import WARM
 from fracslice.bench.methods import grid
 from fracslice.bench.workloads import WORKLOADS, Workload
 from fracslice.export import write
-from fracslice.kernel import compile_scene
 from fracslice.mesh import Mesh
 from fracslice.work import Work
 
@@ -48,7 +47,7 @@ def by_sdf(what: Workload, resolution: int) -> Told:
     """sdf (Fogleman): batches skipped by |f|, which is taken for a distance: f / L is one."""
     import sdf
 
-    kernel, bound, count = compile_scene(what.root), what.root.bounds.lipschitz, 0
+    kernel, bound, count = what.root.kernel(), what.root.bounds.lipschitz, 0
 
     def field(p: np.ndarray) -> np.ndarray:
         nonlocal count
@@ -69,7 +68,7 @@ def by_isomesh(what: Workload, resolution: int) -> Told:
     """
     import isomesh
 
-    kernel, count, depth = compile_scene(what.root, "float64"), 0, resolution.bit_length() - 1
+    kernel, count, depth = what.root.kernel("cpu", "float64"), 0, resolution.bit_length() - 1
 
     def field(p: np.ndarray) -> tuple[np.ndarray, None]:
         nonlocal count

@@ -23,7 +23,6 @@ from fracslice.export.jobs import SliceRun
 from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb
 from fracslice.job import peak_rss_mb
-from fracslice.kernel import compile_scene
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.printers import printer
 from fracslice.slicing.raster import Screen
@@ -47,7 +46,7 @@ def part(stack: Stack, layers: Sequence[int]) -> Stack:
 def dense(stack: Stack, rows: int, columns: int) -> float:
     """Processor seconds for each pixel of all layers, in order, on all cores as the job; measured on a tenth
     of the rows of a few layers, the screen laid over the object's box."""
-    kernel, z = compile_scene(stack.root), stack.z[:: max(1, len(stack.z) // LOOKED_AT)].astype(np.float32)
+    kernel, z = stack.root.kernel(), stack.z[:: max(1, len(stack.z) // LOOKED_AT)].astype(np.float32)
     x, y = (np.linspace(-1.1, 1.1, n, dtype=np.float32) for n in (columns, rows // 10))
     x, y = (a.ravel() for a in np.meshgrid(x, y))
     planes = [np.full_like(x, height) for height in z]

@@ -15,8 +15,9 @@ import numpy as np
 from fracslice.formulas import Node, mandelbulb, material, sphere, transform, union
 from fracslice.kernel import compile_scene, link
 from fracslice.kernel.linker import CALLED, FIELD, Linked
-from fracslice.render.linking import link_frame, optics
-from fracslice.render.waves import loops
+from fracslice.rendering.linking import link_frame
+from fracslice.rendering.optics import optics
+from fracslice.rendering.packets import loops
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
 from fracslice.volume import Lattice, sample
 from fracslice.volume.bricks import INSIDE, Bricks
@@ -100,9 +101,8 @@ def code() -> Iterator[list[object]]:
     for name, (root, view) in pictures.items():
         whole = View(**{**plain, **view})  # type: ignore[arg-type]
         seen = whole.camera or camera
-        frame = link_frame(root, whole, seen, optics(seen, (32, 32), root, 1e-7), 8)
-        linked, entries = loops(frame, 4)
-        yield [name, _instructions(linked, entries)]
+        frame = link_frame(root, whole, seen, optics(seen, (32, 32), root, 1e-7), 4)
+        yield [name, _instructions(frame.linked, loops(frame))]
 
 
 def _instructions(linked: Linked, *entries: object) -> int:

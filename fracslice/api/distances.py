@@ -1,0 +1,49 @@
+"""The field of a shape at points."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError
+from ..formulas import Node
+from ..formulas.parameters import AUTO
+from ..volume import with_depths
+from ..work import Work, chunks
+
+
+def distance(shape: Node, points: ArrayLike) -> NDArray[np.floating]:
+    """As `Node.distance`."""
+    array = _points(points)
+    kernel = _with_depths(shape).kernel("cpu", "float32" if array.dtype == np.float32 else "float64")
+    flat, found = array.reshape(-1, 3), np.empty(array.size // 3, array.dtype)
+
+    def evaluate(part: slice) -> None:
+        found[part] = kernel.points(*flat[part].T)
+
+    Work().map(evaluate, chunks(len(flat), kernel.batch))
+    return found.reshape(array.shape[:-1])
+
+
+def _points(points: ArrayLike) -> NDArray[np.floating]:
+    """An array of float32 or float64, [..., 3]."""
+    try:
+        array = np.asarray(points)
+        array = array if array.dtype == np.float32 else array.astype(np.float64, casting="same_kind")
+    except (TypeError, ValueError):
+        raise SceneError("points: expected numbers, an array [..., 3]") from None
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise SceneError(f"points: expected an array [..., 3], found one of shape {list(array.shape)}")
+    return array
+
+
+@lru_cache(maxsize=32)
+def _with_depths(shape: Node) -> Node:
+    """The shape with every depth a number. Raises `SceneError` where none follows from the shape."""
+    known = with_depths(shape)
+    for node in known.walk():
+        if AUTO in (value for value in node.values.values() if isinstance(value, str)):
+            raise node.fail("iterations: expected a number where the shape has no end")
+    return known

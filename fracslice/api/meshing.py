@@ -1,0 +1,172 @@
+"""A shape becomes a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Unpack
+
+from ..errors import SceneError
+from ..job import make_mesh as make_mesh_job
+from ..mesh import Mesh
+from ..meshjob import MeshJob
+from ..scene import Scene, parse_length
+from ..work import Work
+from .options import Length, Options, keywords, print_of, work_of
+from .sources import Source, as_scene, found
+
+if TYPE_CHECKING:
+    from ..finishing import Placement
+    from ..job import Result as Made
+    from ..kernel import Field
+    from ..report import Report
+    from ..volume import Bricks
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Mesh):
+    """A mesh in mm, standing on z = 0, with what is known of it.
+
+    made: the job's own result. A mesh larger than memory is only in the file that was written.
+    """
+
+    made: Made
+
+    @classmethod
+    def of(cls, made: Made) -> Result:
+        """The result of a job."""
+        found = cls.__new__(cls)
+        vars(found).update(made=made)
+        if made.whole is not None:
+            vars(found).update(vertices=made.whole.vertices, triangles=made.whole.triangles)
+        return found
+
+    def __getattr__(self, name: str) -> Any:
+        """Vertices and triangles that were not kept: raises `TooLargeError`."""
+        if name in ("vertices", "triangles"):
+            return getattr(self.made.mesh, name)
+        raise AttributeError(name)
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh alone."""
+        return self.made.mesh
+
+    @property
+    def report(self) -> Report:
+        """What was made, how good it is and what it took."""
+        return self.made.report
+
+    @property
+    def root(self) -> Field:
+        """The field that was meshed."""
+        return self.made.root
+
+    @property
+    def place(self) -> Placement:
+        """The map from the scene to the mesh."""
+        return self.made.place
+
+    @property
+    def bricks(self) -> Bricks:
+        """Samples of the field where the mesh was made, scene units; taken when first asked for."""
+        return self.made.bricks
+
+
+@keywords
+def make_mesh(
+    shape: Source,
+    what: MeshJob | None = None,
+    work: Work | None = None,
+    *,
+    size: Length | None = None,
+    resolution: float | None = None,
+    voxel: Length | None = None,
+    chord: Length | None = None,
+    simplify: Length | None = None,
+    dust: float | None = None,
+    path: str | Path | None = None,
+    **options: Unpack[Options],
+) -> Result:
+    """Make a printable mesh of a shape.
+
+    Lengths are numbers of mm, or text such as "0.5mm". Keywords stand for the fields of `MeshJob`, `Print`
+    and `Work`, and count more than those of the records and of the scene.
+
+    Parameters
+    ----------
+    shape : Node, Scene, str or path
+        A shape such as ``sphere(0.5) - box()``, a scene, a scene file, or the name of a shipped scene or a
+        formula.
+    what : MeshJob, optional
+        What to make, as a record.
+    work : Work, optional
+        How to make it, as a record.
+    size : float or str, optional
+        The longest side. A scene has its own; without one, a scene unit of a shape is a millimetre.
+    resolution : float, optional
+        Voxels along the longest side; 256 if neither this nor `voxel` is given.
+    voxel : float or str, optional
+        The voxel's size.
+    chord : float or str, optional
+        More triangles where the surface bends farther than this from them.
+    simplify : float or str, optional
+        Fewer triangles, nowhere farther off than this.
+    dust : float, optional
+        Bodies of less volume are dropped, mm3; 1e-5 of the whole if not given.
+    path : str or path, optional
+        The file to write, of the kind that its name ends in. An .stl file may be larger than memory: the
+        mesh is then in that file only, and `TooLargeError` is raised where its vertices are asked for.
+    cavities, keep, bridge, gap, thickness, hollow, drain, base, raft : optional
+        What makes the object printable, as the fields of `Print`.
+    threads : int, optional
+        How many threads to use; one for each core if not given.
+    progress : callable, optional
+        Called as ``progress(stage, share)`` from time to time, the share from 0 to 1.
+    cancel : threading.Event, optional
+        Stops the work with `Cancelled` once it is set.
+    device : {"cpu", "cuda", "auto"}, optional
+        What samples the field.
+
+    Returns
+    -------
+    Result
+        The mesh, in mm, and its `report`. A mesh that would not print is returned, too; the report says why.
+
+    Raises
+    ------
+    SceneError
+        For a shape, a name or a value that cannot be.
+    VolumeError, MeshError
+        For a field without a surface, or too large a job.
+    ExportError
+        For a file that cannot be written.
+    TypeError
+        For an unknown keyword.
+    Cancelled
+        When somebody asked to stop.
+
+    Examples
+    --------
+    >>> from fracslice import box, make_mesh, sphere
+    >>> mesh = make_mesh(box((10, 10, 10)) - sphere(6), resolution=32)
+    >>> mesh.is_watertight, mesh.size.round(3).tolist()
+    (True, [10.0, 10.0, 10.0])
+    >>> mesh.report.problems
+    ()
+    >>> make_mesh("menger-sponge", size="2cm", resolution=27).size.round(3).tolist()
+    [20.0, 20.0, 20.0]
+    """
+    lengths = {"size": size, "voxel": voxel, "chord": chord, "simplify": simplify}
+    given: dict[str, Any] = {
+        f"{name}_mm": parse_length(value, name) for name, value in lengths.items() if value is not None
+    }
+    others = {"resolution": resolution, "dust_mm3": dust}
+    given |= {name: value for name, value in others.items() if value is not None}
+    job, how = replace(what or MeshJob(), **given), work_of(options, work)
+    source = found(shape)
+    scene = as_scene(source, job.size_mm, how)
+    printing = print_of(replace(scene, printing=job.how(scene)), options)
+    if printing.keep == "largest" and job.size_mm is None and not isinstance(source, Scene):
+        raise SceneError("keep='largest': expected a size, too, such as size='40mm', of the body that stays")
+    return Result.of(make_mesh_job(scene, replace(job, printing=printing), how, path))

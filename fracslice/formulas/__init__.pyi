@@ -1,0 +1,471 @@
+# Made from the registry of formulas by `python docs/generate.py`; do not edit.
+from collections.abc import Sequence
+from typing import Literal, Union
+
+from .box import Box as Box
+from .parameters import Axis as Axis
+from .parameters import Choice as Choice
+from .parameters import Count as Count
+from .parameters import Number as Number
+from .parameters import Vector as Vector
+from .registry import Fixed as Fixed
+from .registry import Formula as Formula
+from .registry import Node as Node
+from .registry import csg_operator as csg_operator
+from .registry import domain_operator as domain_operator
+from .registry import get as get
+from .registry import names as names
+from .registry import shape as shape
+from .vocabulary import absolute as absolute
+from .vocabulary import any_of as any_of
+from .vocabulary import atan2 as atan2
+from .vocabulary import cos as cos
+from .vocabulary import exp as exp
+from .vocabulary import floor as floor
+from .vocabulary import log as log
+from .vocabulary import maximum as maximum
+from .vocabulary import minimum as minimum
+from .vocabulary import ratio as ratio
+from .vocabulary import rsqrt as rsqrt
+from .vocabulary import sin as sin
+from .vocabulary import sqrt as sqrt
+from .vocabulary import where as where
+
+def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
+    """A straight axis made an arc (Barr 1984, "Global and Local Deformations of Solid Primitives").
+
+    In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is looked
+    at in theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; at half the smallest
+    radius r that the element reaches, L = 2 / (curvature r) times the element's. Nearer than that, and near
+    the cut opposite to it, the value is a distance to the sector that holds the element.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    degrees : a number
+        how far to turn per unit of length along the bent axis
+    axis : "x", "y" or "z", default 'z'
+        the hinge, which stays straight: z bends x towards y, x bends y towards z, y bends z towards x
+
+    Returns
+    -------
+    Node
+    """
+
+def bounds(*elements: Node, min: Sequence[float], max: Sequence[float]) -> Node:
+    """What is inside a box; the element is not looked at far from it, however much of it there is.
+
+    L = max of 1, which is the box', and the element's.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    min : 3 numbers
+        the corner with the smallest coordinates
+    max : 3 numbers
+        the corner with the largest coordinates
+
+    Returns
+    -------
+    Node
+    """
+
+def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> Node:
+    """A box around the origin, its edges sharp or rounded. L = 1: a distance.
+
+    Parameters
+    ----------
+    size : 3 numbers > 0, default (1.0, 1.0, 1.0)
+        the three edge lengths
+    round : a number >= 0, default 0.0
+        radius of the rounded edges and corners, within the size
+
+    Returns
+    -------
+    Node
+    """
+
+def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.0, 0.0, 0.5), radius: float = 0.25) -> Node:
+    """All points within the radius of a segment. L = 1: a distance.
+
+    Parameters
+    ----------
+    from_ : 3 numbers, default (0.0, 0.0, -0.5)
+        centre of one end
+    to : 3 numbers, default (0.0, 0.0, 0.5)
+        centre of the other end
+    radius : a number > 0, default 0.25
+        the radius
+
+    Returns
+    -------
+    Node
+    """
+
+def cone(radius: float = 0.5, height: float = 1.0) -> Node:
+    """A cone along the z axis, its tip up. L = 1: a distance.
+
+    Parameters
+    ----------
+    radius : a number > 0, default 0.5
+        radius of the base
+    height : a number > 0, default 1.0
+        from the base up to the tip along z, centred at the origin
+
+    Returns
+    -------
+    Node
+    """
+
+def cylinder(radius: float = 0.5, height: float = 1.0) -> Node:
+    """A cylinder along the z axis, with flat ends. L = 1: a distance.
+
+    Parameters
+    ----------
+    radius : a number > 0, default 0.5
+        the radius
+    height : a number > 0, default 1.0
+        the height along z, centred at the origin
+
+    Returns
+    -------
+    Node
+    """
+
+def difference(*elements: Node, smooth: float = 0.0) -> Node:
+    """The first element without the others. L = max of theirs, as of a union.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is made of.
+    smooth : a number >= 0, default 0.0
+        width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)
+
+    Returns
+    -------
+    Node
+    """
+
+def intersection(*elements: Node, smooth: float = 0.0) -> Node:
+    """What is in all of the elements. L = max of theirs, as of a union.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is made of.
+    smooth : a number >= 0, default 0.0
+        width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)
+
+    Returns
+    -------
+    Node
+    """
+
+def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0) -> Node:
+    """The solid filled Julia set of q^2 + c in the quaternions, cut at k = 0.
+
+    Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
+    1989, "Ray Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is
+    Koebe's bound for connected complex Julia sets; one that falls apart has its derivative taken at a larger
+    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/accuracy.md`. What is returned is
+    held still from the escape on; w itself runs on, and its lanes are not looked at.
+
+    Parameters
+    ----------
+    c : 4 numbers >= -4 and <= 4, default (-0.2, 0.8, 0.0, 0.0)
+        the constant added in each step: real part, i, j, k
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    bailout : a number > 1 and <= 1e+06, default 2.0
+        the solid is where the last step is not larger than this
+
+    Returns
+    -------
+    Node
+    """
+
+def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0, julia: Sequence[float] | None = None) -> Node:
+    """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
+
+    White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
+    w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n): both powers are products,
+    and Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The real part of a
+    square is 2 re^2 minus the squared norm, which is known. Of the azimuth u + iv = e^(2 i phi) is taken,
+    which needs no root, to the power n/2; what is left of rho e^(i n phi) is x + iy where n is odd, else rho.
+
+    The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
+    latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
+    it is taken here, as far out as a point of the solid can come (`escape.farthest`). Beyond, each step leads
+    farther away whatever its direction, so that only how radii stretch matters; there it is faded out.
+    There is no theorem for three dimensions; L = 2 is measured (`docs/accuracy.md`). Where a set falls apart
+    (a constant far out) that fails, and the field is also kept below twice a sure distance,
+    `escape.sure_distance`. A power that is not whole tears space where the azimuth jumps from pi to -pi: no
+    bound holds across the tear, and the guarded field stays below the sure distance from it.
+
+    Parameters
+    ----------
+    power : a number >= 2 and <= 32, default 8.0
+        the exponent; whole numbers need no trigonometry and are several times faster
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    bailout : a number > 1 and <= 1e+06, default 2.0
+        the solid is where the last step is not larger than this
+    julia : 3 numbers >= -4 and <= 4
+        adds this point in each step instead of the start point: a Julia set of the Mandelbulb
+
+    Returns
+    -------
+    Node
+    """
+
+def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+    """What the element inside looks like in pictures. A material further inside takes precedence.
+
+    It is not in the field: L = the element's.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    colour : 3 or 6 or 9 or 12 or 15 or 18 or 21 or 24 numbers >= 0 and <= 1, default (0.8, 0.8, 0.8)
+        red, green and blue; several colours, three numbers each, are a palette for the orbit
+    repeats : a number > 0 and <= 1000, default 1.0
+        how often the palette is run through
+    shift : a number >= 0 and <= 1, default 0.0
+        where in the palette it starts, from 0 to 1
+    specular : a number >= 0 and <= 100, default 0.2
+        strength of the highlight
+    shininess : a number >= 1 and <= 10000, default 32.0
+        sharpness of the highlight
+    glow : a number >= 0 and <= 1000, default 0.0
+        light of its own, in its colour
+    reflect : a number >= 0 and <= 1, default 0.0
+        the part of light that is mirrored head on; more is at grazing angles
+    clear : a number >= 0 and <= 1, default 0.0
+        the part of light that goes through
+    index : a number >= 1 and <= 4, default 1.5
+        how strongly that light is bent: 1.33 water, 1.5 glass, 2.4 diamond
+    absorb : 3 numbers >= 0 and <= 1e+06, default (0.0, 0.0, 0.0)
+        how quickly red, green and blue fade inside, per scene unit
+
+    Returns
+    -------
+    Node
+    """
+
+def menger(level: int = 3) -> Node:
+    """The Menger sponge of any level in the cube [-1, 1]^3.
+
+    Menger 1926; distance: Quilez 2011, "Menger fractal": a box minus, per level, an infinite lattice of
+    crosses. Every term is the distance to its own solid or less, so their maximum has L = 1. Volume 8
+    (20/27)^n, area 4 (2 (20/9)^n + 4 (8/9)^n).
+
+    q is how far a point is from the middle of its cell, in cells; the next level's is |3 q - nearest whole|.
+
+    Parameters
+    ----------
+    level : a whole number from 0 to 20, default 3
+        how often holes are cut; meshes and layers stop at bars of a voxel
+
+    Returns
+    -------
+    Node
+    """
+
+def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
+    """The half of the element on the axis' positive side, and its mirror image.
+
+    L = the element's: folding brings points no further apart.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    axis : "x", "y" or "z"
+        the axis that is mirrored: what is on its positive side also appears on its negative side
+
+    Returns
+    -------
+    Node
+    """
+
+def octahedron(radius: float = 1.0) -> Node:
+    """A regular octahedron around the origin. L = 1: a distance.
+
+    Parameters
+    ----------
+    radius : a number > 0, default 1.0
+        from the centre to each of the six corners
+
+    Returns
+    -------
+    Node
+    """
+
+def offset(*elements: Node, distance: float) -> Node:
+    """The element grown or shrunk; exact where its field is a distance.
+
+    A field that underestimates distances would grow further than it should; it is cut off at the grown box.
+    L = the element's, at least 1, the box'; more around an escape-time fractal, whose field is steeper away
+    from its surface (`Bounds.steepening`; measured). What is shrunk lies in the element: where that is a
+    fractal, whose inside bounds nothing, space is skipped by its own field.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    distance : a number
+        how far outward the surface moves, in scene units; negative: inward
+
+    Returns
+    -------
+    Node
+    """
+
+def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> Node:
+    """The half space behind a plane. L = 1: a distance.
+
+    Parameters
+    ----------
+    normal : 3 numbers, not all zero, default (0.0, 0.0, 1.0)
+        points out of the solid; any length
+    offset : a number, default 0.0
+        distance of the plane from the origin along the normal
+
+    Returns
+    -------
+    Node
+    """
+
+def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 0, 0)) -> Node:
+    """Copies on a lattice. Every copy that can be the nearest is looked at, so cell borders are right.
+
+    Copies further than `gap` are not; the value never exceeds it inside the lattice, so that leaving one out
+    is not seen. A copy's value is at least the distance to its box, for the same reason. L = max of 1 and
+    the element's: all that is left out is larger than `gap`, and minima keep the bound.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    period : 3 numbers > 0
+        distance between copies along x, y and z
+    count : 3 whole numbers >= 0 and <= 1e+06, default (0, 0, 0)
+        copies along x, y and z, centred at the origin; 0: without end
+
+    Returns
+    -------
+    Node
+    """
+
+def shell(*elements: Node, thickness: float) -> Node:
+    """The element made hollow: what is deeper inside than the thickness is taken out. L = the element's.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    thickness : a number > 0
+        of the wall, in scene units; its outer face is the element's surface
+
+    Returns
+    -------
+    Node
+    """
+
+def sphere(radius: float = 1.0) -> Node:
+    """A sphere around the origin. L = 1: a distance.
+
+    Parameters
+    ----------
+    radius : a number > 0, default 1.0
+        the radius
+
+    Returns
+    -------
+    Node
+    """
+
+def torus(radius: float = 1.0, tube: float = 0.25) -> Node:
+    """A torus around the z axis. L = 1: a distance.
+
+    Parameters
+    ----------
+    radius : a number > 0, default 1.0
+        from the centre to the middle of the tube
+    tube : a number > 0, default 0.25
+        radius of the tube
+
+    Returns
+    -------
+    Node
+    """
+
+def transform(*elements: Node, translate: Sequence[float] = (0.0, 0.0, 0.0), rotate: Sequence[float] | None = None, scale: float | Sequence[float] = (1.0,), matrix: Sequence[float] | None = None) -> Node:
+    """Scaled, then rotated, then moved.
+
+    The child's field is multiplied by the smallest stretch of the map, its smallest singular value: f never
+    grows faster than the child's (L = the child's), and is a distance where the scale is uniform.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    translate : 3 numbers, default (0.0, 0.0, 0.0)
+        moves by this, last
+    rotate : 4 numbers
+        an axis and an angle in degrees, counter-clockwise seen against the axis
+    scale : 1 or 3 numbers, default (1.0,)
+        one factor, or one per axis, first
+    matrix : 12 or 16 numbers
+        3 x 4 or 4 x 4 numbers row by row, applied before the other three
+
+    Returns
+    -------
+    Node
+    """
+
+def twist(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
+    """Turned about an axis, further the further along it (Barr 1984, "Global and Local Deformations of Solid
+    Primitives").
+
+    At radius rho space is sheared by s = rate rho, which stretches by (s + sqrt(s^2 + 4)) / 2. With that at
+    5/4 of the element's own radius, L = the product of it and the element's. Beyond, the value is the
+    distance to the cylinder around it.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    degrees : a number
+        how far to turn per unit of length along the axis
+    axis : "x", "y" or "z", default 'z'
+        the axis to turn about
+
+    Returns
+    -------
+    Node
+    """
+
+def union(*elements: Node, smooth: float = 0.0) -> Node:
+    """All that is in any of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
+    quadratic).
+
+    The seam weighs the gradients of the two with weights whose sum is 1, so L = max of theirs; a seam with an
+    escape-time fractal has 1.25 times that, one between several 3 times (measured; `conservative_union` does
+    better).
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is made of.
+    smooth : a number >= 0, default 0.0
+        width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)
+
+    Returns
+    -------
+    Node
+    """

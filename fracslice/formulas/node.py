@@ -1,0 +1,152 @@
+"""An element of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from ..errors import SceneError
+from . import signatures
+from .box import Box
+from .field import Bounds, Device, Field, Kernel, Loops, Precision
+from .operators import Operators
+
+if TYPE_CHECKING:
+    from .registry import Formula
+
+
+@dataclass(frozen=True)
+class Node(Operators, Field):
+    """A formula with its parameters and children: one element of a scene. `place` is "file:line";
+    `is_conservative` is set by `conservative`; `depth` counts nested elements, this one included.
+    """
+
+    formula: Formula
+    values: Mapping[str, Any]
+    children: tuple[Node, ...] = ()
+    place: str | None = field(default=None, compare=False)
+    is_conservative: bool = False
+    depth: int = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "depth", 1 + max((child.depth for child in self.children), default=0))
+
+    def __getitem__(self, parameter: str) -> Any:
+        return self.values[parameter]
+
+    def __repr__(self) -> str:
+        kinds, name = self.formula.parameters, signatures.python_name
+        changed = [f"{name(k)}={v!r}" for k, v in self.values.items() if v != kinds[k].default]
+        return f"{self.formula.name}({', '.join([*map(repr, self.children), *changed])})"
+
+    def __hash__(self) -> int:
+        return hash((self.formula.name, tuple(self.values.items()), self.children))
+
+    def walk(self) -> Iterator[Node]:
+        """This node and all below it, parents first."""
+        left = [self]
+        while left:
+            node = left.pop()
+            yield node
+            left += reversed(node.children)
+
+    def changed(self, children: tuple[Node, ...] | None = None, **values: Any) -> Node:
+        """A copy with other values or children."""
+        kept = self.children if children is None else children
+        return self.formula(*kept, place=self.place, **{**_given(self), **values})
+
+    def conservative(self) -> Node:
+        """The scene by whose field space may be skipped, where its own exceeds its bound: beside the tears of
+        powers that are not whole, and at seams with an escape-time fractal. Only its positive values say
+        something: as much, divided by its own Lipschitz bound, is the distance from the surface at least.
+        """
+        return replace(
+            self, is_conservative=True, children=tuple(child.conservative() for child in self.children)
+        )
+
+    def fail(self, message: str) -> SceneError:
+        """The error to raise about this node: file, line and element, then `message`."""
+        return SceneError(f"{self.place + ': ' if self.place else ''}<{self.formula.name}> {message}")
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """Box, Lipschitz bound and weakness of this field."""
+        hooks, below = self.formula.hooks, [child.bounds for child in self.children]
+        box = hooks["bounds"](self) if "bounds" in hooks else Box.everywhere()
+        slope = (
+            hooks["slope"](self)
+            if "slope" in hooks
+            else max([self.formula.lipschitz, *(b.lipschitz for b in below)])
+        )
+        steepening = (
+            hooks["steepening"](self)
+            if "steepening" in hooks
+            else max((b.steepening for b in below), default=0.0)
+        )
+        names = [*(n for b in below for n in b.boxless), *([] if "bounds" in hooks else [self.formula.name])]
+        exterior_only = self.formula.exterior_only or any(b.exterior_only for b in below)
+        return Bounds(box, slope, exterior_only, steepening, tuple(dict.fromkeys(names)))
+
+    @property
+    def tree(self) -> Node:
+        """`Field.tree`."""
+        return self
+
+    @property
+    def escape_time_only(self) -> bool:
+        """`Field.escape_time_only`."""
+        return all(node.formula.exterior_only for node in self.walk() if node.formula.kind == "shape")
+
+    @property
+    def key(self) -> str:
+        """`Field.key`. All depths must be resolved, as for kernels and loops."""
+        from ..kernel import tree  # a method stands for the function of a layer above
+
+        return tree.key(self)
+
+    def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
+        """`Field.kernel`."""
+        from ..kernel import tree
+
+        return tree.kernel(self, device, precision)
+
+    def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
+        """`Field.loops`."""
+        from ..kernel import tree
+
+        return tree.loops(self, loops, precision)
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What the kernel's function is called with: numbers, tuples of numbers, or `Fixed`."""
+        hook = self.formula.hooks.get("arguments")
+        return hook(self) if hook else dict(self.values)
+
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The function to compile for this node."""
+        hook = self.formula.hooks.get("select")
+        return hook(self) if hook else self.formula.function
+
+    def visible(self, voxel: float) -> Node:
+        """This node without detail that a voxel, in its own units, is too large for; its children as they
+        are.
+        """
+        hook = self.formula.hooks.get("visible")
+        return hook(self, voxel) if hook else self
+
+    @property
+    def is_identity(self) -> bool:
+        hook = self.formula.hooks.get("identity")
+        return bool(hook and hook(self))
+
+    @property
+    def is_unordered(self) -> bool:
+        hook = self.formula.hooks.get("unordered")
+        return bool(hook and hook(self))
+
+
+def _given(node: Node) -> dict[str, Any]:
+    return {name: value for name, value in node.values.items() if value is not None}

@@ -1,0 +1,137 @@
+"""What calling a formula looks like in Python: names, positions, types and a docstring, from the registry."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Mapping, Sequence
+from inspect import Parameter, Signature
+from keyword import iskeyword
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from ..errors import SceneError
+from ..nearest import hint
+from .parameters import REQUIRED, Axis, Choice, Count, Vector
+
+if TYPE_CHECKING:
+    from .registry import Formula
+
+
+def python_name(name: str) -> str:
+    """The name of a parameter in Python: `from` is a keyword, and becomes ``from_`` (PEP 8)."""
+    return f"{name}_" if iskeyword(name) else name
+
+
+def ordered(formula: Formula) -> dict[str, Any]:
+    """The parameters, those without a default first, as Python wants them."""
+    return dict(sorted(formula.parameters.items(), key=lambda item: item[1].default is not REQUIRED))
+
+
+def bound(
+    formula: Formula, positional: tuple[Any, ...], keywords: Mapping[str, Any]
+) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """The elements inside a formula, and its values by the names of its parameters.
+
+    Positional arguments of a shape fill its parameters in order; those of other formulas are elements.
+    Raises `SceneError` for an unknown name, and for a value that is given twice or has no parameter.
+    """
+    names = {python_name(name): name for name in ordered(formula)}
+    given = {names.get(name, name): value for name, value in keywords.items()}
+    for name in given:
+        if name not in formula.parameters:
+            near = hint(name, names) if names else "it has none"
+            raise SceneError(f"<{formula.name}> has no attribute {name!r}; {near}")
+    if formula.kind != "shape":
+        return positional, given
+    if len(positional) > len(names):
+        most = f"at most {len(names)}: {', '.join(names)}" if names else "none"
+        raise SceneError(f"<{formula.name}> has {len(positional)} values: expected {most}")
+    first = dict(zip(names.values(), positional, strict=False))
+    for name in first.keys() & given.keys():
+        raise SceneError(f"<{formula.name}> has two values of {name}: expected one")
+    return (), first | given
+
+
+def signature(formula: Formula) -> Signature:
+    """The signature of a formula as a Python function."""
+    from .registry import Node
+
+    shape = formula.kind == "shape"
+    kind = Parameter.POSITIONAL_OR_KEYWORD if shape else Parameter.KEYWORD_ONLY
+    elements = [] if shape else [Parameter("elements", Parameter.VAR_POSITIONAL, annotation=Node)]
+    values = [
+        Parameter(
+            python_name(name),
+            kind,
+            default=Parameter.empty if parameter.default is REQUIRED else parameter.default,
+            annotation=annotation(parameter),
+        )
+        for name, parameter in ordered(formula).items()
+    ]
+    return Signature([*elements, *values], return_annotation=Node)
+
+
+def annotation(parameter: Any) -> Any:
+    """The type of a parameter's values."""
+    match parameter:
+        case Count(auto=auto):
+            found: Any = int | Literal["auto"] if auto else int
+        case Vector(sizes=sizes, whole=whole):
+            several = Sequence[int] if whole else Sequence[float]
+            found = float | several if 1 in sizes else several
+        case Axis():
+            found = Literal["x", "y", "z"]
+        case Choice(words=words):
+            found = Literal[*words]
+        case _:
+            found = float
+    return found | None if parameter.default is None else found
+
+
+def docstring(formula: Formula) -> str:
+    """The docstring of a formula with its parameters, as numpydoc has it."""
+    lines = [inspect.cleandoc(formula.doc)]
+    if formula.kind != "shape" or formula.parameters:
+        lines += ["", "Parameters", "----------"]
+    if formula.kind != "shape":
+        lines += ["*elements : Node", f"    {_ELEMENTS[formula.children[1] == 1]}"]
+    for name, parameter in ordered(formula).items():
+        default = "" if parameter.default in (REQUIRED, None) else f", default {parameter.default!r}"
+        lines += [f"{python_name(name)} : {parameter.expects}{default}", f"    {parameter.doc}"]
+    return "\n".join([*lines, "", "Returns", "-------", "Node"])
+
+
+_ELEMENTS = {True: "What it is applied to; several are a union.", False: "What it is made of."}
+
+
+def stub() -> str:
+    """The stub file of `fracslice.formulas`: every formula as a function, everything else as it is."""
+    from .registry import get, names
+
+    package = Path(__file__).with_name("__init__.py")
+    imports = [
+        n for n in ast.parse(package.read_text(encoding="utf-8")).body if isinstance(n, ast.ImportFrom)
+    ]
+    formulas = [name for name in names() if get(name).function.__module__.startswith(__package__)]
+    lines = [_HEAD]
+    for node in imports:
+        kept = sorted(f"{a.name} as {a.name}" for a in node.names if a.name not in formulas)
+        lines += [f"from .{node.module} import {name}" for name in kept]
+    return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in formulas)]) + "\n"
+
+
+_HEAD = """\
+# Made from the registry of formulas by `python docs/generate.py`; do not edit.
+from collections.abc import Sequence
+from typing import Literal, Union
+"""
+
+
+def _function(formula: Formula) -> str:
+    """A formula in a stub file."""
+    text = str(signature(formula))
+    for module in ("fracslice.formulas.registry.", "collections.abc."):
+        text = text.replace(module, "")
+    body = docstring(formula).replace("\n", "\n    ").replace("\n    \n", "\n\n")
+    return f'def {formula.name}{text}:\n    """{body}\n    """'

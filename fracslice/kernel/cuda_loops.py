@@ -1,0 +1,32 @@
+"""Loops around a field on CUDA, one thread a point: what `loops` has for the lanes."""
+
+from __future__ import annotations
+
+from ..formulas.vocabulary import where
+from .cuda_stubs import kernel, real, thread, whole
+from .intrinsics import field
+
+
+@kernel
+def points(P, X, Y, Z, F):
+    """Field values at points; a point with a NaN gives NaN."""
+    i = thread()
+    if i < F.size:
+        x = X[i]
+        y = Y[i]
+        z = Z[i]
+        f = field(x, y, z, P)
+        F[i] = where((x == x) & (y == y) & (z == z), f, x + y + z)
+
+
+@kernel
+def bricks(P, ox, oy, oz, h, corners, F):
+    """512 samples of each brick, at ``(ox, oy, oz) + h * (corner + offset)``."""
+    i = thread()
+    b = i >> 9
+    s = i & 511
+    if b < F.shape[0]:
+        x = real(whole(corners[b, 0] + (s >> 6))) * h + ox
+        y = real(whole(corners[b, 1] + (s >> 3 & 7))) * h + oy
+        z = real(whole(corners[b, 2] + (s & 7))) * h + oz
+        F[b, s] = field(x, y, z, P)

@@ -1,0 +1,210 @@
+"""Loops and the functions that they call as trees that the compilers take, each line where it stands in its
+file.
+
+Numbers that a function takes from elsewhere (of its module, of an enumeration, of a fixed record) become
+constants, and branches on constants the one that is taken. A function that is called with fixed arguments is
+a copy of its own. Intrinsics and the words of the formulas keep their names.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import copy
+import inspect
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from types import FunctionType
+from typing import Any, NoReturn
+
+from ..errors import KernelError
+from . import language
+from .intrinsics import is_intrinsic
+from .loops import Loop
+
+OF_LOOPS = "l_"
+"""What the names of functions that loops call begin with, so that they are no formula's and no unit's."""
+
+Fixed = tuple[tuple[str, Any], ...]
+
+
+@dataclass(frozen=True)
+class LinkedFunction:
+    """A function that calls linked functions and intrinsics only. file: where its lines are."""
+
+    tree: ast.FunctionDef
+    file: str
+
+
+@lru_cache(maxsize=32)
+def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
+    """Loops and the functions that they call, by name. Raises `KernelError`."""
+    linker = _LoopLinker()
+    for loop in loops:
+        linker.linked(loop.function, loop.fixed, loop.name)
+    return linker.functions
+
+
+def loop_source(loops: Sequence[Loop]) -> str:
+    """The text of loops and of the functions that they call."""
+    return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
+
+
+@dataclass
+class _LoopLinker:
+    functions: dict[str, LinkedFunction] = field(default_factory=dict)
+    names: dict[tuple[Callable[..., Any], Fixed], str] = field(default_factory=dict)
+
+    def linked(self, function: Callable[..., Any], fixed: Fixed, name: str) -> str:
+        """Links a function once for the same fixed arguments; returns its name: a longer one if that is
+        taken."""
+        if (function, fixed) not in self.names:
+            while name in self.names.values():
+                name += "_"
+            self.names[function, fixed] = name
+            tree = _Resolver(self, function, dict(fixed)).tree(name)
+            self.functions[name] = LinkedFunction(tree, function.__code__.co_filename)
+        return self.names[function, fixed]
+
+
+_UNKNOWN = object()
+
+
+class _Resolver(ast.NodeTransformer):
+    """Gives a function's names from elsewhere their values."""
+
+    def __init__(self, linker: _LoopLinker, function: Callable[..., Any], fixed: dict[str, Any]) -> None:
+        self.linker, self.function, self.fixed = linker, function, fixed
+        self.scope = language.scope(function)
+        self.local: set[str] = set()
+
+    def tree(self, name: str) -> ast.FunctionDef:
+        """The function under another name, without its fixed arguments."""
+        tree = _parsed(self.function)
+        stored = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        arguments = [a.arg for a in tree.args.args if a.arg not in self.fixed]
+        self.local = {*stored, *arguments}
+        tree.name, tree.returns = name, None
+        tree.args = ast.arguments([], [ast.arg(a) for a in arguments], None, [], [], None, [])
+        tree.body = self.statements(tree.body[1:] if ast.get_docstring(tree) is not None else tree.body)
+        tree.decorator_list = [mark for mark in tree.decorator_list if isinstance(mark, ast.Name)]
+        return ast.fix_missing_locations(tree)
+
+    def fail(self, node: ast.AST, message: str) -> NoReturn:
+        code = self.function.__code__
+        line = getattr(node, "lineno", code.co_firstlineno)
+        raise KernelError(f"{code.co_filename}:{line}: loop {self.function.__name__}: {message}")
+
+    def known(self, node: ast.expr) -> Any:
+        """The value of what is the same whenever the loop runs."""
+        match node:
+            case ast.Name(name) if name in self.fixed:
+                return self.fixed[name]
+            case ast.Name(name) if name not in self.local:
+                return self.scope.get(name, _UNKNOWN)
+            case ast.Attribute(record, name):
+                return getattr(self.known(record), name, _UNKNOWN)
+        return _UNKNOWN
+
+    # --- names ---
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        return node if self.is_local(node) or node.id == "WIDTH" else self.resolved(node)
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        local = any(self.is_local(n) for n in ast.walk(node) if isinstance(n, ast.Name))
+        return self.generic_visit(node) if local else self.resolved(node)
+
+    def is_local(self, node: ast.Name) -> bool:
+        return node.id in self.local and node.id not in self.fixed
+
+    def resolved(self, node: ast.Name | ast.Attribute) -> ast.AST:
+        value = self.known(node)
+        found: ast.expr
+        if isinstance(value, (bool, float)):
+            found = ast.Constant(value)
+        elif isinstance(value, int):
+            found = ast.Constant(int(value))
+        elif isinstance(node, ast.Name) and value is getattr(builtins, node.id, _UNKNOWN):
+            found = ast.Name(node.id, ast.Load())
+        elif name := language.word(value):
+            found = ast.Name(name, ast.Load())
+        elif is_intrinsic(value):
+            found = ast.Name(value.__name__, ast.Load())
+        elif isinstance(value, FunctionType):
+            found = ast.Name(self.linker.linked(value, (), OF_LOOPS + value.__name__), ast.Load())
+        else:
+            self.fail(node, f"{ast.unparse(node)!r} has no value here")
+        return ast.copy_location(found, node)
+
+    # --- calls ---
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        if node.keywords:
+            self.fail(node, f"{ast.unparse(node)!r}: expected arguments by their place")
+        match node:
+            case ast.Call(ast.Name("tuple"), [ast.GeneratorExp(element, [generator])]):
+                return self.unrolled(node, element, generator)
+        called = self.known(node.func)
+        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.word(called):
+            return self.generic_visit(node)
+        fixed, passed = [], []
+        for parameter, argument in zip(language.parameters(called), node.args, strict=False):
+            value = self.known(argument)
+            if value is _UNKNOWN or isinstance(value, (int, float)):
+                passed.append(self.visit(argument))
+            else:
+                fixed.append((parameter, value))
+        passed += map(self.visit, node.args[len(fixed) + len(passed) :])
+        name = self.linker.linked(called, tuple(fixed), OF_LOOPS + called.__name__)
+        return ast.copy_location(ast.Call(ast.Name(name, ast.Load()), passed, []), node)
+
+    def unrolled(self, node: ast.Call, element: ast.expr, generator: ast.comprehension) -> ast.AST:
+        """A tuple of as many elements as are known."""
+        match generator:
+            case ast.comprehension(ast.Name(counter), ast.Call(ast.Name("range"), [limit]), []):
+                match self.visit(limit):
+                    case ast.Constant(int(count)):
+                        elements = [self.element(element, counter, k) for k in range(count)]
+                        return ast.copy_location(ast.Tuple(elements, ast.Load()), node)
+        self.fail(node, "expected a range that is known when the loop is compiled")
+
+    def element(self, element: ast.expr, counter: str, k: int) -> ast.expr:
+        outer, self.fixed = self.fixed, {**self.fixed, counter: k}
+        found: ast.expr = self.visit(copy.deepcopy(element))
+        self.fixed = outer
+        return found
+
+    # --- branches ---
+    def statements(self, body: Sequence[ast.stmt]) -> list[ast.stmt]:
+        visited = (self.visit(statement) for statement in body)
+        return [part for found in visited for part in (found if isinstance(found, list) else [found])]
+
+    def visit_If(self, node: ast.If) -> Any:
+        node.test = self.visit(node.test)
+        if isinstance(node.test, ast.Constant):
+            return self.statements(node.body if node.test.value else node.orelse)
+        node.body, node.orelse = self.statements(node.body), self.statements(node.orelse)
+        return node
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
+        self.generic_visit(node)
+        if isinstance(node.op, ast.Not) and isinstance(node.operand, ast.Constant):
+            return ast.copy_location(ast.Constant(not node.operand.value), node)
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> Any:
+        node.test = self.visit(node.test)
+        if isinstance(node.test, ast.Constant):
+            return self.visit(node.body if node.test.value else node.orelse)
+        node.body, node.orelse = self.visit(node.body), self.visit(node.orelse)
+        return node
+
+
+def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
+    """A function's own tree, with the lines of its file."""
+    lines, first = inspect.getsourcelines(function)
+    (tree,) = ast.parse(textwrap.dedent("".join(lines))).body
+    assert isinstance(tree, ast.FunctionDef)
+    ast.increment_lineno(tree, first - 1)
+    return tree

@@ -1,0 +1,128 @@
+// Extraction of surfaces, for fracslice._native.
+#include <algorithm>
+
+#include "../unlocked.h"
+#include "../volume/brick_arrays.h"
+#include "bind_roots.h"
+#include "contour.h"
+
+namespace fracslice::mesh {
+namespace {
+
+using volume::IjkArray, volume::IndexArray, volume::SignsArray, volume::ValuesArray;
+using RootsArray = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using NormalsArray = nb::ndarray<const float, nb::shape<3, -1>, nb::device::cpu>;
+using RootsOut = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using NormalsOut = nb::ndarray<float, nb::shape<3, -1>, nb::device::cpu>;
+
+nb::tuple bind_marching_cubes(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index,
+                              const std::array<double, 3>& origin, double voxel, double margin, int threads) {
+    Bricks bricks = volume::view(ijk, values, index);
+    Surface surface = unlocked(threads, [&] { return marching_cubes(bricks, {origin, voxel, margin}); });
+    size_t n = surface.vertices.rows, m = surface.triangles.rows;
+    return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}));
+}
+
+// The cells of a surface, kept from one piece of it to the next together with the arrays they look into.
+class Cells {
+  public:
+    Cells(const IjkArray& ijk, const SignsArray& signs, const IndexArray& index, int threads)
+        : ijk_(ijk), index_(index), threads_(threads),
+          grid_(unlocked(threads, [&] { return CellGrid(volume::layout(ijk, index), words(ijk, signs)); })) {}
+
+    nb::object segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel) const {
+        if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
+        size_t n = end - begin;
+        Array<double> rows(6, n);
+        {
+            nb::gil_scoped_release released;
+            GridEdges edges;
+            grid_.lay(begin, end, origin, voxel, edges);
+            for (size_t k = 0; k < 3; ++k) {
+                double* to = std::copy(edges.starts[k].begin(), edges.starts[k].end(), &rows.data[k * n]) + 2 * n;
+                for (size_t i = 0; i < n; ++i) to[i] = edges.axis(i) == k ? voxel : 0;
+            }
+        }
+        return to_numpy(std::move(rows), {6, n});
+    }
+
+    void find_crossings(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, const RootLoops& loops,
+                        const RootsOut& t, const NormalsOut& normals) const {
+        if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
+        if (t.shape(0) != end - begin || normals.shape(1) != end - begin) throw nb::value_error("as many rows as crossings");
+        unlocked(threads_, [&] {
+            mesh::find_crossings(grid_, loops, begin, end, origin, voxel, t.data(), normals.data(),
+                                      size_t(normals.stride(0)));
+            return 0;
+        });
+    }
+
+    size_t crossings_before(int layer) const { return grid_.crossings_before(layer); }
+
+    const CellGrid& grid() const { return grid_; }
+    int threads() const { return threads_; }
+
+  private:
+    static std::vector<Signs> words(const IjkArray& ijk, const SignsArray& signs) {
+        if (ijk.shape(0) != signs.shape(0)) throw nb::value_error("ijk and signs differ in length");
+        std::vector<Signs> rows(signs.shape(0));
+        std::copy_n(signs.data(), signs.size(), reinterpret_cast<uint8_t*>(rows.data()));
+        return rows;
+    }
+
+    IjkArray ijk_;
+    IndexArray index_;
+    int threads_;
+    CellGrid grid_;
+};
+
+// The surface in some layers of cells, while it is made.
+class Surfacing {
+  public:
+    Surfacing(const Cells& cells, int first, int last, const std::array<double, 3>& origin, double voxel, double margin)
+        : threads_(cells.threads()), margin_(margin), made_(cells.grid(), {first, last}, {origin, voxel, margin}) {}
+
+    void advance(int end, size_t first, const RootsArray& t, const NormalsArray& normals) {
+        if (t.shape(0) != normals.shape(1)) throw nb::value_error("t and normals differ in length");
+        if (normals.stride(1) != 1) throw nb::value_error("each row of normals contiguous");
+        Hermite data{first, t.shape(0), size_t(normals.stride(0)), t.data(), normals.data(), margin_};
+        unlocked(threads_, [&] { return made_.advance(end, data), 0; });
+    }
+
+    nb::tuple finish() {
+        Contour surface = made_.finish();
+        size_t n = surface.vertices.rows, m = surface.triangles.rows, k = surface.cases.rows;
+        return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
+                              surface.crossings, to_numpy(std::move(surface.cases), {k}),
+                              to_numpy(std::move(surface.to_means), {k, 3}));
+    }
+
+  private:
+    int threads_;
+    double margin_;
+    Contouring made_;
+};
+
+}  // namespace
+
+void bind_contour(nb::module_& module) {
+    using namespace nanobind::literals;
+    module.def("marching_cubes", &bind_marching_cubes, "ijk"_a, "values"_a, "index"_a, "origin"_a, "voxel"_a,
+               "minimum_edge_parameter"_a, "threads"_a = 0);
+    nb::class_<RootLoops>(module, "RootLoops")
+        .def(nb::new_(&root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "field"_a,
+             "steps"_a, "sure"_a);
+    nb::class_<Cells>(module, "Cells")
+        .def(nb::init<const IjkArray&, const SignsArray&, const IndexArray&, int>(),
+             "ijk"_a, "signs"_a, "index"_a, "threads"_a = 0)
+        .def("segments", &Cells::segments, "begin"_a, "end"_a, "origin"_a, "voxel"_a)
+        .def("find_crossings", &Cells::find_crossings, "begin"_a, "end"_a, "origin"_a, "voxel"_a, "loops"_a, "t"_a, "normals"_a)
+        .def("crossings_before", &Cells::crossings_before, "layer"_a);
+    nb::class_<Surfacing>(module, "Contouring")
+        .def(nb::init<const Cells&, int, int, const std::array<double, 3>&, double, double>(),
+             nb::keep_alive<1, 2>(), "cells"_a, "first"_a, "last"_a, "origin"_a, "voxel"_a, "minimum_edge_parameter"_a)
+        .def("advance", &Surfacing::advance, "end"_a, "first"_a, "t"_a, "normals"_a)
+        .def("finish", &Surfacing::finish);
+}
+
+}  // namespace fracslice::mesh

@@ -1,0 +1,58 @@
+// Work in blocks of equal size: what is found in each is put together in order, so that results are the same for any number
+// of threads.
+#pragma once
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace fracslice::mesh {
+
+constexpr size_t kBlock = size_t(1) << 14;
+
+constexpr size_t blocks_of(size_t count) { return (count + kBlock - 1) / kBlock; }
+
+// Calls act(block, first, last) for each block of `count` things.
+template <class Do>
+void for_each_block(size_t count, const Do& act) {
+    tbb::parallel_for(size_t(0), blocks_of(count), [&](size_t k) { act(k, k * kBlock, std::min(count, (k + 1) * kBlock)); });
+}
+
+// What act(first, last) returns for each block of `count` things.
+template <class Part, class Do>
+std::vector<Part> in_blocks(size_t count, const Do& act) {
+    std::vector<Part> parts(blocks_of(count));
+    for_each_block(count, [&](size_t k, size_t first, size_t last) { parts[k] = act(first, last); });
+    return parts;
+}
+
+template <class T>
+std::vector<T> joined(const std::vector<std::vector<T>>& parts) {
+    std::vector<T> all;
+    for (const std::vector<T>& part : parts) all.insert(all.end(), part.begin(), part.end());
+    return all;
+}
+
+// The numbers below `count` for which choose(number) holds, ascending.
+template <class Do>
+std::vector<int64_t> chosen(size_t count, const Do& choose) {
+    return joined(in_blocks<std::vector<int64_t>>(count, [&](size_t first, size_t last) {
+        std::vector<int64_t> found;
+        for (size_t i = first; i < last; ++i) {
+            if (choose(i)) found.push_back(int64_t(i));
+        }
+        return found;
+    }));
+}
+
+// Lowers a number to another, whichever thread comes first.
+template <class T>
+void lower(std::atomic<T>& number, T to) {
+    T now = number.load(std::memory_order_relaxed);
+    while (to < now && !number.compare_exchange_weak(now, to, std::memory_order_relaxed)) {}
+}
+
+}  // namespace fracslice::mesh

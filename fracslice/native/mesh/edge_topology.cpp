@@ -1,0 +1,135 @@
+// Around vertex v each triangle is an arrow from its next corner to the one before. On a closed, oriented surface every
+// neighbour of v then has one arrow in and one out, and all arrows form one ring.
+#include "edge_topology.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
+#include "stars.h"
+
+namespace fracslice::mesh {
+namespace {
+
+// Joins two sets of a forest of lowest indices, halving paths (Tarjan and van Leeuwen 1984); whether they were apart.
+bool unite(std::vector<int32_t>& parent, int32_t a, int32_t b) {
+    while (parent[a] != a) a = parent[a] = parent[parent[a]];
+    while (parent[b] != b) b = parent[b] = parent[parent[b]];
+    if (a == b) return false;
+    parent[std::max(a, b)] = std::min(a, b);
+    return true;
+}
+
+// Counts at one vertex after the other.
+class Fans {
+  public:
+    explicit Fans(const Triangles& triangles) : triangles_(triangles) {}
+
+    void add(const int64_t* corners, size_t degree) {
+        if (ring(corners, degree)) {
+            counts.edges += int64_t(degree);
+            return;
+        }
+        set_spokes(corners, degree);
+        int64_t fans = int64_t(degree);
+        for (size_t i = 0, j; i < spokes_.size(); i = j) {  // one neighbour after the other
+            size_t outward = 0;
+            for (j = i; j < spokes_.size() && spokes_[j] >> 32 == spokes_[i] >> 32; ++j) {
+                outward += !(spokes_[j] & 1);
+                fans -= j > i && unite(fan_, corner(spokes_[i]), corner(spokes_[j]));
+            }
+            ++counts.edges;
+            counts.open += j - i == 1;
+            counts.crowded += j - i > 2;
+            counts.misoriented += j - i > 1 && 2 * outward != j - i;
+        }
+        counts.extra_fans += fans - 1;
+    }
+
+    Links counts;
+
+  private:
+    // Whether all arrows form one ring, as nearly everywhere: then nothing needs to be sorted.
+    bool ring(const int64_t* corners, size_t degree) {
+        arrows_.resize(degree);
+        for (size_t i = 0; i < degree; ++i) {
+            const int32_t* t = triangles_[size_t(corners[i] / 3)];
+            int k = int(corners[i] % 3);
+            arrows_[i] = {t[(k + 1) % 3], t[(k + 2) % 3]};
+        }
+        int32_t first = arrows_[0].from, at = arrows_[0].to;
+        size_t length = 1;
+        for (; at != first && length < degree; ++length) {
+            size_t next = 1;
+            while (next < degree && arrows_[next].from != at) ++next;
+            if (next == degree) return false;
+            at = arrows_[next].to;
+        }
+        return at == first && length == degree;
+    }
+
+    // The two edges of each corner that meet at the vertex, by neighbour: neighbour, corner, whether inward, as one number.
+    void set_spokes(const int64_t* corners, size_t degree) {
+        spokes_.resize(2 * degree);
+        fan_.resize(degree);
+        for (size_t i = 0; i < degree; ++i) {
+            const int32_t* t = triangles_[size_t(corners[i] / 3)];
+            int k = int(corners[i] % 3);
+            spokes_[2 * i] = uint64_t(t[(k + 1) % 3]) << 32 | 2 * i;
+            spokes_[2 * i + 1] = uint64_t(t[(k + 2) % 3]) << 32 | 2 * i | 1;
+            fan_[i] = int32_t(i);
+        }
+        std::sort(spokes_.begin(), spokes_.end());
+    }
+
+    static int32_t corner(uint64_t spoke) { return int32_t(uint32_t(spoke) >> 1); }
+
+    struct Arrow {
+        int32_t from, to;
+    };
+
+    const Triangles& triangles_;
+    std::vector<Arrow> arrows_;
+    std::vector<uint64_t> spokes_;
+    std::vector<int32_t> fan_;
+};
+
+Links operator+(const Links& a, const Links& b) {
+    return {a.edges + b.edges, a.open + b.open, a.crowded + b.crowded, a.misoriented + b.misoriented,
+            a.extra_fans + b.extra_fans};
+}
+
+}  // namespace
+
+CornersByVertex corners_by_vertex(const Triangles& triangles) {
+    CornersByVertex found{{triangles.vertices + 1, 1}, {3 * triangles.count, 1}};
+    int64_t *start = found.start.data.get(), *corner = found.corner.data.get();
+    Stars stars(triangles);
+    tbb::parallel_for(size_t(0), stars.blocks(), [&](size_t block) {
+        size_t next = stars.corners_before(block);
+        stars.for_each(block, [&](size_t v, std::span<const int64_t> corners) {
+            start[v] = int64_t(next);
+            std::copy(corners.begin(), corners.end(), corner + next);
+            next += corners.size();
+        });
+    });
+    start[triangles.vertices] = int64_t(3 * triangles.count);
+    return found;
+}
+
+Links links(const Triangles& triangles, const bool* counted) {
+    Stars stars(triangles);
+    return tbb::parallel_reduce(
+        tbb::blocked_range<size_t>(0, stars.blocks(), 1), Links(),
+        [&](const tbb::blocked_range<size_t>& range, const Links& before) {
+            Fans fans(triangles);
+            for (size_t block = range.begin(); block < range.end(); ++block) {
+                stars.for_each(block, [&](size_t v, std::span<const int64_t> corners) {
+                    if (!corners.empty() && counted[v]) fans.add(corners.data(), corners.size());
+                });
+            }
+            return before + fans.counts;
+        },
+        [](const Links& a, const Links& b) { return a + b; });
+}
+
+}  // namespace fracslice::mesh

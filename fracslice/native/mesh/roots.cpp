@@ -1,0 +1,281 @@
+// Batch by batch, in memory that is used again. What is left after a few steps, or after the polish, is brought together and
+// goes on by itself.
+#include "roots.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "feature.h"
+
+namespace fracslice::mesh {
+namespace {
+
+constexpr size_t kRows = 6;  // of a segment
+
+// Some segments and what is found on them; one thread's.
+template <class Real>
+struct Segments {
+    std::vector<Real> rows, out;
+    size_t count = 0, whole = 0;  // without and with those that fill the last lanes
+
+    void resize(size_t n, size_t lanes) {
+        count = n, whole = (n + lanes - 1) / lanes * lanes;
+        rows.resize(kRows * whole);
+        out.resize(5 * whole);
+    }
+
+    void pad() {
+        for (size_t k = 0; k < kRows; ++k) {
+            std::fill(&rows[k * whole] + count, &rows[k * whole] + whole, rows[k * whole + count - 1]);
+        }
+    }
+
+    // Takes some grid edges.
+    void take(const GridEdges& edges, const std::vector<uint32_t>& which, Real length, size_t lanes) {
+        resize(which.size(), lanes);
+        for (size_t k = 0; k < 3; ++k) {
+            Real* to = &rows[k * whole];
+            for (uint32_t edge : which) *to++ = edges.starts[k][edge];
+        }
+        Real* ways = std::fill_n(&rows[3 * whole], 3 * whole, Real(0)) - 3 * whole;
+        for (size_t i = 0; i < count; ++i) ways[edges.axis(which[i]) * whole + i] = length;
+        pad();
+    }
+
+    // How far polishing moved its root.
+    Real moved(size_t i) const { return out[4 * whole + i]; }
+
+    template <class From>
+    void convert(const Segments<From>& from, size_t lanes) {
+        resize(from.count, lanes);
+        std::copy(from.rows.begin(), from.rows.end(), rows.begin());
+    }
+
+    // Takes some of others.
+    void take(const Segments& from, const std::vector<uint32_t>& which, size_t lanes) {
+        resize(which.size(), lanes);
+        for (size_t k = 0; k < kRows; ++k) {
+            for (size_t i = 0; i < count; ++i) rows[k * whole + i] = from.rows[k * from.whole + which[i]];
+        }
+        pad();
+    }
+
+    // Finds the roots; `left` is for those that take many steps.
+    template <class Find>
+    void find(const Find& function, const RootLoops& loops, Segments& left, std::vector<uint32_t>& which) {
+        function(rows.data(), out.data(), loops.quick, whole);
+        which.clear();
+        for (size_t i = 0; i < count; ++i) {
+            if (out[i] > 1) which.push_back(uint32_t(i));
+        }
+        if (which.empty()) return;
+        left.take(*this, which, loops.lanes);
+        function(left.rows.data(), left.out.data(), loops.most, left.whole);
+        for (size_t i = 0; i < which.size(); ++i) out[which[i]] = left.out[i] > 1 ? left.out[i] - 2 : left.out[i];
+    }
+};
+
+// What is found of crossings: roots, and rows of normals.
+struct RootRows {
+    double* t;
+    float* normals;
+    size_t stride;
+
+    Normal normal(size_t i) const { return {normals[i], normals[i + stride], normals[i + 2 * stride]}; }
+
+    // Whether it is along its edge.
+    bool along(size_t axis, size_t i) const {
+        Normal n = normal(i);
+        return along_axis(n[(axis + 1) % 3], n[(axis + 2) % 3]);
+    }
+
+    void put(size_t i, double root, const Normal& normal) const {
+        t[i] = root;
+        for (size_t k = 0; k < 3; ++k) normals[k * stride + i] = normal[k];
+    }
+};
+
+// What a leader has found: whether it is in a plane across its edge; how far from an edge's start the field is compared for
+// those that it leads, and what it is there for itself.
+struct Lead {
+    uint32_t edge;
+    bool across;
+    double t;
+    Normal normal;
+    Vec3 shift;
+    double value;
+};
+
+// The edges of a brick, and their leaders.
+struct FlatBrick {
+    uint32_t edge, edge_end, leader, leader_end;
+};
+
+// A brick looks flat where leaders lead so many on average.
+constexpr size_t kLed = 10;
+
+// The field is compared so far beside two crossings, in voxels, in no direction that a scene would have: where it is the same
+// but for its sign and rounding, so are their distances from a plane and its normals.
+constexpr Vec3 kBeside = {3.1e-4, 7.3e-4, 5.9e-4};
+constexpr double kSame = 1e-11;
+
+class Search {
+  public:
+    Search(const CellGrid& cells, const RootLoops& loops, const std::array<double, 3>& origin, double voxel)
+        : cells_(cells), loops_(loops), origin_(origin), voxel_(voxel) {}
+
+    void run(size_t begin, size_t end, const RootRows& found) {
+        cells_.lay(begin, end, origin_, voxel_, edges_);
+        choose();
+        each(found);
+        follow(found);
+        if (!which_.empty()) each(found);
+    }
+
+  private:
+    // All edges, but only the leaders in bricks that look flat.
+    void choose() {
+        which_.clear();
+        flat_.clear();
+        for (size_t k = 0; k + 1 < edges_.bricks.size(); ++k) {
+            auto [edge, leader] = edges_.bricks[k];
+            auto [edge_end, leader_end] = edges_.bricks[k + 1];
+            if (edge_end - edge < kLed * (leader_end - leader)) {
+                for (; edge < edge_end; ++edge) which_.push_back(edge);
+            } else {
+                flat_.push_back({edge, edge_end, leader, leader_end});
+                for (; leader < leader_end; ++leader) which_.push_back(edges_.leaders[leader].edge);
+            }
+        }
+    }
+
+    // Takes what leaders in planes across their edges have found for those that they lead; `which_` is the rest of these.
+    void follow(const RootRows& found) {
+        look(found);
+        which_.clear();
+        auto curved = [&](const FlatBrick& brick) {
+            uint32_t count = 0;
+            for (uint32_t k = brick.leader; k < brick.leader_end; ++k) count += leads_[k].across;
+            if (2 * count > brick.leader_end - brick.leader) return false;
+            for (uint32_t i = brick.edge; i < brick.edge_end; ++i) add_led(i);
+            return true;
+        };
+        flat_.erase(std::remove_if(flat_.begin(), flat_.end(), curved), flat_.end());
+        if (!flat_.empty()) compare(found);
+    }
+
+    // Adds an edge to `which_` that is no leader.
+    void add_led(uint32_t edge) {
+        if (leads_[edges_.led[edge]].edge != edge) which_.push_back(edge);
+    }
+
+    // What the leaders of bricks that look flat have found.
+    void look(const RootRows& found) {
+        leads_.resize(edges_.leaders.size());
+        for (const FlatBrick& brick : flat_) {
+            for (uint32_t k = brick.leader; k < brick.leader_end; ++k) {
+                auto [edge, axis] = edges_.leaders[k];
+                leads_[k] = {edge, found.along(axis, edge), found.t[edge], found.normal(edge), voxel_ * kBeside, 0};
+                leads_[k].shift[axis] += voxel_ * found.t[edge];
+            }
+        }
+    }
+
+    // The same in bricks that are flat.
+    void compare(const RootRows& found) {
+        evaluate();
+        const double* value = values_.data();
+        for (const FlatBrick& brick : flat_) {
+            for (uint32_t edge = brick.edge; edge < brick.edge_end; ++edge, ++value) {
+                Lead& lead = leads_[edges_.led[edge]];
+                if (lead.edge == edge) lead.value = *value;
+                bool same = std::abs(std::abs(*value) - std::abs(lead.value)) <= kSame * voxel_;
+                if (lead.across && same) {
+                    found.put(edge, lead.t, (*value < 0) == (lead.value < 0) ? lead.normal : -lead.normal);
+                } else {
+                    add_led(edge);
+                }
+            }
+        }
+    }
+
+    // The field at their edges' shifted places.
+    void evaluate() {
+        size_t n = 0;
+        for (const FlatBrick& brick : flat_) n += brick.edge_end - brick.edge;
+        size_t whole = (n + loops_.lanes - 1) / loops_.lanes * loops_.lanes;
+        points_.resize(3 * whole);
+        values_.resize(whole);
+        for (size_t k = 0; k < 3; ++k) {
+            double* to = &points_[k * whole];
+            for (const FlatBrick& brick : flat_) {
+                for (uint32_t i = brick.edge; i < brick.edge_end; ++i) {
+                    *to++ = edges_.starts[k][i] + leads_[edges_.led[i]].shift[k];
+                }
+            }
+            std::fill(to, &points_[k * whole] + whole, to[-1]);
+        }
+        loops_.field(points_.data(), values_.data(), whole);
+    }
+
+    // Looks for each of `which_` by itself.
+    void each(const RootRows& found) {
+        exact_.take(edges_, which_, voxel_, loops_.lanes);
+        fast_.convert(exact_, loops_.lanes);
+        fast_.find(loops_.guess, loops_, fast_left_, slow_ones_);
+        std::copy(fast_.out.begin(), fast_.out.begin() + ptrdiff_t(fast_.whole), exact_.out.begin());
+        loops_.polish(exact_.rows.data(), exact_.out.data(), exact_.whole);
+        unsure_.clear();
+        for (size_t i = 0; i < exact_.count; ++i) {
+            found.put(which_[i], exact_.out[i], normal(exact_, i));
+            if (!(exact_.moved(i) <= loops_.sure)) unsure_.push_back(uint32_t(i));
+        }
+        if (!unsure_.empty()) again(found);
+    }
+
+    void again(const RootRows& found) {
+        slow_.take(exact_, unsure_, loops_.lanes);
+        slow_.find(loops_.find, loops_, left_, slow_ones_);
+        roots_.assign(slow_.out.begin(), slow_.out.begin() + ptrdiff_t(slow_.count));
+        std::fill(&slow_.out[0] + slow_.count, &slow_.out[0] + slow_.whole, roots_.back());
+        loops_.polish(slow_.rows.data(), slow_.out.data(), slow_.whole);
+        for (size_t i = 0; i < slow_.count; ++i) {
+            double root = slow_.moved(i) <= loops_.sure ? slow_.out[i] : roots_[i];
+            found.put(which_[unsure_[i]], root, normal(slow_, i));
+        }
+    }
+
+    static Normal normal(const Segments<double>& of, size_t i) {
+        return {float(of.out[of.whole + i]), float(of.out[2 * of.whole + i]), float(of.out[3 * of.whole + i])};
+    }
+
+    const CellGrid& cells_;
+    const RootLoops& loops_;
+    std::array<double, 3> origin_;
+    double voxel_;
+    GridEdges edges_;
+    Segments<double> exact_, slow_, left_;
+    Segments<float> fast_, fast_left_;
+    std::vector<uint32_t> which_, slow_ones_, unsure_;
+    std::vector<Lead> leads_;
+    std::vector<FlatBrick> flat_;
+    std::vector<double> roots_, points_, values_;
+};
+
+}  // namespace
+
+void find_crossings(const CellGrid& cells, const RootLoops& loops, size_t begin, size_t end,
+                    const std::array<double, 3>& origin, double voxel, double* t, float* normals, size_t stride) {
+    std::vector<size_t> cuts{begin};
+    while (cuts.back() < end) cuts.push_back(std::min(cells.end_of_brick(std::min(cuts.back() + loops.batch, end) - 1), end));
+    tbb::enumerable_thread_specific<Search> searches([&] { return Search(cells, loops, origin, voxel); });
+    tbb::parallel_for(size_t(0), cuts.size() - 1, [&](size_t k) {
+        size_t at = cuts[k] - begin;
+        searches.local().run(cuts[k], cuts[k + 1], {t + at, normals + at, stride});
+    });
+}
+
+}  // namespace fracslice::mesh

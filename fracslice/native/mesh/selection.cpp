@@ -1,0 +1,112 @@
+#include "selection.h"
+
+#include <cassert>
+#include <utility>
+
+#include "blocks.h"
+#include "measures.h"
+
+namespace fracslice::mesh {
+namespace {
+
+// Of each block of `count` things how many before it hold, and behind the last how many in all.
+template <class Do>
+std::vector<size_t> counted(size_t count, const Do& holds) {
+    std::vector<size_t> before = in_blocks<size_t>(count, [&](size_t first, size_t last) {
+        size_t found = 0;
+        for (size_t i = first; i < last; ++i) found += holds(i);
+        return found;
+    });
+    size_t total = 0;
+    for (size_t& number : before) total += std::exchange(number, total);
+    before.push_back(total);
+    return before;
+}
+
+// Cells of a grid around a mesh, some of them marked.
+class CoarseGrid {
+  public:
+    explicit CoarseGrid(const Bounds& box) : low_(box.low), marked_(size_t(kSide) * kSide * kSide, false) {
+        double size = 0;
+        for (int k = 0; k < 3; ++k) size = std::max(size, box.high[k] - box.low[k]);
+        scale_ = size > 0 ? kSide / size : 0;
+    }
+
+    // Calls act(marked) for the cells of a triangle's box, until it returns true, and whether it did.
+    template <class Do>
+    bool any(const MeshView& mesh, size_t t, const Do& act) {
+        std::array<int, 3> first, last;
+        for (size_t k = 0; k < 3; ++k) {
+            const double a = mesh.corner(t, 0)[k], b = mesh.corner(t, 1)[k], c = mesh.corner(t, 2)[k];
+            first[k] = place(std::min({a, b, c}), k), last[k] = place(std::max({a, b, c}), k);
+        }
+        for (int x = first[0]; x <= last[0]; ++x) {
+            for (int y = first[1]; y <= last[1]; ++y) {
+                for (int z = first[2]; z <= last[2]; ++z) {
+                    if (act(marked_[size_t((x * kSide + y) * kSide + z)])) return true;
+                }
+            }
+        }
+        return false;
+    }
+
+  private:
+    static constexpr int kSide = 64;
+
+    int place(double x, size_t k) const { return int(std::clamp((x - low_[k]) * scale_, 0.0, kSide - 1.0)); }
+
+    Vec3 low_;
+    double scale_;
+    std::vector<uint8_t> marked_;
+};
+
+}  // namespace
+
+Selection selected(const MeshView& mesh, std::span<const bool> keep) {
+    assert(keep.size() == mesh.count);
+    std::vector<std::atomic<bool>> used(mesh.vertices);
+    for_each_block(mesh.count, [&](size_t, size_t first, size_t last) {
+        for (size_t t = first; t < last; ++t) {
+            for (int k = 0; keep[t] && k < 3; ++k) used[size_t(mesh[t][k])].store(true, std::memory_order_relaxed);
+        }
+    });
+    auto is_used = [&](size_t v) { return used[v].load(std::memory_order_relaxed); };
+    std::vector<size_t> vertices = counted(mesh.vertices, is_used);
+    std::vector<size_t> triangles = counted(mesh.count, [&](size_t t) { return keep[t]; });
+    Selection found{{vertices.back(), 3}, {triangles.back(), 3}};
+    if (vertices.back() == mesh.vertices && triangles.back() == mesh.count) return found;
+    Array<int32_t> number(mesh.vertices, 1);
+    for_each_block(mesh.vertices, [&](size_t block, size_t first, size_t last) {
+        size_t next = vertices[block];
+        for (size_t v = first; v < last; ++v) {
+            number.data[v] = int32_t(next);
+            if (is_used(v)) std::copy_n(mesh.point(int32_t(v)), 3, &found.vertices.data[3 * next++]);
+        }
+    });
+    for_each_block(mesh.count, [&](size_t block, size_t first, size_t last) {
+        int32_t* out = found.triangles.data.get() + 3 * triangles[block];
+        for (size_t t = first; t < last; ++t) {
+            for (int k = 0; keep[t] && k < 3; ++k) *out++ = number.data[mesh[t][k]];
+        }
+    });
+    return found;
+}
+
+std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> vertices) {
+    assert(vertices.size() == triangles.vertices);
+    return chosen(triangles.count, [&](size_t t) {
+        const int32_t* corners = triangles[t];
+        return vertices[size_t(corners[0])] | vertices[size_t(corners[1])] | vertices[size_t(corners[2])];
+    });
+}
+
+std::vector<int64_t> surroundings(const MeshView& mesh, std::span<const bool> of) {
+    assert(of.size() == mesh.count);
+    CoarseGrid grid(bounds(mesh.positions, mesh.vertices));
+    for (int64_t t : chosen(mesh.count, [&](size_t t) { return of[t]; })) {
+        grid.any(mesh, size_t(t), [](uint8_t& marked) { return marked = true, false; });
+    }
+    return chosen(mesh.count, [&](size_t t) { return grid.any(mesh, t, [](uint8_t marked) { return marked != 0; }); });
+}
+
+}  // namespace fracslice::mesh

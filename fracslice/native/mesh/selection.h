@@ -1,0 +1,25 @@
+// Parts of a mesh: some of its triangles by themselves, or what is near some of them.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "../array.h"
+#include "triangles.h"
+
+namespace fracslice::mesh {
+
+struct Selection {
+    Array<double> vertices;    // those that the triangles use, in order
+    Array<int32_t> triangles;
+};
+
+// keep: of each triangle. Of a mesh that stays as it is, only how much that is.
+Selection selected(const MeshView& mesh, std::span<const bool> keep);
+
+// The triangles with a corner among some vertices, ascending.
+std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> vertices);
+
+// The triangles that may meet one of some, these included, ascending: those with a box in the same cells of a coarse grid.
+std::vector<int64_t> surroundings(const MeshView& mesh, std::span<const bool> of);
+
+}  // namespace fracslice::mesh

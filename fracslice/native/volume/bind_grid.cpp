@@ -1,0 +1,80 @@
+#include "brick_arrays.h"
+#include "grid.h"
+
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+namespace fracslice::volume {
+namespace {
+
+struct Grid {
+    FloatGrid::Ptr vdb;
+};
+
+Grid from_bricks(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index,
+                 const std::array<double, 3>& origin, double voxel) {
+    Bricks bricks = view(ijk, values, index);
+    nb::gil_scoped_release released;
+    return {grid_from_bricks(bricks, origin, voxel)};
+}
+
+nb::tuple to_bricks(const Grid& grid) {
+    BrickArrays out;
+    {
+        nb::gil_scoped_release released;
+        out = bricks_from_grid(*grid.vdb);
+    }
+    auto [origin, voxel] = placement_of(*grid.vdb);
+    for (int k = 0; k < 3; ++k) origin[k] += voxel * out.shift[k];
+    size_t n = out.ijk.rows;
+    auto [x, y, z] = out.size;
+    return nb::make_tuple(origin, voxel, to_numpy(std::move(out.ijk), {n, 3}),
+                          to_numpy(std::move(out.values), {n, kSamples}), to_numpy(std::move(out.index), {x, y, z}));
+}
+
+nb::tuple mesh(const Grid& grid, double adaptivity) {
+    GridMesh found;
+    {
+        nb::gil_scoped_release released;
+        found = mesh_of(*grid.vdb, adaptivity);
+    }
+    return nb::make_tuple(to_numpy<float>(found.points), to_numpy<uint32_t>(found.triangles),
+                          to_numpy<uint32_t>(found.quads));
+}
+
+std::vector<Grid> parts(const Grid& grid) {
+    nb::gil_scoped_release released;
+    std::vector<Grid> found;
+    for (auto& part : surfaces(*grid.vdb)) found.push_back({part});
+    return found;
+}
+
+}  // namespace
+
+void bind_grid(nb::module_& module) {
+    using namespace nanobind::literals;
+    using released = nb::call_guard<nb::gil_scoped_release>;
+    openvdb::initialize();
+    nb::class_<Grid>(module, "Grid")
+        .def_static("from_bricks", &from_bricks, "ijk"_a, "values"_a, "index"_a, "origin"_a, "voxel"_a)
+        .def_static("read", [](const std::string& path, const std::string& name) { return Grid{read_grid(path, name)}; },
+                    "path"_a, "name"_a = "", released())
+        .def("write", [](const Grid& g, const std::string& path, const Metadata& metadata) { write_grid(g.vdb, path, metadata); },
+             "path"_a, "metadata"_a, released())
+        .def("to_bricks", &to_bricks)
+        .def("mesh", &mesh, "adaptivity"_a = 0.0)
+        .def("redistance", [](const Grid& g) { return Grid{redistance(*g.vdb)}; }, released())
+        .def("offset", [](const Grid& g, double distance) { return Grid{offset(*g.vdb, distance)}; }, "distance"_a, released())
+        .def("surfaces", &parts)
+        .def_prop_rw("name", [](const Grid& g) { return g.vdb->getName(); },
+                     [](Grid& g, const std::string& name) { g.vdb->setName(name); })
+        .def_prop_ro("metadata", [](const Grid& g) { return strings_of(*g.vdb); })
+        .def_prop_ro("background", [](const Grid& g) { return g.vdb->background(); })
+        .def_prop_ro("active_voxels", [](const Grid& g) { return g.vdb->activeVoxelCount(); })
+        .def_prop_ro("leaves", [](const Grid& g) { return g.vdb->tree().leafCount(); })
+        .def_prop_ro("memory", [](const Grid& g) { return g.vdb->memUsage(); });
+}
+
+}  // namespace fracslice::volume

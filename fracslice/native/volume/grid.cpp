@@ -1,0 +1,169 @@
+#include "grid.h"
+
+#pragma GCC visibility push(default)
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/File.h>
+#include <openvdb/tools/Prune.h>
+#pragma GCC visibility pop
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+
+namespace fracslice::volume {
+namespace {
+
+using openvdb::Coord;
+using Leaf = FloatGrid::TreeType::LeafNodeType;
+
+float largest(const Bricks& bricks) {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<size_t>(0, bricks.count * kSamples), 0.f,
+        [&](const tbb::blocked_range<size_t>& range, float most) {
+            for (size_t i = range.begin(); i < range.end(); ++i) most = std::max(most, std::fabs(bricks.values[i]));
+            return most;
+        },
+        [](float a, float b) { return std::max(a, b); });
+}
+
+Coord first_sample(int x, int y, int z) { return {x * kSide, y * kSide, z * kSide}; }
+
+Coord brick_of(const Bricks& bricks, size_t row) {
+    const int32_t* p = bricks.ijk + 3 * row;
+    return {p[0], p[1], p[2]};
+}
+
+void fill_inside(const Bricks& bricks, FloatGrid::TreeType& tree) {
+    const int32_t* at = bricks.index;
+    for (int x = 0; x < bricks.size[0]; ++x) {
+        for (int y = 0; y < bricks.size[1]; ++y) {
+            for (int z = 0; z < bricks.size[2]; ++z) {
+                if (*at++ == kInside) tree.addTile(1, first_sample(x, y, z), -tree.background(), false);
+            }
+        }
+    }
+}
+
+std::vector<const Leaf*> sorted_leaves(const FloatGrid& grid) {
+    std::vector<const Leaf*> leaves;
+    leaves.reserve(grid.tree().leafCount());
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
+    std::sort(leaves.begin(), leaves.end(), [](auto* a, auto* b) { return a->origin() < b->origin(); });
+    return leaves;
+}
+
+// What the archive class keeps to itself: a whole seekable file on a stream whose state can be asked for afterwards.
+struct Archive : openvdb::io::Archive {
+    using openvdb::io::Archive::write;
+    Ptr copy() const override { return Ptr(new Archive(*this)); }
+};
+
+}  // namespace
+
+FloatGrid::Ptr grid_from_bricks(const Bricks& bricks, const std::array<double, 3>& origin, double voxel) {
+    check(bricks);
+    auto grid = FloatGrid::create(largest(bricks));
+    auto& tree = grid->tree();
+    std::vector<Leaf*> leaves(bricks.count);
+    tbb::parallel_for(size_t(0), bricks.count, [&](size_t row) {
+        leaves[row] = new Leaf(brick_of(bricks, row), tree.background(), true);
+        std::copy_n(bricks.values + row * kSamples, kSamples, leaves[row]->buffer().data());
+    });
+    for (Leaf* leaf : leaves) tree.addLeaf(leaf);
+    fill_inside(bricks, tree);
+    openvdb::tools::pruneTiles(tree);
+    auto transform = openvdb::math::Transform::createLinearTransform(voxel);
+    transform->postTranslate({origin[0], origin[1], origin[2]});
+    grid->setTransform(transform);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    return grid;
+}
+
+BrickArrays bricks_from_grid(const FloatGrid& grid) {
+    auto leaves = sorted_leaves(grid);
+    Coord low(0), high(0);
+    for (const Leaf* leaf : leaves) {
+        low.minComponent(leaf->origin());
+        high.maxComponent(leaf->origin() + Coord(kSide));
+    }
+    BrickArrays out;
+    Coord size = (high - low) >> 3;
+    out.shift = {low[0], low[1], low[2]};
+    out.size = {size_t(size[0]), size_t(size[1]), size_t(size[2])};
+    out.ijk = {leaves.size(), 3};
+    out.values = {leaves.size(), kSamples};
+    out.index = {out.size[0] * out.size[1] * out.size[2], 1};
+    tbb::parallel_for(size_t(0), out.size[0], [&](size_t x) {
+        auto tree = grid.getConstAccessor();
+        int32_t* at = out.index.data.get() + x * out.size[1] * out.size[2];
+        for (int y = 0; y < size[1]; ++y) {
+            for (int z = 0; z < size[2]; ++z) {
+                *at++ = tree.getValue(low + first_sample(int(x), y, z)) < 0 ? kInside : kOutside;
+            }
+        }
+    });
+    tbb::parallel_for(size_t(0), leaves.size(), [&](size_t row) {
+        Coord p = leaves[row]->origin() - low;
+        for (int k = 0; k < 3; ++k) out.ijk.data[3 * row + k] = p[k];
+        std::copy_n(leaves[row]->buffer().data(), kSamples, out.values.data.get() + row * kSamples);
+        out.index.data[((p[0] >> 3) * out.size[1] + (p[1] >> 3)) * out.size[2] + (p[2] >> 3)] = int32_t(row);
+    });
+    return out;
+}
+
+std::pair<std::array<double, 3>, double> placement_of(const FloatGrid& grid) {
+    const auto& transform = grid.transform();
+    auto origin = transform.indexToWorld(openvdb::Vec3d(0));
+    double voxel = transform.voxelSize()[0];
+    bool cubes = transform.isLinear();
+    for (int k = 0; k < 3 && cubes; ++k) {
+        openvdb::Vec3d unit(0), expected = origin;
+        unit[k] = 1;
+        expected[k] += voxel;
+        cubes = (transform.indexToWorld(unit) - expected).length() <= 1e-6 * voxel;
+    }
+    if (!cubes) throw std::invalid_argument("its voxels are not axis-aligned cubes");
+    return {{origin[0], origin[1], origin[2]}, voxel};
+}
+
+void write_grid(const FloatGrid::Ptr& grid, const std::string& path, const Metadata& metadata) {
+    for (const auto& [name, text] : metadata) grid->insertMeta(name, openvdb::StringMetadata(text));
+    errno = 0;
+    std::ofstream file(path, std::ios::binary);
+    if (file) {
+        Archive().write(file, openvdb::GridCPtrVec{grid}, true);
+        file.close();
+    }
+    if (!file) throw std::runtime_error(path + ": " + (errno ? std::strerror(errno) : "cannot be written"));
+}
+
+FloatGrid::Ptr read_grid(const std::string& path, const std::string& name) {
+    try {
+        openvdb::io::File file(path);
+        file.open(false);  // no delayed loading: nothing may depend on the file once this returns
+        for (auto found = file.beginName(); found != file.endName(); ++found) {
+            if (!name.empty() && found.gridName() != name) continue;
+            auto grid = openvdb::gridPtrCast<FloatGrid>(file.readGrid(found.gridName()));
+            if (grid) return grid;
+        }
+    } catch (const std::exception& error) {
+        throw std::runtime_error(path + ": " + error.what());
+    }
+    throw std::runtime_error(path + ": no float grid" + (name.empty() ? "" : " named " + name));
+}
+
+Metadata strings_of(const FloatGrid& grid) {
+    Metadata strings;
+    for (auto item = grid.beginMeta(); item != grid.endMeta(); ++item) {
+        if (item->second) strings[item->first] = item->second->str();
+    }
+    return strings;
+}
+
+}  // namespace fracslice::volume

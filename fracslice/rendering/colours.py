@@ -1,0 +1,78 @@
+"""Materials in a kernel: what the surface is like at a hit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..formulas.material import material
+from ..formulas.registry import Fixed, Node
+from ..kernel.linker import Linker
+from ..kernel.structure import link_tree
+from .tracing import TraceDialect
+from .units import shade
+
+
+def linear(colour: Sequence[float]) -> tuple[float, ...]:
+    """sRGB, as colours are written, to light (IEC 61966-2-1)."""
+    return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
+
+
+@dataclass
+class Look:
+    """The materials of a scene, and the lines that put the one at a hit into variables.
+
+    Where there is one material, its numbers are read from P; where there are several, they are chosen by
+    paint.
+    """
+
+    linker: Linker
+    root: Node
+
+    def __post_init__(self) -> None:
+        self.nodes = [n for n in self.root.walk() if n.formula.name == material.name]
+        covered = bool(self.nodes) and self.root is self.nodes[0] and len(self.nodes) == 1
+        plain = material(self.root)
+        self.all = self.nodes if covered else [plain, *self.nodes]
+        self.paints = {id(n): self.all.index(n) if covered else k + 1 for k, n in enumerate(self.nodes)}
+        self.palettes = any(len(n["colour"]) > 3 for n in self.all)
+        self.glows = any(n["glow"] for n in self.all)
+        self.inside = any(n["clear"] for n in self.all)
+        self.bounces = self.inside or any(n["reflect"] for n in self.all)
+
+    def lines(self) -> list[str]:
+        """Sets cr, cg, cb, specular, shininess and what else some material has."""
+        lines = []
+        if len(self.all) > 1 or self.palettes:
+            trace = link_tree(self.linker, self.root, TraceDialect(self.linker, materials=self.paints))
+            lines.append(f"_, paint, tone = {trace}")
+        lines += self.chosen([self.colour(k, n) for k, n in enumerate(self.all)], ("cr", "cg", "cb"))
+        names = ["specular", "shininess"]
+        names += ["glow"] * self.glows + ["reflect"] * self.bounces + ["clear", "index"] * self.inside
+        for name in names:
+            values = [[self.linker.argument(n[name])] for n in self.all]
+            lines += self.chosen([([], v) for v in values], (name,))
+        if self.inside:
+            fading = [[self.linker.argument(a) for a in n["absorb"]] for n in self.all]
+            lines += self.chosen([([], v) for v in fading], ("absorbr", "absorbg", "absorbb"))
+        return lines
+
+    def colour(self, k: int, node: Node) -> tuple[list[str], list[str]]:
+        """Lines, and the expressions of a material's red, green and blue."""
+        colours = linear(node["colour"])
+        if len(colours) == 3:
+            return [], [self.linker.argument(c) for c in colours]
+        self.linker.bind(f"palette{k}", shade.palette, {"stops": colours, "count": Fixed(len(colours) // 3)})
+        repeats, shift = self.linker.argument(node["repeats"]), self.linker.argument(node["shift"])
+        turns = f"turns{k} = tone * {repeats} + {shift}"
+        names = [f"p{k}{c}" for c in "rgb"]
+        return [turns, f"{', '.join(names)} = palette{k}(turns{k} - floor(turns{k}), P)"], names
+
+    def chosen(self, options: list[tuple[list[str], list[str]]], names: tuple[str, ...]) -> list[str]:
+        """Sets the names to the option that paint says."""
+        lines = [line for before, _ in options for line in before]
+        for i, name in enumerate(names):
+            lines.append(f"{name} = {options[0][1][i]} + 0.0 * t")
+            for k, (_, values) in enumerate(options[1:], 1):
+                lines.append(f"{name} = where(paint > {k - 0.5}, {values[i]}, {name})")
+        return lines

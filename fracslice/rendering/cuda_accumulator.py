@@ -1,0 +1,99 @@
+"""A picture in the making that stays on the GPU: only numbers of its statistics, and what is shown, leave
+it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from copy import copy
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ..formulas.field import Precision
+from ..kernel.cuda import launched, load_loops, require
+from ..kernel.linker import Linked
+from ..scene.view import Film
+from .accumulator import FEW, NEARLY, TRUSTED, HostAccumulator, first_passes
+from .cpu import ordered
+from .cuda_accumulator_loops import LOOPS
+
+PARTS = 8192
+"""Threads that sum over a picture, each over every 8192nd pixel, so that sums come out the same every
+time."""
+GONE = -1
+"""As many passes as no picture has: the memory is another's."""
+TONES = {"none": 0, "filmic": 1, "reinhard": 2}
+
+
+class CudaAccumulator:
+    """The face of `HostAccumulator`, with arrays of the GPU. Raises `KernelError` if there is no GPU."""
+
+    def __init__(self, start: HostAccumulator) -> None:
+        cuda = self._cuda = require()
+        self.width, self.height = start.width, start.height
+        self.passes, self.coarse = start.passes, start.coarse
+        self.dtype, pixels = start.sums.dtype, start.width * start.height
+        precision: Precision = "float32" if self.dtype == np.float32 else "float64"
+        self._loops = load_loops(Linked("", np.zeros(1)), precision, LOOPS)
+        self.sums = cuda.to_device(start.sums)
+        self._first_passes = lru_cache(maxsize=4)(self._sent)
+        self._order = cuda.to_device(ordered(self.width, self.height))
+        self._pixels = cuda.device_array(pixels, np.int32)
+        self._squares, self._gains = (cuda.device_array(pixels, self.dtype) for _ in range(2))
+        self._parts = cuda.device_array((min(PARTS, pixels), 3), self.dtype)
+        self._shown = cuda.device_array((pixels, 3), np.uint8)
+
+    @classmethod
+    def of(cls, other: HostAccumulator) -> CudaAccumulator:
+        return cls(other)
+
+    def anew(self, coarse: int) -> CudaAccumulator:
+        fresh = copy(self)
+        fresh.passes, fresh.coarse, self.passes = 0, coarse, GONE
+        launched(self._loops.clear, len(self.sums), self.sums)
+        return fresh
+
+    def host(self) -> HostAccumulator:
+        return HostAccumulator(self.width, self.height, self.sums.copy_to_host(), self.passes, self.coarse)
+
+    def _sent(self, coarse: int) -> list[Any]:
+        return [self._cuda.to_device(pixels) for pixels in first_passes(self.width, self.height, coarse)]
+
+    def _summed(self, loop: Any, *arguments: Any) -> np.ndarray:
+        """Runs a loop over PARTS; returns the sums, float64 [3]."""
+        launched(loop, len(self._parts), *arguments)
+        total: np.ndarray = self._parts.copy_to_host().sum(0, dtype=np.float64)
+        return total
+
+    def statistics(self) -> tuple[float, float]:
+        total, known, samples = self._summed(self._loops.measure, self.sums, self._squares, self._parts)
+        return samples / (self.width * self.height), math.sqrt(total / known) if known else math.inf
+
+    def wanted(self, most: int, tolerance: float) -> tuple[Any, int]:
+        first = self._first_passes(self.coarse)
+        if self.passes < len(first):
+            return first[self.passes], first[self.passes].size
+        self.statistics()
+        real = self.dtype.type
+        judged = (self.sums, self._squares, self._gains, self._parts, self.width)
+        limits = (real(TRUSTED), real(most), real(tolerance * tolerance))
+        total, unfinished, _ = self._summed(self._loops.judge, *judged, *limits)
+        least = real(NEARLY * total / unfinished if unfinished > FEW * self.width * self.height else 0.0)
+        chosen = (self._gains, self._order, self._pixels, self._parts, self.width, least)
+        return self._pixels, int(self._summed(self._loops.choose, *chosen)[0])
+
+    def receive(self, add: Callable[[Any], None]) -> None:
+        add(self.sums)
+        self.passes += 1
+
+    def shown(self, film: Film, mode: str) -> np.ndarray:
+        if film.bloom and mode == "light":
+            return self.host().shown(film, mode)
+        lit = mode == "light"
+        tone, exposure = TONES[film.tone] if lit else -1, 2.0**film.exposure if lit else 1.0
+        coarse = self.coarse if self.passes == 1 else 1
+        given = (self.width, coarse, self.dtype.type(exposure), tone)
+        launched(self._loops.show, len(self._shown), self.sums, self._shown, *given)
+        return np.asarray(self._shown.copy_to_host().reshape(self.height, self.width, 3))

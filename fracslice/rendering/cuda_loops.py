@@ -1,0 +1,117 @@
+"""The loops around the units on CUDA: one thread takes one ray from the film to the last bounce.
+
+They do what the lanes' loops in `packets` do.
+"""
+
+from __future__ import annotations
+
+from ..formulas.vocabulary import maximum, minimum
+from ..kernel.cuda_stubs import device, divide, kernel, real, thread, together, whole
+from ..kernel.loops import Loop
+from .linking import Frame
+from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
+from .units.random import centred, sample
+
+
+def loops(frame: Frame) -> tuple[Loop, ...]:
+    """The kernels around a frame's source: `tile`, and `cones` where rays start at the eye."""
+    return tuple(made.fix(frame=frame) for made in ((tile, cones) if frame.sharp else (tile,)))
+
+
+@kernel
+def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
+    """Adds to each pixel, those below zero left out, its next sample, the point of Q whose index is how many
+    it has."""
+    k = thread()
+    if k < pixels.size and pixels[k] >= 0:
+        pixel = whole(pixels[k])
+        column = pixel & 65535
+        row = pixel >> 16
+        q = whole(A[row * width + column, 5])
+        px = real(column) + centred(whole(Q[q, 0]), pixel, 0)
+        py = real(row) + centred(whole(Q[q, 1]), pixel, 1)
+        u, v = (
+            (real(0.0), real(0.0))
+            if frame.sharp
+            else (sample(whole(Q[q, 2]), pixel, 2), sample(whole(Q[q, 3]), pixel, 3))
+        )
+        ox, oy, oz, dx, dy, dz = camera_ray(px, py, u, v, P)
+        start, end = span_box(ox, oy, oz, dx, dy, dz, P)
+        start = maximum(start, S[(row >> frame.shift) * blocks + (column >> frame.shift)])
+        r, g, b = real(0.0), real(0.0), real(0.0)
+        tr, tg, tb = real(1.0), real(1.0), real(1.0)
+        path, side = real(0.0), real(1.0)
+        for bounce in range(frame.bounces + 1):
+            t, steps, before, stride = start, real(0.0), real(0.0), real(0.0)
+            missed = start >= end
+            while not missed:
+                t, before, stride, gap = step_ray(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P)
+                steps += real(1.0)
+                if gap < real(0.0):
+                    break
+                missed = (t - stride + before if stride > real(0.0) else t) > end
+                if steps >= limit:
+                    break
+            together()
+            if missed:
+                hr, hg, hb = background(dx, dy, dz, P)
+                r, g, b = r + tr * hr, g + tg * hg, b + tb * hb
+                break
+            x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
+            first = frame.camera_samples + bounce * frame.bounce_samples
+            chance = tuple(
+                sample(whole(Q[q, first + d]), pixel, first + d) for d in range(frame.bounce_samples)
+            )
+            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, chance, P)
+            hr, hg, hb = light
+            r, g, b = r + tr * hr, g + tg * hg, b + tb * hb
+            if not frame.bounces:
+                break
+            er, eg, eb, ox, oy, oz, dx, dy, dz, side = onward
+            tr, tg, tb = tr * er, tg * eg, tb * eb
+            path = path + t
+            start, end = span_box(ox, oy, oz, dx, dy, dz, P)
+            if not tr + tg + tb > real(0.002):
+                start = real(1e30)
+        gather(A, row * width + column, r, g, b)
+
+
+@kernel
+def cones(P, S, blocks, limit, frame):
+    """For every block of pixels, up to where all its rays are free."""
+    k = thread()
+    if k < S.size:
+        px = (real(k % blocks) + real(0.5)) * real(frame.block)
+        py = (real(k // blocks) + real(0.5)) * real(frame.block)
+        ox, oy, oz, dx, dy, dz = camera_ray(px, py, real(0.0), real(0.0), P)
+        t, steps, before, stride, gap = real(0.0), real(0.0), real(0.0), real(0.0), real(1.0)
+        while not t > P[frame.far]:
+            t, before, stride, gap = step_cone(
+                ox, oy, oz, dx, dy, dz, t, before, stride, real(1.0), real(0.0), P
+            )
+            steps += real(1.0)
+            if gap < real(0.0) or steps >= limit:
+                break
+        S[k] = real(1e30) if gap >= real(0.0) and t > P[frame.far] else t
+
+
+@device
+def gather(A, a, r, g, b):
+    """Adds a sample to a pixel; no NaN, no infinity, no negative light."""
+    r = tamed(r)
+    g = tamed(g)
+    b = tamed(b)
+    bright = real(0.2126) * r + real(0.7152) * g + real(0.0722) * b
+    bright = divide(bright, real(1.0) + bright)
+    A[a, 0] += r
+    A[a, 1] += g
+    A[a, 2] += b
+    A[a, 3] += bright
+    A[a, 4] += bright * bright
+    A[a, 5] += real(1.0)
+
+
+@device
+def tamed(c):
+    """A sum of light that is a number."""
+    return minimum(maximum(c, real(0.0)), real(1e4)) if c == c else real(0.0)

@@ -1,0 +1,277 @@
+"""Ray packets: the loops around the units on SIMD lanes, from pixels to sums of light.
+
+The rays of a tile lie in the rows of a workspace W, m numbers each: the t of ray i is ``W[Row.t * m + i]``.
+Rays are followed in packets that are refilled: as soon as a lane is done, the next ray takes its place, so no
+lane idles while another is on its way. The lanes of a packet lie in L, WIDTH numbers each; `rays` says which
+ray each lane holds, -1 for none.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from ..formulas.vocabulary import any_of, where
+from ..kernel.intrinsics import WIDTH, load, store
+from ..kernel.loops import Loop, loop
+from .linking import Frame
+from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
+from .units.random import centred, sample
+
+Row = IntEnum("Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb px py", start=0)
+"""What is known of a ray. status: 1 hit, 2 missed, 3 out of steps. r, g, b: light gathered; tr, tg, tb: how
+much of what is still to come counts. side: -1 inside. path: how long the way was before this ray. px, py:
+where on the film, the first two of its random numbers; the others are in the rows behind.
+"""
+Lane = IntEnum("Lane", "ox oy oz dx dy dz start end side path t steps done before stride", start=0)
+"""What is known of a ray that is under way, the first ten as in `Row`."""
+
+CHANNELS = 6
+"""Of a pixel: the sums of red, green, blue, shown brightness, its square, and the number of samples."""
+
+
+def loops(frame: Frame) -> tuple[Loop, ...]:
+    """The C functions to make of a frame: `tile`, and `cones` where rays start at the eye."""
+    return tuple(made.fix(frame=frame) for made in ((tile, cones) if frame.sharp else (tile,)))
+
+
+def workspace(frame: Frame, rays: int) -> int:
+    """The numbers in the rows of a tile."""
+    return (Row.px + frame.samples) * rays
+
+
+@loop("rirrriirnnnnn")
+def tile(P, Q, S, W, L, rays, pixels, A, n, m, width, limit, blocks, frame):
+    """Adds to n pixels, ``y << 16 | x`` each, their next sample."""
+    draw(W, Q, pixels, A, n, m, width, frame)
+    begin(W, m, P, frame)
+    for k in range(n):
+        pixel = pixels[k]
+        early = S[(pixel >> 16 + frame.shift) * blocks + ((pixel & 65535) >> frame.shift)]
+        W[Row.start * m + k] = max(W[Row.start * m + k], early)
+    for bounce in range(frame.bounces + 1):
+        follow(W, L, rays, n, m, limit, P, step_ray)
+        shade(W, m, Row.px + frame.camera_samples + bounce * frame.bounce_samples, P, frame)
+    gather(W, pixels, A, n, m, width)
+
+
+@loop("rrirrinnnn")
+def cones(P, S, ids, W, L, rays, n, m, blocks, limit, frame):
+    """Up to where all rays of each of n blocks of pixels are free."""
+    for k in range(m):
+        block = ids[min(k, n - 1)]
+        W[Row.px * m + k] = (block % blocks + 0.5) * frame.block
+        W[Row.py * m + k] = (block // blocks + 0.5) * frame.block
+    begin(W, m, P, frame)
+    for k in range(n):
+        W[Row.start * m + k] = 0.0
+        W[Row.end * m + k] = P[frame.far]
+    follow(W, L, rays, n, m, limit, P, step_cone)
+    for k in range(n):
+        S[ids[k]] = W[Row.t * m + k] if W[Row.status * m + k] != 2.0 else 1e30
+
+
+def load_vector(W, row, m, i):
+    """Three rows of rays from i on."""
+    return load(W, row * m + i), load(W, (row + 1) * m + i), load(W, (row + 2) * m + i)
+
+
+def store_vector(W, row, m, i, a, b, c):
+    """Writes three rows of rays from i on."""
+    store(W, row * m + i, a)
+    store(W, (row + 1) * m + i, b)
+    store(W, (row + 2) * m + i, c)
+
+
+def draw(W, Q, pixels, A, n, m, width, frame):
+    """All random numbers of the next sample of n pixels; rows beyond n repeat the last pixel."""
+    for k in range(m):
+        pixel = pixels[min(k, n - 1)]
+        q = frame.samples * int(A[CHANNELS * ((pixel >> 16) * width + (pixel & 65535)) + 5])
+        W[Row.px * m + k] = (pixel & 65535) + centred(Q[q], pixel, 0)
+        W[Row.py * m + k] = (pixel >> 16) + centred(Q[q + 1], pixel, 1)
+        for d in range(2, frame.samples):
+            W[(Row.px + d) * m + k] = sample(Q[q + d], pixel, d)
+
+
+def begin(W, m, P, frame):
+    """The rays through the points (px, py) of the film, from where they enter the scene's box."""
+    for i in range(0, m, WIDTH):
+        u, v = (0.0, 0.0) if frame.sharp else (load(W, (Row.px + 2) * m + i), load(W, (Row.px + 3) * m + i))
+        px, py = load(W, Row.px * m + i), load(W, Row.py * m + i)
+        ox, oy, oz, dx, dy, dz = camera_ray(px, py, u, v, P)
+        enter, leave = span_box(ox, oy, oz, dx, dy, dz, P)
+        zero = 0.0 * dx
+        store_vector(W, Row.ox, m, i, ox, oy, oz)
+        store_vector(W, Row.dx, m, i, dx, dy, dz)
+        store(W, Row.start * m + i, enter)
+        store(W, Row.end * m + i, leave)
+        store(W, Row.path * m + i, zero)
+        store_vector(W, Row.r, m, i, zero, zero, zero)
+        store(W, Row.side * m + i, zero + 1.0)
+        store_vector(W, Row.tr, m, i, zero + 1.0, zero + 1.0, zero + 1.0)
+
+
+def follow(W, L, rays, n, m, limit, P, step):
+    """Follows n rays until all have hit, left or used up their steps.
+
+    A ray has left where it is known to be free, not where an over-relaxed step took it.
+    """
+    for lane in range(WIDTH):
+        rays[lane] = -1
+        L[Lane.done * WIDTH + lane] = 1.0
+    under_way = 0
+    following = 0
+    while True:
+        for lane in range(WIDTH):
+            if L[Lane.done * WIDTH + lane] > 0.0:
+                under_way -= finish(W, L, rays, m, lane)
+                following = skip_missed(W, m, n, following)
+                L[Lane.before * WIDTH + lane] = 0.0
+                L[Lane.stride * WIDTH + lane] = 0.0
+                L[Lane.steps * WIDTH + lane] = 0.0
+                if following < n:
+                    take(W, L, rays, m, lane, following)
+                    following += 1
+                    under_way += 1
+                else:
+                    idle(L, rays, lane)
+        if under_way == 0:
+            break
+        march(L, limit, P, step)
+
+
+def finish(W, L, rays, m, lane):
+    """Writes what became of the ray of a lane; returns how many rays that is."""
+    i = rays[lane]
+    if i < 0:
+        return 0
+    W[Row.t * m + i] = L[Lane.t * WIDTH + lane]
+    W[Row.steps * m + i] = L[Lane.steps * WIDTH + lane]
+    W[Row.status * m + i] = L[Lane.done * WIDTH + lane]
+    return 1
+
+
+def skip_missed(W, m, n, i):
+    """The first ray from i on that is to be followed; those before it miss."""
+    while i < n and W[Row.start * m + i] >= W[Row.end * m + i]:
+        W[Row.status * m + i] = 2.0
+        W[Row.steps * m + i] = 0.0
+        W[Row.t * m + i] = 0.0
+        i += 1
+    return i
+
+
+def take(W, L, rays, m, lane, i):
+    """Gives a lane the ray i."""
+    for k in range(Row.path + 1):
+        L[k * WIDTH + lane] = W[k * m + i]
+    L[Lane.t * WIDTH + lane] = W[Row.start * m + i]
+    rays[lane] = i
+
+
+def idle(L, rays, lane):
+    """Puts a lane without a ray far away."""
+    for k in range(Lane.dz + 1):
+        L[k * WIDTH + lane] = 1e4
+    L[Lane.end * WIDTH + lane] = 1e30
+    L[Lane.side * WIDTH + lane] = 1.0
+    L[Lane.path * WIDTH + lane] = 0.0
+    L[Lane.t * WIDTH + lane] = 1.0
+    rays[lane] = -1
+
+
+def march(L, limit, P, step):
+    """Steps all lanes until one is done."""
+    ox, oy, oz = load_vector(L, Lane.ox, WIDTH, 0)
+    dx, dy, dz = load_vector(L, Lane.dx, WIDTH, 0)
+    end = load(L, Lane.end * WIDTH)
+    side = load(L, Lane.side * WIDTH)
+    path = load(L, Lane.path * WIDTH)
+    t = load(L, Lane.t * WIDTH)
+    steps = load(L, Lane.steps * WIDTH)
+    before = load(L, Lane.before * WIDTH)
+    stride = load(L, Lane.stride * WIDTH)
+    while True:
+        t, before, stride, gap = step(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P)
+        steps = steps + 1.0
+        free = where(stride > 0.0, t - stride + before, t)
+        done = where(gap < 0.0, 1.0, where(free > end, 2.0, where(steps < limit, 0.0 * steps, 3.0)))
+        if any_of(done > 0.0):
+            break
+    store(L, Lane.t * WIDTH, t)
+    store(L, Lane.steps * WIDTH, steps)
+    store(L, Lane.before * WIDTH, before)
+    store(L, Lane.stride * WIDTH, stride)
+    store(L, Lane.done * WIDTH, done)
+
+
+def shade(W, m, first, P, frame):
+    """Adds the light of every ray, and turns it into the one that goes on."""
+    for i in range(0, m, WIDTH):
+        status = load(W, Row.status * m + i)
+        dx, dy, dz = load_vector(W, Row.dx, m, i)
+        tr, tg, tb = load_vector(W, Row.tr, m, i)
+        missed = (status > 1.5) & (status < 2.5)
+        hit = (status < 1.5) | (status > 2.5)
+        r = 0.0 * dx
+        g = r
+        b = r
+        if any_of(missed):
+            r, g, b = background(dx, dy, dz, P)
+        more = 0.0 * dx
+        if any_of(hit):
+            t = load(W, Row.t * m + i)
+            path = load(W, Row.path * m + i)
+            x = load(W, Row.ox * m + i) + t * dx
+            y = load(W, Row.oy * m + i) + t * dy
+            z = load(W, Row.oz * m + i) + t * dz
+            steps, side = load(W, Row.steps * m + i), load(W, Row.side * m + i)
+            u = tuple(load(W, (first + k) * m + i) for k in range(frame.bounce_samples))
+            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, u, P)
+            hr, hg, hb = light
+            r = where(hit, hr, r)
+            g = where(hit, hg, g)
+            b = where(hit, hb, b)
+            if frame.bounces:
+                er, eg, eb, ox, oy, oz, ex, ey, ez, es = onward
+                er = where(hit, tr * er, 0.0)
+                eg = where(hit, tg * eg, 0.0)
+                eb = where(hit, tb * eb, 0.0)
+                more = er + eg + eb
+                store_vector(W, Row.tr, m, i, er, eg, eb)
+                store(W, Row.path * m + i, path + t)
+                store_vector(W, Row.ox, m, i, ox, oy, oz)
+                store_vector(W, Row.dx, m, i, ex, ey, ez)
+                store(W, Row.side * m + i, es)
+                enter, leave = span_box(ox, oy, oz, ex, ey, ez, P)
+                store(W, Row.start * m + i, enter)
+                store(W, Row.end * m + i, where(more > 0.002, leave, 0.0))
+        elif frame.bounces:
+            store_vector(W, Row.tr, m, i, more, more, more)
+        if frame.bounces:  # behind its end, a ray that is over is not followed: its numbers may be no numbers
+            store(W, Row.start * m + i, where(more > 0.002, load(W, Row.start * m + i), 1e30))
+        sr, sg, sb = load_vector(W, Row.r, m, i)
+        store_vector(W, Row.r, m, i, sr + tr * r, sg + tg * g, sb + tb * b)
+
+
+def gather(W, pixels, A, n, m, width):
+    """Adds one sample to n pixels; no NaN, no infinity, no negative light."""
+    for k in range(n):
+        pixel = pixels[k]
+        a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
+        r = tamed(W[Row.r * m + k])
+        g = tamed(W[Row.g * m + k])
+        b = tamed(W[Row.b * m + k])
+        bright = 0.2126 * r + 0.7152 * g + 0.0722 * b
+        bright = bright / (1.0 + bright)
+        A[a] += r
+        A[a + 1] += g
+        A[a + 2] += b
+        A[a + 3] += bright
+        A[a + 4] += bright * bright
+        A[a + 5] += 1.0
+
+
+def tamed(c):
+    """A sum of light that is a number."""
+    return min(max(c, 0.0), 1e4) if c == c else 0.0

@@ -1,0 +1,149 @@
+"""A scene's second function: which material a point of the surface has, and how near its orbit came to the
+origin.
+
+The field's tree once more, with every function returning (f, paint, tone): paint is the number of a material,
+0 for none; tone the smallest |w| of the orbit (Pickover's and Carlson's orbit traps; Carlson 1999). It is
+called once per hit.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..formulas.material import material
+from ..formulas.registry import Node
+from ..kernel import source
+from ..kernel.linker import OF_FORMULAS, FieldDialect, folded, function, leading
+from ..kernel.structure import Arguments, Run, Subroutine, arguments, read
+
+
+@dataclass
+class TraceDialect(FieldDialect):
+    """Functions that return (f, paint, tone). materials: by its id, the paint of every material node."""
+
+    materials: dict[int, int] = field(default_factory=dict)
+    prefix: str = "T"
+
+    def kept(self, node: Node) -> Node:
+        while node.is_identity and node.formula.name != material.name:
+            node = node.children[0]
+        return node
+
+    def arguments(self, node: Node) -> Arguments:
+        if node.formula.name != material.name:
+            return arguments(node, leading(node))
+        paint: list[float] = []
+        passed = read(float(self.materials[id(node)]), paint, "P0")
+        return Arguments(node.function, (), (passed,), tuple(paint))
+
+    def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
+        """As they stand: where two are as near, the first one's paint is taken."""
+        return range(len(parts))
+
+    def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
+        if node.formula.name == material.name:
+            return self.painted(name, given, runs[0])
+        return super().write(name, node, given, runs)
+
+    def painted(self, name: str, given: Arguments, child: Run) -> str:
+        return function(
+            name,
+            [
+                f"f, paint, tone = {child.call()}",
+                f"return f, where(paint > 0.5, paint, {given.passed[0]}), tone",
+            ],
+        )
+
+    def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
+        tree = _KeepsNearest().visit(source.specialised(given.function, dict(given.fixed)))
+        tree.body.insert(0, ast.parse("nearest = 0.0 * x + 1e30").body[0])
+        called = f"{name}_of"
+        self.linker.functions[called] = self.linker.named(called, tree, given.function)
+        return function(
+            name,
+            [
+                f"f, nearest = {called}({', '.join(['x', 'y', 'z', *given.passed])})",
+                "return f, 0.0 * x, sqrt(minimum(nearest, 1.0))",
+            ],
+        )
+
+    def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
+        lines = [f"f, paint, tone = {runs[0].call()}"]
+        if sum(run.count for run in runs) == 1:
+            lines.append(f"f = {called}({', '.join(['f', *given.passed])})")
+        taken = [
+            "g, p, t = {}",
+            f"a, f = f, {called}({', '.join(['f', 'g', *given.passed])})",
+            "mine = absolute(absolute(f) - absolute(a)) <= absolute(absolute(f) - absolute(g))",
+            "paint, tone = where(mine, paint, p), where(mine, tone, t)",
+        ]
+        for k, run in enumerate(runs):
+            lines += folded(run, k == 0, lambda call: [taken[0].format(call), *taken[1:]])
+        return function(name, [*lines, "return f, paint, tone"])
+
+    def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        tree = source.specialised(given.function, dict(given.fixed))
+        arguments = [a.arg for a in tree.args.args][4:]
+        tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]
+        tree = _KeepsChild(runs[0]).visit(tree)
+        start = [f"{a} = {p}" for a, p in zip(arguments, given.passed, strict=True)]
+        start += ["lowest = 0.0 * x + 1e30", "paint = 0.0 * x", "tone = 0.0 * x"]
+        tree.body = [*(ast.parse(line).body[0] for line in start), *tree.body]
+        return self.linker.named(name, tree, given.function)
+
+
+class _KeepsNearest(ast.NodeTransformer):
+    """Marks of the orbit become the least r2 so far, which is returned beside the value."""
+
+    def visit_Expr(self, node: ast.Expr) -> Any:
+        if not source.is_mark(node):
+            return node
+        assert isinstance(node.value, ast.Call)
+        r2, alive = map(ast.unparse, node.value.args)
+        return ast.parse(f"nearest = where({alive}, minimum(nearest, {r2}), nearest)").body[0]
+
+    def visit_Return(self, node: ast.Return) -> Any:
+        assert node.value is not None
+        return ast.parse(f"return {ast.unparse(node.value)}, nearest").body[0]
+
+
+class _KeepsChild(ast.NodeTransformer):
+    """Before every statement that looks at the child, its triple is taken; the child with the lowest value
+    stays."""
+
+    def __init__(self, child: Run) -> None:
+        self.child = child
+
+    def visit_Assign(self, node: ast.Assign) -> Any:
+        return self.taken(node)
+
+    def visit_Return(self, node: ast.Return) -> Any:
+        lines = self.taken(node)
+        value = ast.unparse(lines[-1].value)
+        return [*lines[:-1], ast.parse(f"return {value}, paint, tone").body[0]]
+
+    def taken(self, node: Any) -> list[Any]:
+        calls = [
+            c
+            for c in ast.walk(node)
+            if isinstance(c, ast.Call) and isinstance(c.func, ast.Name) and c.func.id == "child"
+        ]
+        if not calls:
+            return [node]
+        point = ", ".join(map(ast.unparse, calls[0].args))
+        text = ast.unparse(node).replace(ast.unparse(calls[0]), "inner")
+        lines = [
+            f"inner, p, t = {self.child.call(points=point)}",
+            "paint, tone = where(inner < lowest, p, paint), where(inner < lowest, t, tone)",
+            "lowest = minimum(lowest, inner)",
+        ]
+        return [statement for line in [*lines, text] for statement in self.parsed(line)]
+
+    @staticmethod
+    def parsed(line: str) -> list[Any]:
+        # A return outside a function is no error to the parser.
+        return ast.parse(line).body

@@ -1,0 +1,45 @@
+"""Numbers between 0 and 1 that fill space evenly: whole-number arithmetic on one sample, for loops over
+samples."""
+
+from __future__ import annotations
+
+
+def reversed_bits(a):
+    """32 bits, the last first."""
+    a = ((a >> 1) & 0x55555555) | ((a & 0x55555555) << 1)
+    a = ((a >> 2) & 0x33333333) | ((a & 0x33333333) << 2)
+    a = ((a >> 4) & 0x0F0F0F0F) | ((a & 0x0F0F0F0F) << 4)
+    a = ((a >> 8) & 0x00FF00FF) | ((a & 0x00FF00FF) << 8)
+    return ((a >> 16) & 0x0000FFFF) | ((a & 0x0000FFFF) << 16)
+
+
+def hashed(a):
+    """A 32-bit hash without patterns (Wellons 2018, lowbias32)."""
+    a = ((a ^ (a >> 16)) * 0x7FEB352D) & 0xFFFFFFFF
+    a = ((a ^ (a >> 15)) * 0x846CA68B) & 0xFFFFFFFF
+    return a ^ (a >> 16)
+
+
+def scrambled(a, seed):
+    """Owen's scrambling of a number whose bits come reversed; they leave in order. See
+    `fracslice.rendering.sequence`."""
+    a = (a ^ (a * 0x3D20ADEA)) & 0xFFFFFFFF
+    a = (a + seed) & 0xFFFFFFFF
+    a = (a * ((seed >> 16) | 1)) & 0xFFFFFFFF
+    a = (a ^ (a * 0x05526C56)) & 0xFFFFFFFF
+    a = (a ^ (a * 0x53A22864)) & 0xFFFFFFFF
+    return reversed_bits(a)
+
+
+def sample(a, pixel, dimension):
+    """Number `dimension` of a point of the sequence, scrambled for a pixel: a float in [0, 1)."""
+    seed = hashed((pixel * 64 + dimension) & 0xFFFFFFFF)
+    return (scrambled(a & 0xFFFFFFFF, seed) >> 8) * 5.9604644775390625e-08
+
+
+def centred(a, pixel, dimension):
+    """As `sample`, digitally shifted so that the first point of the sequence is 1/2: the middle of the
+    pixel."""
+    seed = hashed((pixel * 64 + dimension) & 0xFFFFFFFF)
+    shifted = scrambled(a & 0xFFFFFFFF, seed) ^ scrambled(0, seed) ^ 0x80000000
+    return (shifted >> 8) * 5.9604644775390625e-08

@@ -1,0 +1,67 @@
+"""A picture as an array."""
+
+from __future__ import annotations
+
+import io
+import threading
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fracslice import Picture, box, render, sphere
+from fracslice.errors import Cancelled, RenderError, SceneError
+from fracslice.scene import scene
+from fracslice.scene.view import Camera, Film, View
+
+SHAPE = (box() - sphere(0.6)).material(colour=(0.9, 0.1, 0.1))
+SMALL = {"size": (48, 32), "samples": 1, "device": "cpu"}
+
+
+@pytest.fixture(scope="module")
+def picture() -> Picture:
+    return render(SHAPE, **SMALL)
+
+
+def test_a_picture_is_an_array_that_notebooks_show(picture: Picture) -> None:
+    assert (picture.shape, picture.dtype.name) == ((32, 48, 3), "uint8")
+    shown = Image.open(io.BytesIO(picture._repr_png_() or b""))
+    assert np.array_equal(np.asarray(shown), picture)
+    assert picture[8:24]._repr_png_() is not None and picture[..., 0]._repr_png_() is None
+    assert not picture.flags.writeable and picture.copy().flags.writeable
+
+
+def test_it_shows_the_shape(picture: Picture) -> None:
+    red = picture[..., 0].astype(int) - picture[..., 2]
+    assert red[12:20, 20:28].mean() > 40 and red[:, 0].max() < 20
+
+
+def test_the_scene_and_the_keywords_say_how() -> None:
+    view = View(film=Film(width=20, height=10, samples=1), camera=Camera(eye=(0, -5, 1)))
+    by_scene = render(scene(SHAPE, size=10, view=view), device="cpu")
+    assert by_scene.shape == (10, 20, 3)
+    assert np.array_equal(by_scene, render(SHAPE, size=(20, 10), samples=1, camera=view.camera, device="cpu"))
+
+
+def test_progress_is_told_and_work_is_cancelled() -> None:
+    told: list[tuple[str, float]] = []
+    render(SHAPE, size=(16, 16), samples=2, progress=lambda stage, share: told.append((stage, share)))
+    assert told[-1] == ("rendering", 1.0)
+    stop = threading.Event()
+    stop.set()
+    with pytest.raises(Cancelled):
+        render(SHAPE, cancel=stop, **SMALL)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"sample": 1}, TypeError, r"render\(\) has no argument 'sample'; did you mean samples\?"),
+        ({"size": (0, 10)}, RenderError, r"size=\(0, 10\): expected 2 whole numbers"),
+        ({"samples": 0}, RenderError, "samples=0: expected a whole number"),
+        ({"camera": Camera(eye=(0.1, 0, 0.4))}, SceneError, "eye: expected a place outside"),
+    ],
+)
+def test_values_that_cannot_be_are_named(options: dict, error: type, message: str) -> None:
+    with pytest.raises(error, match=message):
+        render(box(), **{"size": (16, 16), **options})

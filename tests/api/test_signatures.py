@@ -1,0 +1,72 @@
+"""How formulas look to Python, editors and type checkers."""
+
+from __future__ import annotations
+
+import inspect
+import pydoc
+from pathlib import Path
+
+import pytest
+
+import fracslice
+from fracslice import capsule, formulas, sphere, torus
+from fracslice.errors import SceneError
+from fracslice.formulas import get, names
+from fracslice.formulas.parameters import REQUIRED
+from fracslice.formulas.signatures import python_name, stub
+
+SHIPPED = [name for name in names() if get(name).function.__module__.startswith("fracslice.")]
+
+
+def test_the_stub_file_is_up_to_date() -> None:
+    made = Path(formulas.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    assert made == stub(), "run `python docs/generate.py`"
+
+
+def test_every_formula_is_a_public_name() -> None:
+    assert {n for n in fracslice.__all__ if n in names()} == set(SHIPPED)
+    assert all(getattr(fracslice, name) is get(name) for name in SHIPPED)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_signature_is_the_registrys(name: str) -> None:
+    formula, signature = get(name), inspect.signature(get(name))
+    elements = [] if formula.kind == "shape" else ["elements"]
+    assert {*signature.parameters} == {*elements, *map(python_name, formula.parameters)}
+    for parameter, kind in formula.parameters.items():
+        found = signature.parameters[python_name(parameter)]
+        assert found.default == (inspect.Parameter.empty if kind.default is REQUIRED else kind.default)
+        assert found.kind is (found.KEYWORD_ONLY if elements else found.POSITIONAL_OR_KEYWORD)
+        assert kind.doc in formula.__doc__
+    assert signature.return_annotation is formulas.Node
+    assert formula.doc.splitlines()[0] in pydoc.render_doc(formula)
+
+
+@pytest.mark.parametrize("name", [n for n in SHIPPED if get(n).kind == "shape"])
+def test_positions_fill_parameters_in_the_order_of_the_signature(name: str) -> None:
+    bound = inspect.signature(get(name)).bind()
+    bound.apply_defaults()
+    assert get(name)(*bound.args) == get(name)()
+    first = next(iter(bound.arguments))
+    assert get(name)(bound.arguments[first]) == get(name)(**{first: bound.arguments[first]})
+
+
+def test_a_shape_takes_its_values_by_position_or_name() -> None:
+    assert sphere(0.5) == sphere(radius=0.5)
+    assert torus(1, 0.1) == torus(1, tube=0.1)
+    assert capsule((0, 0, 0), to=(1, 0, 0)) == capsule(**{"from": (0, 0, 0), "to": (1, 0, 0)})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: sphere(1, 2), "<sphere> has 2 values: expected at most 1: radius"),
+        (lambda: sphere(1, radius=2), "<sphere> has two values of radius: expected one"),
+        (lambda: sphere(raduis=2), r"<sphere> has no attribute 'raduis'; did you mean radius\?"),
+        (lambda: capsule(form=(0, 0, 0)), r"did you mean from_\?"),
+        (lambda: sphere(sphere()), r"<sphere> radius=sphere\(\): expected a number > 0"),
+    ],
+)
+def test_calls_that_cannot_be_are_one_line(wrong, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        wrong()

@@ -1,0 +1,163 @@
+"""Loops are plain Python: what their modules see becomes constants and functions, and they run without a
+compiler."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from fracslice.errors import KernelError
+from fracslice.formulas import box
+from fracslice.formulas.field import Kernel, Precision
+from fracslice.kernel import intrinsics
+from fracslice.kernel.arrays import ArrayField
+from fracslice.kernel.cpu import load_functions
+from fracslice.kernel.host import lane_count
+from fracslice.kernel.intrinsics import load, store
+from fracslice.kernel.linker import Linked
+from fracslice.kernel.loop_linker import loop_source
+from fracslice.kernel.loops import Loop, loop
+from fracslice.rendering import packets
+from fracslice.volume import roots
+
+STEP = 3
+NOTHING = Linked("", np.zeros(1))
+
+
+class Place(IntEnum):
+    FIRST = 4
+
+
+@dataclass(frozen=True)
+class Told:
+    deep: bool
+    count: int
+
+
+def doubled(v):  # type: ignore[no-untyped-def]
+    return 2.0 * v
+
+
+def applied(v, function, told):  # type: ignore[no-untyped-def]
+    """A docstring."""
+    return function(v) if told.deep else v
+
+
+@loop("rn")
+def example(A, n, told):  # type: ignore[no-untyped-def]
+    A[Place.FIRST] = applied(A[0], doubled, told)
+    if not told.count:
+        A[n] = STEP
+    parts = tuple(A[k] for k in range(told.count))
+    if told.count:
+        A[n] = parts[1]
+
+
+def test_what_a_loop_sees_is_constants_and_functions() -> None:
+    assert loop_source([example.fix(told=Told(True, 2))]) == (
+        "def l_doubled(v):\n    return 2.0 * v\n\n\n"
+        "def l_applied(v):\n    return l_doubled(v)\n\n\n"
+        "def example(A, n):\n    A[4] = l_applied(A[0])\n    parts = (A[0], A[1])\n    A[n] = parts[1]"
+    )
+    assert loop_source([example.fix(told=Told(False, 0))]) == (
+        "def l_applied(v):\n    return v\n\n\n"
+        "def example(A, n):\n    A[4] = l_applied(A[0])\n    A[n] = 3\n    parts = ()"
+    )
+
+
+def test_copies_for_other_fixed_arguments_have_other_names() -> None:
+    deep, flat = (example.fix(told=Told(deep, 2)) for deep in (True, False))
+    text = loop_source([deep, Loop(applied_flat, "r")])
+    assert "def l_applied(v):" in text and "def l_applied_(v):" in text
+    assert flat.name == "example"
+
+
+def applied_flat(A):  # type: ignore[no-untyped-def]
+    A[0] = applied(A[1], doubled, FLAT)
+
+
+FLAT = Told(False, 0)
+
+
+def wrong_keyword(A):  # type: ignore[no-untyped-def]
+    A[0] = 1.0
+    A[1] = doubled(v=A[0])
+
+
+def wrong_name(A):  # type: ignore[no-untyped-def]
+    A[0] = np.pi + ModuleType
+
+
+@pytest.mark.parametrize(
+    ("function", "line", "message"),
+    [
+        (wrong_keyword, 2, "expected arguments by their place"),
+        (wrong_name, 1, "'ModuleType' has no value here"),
+    ],
+)
+def test_what_cannot_be_linked_is_one_line_with_its_place(function, line: int, message: str) -> None:  # type: ignore[no-untyped-def]
+    place = f"test_loops.py:{function.__code__.co_firstlineno + line}: loop {function.__name__}: .*{message}$"
+    with pytest.raises(KernelError, match=place):
+        loop_source([Loop(function, "r")])
+
+
+def to_the_floor(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):  # type: ignore[no-untyped-def]
+    """Half of the way to the plane z = 0 at each step."""
+    gap = (oz + t * dz) * P[0] - 0.001
+    return t + 0.5 * gap, before, stride, gap
+
+
+def test_packets_followed_by_python_are_those_of_the_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    width = lane_count(64)
+    n, m = 3 * width - 5, 3 * width
+    rows = np.zeros((len(packets.Row), m))
+    rows[packets.Row.oz] = np.random.default_rng(0).uniform(-0.5, 3.0, m)
+    rows[packets.Row.dz] = np.where(np.arange(m) % 7 == 3, 1.0, -1.0)
+    rows[packets.Row.end] = np.where(np.arange(m) % 5 == 1, -1.0, 9.0)
+    follow = Loop(packets.follow, "rrinnnr").fix(step=to_the_floor)
+    compiled = load_functions(NOTHING, 64, width, [follow])["follow"]
+    for module in (intrinsics, packets):
+        monkeypatch.setattr(module, "WIDTH", width)
+    found = []
+    for run, last in ((compiled, ()), (packets.follow, (to_the_floor,))):
+        own = rows.copy()
+        lanes, rays = np.zeros(len(packets.Lane) * width), np.zeros(width, np.int32)
+        run(own.ravel(), lanes, rays, n, m, 20, np.ones(1), *last)
+        found.append(own)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
+    assert set(found[0][packets.Row.status, :n]) == {1.0, 2.0, 3.0}
+
+
+def test_roots_of_a_field_that_is_not_linked_move_as_the_compiled_ones_do() -> None:
+    """`polish` says how far it moved a root: a row of lanes that was read does not change with what is
+    written."""
+    root, voxel = box(), 0.1
+
+    class Plain(ArrayField):
+        bounds = root.bounds
+
+        def kernel(self, device: str, precision: Precision) -> Kernel:  # type: ignore[override]
+            return root.kernel(device, precision)  # type: ignore[arg-type]
+
+    ways = roots.Roots(root, "float64", voxel), roots.Roots(Plain(), "float64", voxel)  # type: ignore[abstract]
+    n = ways[0].width
+    segments = np.zeros((6, n))
+    segments[0], segments[1], segments[3] = 0.45, np.linspace(-0.3, 0.3, n), voxel
+    found = []
+    for way in ways:
+        out = np.full((5, n), 0.25)
+        way._runs["polish"](way._frame, segments, out)
+        found.append(out)
+    np.testing.assert_allclose(found[1], found[0], atol=1e-9)
+    assert found[0][4].min() > 0.01
+
+
+def test_lanes_that_were_loaded_are_values() -> None:
+    array = np.zeros(4)
+    lanes = load(array, 0)
+    store(array, 0, lanes + 1.0)
+    assert lanes.max() == 0.0 and array.min() == 1.0

@@ -1,0 +1,43 @@
+"""Pictures that use every loop and most units of the CUDA renderer, small ones."""
+
+from __future__ import annotations
+
+from fracslice.formulas import Node, box, get, mandelbulb, menger, plane, sphere, torus, transform, union
+from fracslice.rendering.cpu import BLOCK
+from fracslice.rendering.linking import Frame, link_frame
+from fracslice.rendering.optics import optics
+from fracslice.scene.view import Camera, Fog, Light, Shading, View
+
+WIDTH, HEIGHT = 17, 12
+SUN = Light(kind="sun", position=(1.0, -2.0, 3.0))
+SKY = Light(kind="sky", strength=0.5)
+SOFT = (
+    Light(kind="sun", position=(1.0, -2.0, 3.0), size=3.0),
+    Light(kind="lamp", position=(2.0, -1.0, 2.0), size=0.3),
+    SKY,
+)
+
+
+def _glass() -> Node:
+    material = get("material")
+    mirror = transform(material(box(), reflect=0.5), translate=(1.2, 0.3, 0.0))
+    return union(material(sphere(radius=0.8), clear=0.9, reflect=0.1), mirror, plane(offset=-1.2))
+
+
+CASES: dict[str, tuple[Node, View]] = {
+    "fractal": (mandelbulb(iterations=5), View(lights=(SUN,), shading=Shading(ambient=0.1))),
+    "soft shadows, fog, occlusion": (
+        menger(level=2),
+        View(lights=SOFT, fog=Fog(density=0.05), shading=Shading(ambient=0.1, occlusion=0.5)),
+    ),
+    "depth of field": (torus(), View(camera=Camera(aperture=0.05), lights=(SKY,))),
+    "glass and mirrors": (_glass(), View(lights=(SKY, SUN), shading=Shading(bounces=4))),
+    "normals": (torus(), View(shading=Shading(mode="normal"))),
+    "steps": (torus(), View(shading=Shading(mode="steps"))),
+}
+
+
+def frame(name: str) -> Frame:
+    root, view = CASES[name]
+    camera = view.camera or Camera()
+    return link_frame(root, view, camera, optics(camera, (WIDTH, HEIGHT), root, 1e-5), BLOCK)

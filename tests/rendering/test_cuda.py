@@ -1,0 +1,53 @@
+"""The CUDA renderer where there is no GPU. On a real one: ``python -m tests.benchmarks.gpu.frame``."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fracslice.kernel import Linked
+from fracslice.rendering import cuda_accumulator
+from fracslice.rendering.cuda_loops import loops
+from tests.kernel.cuda_ptx import compiled
+from tests.rendering.cuda_cases import CASES, frame
+
+pytestmark = pytest.mark.skipif(
+    importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not there"
+)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_float32_kernels_hold_no_float64(name: str, tmp_path: Path) -> None:
+    seen = frame(name)
+    ptx = compiled(seen.linked, 32, loops(seen), "tile", "RNRIMnrn", tmp_path)
+    assert ".f64" not in ptx
+    assert ".f32" in ptx
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [("measure", "MRM"), ("judge", "MRRMnrrr"), ("choose", "RIIMnr"), ("show", "MUnnrn")],
+)
+def test_what_keeps_the_picture_holds_no_float64(name: str, arguments: str, tmp_path: Path) -> None:
+    ptx = compiled(Linked("", np.zeros(1)), 32, cuda_accumulator.LOOPS, name, arguments, tmp_path)
+    assert ".f64" not in ptx
+    assert ".f32" in ptx
+
+
+def test_threads_go_on_together_after_the_march(tmp_path: Path) -> None:
+    """Without the barrier those that hit first shade alone, and a frame takes twice as long."""
+    seen = frame("fractal")
+    assert "bar.warp.sync" in compiled(seen.linked, 32, loops(seen), "tile", "RNRIMnrn", tmp_path)
+
+
+def test_pictures_are_those_of_the_lanes_on_the_simulator() -> None:
+    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1"}
+    command = [sys.executable, "-m", "tests.rendering.cuda_simulated"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,69 @@
+"""A kernel holds what its scene uses, and nothing else."""
+
+from __future__ import annotations
+
+import pytest
+
+from fracslice.formulas import mandelbulb, material, sphere, union
+from fracslice.formulas.registry import Node
+from fracslice.kernel.linker import link
+from fracslice.rendering.linking import Frame, link_frame
+from fracslice.rendering.optics import optics
+from fracslice.scene.view import Camera, Fog, Light, Shading, View
+
+CAMERA = Camera(eye=(2, -2, 1))
+PLAIN = (Light(shadows="no"),)
+BULB = mandelbulb(iterations=4)
+
+
+def frame(root: Node = BULB, camera: Camera = CAMERA, **view: object) -> Frame:
+    whole = View(camera=camera, **{"lights": PLAIN, **view})  # type: ignore[arg-type]
+    return link_frame(root, whole, camera, optics(camera, (32, 32), root, 1e-7), 8)
+
+
+EFFECTS = {
+    "def visible(": {"lights": (Light(),)},
+    "def sun(": {"lights": (Light(size=2, shadows="no"),)},
+    "def lamp(": {"lights": (Light(kind="lamp", size=0.1, shadows="no"),)},
+    "def sharp_lamp(": {"lights": (Light(kind="lamp", shadows="no"),)},
+    "def upward(": {"lights": (Light(kind="sky"),)},
+    "def sky(": {"lights": (Light(kind="sky", shadows="no"),)},
+    "def fog(": {"fog": Fog()},
+    "def occlusion(": {"shading": Shading(ambient=0.1, occlusion=1)},
+    "def lens(": {"camera": Camera(eye=(2, -2, 1), aperture=0.1)},
+    "def palette_count_2(": {"root": material(BULB, colour=(1, 0, 0, 0, 1, 0))},
+    "nearest": {"root": material(BULB, colour=(1, 0, 0, 0, 1, 0))},
+    "def reflects(": {"root": material(BULB, reflect=0.2)},
+    "def goes_on(": {"root": material(BULB, clear=0.9)},
+    "glow": {"root": material(BULB, glow=1)},
+    "paint": {"root": union(material(BULB), sphere(radius=0.3))},
+}
+
+
+@pytest.mark.parametrize("line", EFFECTS)
+def test_an_effect_is_in_the_kernel_of_a_scene_that_uses_it_and_in_no_other(line: str) -> None:
+    assert line in frame(**EFFECTS[line]).linked.source  # type: ignore[arg-type]
+    assert line not in frame().linked.source
+
+
+@pytest.mark.parametrize("mode", ["normal", "depth", "distance", "steps"])
+def test_modes_that_show_a_number_light_nothing(mode: str) -> None:
+    source = frame(shading=Shading(mode=mode), lights=(Light(),)).linked.source
+    assert "phong" not in source
+    assert ("def normal(" in source) == (mode == "normal")
+
+
+def test_numbers_are_no_source() -> None:
+    one = frame(lights=(Light(strength=1, position=(1, 2, 3)),))
+    other = frame(root=mandelbulb(iterations=9), camera=Camera(eye=(3, 0, 1)), lights=(Light(strength=5),))
+    assert one.linked.source == other.linked.source
+
+
+def test_random_numbers_are_drawn_for_what_needs_them() -> None:
+    assert frame().samples == 2
+    assert frame(lights=(Light(size=1), Light(kind="sky"))).samples == 6
+    assert frame(camera=Camera(eye=(2, -2, 1), aperture=0.1)).samples == 4
+
+
+def test_materials_change_no_field() -> None:
+    assert link(material(BULB, colour=(1, 0, 0, 0, 1, 0), clear=0.5)).source == link(BULB).source

@@ -1,0 +1,124 @@
+"""A picture that follows its pilot and its file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fracslice.errors import SceneError
+from fracslice.rendering.live import CameraInput, Live
+from fracslice.scene.view import Camera
+from fracslice.work import Work
+
+SCENE = '<scene version="1"><solid size="80mm">{}</solid><camera eye="3 -2 1"/><film samples="4"/></scene>'
+SPHERE, BOX = "<sphere/>", '<box size="1 1 1"/>'
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "ball.xml"
+    path.write_text(SCENE.format(SPHERE))
+    return path
+
+
+@pytest.fixture
+def live(path: Path) -> Iterator[Live]:
+    live = Live(path, size=(48, 32), work=Work(threads=1), device="cpu")
+    yield live
+    live.close()
+    assert not live.running
+
+
+def within(holds: Callable[[], bool], seconds: float = 60) -> None:
+    """Waits until it holds."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.005)
+
+
+def sharp(live: Live, camera: Camera) -> np.ndarray:
+    """The picture from there, when it has all of its samples."""
+    within(lambda: live.shown.camera == camera and live.shown.done.samples == 4)
+    return live.shown.pixels
+
+
+def test_a_flight_never_gets_there() -> None:
+    camera, ahead = Camera(eye=(3, 0, 0), target=(0, 0, 0)), CameraInput(forward=1, pace=40)
+    ways = [3.0]
+    for _ in range(30):
+        camera = ahead.flown(camera, np.hypot.reduce(camera.eye) - 1, 0.1)
+        ways.append(camera.eye[0])
+    assert 1 < min(ways) < 1 + 1e-6
+    assert all(a > b for a, b in pairwise(ways))
+    aside = CameraInput(1, 1, 1, pace=1e3).flown(Camera(eye=(3, 0, 0), target=(0, 0, 0)), 2.0, 1.0)
+    assert np.hypot.reduce(np.subtract(aside.eye, (3, 0, 0))) == pytest.approx(1.0)
+    assert CameraInput(pace=3).idle and not ahead.idle
+
+
+def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
+    before = live.camera
+    first = sharp(live, before)
+    assert first.shape == (32, 48, 3) and np.ptp(first) > 50
+    live.steer(CameraInput(forward=1, pace=5))
+    within(lambda: 0 < live.shown.room < 0.1)
+    live.steer(CameraInput())
+    assert np.linalg.norm(np.cross(live.camera.forward, before.forward)) < 1e-9, "straight ahead"
+    within(lambda: live.shown.done.samples == 4)  # it has come to rest
+    near = live.shown.pixels
+    assert abs(near.astype(int) - first).mean() > 5
+    aside = live.camera.turned(90, 10)
+    live.turn(90, 10)
+    within(lambda: live.shown.camera == aside)
+    live.look(live.first)
+    within(lambda: live.camera == before)
+    assert abs(sharp(live, before).astype(int) - first).mean() < 1
+
+
+def test_there_is_no_looking_from_inside(live: Live) -> None:
+    before = live.camera
+    live.look(replace(before, eye=(0.1, 0, 0)))
+    live.turn(0.0, 0.0)
+    time.sleep(0.3)
+    sharp(live, before)
+    assert live.running and live.camera == before
+
+
+def test_a_saved_file_is_looked_at_from_the_same_place(live: Live, path: Path) -> None:
+    first = sharp(live, live.first)
+    live.turn(5, 0)
+    turned = live.first.turned(5, 0)
+    before = sharp(live, turned)
+    path.write_text(SCENE.format(BOX))
+    within(lambda: abs(live.shown.pixels.astype(int) - before).mean() > 3)
+    boxed = sharp(live, turned)
+    path.write_text(SCENE.format('<sphere radius="x"/>'))
+    within(lambda: "ball.xml:1" in live.shown.trouble)
+    assert "radius" in live.shown.caption and live.running
+    np.testing.assert_array_equal(live.shown.pixels, boxed)
+    path.write_text(SCENE.format(SPHERE).replace("3 -2 1", "-3 -2 1"))
+    other = sharp(live, replace(live.first, eye=(-3, -2, 1)))
+    assert live.shown.trouble == ""
+    assert abs(other.astype(int) - first).mean() > 1, "seen from the other side"
+
+
+def test_what_cannot_be_rendered_is_said_at_once(path: Path) -> None:
+    path.write_text(SCENE.format(SPHERE).replace("3 -2 1", "0.1 0 0"))
+    with pytest.raises(SceneError, match="outside the solid"):
+        Live(path, size=(48, 32))
+    with pytest.raises(SceneError, match=r"sphere\.radios"):
+        Live(path, ["sphere.radios=2"])
+
+
+def test_what_stops_it_is_raised_at_the_end(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    live = Live(path, size=(48, 32), device="cpu")
+    monkeypatch.setattr(live, "_step", lambda: 1 / 0)
+    within(lambda: not live.running)
+    with pytest.raises(ZeroDivisionError):
+        live.close()

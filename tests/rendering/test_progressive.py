@@ -1,0 +1,198 @@
+"""Passes: what they show, that they stop, and that stopping changes nothing."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import pytest
+
+from fracslice.errors import Cancelled, RenderError
+from fracslice.formulas import material, menger, sphere, union
+from fracslice.rendering import Renderer, progressive
+from fracslice.scene.view import Camera, Film, Light, View
+from fracslice.work import Work
+
+ROOT = union(menger(level=2), material(sphere(radius=1.2), reflect=0.4))
+VIEW = View(
+    camera=Camera(eye=(2.5, -3, 1.6), aperture=0.05),
+    lights=(Light(kind="sun", size=4), Light(kind="sky")),
+    film=Film(samples=12),
+)
+SIZE = (50, 34)
+
+
+def renderer(threads: int = 1) -> Renderer:
+    return Renderer(ROOT, VIEW, SIZE, Work(threads=threads), "cpu")
+
+
+def finished(of: Renderer, samples: int = 12) -> np.ndarray:
+    *_, last = of.passes(samples, tolerance=0.01)
+    return last.image
+
+
+def test_the_first_pass_shows_something_everywhere_and_the_second_has_every_pixel() -> None:
+    of = renderer()
+    passes = of.passes()
+    first = next(passes)
+    assert 0 < first.samples < 0.08
+    assert (first.image.sum(2) > 0).all()
+    second = next(passes)
+    assert second.samples == 1
+    assert (of.accumulator.counts == 1).all()
+
+
+def test_samples_reduce_the_error_and_clean_pixels_get_no_more() -> None:
+    of = renderer()
+    errors, counts = [], []
+    for done in of.passes(40, tolerance=0.01):
+        errors.append(done.error)
+        counts.append(of.accumulator.counts.copy())
+    assert errors[-1] < errors[4] / 2
+    assert counts[-1].min() < counts[-1].max() <= 40
+    assert counts[-1].min() >= 8
+
+
+def test_threads_change_no_bit() -> None:
+    assert finished(renderer(1)).tobytes() == finished(renderer(3)).tobytes()
+
+
+def test_resuming_changes_no_bit(tmp_path: Path) -> None:
+    of = renderer()
+    for done in of.passes(12, tolerance=0.01):
+        if done.number == 5:
+            break
+    with open(tmp_path / "state.npz", "wb") as file:
+        of.save(file)
+    again = renderer()
+    again.resume(tmp_path / "state.npz")
+    assert again.accumulator.passes == 5
+    assert finished(again).tobytes() == finished(renderer()).tobytes()
+
+
+def test_a_state_of_another_picture_is_refused(tmp_path: Path) -> None:
+    with open(tmp_path / "state.npz", "wb") as file:
+        renderer().save(file)
+    other = Renderer(ROOT, VIEW, (34, 50), Work(threads=1), "cpu")
+    with pytest.raises(RenderError, match="another scene"):
+        other.resume(tmp_path / "state.npz")
+
+
+@pytest.mark.parametrize("left", [0, 2, 500, -30])
+def test_a_state_that_was_cut_off_is_refused(tmp_path: Path, left: int) -> None:
+    of, path = renderer(), tmp_path / "state.npz"
+    with open(path, "wb") as file:
+        of.save(file)
+    path.write_bytes(path.read_bytes()[:left])
+    with pytest.raises(RenderError, match=r"state.npz: expected a picture in the making"):
+        of.resume(path)
+
+
+FORGED: dict[str, Callable[[dict[str, np.ndarray]], object]] = {
+    "of another type": lambda s: s.update(sums=s["sums"].astype(np.float16)),
+    "of fewer pixels": lambda s: s.update(sums=s["sums"][:-1]),
+    "smaller": lambda s: s.update(sums=s["sums"][: 8 * 8], shape=np.array([8, 8, 1, 4])),
+    "turned": lambda s: s.update(sums=np.asfortranarray(s["sums"])),
+    "with more samples than passes": lambda s: s["sums"].__setitem__((0, 5), 1e9),
+    "with half a sample": lambda s: s["sums"].__setitem__((0, 5), 0.5),
+    "with less than none": lambda s: s["sums"].__setitem__((0, 5), -1),
+    "with no number of them": lambda s: s["sums"].__setitem__((0, 5), np.nan),
+    "without a grid": lambda s: s.update(shape=np.array([*s["shape"][:3], 0])),
+    "without a shape": lambda s: s.pop("shape"),
+    "with code": lambda s: s.update(shape=np.array([print] * 4, dtype=object)),
+    "too large": lambda s: s.update(sums=np.zeros((len(s["sums"]) + 1000, 6), s["sums"].dtype)),
+}
+
+
+@pytest.mark.parametrize("forged", FORGED)
+def test_a_state_that_no_renderer_wrote_is_refused(tmp_path: Path, forged: str) -> None:
+    """Native code is given its numbers and its size."""
+    of, path = renderer(), tmp_path / "state.npz"
+    with open(path, "wb") as file:
+        of.save(file)
+    with np.load(path) as arrays:
+        state = {name: arrays[name].copy() for name in arrays}
+    FORGED[forged](state)
+    np.savez_compressed(path, allow_pickle=True, **state)
+    with pytest.raises(RenderError, match=r"state.npz: expected a picture in the making"):
+        of.resume(path)
+
+
+def test_a_state_is_of_one_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open(tmp_path / "state.npz", "wb") as file:
+        renderer().save(file)
+    monkeypatch.setattr(progressive, "program", lambda: "another")
+    with pytest.raises(RenderError, match="another scene, view, size or version"):
+        renderer().resume(tmp_path / "state.npz")
+
+
+@pytest.mark.parametrize("saved", [np.save, lambda file, a: file.write(b"text")])
+def test_what_is_no_state_is_refused(tmp_path: Path, saved: Callable[[BinaryIO, np.ndarray], object]) -> None:
+    with open(tmp_path / "state.npz", "wb") as file:
+        saved(file, np.zeros(4))
+    with pytest.raises(RenderError, match=r"state.npz: expected a picture in the making"):
+        renderer().resume(tmp_path / "state.npz")
+
+
+def test_a_picture_that_was_not_looked_at_in_time_is_gone() -> None:
+    passes = renderer().passes()
+    first, second = next(passes), next(passes)
+    assert second.shown.dtype == np.uint8
+    with pytest.raises(RenderError, match="pass 1: its picture is gone"):
+        _ = first.image
+
+
+def test_most_samples_go_where_they_take_most_error_away() -> None:
+    of = renderer()
+    for done in of.passes(256, tolerance=0.0):
+        if done.samples > 24:
+            break
+    n = of.accumulator.host().counts
+    assert n.min() >= 8
+    assert n.max() >= 4 * n.min()
+    assert ((n[n > 8].astype(int) & (n[n > 8].astype(int) - 1)) == 0).any()
+
+
+@pytest.mark.parametrize(("within", "coarse"), [(1e-9, 8), (1e9, 1)])
+def test_the_first_pass_from_a_moved_camera_is_as_fine_as_there_is_time(within: float, coarse: int) -> None:
+    of = renderer()
+    finished(of)
+    of.look(VIEW.camera.moved(right=0.1), within)  # type: ignore[union-attr]
+    first = next(of.passes())
+    assert first.active == -(-SIZE[0] // coarse) * -(-SIZE[1] // coarse) / (SIZE[0] * SIZE[1])
+    assert (first.image.sum(2) > 0).mean() > 0.9
+    assert [done.samples for done in of.passes(3)][-2:] == [2, 3]
+
+
+def test_cancelling_keeps_what_was_complete() -> None:
+    work = Work(threads=1)
+    of = Renderer(ROOT, VIEW, SIZE, work, "cpu")
+    passes = of.passes()
+    next(passes), next(passes)
+    before = of.accumulator.sums.copy()
+    work.cancel.set()
+    with pytest.raises(Cancelled):
+        next(passes)
+    assert (of.accumulator.sums == before).all()
+    work.cancel.clear()
+    buffer = io.BytesIO()
+    of.save(buffer)
+    assert len(buffer.getvalue()) > before.nbytes
+
+
+def test_the_mean_does_not_depend_on_where_sampling_stopped() -> None:
+    rough, clean = finished(renderer(), 16), finished(renderer(), 200)
+    assert abs(rough.mean() - clean.mean()) < 0.01 * clean.mean()
+
+
+def test_looking_back_again_gives_the_same_picture() -> None:
+    of, camera = renderer(), VIEW.camera
+    assert camera is not None
+    wanted = finished(of)
+    of.look(camera.moved(right=0.2).turned(yaw=5))
+    assert abs(finished(of) - wanted).mean() > 0.01
+    of.look(camera)
+    assert finished(of).tobytes() == wanted.tobytes()
