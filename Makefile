@@ -1,4 +1,5 @@
 # make demo: a shipped scene becomes a printable mesh. make test: tests and linters. make wheel: a wheel that needs no OpenVDB.
+# make docs: the site, in docs/_build.
 # make nightly: 500 random scenes, an hour or two.
 # make native-tests: unit tests of the native code. make sanitize: all of it under GCC's sanitizers, some minutes.
 # All of them set up what is missing first: Debian packages (as root or with sudo) and an own .venv. Debian 12, Ubuntu 24.04.
@@ -14,7 +15,7 @@ PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
 NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
 
-.PHONY: demo test suite native-tests nightly sanitize lint wheel peers setup packages clean
+.PHONY: demo test suite native-tests docs nightly sanitize lint wheel peers setup packages clean
 
 demo: setup
 	mkdir -p out
@@ -31,6 +32,16 @@ native-tests: packages
 	cmake -S tests/native -B build/native-tests -G Ninja
 	cmake --build build/native-tests
 	cd build/native-tests && ctest --output-on-failure
+
+# No warning is let through, and nothing of an earlier build is kept.
+docs: setup $(VENV)/.docs
+	rm -rf docs/_build docs/examples
+	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet docs docs/_build
+	@ls docs/_build/index.html
+
+$(VENV)/.docs: docs/requirements.lock | $(VENV)/.locked
+	$(BIN)/python -m pip install --quiet -r docs/requirements.lock
+	touch $@
 
 nightly: setup
 	$(BIN)/python -m tests.benchmarks.stability.random_scenes
@@ -73,4 +84,4 @@ $(VENV)/.installed: $(VENV)/.locked pyproject.toml $(NATIVE)
 	touch $@
 
 clean:
-	rm -rf .venv .venv-* build dist out
+	rm -rf .venv .venv-* build dist out docs/_build docs/examples

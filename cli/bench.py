@@ -25,7 +25,7 @@ from .working import working
     "workloads",
     multiple=True,
     metavar="NAME",
-    help="What to mesh, all of them by default; may be given again.",
+    help="A workload to mesh, all of them by default; repeatable.",
 )
 @click.option(
     "--resolution",
@@ -33,7 +33,7 @@ from .working import working
     type=Whole(16, 2048),
     multiple=True,
     metavar="N",
-    help="Voxels along the cube; 64, 128 and 256 by default; may be given again.",
+    help="Voxels along the cube; 64, 128 and 256 by default; repeatable.",
 )
 @click.option(
     "--peer",
@@ -47,14 +47,14 @@ from .working import working
     type=Whole(1, 100),
     default=3,
     metavar="N",
-    help="Runs of each, of which the median is told; 3 by default.",
+    help="Number of runs, of which the median counts; 3 by default.",
 )
 @click.option(
     "--limit",
     type=Positive(),
     default=60.0,
     metavar="SECONDS",
-    help="What takes longer is not tried at finer resolutions; 60 by default.",
+    help="Skip finer resolutions of what takes longer; 60 by default.",
 )
 @threads_option
 @quiet_option

@@ -30,7 +30,7 @@ OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
 
 @click.command(short_help="Say whether a model, or a scene's mesh or layers, would print.")
 @source_argument("MODEL|SCENE")
-@click.option("--json", "as_json", is_flag=True, help="All numbers, as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print all figures as JSON.")
 @click.option("--layer", callback=heights, metavar="LENGTH[..LENGTH]", help="Check layers of this height.")
 @click.option(
     "--pixel",
@@ -45,14 +45,14 @@ OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
     callback=length,
     default="0.1mm",
     metavar="LENGTH",
-    help="Thinner walls would not print; 0.1mm by default.",
+    help="Minimum thickness of walls; 0.1mm by default.",
 )
 @click.option(
     "--floor",
     callback=length,
     default="0.1mm",
     metavar="LENGTH",
-    help="Thinner floors and roofs would not print; 0.1mm by default.",
+    help="Minimum thickness of floors and roofs; 0.1mm by default.",
 )
 @print_options
 @job_options

@@ -8,7 +8,7 @@ import click
 @click.command()
 @click.argument("name", required=False)
 def formulas(name: str | None) -> None:
-    """List the elements of scenes, or describe the one called NAME."""
+    """List the elements of a scene, or describe the element NAME."""
     from fracslice.scene import manual
 
     click.echo(manual.overview() if name is None else manual.page(name))

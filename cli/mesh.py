@@ -48,19 +48,19 @@ GRID = ".vdb"
 @print_options
 @job_options
 @set_option
-@click.option("--report", type=NAME, metavar="FILE.json", help="Write the numbers that prove what was made.")
+@click.option("--report", type=NAME, metavar="FILE.json", help="Write the figures that prove the mesh.")
 @click.option("--picture", type=NAME, metavar="FILE.png", help="Write a shaded picture of the mesh.")
 @click.option(
     "--cache",
     type=NAME,
     metavar="FOLDER",
-    help="Keep samples and surface there, and use those of the same scene and voxel, whatever else differs.",
+    help="Keep samples and surface in this folder, for further jobs of the same scene and voxel.",
 )
 @click.option(
     "--device",
     type=click.Choice(["cpu", "cuda", "auto"]),
     default="cpu",
-    help="What samples the field, cpu by default; auto: the GPU, if there is one.",
+    help="The device that samples the field; cpu by default. auto: the GPU, if there is one.",
 )
 @threads_option
 @quiet_option
@@ -79,9 +79,9 @@ def mesh(
     quiet: bool,
     **options: Any,
 ) -> int:
-    """Make a printable mesh of SCENE, and say what it is.
+    """Make a printable mesh of SCENE, and print a summary.
 
-    Exits with 1 if the mesh has defects that a slicer would stumble over; it is written all the same. A mesh
+    Exit status: 1 if the mesh would not print; the file is written. A mesh
     that does not fit in memory is made piece after piece if it goes to an .stl file.
     """
     from fracslice.kernel.devices import chosen

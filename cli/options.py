@@ -98,26 +98,26 @@ _JOB = [
         "--resolution",
         type=WHOLE,
         metavar="N",
-        help="Or voxels along the longest side, 8 to 16384; 256 by default.",
+        help="Voxels along the longest side, instead of --voxel: 8 to 16384; 256 by default.",
     ),
     click.option(
         "--dust",
         type=NUMBER,
         callback=amount,
         metavar="MM3",
-        help="Drop bodies of less volume, in mm3; 1e-5 of the whole by default.",
+        help="Drop connected components of less volume, in mm3; 1e-5 of the whole by default.",
     ),
     click.option(
         "--chord",
         callback=length,
         metavar="LENGTH",
-        help="More triangles where the surface bends farther than this from them, such as 0.001mm.",
+        help="Split triangles farther than this from a smooth surface, such as 0.001mm.",
     ),
     click.option(
         "--simplify",
         callback=length,
         metavar="LENGTH",
-        help="Fewer triangles, nowhere farther off than this, such as 0.02mm.",
+        help="Remove triangles within this tolerance, such as 0.02mm.",
     ),
 ]
 
@@ -140,15 +140,15 @@ def print_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 _PRINT = [
-    ("cavities", "keep|fill", "Keep sealed hollows, or fill them; keep by default."),
-    ("keep", "all|largest", "Keep all bodies, or the largest alone; all by default."),
-    ("bridge", "LENGTH", "Join loose bodies by struts this thick."),
+    ("cavities", "keep|fill", "Keep sealed cavities, or fill them; keep by default."),
+    ("keep", "all|largest", "Keep all connected components, or only the largest; all by default."),
+    ("bridge", "LENGTH", "Join connected components by struts of this diameter."),
     ("gap", "LENGTH", "Close gaps up to this width."),
-    ("thickness", "LENGTH", "Thicken what is thinner than this."),
-    ("hollow", "LENGTH", "Hollow it out, leaving walls this thick."),
-    ("drain", "LENGTH", "Diameter of a hollow's drain holes, 3mm by default; 0: none."),
+    ("thickness", "LENGTH", "Thicken thinner walls to this."),
+    ("hollow", "LENGTH", "Hollow the object, leaving walls of this thickness."),
+    ("drain", "LENGTH", "Diameter of the drain holes of a hollow, 3mm by default; 0: none."),
     ("base", "LENGTH", "Cut off this much at the bottom, to stand flat."),
-    ("raft", "LENGTH", "Stand it on a plate of this height."),
+    ("raft", "LENGTH", "Put the object on a plate of this height."),
 ]
 """The attributes of `<print>`; each option overrides the scene's."""
 
@@ -164,20 +164,20 @@ set_option = click.option(
     "settings",
     multiple=True,
     metavar="NAME.ATTRIBUTE=VALUE",
-    help="Change a value of the scene, as mandelbulb.power=6; may be given again.",
+    help="Change a value of the scene, such as mandelbulb.power=6; repeatable.",
 )
 threads_option = click.option(
     "--threads",
     type=Whole(1, 1024),
     default=os.cpu_count() or 1,
     metavar="N",
-    help="How many threads to use; one for each core by default.",
+    help="Number of threads; one for each core by default.",
 )
 device_option = click.option(
     "--device",
     type=click.Choice(["cpu", "cuda", "auto"]),
     default="auto",
-    help="What computes it; auto, by default: the GPU, if there is one.",
+    help="The device that computes; auto by default: the GPU, if there is one.",
 )
 quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress, no summary.")
 

@@ -57,7 +57,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     "--samples",
     type=Whole(1, 1_000_000),
     metavar="N",
-    help="The most samples of a pixel; the scene's by default, or 64.",
+    help="Maximum number of samples per pixel; the scene's by default, or 64.",
 )
 @click.option(
     "--size",
@@ -67,17 +67,24 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 )
 @device_option
 @click.option(
-    "--time", "limit", callback=duration, metavar="TIME", help="Stop after so long, such as 10s, 2min or 1h."
+    "--time",
+    "limit",
+    callback=duration,
+    metavar="TIME",
+    help="Stop after this time: 10s, 2min or 1h.",
 )
 @click.option(
-    "--bits", type=click.Choice(["8", "16"]), default="8", help="Bits per colour of a PNG file; 8 by default."
+    "--bits",
+    type=click.Choice(["8", "16"]),
+    default="8",
+    help="Bits per channel of a PNG; 8 by default.",
 )
-@click.option("--pass-images", type=NAME, metavar="DIR", help="Keep the picture of every pass in a folder.")
+@click.option("--pass-images", type=NAME, metavar="DIR", help="Write the picture of every pass there.")
 @click.option(
     "--state",
     type=NAME,
     metavar="FILE.npz",
-    help="Go on from this file, if it is there, and save to it after every pass.",
+    help="Resume from this file if it exists, and save to it after every pass.",
 )
 @set_option
 @threads_option

@@ -108,7 +108,11 @@ def printer_option(text: str) -> Callable[..., Any]:
 )
 @printer_option('The printer whose screen the layers are for; "list" shows all.')
 @click.option(
-    "--up", nargs=3, type=NUMBER, metavar="X Y Z", help="The scene's direction that is up; 0 0 1 by default."
+    "--up",
+    nargs=3,
+    type=NUMBER,
+    metavar="X Y Z",
+    help="The scene's direction that is up; 0 0 1 by default.",
 )
 @click.option(
     "--compensation",
@@ -117,7 +121,7 @@ def printer_option(text: str) -> Callable[..., Any]:
     metavar="LENGTH",
     help="Move all outlines outwards by this, or inwards if it is negative; at most 1mm, 0 by default.",
 )
-@click.option("--gamma", type=NUMBER, default=1.0, metavar="N", help="Of the grey levels; 1 by default.")
+@click.option("--gamma", type=NUMBER, default=1.0, metavar="N", help="Gamma of grey levels; 1 by default.")
 @click.option(
     "--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default."
 )
@@ -127,7 +131,7 @@ def printer_option(text: str) -> Callable[..., Any]:
     type=NUMBER,
     default=(8.0, 35.0),
     metavar="S S",
-    help="Of an .sl1 file: seconds of each layer and of the first; 8 35 by default.",
+    help="Exposure in an .sl1 file: seconds of each layer and of the first; 8 35 by default.",
 )
 @click.option(
     "--preview",
@@ -150,7 +154,7 @@ def slice_(
 ) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
-    An interrupted job goes on when it is started again.
+    An interrupted job resumes when it is started again.
     """
     from fracslice.export.jobs import SliceRun
     from fracslice.export.slices import slice_format, write_slices

@@ -28,7 +28,6 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx_click",
-    "sphinx_design",
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["_build", "examples/*.ipynb", "examples/*.md5"]
@@ -44,6 +43,8 @@ html_theme_options = {
     "show_prev_next": False,
     "secondary_sidebar_items": ["page-toc"],
 }
+html_sidebars = {page: [] for page in ("index", "start", "measurements", "gallery", "changelog")}
+html_title = "fracslice"
 html_show_sourcelink = False
 
 
@@ -55,9 +56,9 @@ def arguments(_: dict[str, Any], variables: dict[str, Any]) -> list[str]:
 def figures(_: tuple[str, str, int], variables: dict[str, Any], configuration: dict[str, Any]) -> str:
     """The pictures that a part of an example wrote, and its mesh."""
     made = sorted(OUTPUT.glob("*.png"))
-    result = variables["example_globals"].pop("result", None)
-    if result is not None:
-        made.append(picture(result.mesh, OUTPUT / "mesh.png", (640, 480)))
+    mesh = variables["example_globals"].pop("mesh", None)
+    if mesh is not None:
+        made.append(picture(mesh, OUTPUT / "mesh.png", (640, 480)))
     names = [
         str(shutil.move(path, name))
         for path, name in zip(made, variables["image_path_iterator"], strict=False)

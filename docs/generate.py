@@ -1,4 +1,4 @@
-"""Writes docs/reference/elements.md, the schema and the stub of the formulas: run it for a new formula."""
+"""Write docs/reference/elements.md, the schema and the stub of the formulas, after adding a formula."""
 
 from pathlib import Path
 

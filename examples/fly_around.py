@@ -6,12 +6,11 @@ One picture a step, ready for a film: ``python examples/fly_around.py [FOLDER] [
 """
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
-from fracslice import read
-from fracslice.export.images import write_image
-from fracslice.rendering import Renderer, develop
+from PIL import Image
+
+from fracslice import read, render
 from fracslice.scene import library
 from fracslice.scene.view import Camera
 
@@ -20,12 +19,11 @@ steps = int(sys.argv[2]) if len(sys.argv) > 2 else 24
 width, height = map(int, (sys.argv[3] if len(sys.argv) > 3 else "480x300").split("x"))
 
 # %%
-# The camera starts where the whole object is in view. ``passes`` yields better and better pictures; the last is kept.
+# The camera starts where the whole object is in view.
 
 scene = read(library.path("mandelbulb"))
 start = Camera.around(scene.root.bounds.box)
 for step in range(steps):
-    view = replace(scene.view, camera=start.orbited(360 * step / steps))
-    *_, picture = Renderer(scene.root, view, (width, height)).passes(samples=16)
-    write_image(folder / f"step{step:03}.png", develop(picture.image, view.film), picture.image)
-    print(f"step {step}: {picture.samples:.1f} samples a pixel, error {picture.error:.3f}")
+    camera = start.orbited(360 * step / steps)
+    picture = render(scene, size=(width, height), samples=16, camera=camera)
+    Image.fromarray(picture).save(folder / f"step{step:03}.png")

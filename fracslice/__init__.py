@@ -1,11 +1,39 @@
 """Fractals as signed distance fields, made into printable meshes.
 
-A scene is a tree of formulas and a size, from a file or from one expression:
+Shapes are functions and combine by operators:
 
->>> from fracslice.formulas import difference, menger, sphere
->>> from fracslice.scene import read, reads, scene, to_xml
->>> cheese = scene(difference(menger(level=2), sphere(radius=1.2)), size="30mm", name="cheese")
->>> print(to_xml(cheese), end="")
+>>> from fracslice import make_mesh, menger, render, slice_layers, sphere
+>>> cheese = menger(2) - sphere(1.2)
+>>> cheese
+difference(menger(level=2), sphere(radius=1.2))
+>>> float(cheese.distance([0, 0, 2]))
+1.0
+
+One call makes the mesh, in mm, and a report on it. It goes to a file of the kind that the name says, whole
+or not at all:
+
+>>> mesh = make_mesh(cheese, size="30mm", resolution=48)
+>>> mesh.size.round(3).tolist(), mesh.is_watertight
+([30.0, 30.0, 30.0], True)
+>>> mesh.report.problems, mesh.report.mesh.components
+((), 1)
+>>> import tempfile, pathlib
+>>> with tempfile.TemporaryDirectory() as folder:
+...     mesh.export(pathlib.Path(folder) / "cheese.3mf").name
+'cheese.3mf'
+
+Layers of a print and pictures are arrays:
+
+>>> slice_layers(cheese, layer=1, size="30mm", pixel=0.5)[0].dtype.name
+'uint8'
+>>> render(cheese, size=(32, 24), samples=1).shape
+(24, 32, 3)
+
+A scene is a shape with a size, what makes it printable, and a view, from a file or not:
+
+>>> from fracslice import Scene, reads, to_xml
+>>> scene = Scene(cheese, "30mm", name="cheese")
+>>> print(to_xml(scene), end="")
 <scene version="1">
   <solid size="30mm">
     <difference>
@@ -14,30 +42,20 @@ A scene is a tree of formulas and a size, from a file or from one expression:
     </difference>
   </solid>
 </scene>
->>> reads(to_xml(cheese)) == cheese
+>>> reads(to_xml(scene)) == scene
 True
 
 Values can be changed from outside, as ``--set`` does:
 
->>> smaller = cheese.with_values(["menger.level=1", "solid.size=2cm"])
+>>> smaller = scene.with_values(["menger.level=1", "solid.size=2cm"])
 >>> smaller.root, smaller.size_mm
 (difference(menger(level=1), sphere(radius=1.2)), 20.0)
 
-One call makes the mesh, in mm, and a report on it. *What* to make (`MeshJob`) is apart from *how* (`Work`):
+*What* to make (`MeshJob`) and *how* (`Work`) are records that keywords stand for:
 
->>> from fracslice import MeshJob, Work, make_mesh, write
->>> result = make_mesh(cheese, MeshJob(resolution=48), Work(threads=2))
->>> result.mesh.size.round(3).tolist()
-[30.0, 30.0, 30.0]
->>> result.report.mesh.printable, result.report.mesh.components
-(True, 1)
-
-The mesh goes to a file of the kind that its name says, whole or not at all:
-
->>> import tempfile, pathlib
->>> with tempfile.TemporaryDirectory() as folder:
-...     write(result.mesh, pathlib.Path(folder) / "cheese.3mf").name
-'cheese.3mf'
+>>> from fracslice import MeshJob, Work
+>>> make_mesh(smaller, MeshJob(resolution=27), Work(threads=2)).report.mesh.printable
+True
 """
 
 from __future__ import annotations
@@ -80,7 +98,8 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .meshjob import MeshJob
     from .report import Report
-    from .scene import Scene, read, reads, to_xml
+    from .scene import Print, Scene, read, reads, to_xml
+    from .scene.view import Camera, Light
     from .work import Work
 
 _FORMULAS = (
@@ -110,11 +129,14 @@ _FORMULAS = (
 )
 
 _WHERE = {
+    "Camera": "scene.view",
     "FracsliceError": "errors",
+    "Light": "scene.view",
     "Mesh": "mesh",
     "MeshJob": "meshjob",
     "Node": "formulas",
     "Picture": "api.pictures",
+    "Print": "scene",
     "Report": "report",
     "Result": "api.meshing",
     "Scene": "scene",
@@ -131,11 +153,14 @@ _WHERE = {
 }
 
 __all__ = [
+    "Camera",
     "FracsliceError",
+    "Light",
     "Mesh",
     "MeshJob",
     "Node",
     "Picture",
+    "Print",
     "Report",
     "Result",
     "Scene",

@@ -230,6 +230,9 @@ def surroundings(
 ) -> NDArray[int64]:
     """The triangles, ascending, that may meet one of some, bool [m], and these."""
 
+def stl(vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0) -> NDArray[uint8]:
+    """The triangles as binary STL holds them, uint8 [m, 50]."""
+
 def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]: ...
 def tree(
     vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0

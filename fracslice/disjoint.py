@@ -30,6 +30,13 @@ def unite(parent, a, b):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def unite_all(parent, some, others):  # type: ignore[no-untyped-def]
+    """The sets of each pair become one."""
+    for i in range(len(some)):
+        unite(parent, some[i], others[i])
+
+
+@compiled
 def roots(parent):  # type: ignore[no-untyped-def]
     """The root of each."""
     root = np.empty_like(parent)

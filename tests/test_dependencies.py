@@ -22,7 +22,13 @@ MODULES = {"pillow": "PIL", "scikit-image": "skimage", "numba-cuda": "numba_cuda
 WITHIN = {"vtkmodules": "pyvista"}
 """Modules that come with a package, and no other way."""
 
-BLOCKED = "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx hypothesis"
+BLOCKED = (
+    "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx hypothesis shapely"
+)
+
+
+DEVELOPERS = {"dev", "docs"}
+"""Extras that nobody else needs."""
 
 
 def modules(requirements: list[str]) -> set[str]:
@@ -60,15 +66,15 @@ def test_every_core_dependency_is_imported_at_run_time() -> None:
 
 
 def test_what_is_imported_at_run_time_is_declared() -> None:
-    extras = [package for name, packages in EXTRAS.items() if name != "dev" for package in packages]
+    extras = [package for name, packages in EXTRAS.items() if name not in DEVELOPERS for package in packages]
     assert used() - {"numba_cuda"} <= modules(PROJECT["dependencies"] + extras)
     assert modules(extras) - used() == set()
 
 
 def test_what_is_for_developers_is_not_needed_by_anybody_else() -> None:
-    own = [package for package in EXTRAS["dev"] if not package.startswith("fracslice")]
+    own = [package for name in DEVELOPERS for package in EXTRAS[name] if not package.startswith("fracslice")]
     assert modules(own) & used() == set()
-    assert EXTRAS["dev"][0] == f"fracslice[{','.join(name for name in EXTRAS if name != 'dev')}]"
+    assert EXTRAS["dev"][0] == f"fracslice[{','.join(name for name in EXTRAS if name not in DEVELOPERS)}]"
 
 
 def without(modules: str, *commands: str, cwd: Path) -> subprocess.CompletedProcess[str]:

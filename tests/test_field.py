@@ -11,7 +11,7 @@ import pytest
 from fracslice.formulas import mandelbulb, sphere, transform, union
 from fracslice.formulas.field import Field, Precision
 from fracslice.kernel import reference
-from fracslice.kernel.loops import POINTS
+from fracslice.kernel.loops import points as points_loop
 from fracslice.printing.edits import Does, EditedField, edited
 from fracslice.printing.offset_field import OffsetField
 from fracslice.printing.samples import Samples
@@ -125,7 +125,7 @@ def test_every_way_to_evaluate_gives_the_same(name: str, precision: Precision) -
     grid = corners[:, :, None] + np.indices((8, 8, 8)).reshape(3, 512)
     places = (np.array(ORIGIN)[:, None] + VOXEL * grid).transpose(1, 0, 2).reshape(3, -1)
     np.testing.assert_allclose(out.ravel(), kernel.points(*places), rtol=0, atol=2e-6)
-    loops = field.loops([POINTS], precision)
+    loops = field.loops([points_loop], precision)
     rows = np.ascontiguousarray(places, precision)
     assert rows.shape[1] % loops.width == 0 < loops.batch
     values = np.empty((1, rows.shape[1]), precision)

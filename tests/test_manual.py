@@ -1,9 +1,10 @@
-"""What the README and the manual tell to type is understood, up to where the work begins."""
+"""What the pages say holds: links resolve, commands are understood, what they name exists."""
 
 from __future__ import annotations
 
 import re
 import shlex
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -14,23 +15,62 @@ from fracslice.export import write
 from .mesh import shapes
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+MADE = {"_build", "examples"}
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "licenses/README.md")),
+    *sorted(page for page in DOCS.rglob("*.md") if page.relative_to(DOCS).parts[0] not in MADE),
+]
+TEXT = {page: page.read_text(encoding="utf-8") for page in PAGES}
+BARE = {
+    page: re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL) for page, text in TEXT.items()
+}
+"""Pages without their fenced blocks."""
+
+each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 
 
-def told() -> list[str]:
-    """The command lines of all pages, as they stand in indented blocks."""
-    lines = [line for page in PAGES for line in page.read_text(encoding="utf-8").splitlines()]
-    found = [line.partition("#")[0].strip() for line in lines if line.startswith("    fracslice ")]
-    return list(dict.fromkeys(found))
+def anchors(page: Path) -> set[str]:
+    """The names of a page's headings, as GitHub and Sphinx make them, and its own labels."""
+    headings = re.findall(r"^#+ (.*)$", BARE[page], re.MULTILINE)
+    slugs = {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    return slugs | set(re.findall(r"^\(([\w-]+)\)=$", BARE[page], re.MULTILINE))
 
 
-def test_there_is_something_to_try() -> None:
-    assert len(told()) > 15
-    assert {shlex.split(line)[1] for line in told()} >= {*commands.commands}
+@each_page
+def test_links_and_anchors_resolve(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", BARE[page]):
+        if target.startswith("https:"):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        assert file.exists(), target
+        assert not anchor or anchor in anchors(file), target
+
+
+def test_every_page_is_in_one_table_of_contents() -> None:
+    listed = []
+    for page, text in TEXT.items():
+        for tree in re.findall(r"```\{toctree\}\n(?::.*\n)*\n(.*?)```", text, re.DOTALL):
+            listed += [(page.parent / f"{name}.md").resolve() for name in tree.split() if name[0] != "/"]
+    pages = {page for page in PAGES if page.is_relative_to(DOCS)}
+    assert sorted(listed) == sorted(pages - {DOCS / "index.md"})
+
+
+def typed(program: str) -> list[str]:
+    """The lines of all pages' shell blocks that start a program."""
+    blocks = [block for text in TEXT.values() for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL)]
+    lines = [line.strip() for block in blocks for line in block.splitlines()]
+    return list(dict.fromkeys(line for line in lines if line.startswith(f"{program} ")))
+
+
+def test_every_command_is_shown() -> None:
+    assert {shlex.split(line)[1] for line in typed("fracslice")} >= {*commands.commands} - {"formulas"}
+    assert "`fracslice formulas`" in TEXT[DOCS / "start.md"]
 
 
 class BegunError(Exception):
-    """The work would begin now: all that was said is understood, files can be written, the scene is there."""
+    """The work would begin now: the line is understood, files can be written, the scene is there."""
 
 
 def begin(*_: object, **__: object) -> None:
@@ -54,8 +94,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("line", told())
-def test_what_is_told_to_type_is_understood(line: str, folder: Path, monkeypatch, capfd) -> None:
+@pytest.mark.parametrize("line", typed("fracslice"))
+def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) -> None:
     for work in (
         "job.make_mesh",
         "slicing.plan_stack",
@@ -65,20 +105,38 @@ def test_what_is_told_to_type_is_understood(line: str, folder: Path, monkeypatch
     ):
         monkeypatch.setattr(f"fracslice.{work}", begin)
     monkeypatch.setattr("fracslice.viewer.show", begin)
-    words = shlex.split(line.replace("[NAME]", "box"))[1:]
-    if words[0] in ("scenes", "formulas") or words[:2] == ["check", "my.stl"]:
+    monkeypatch.setattr("fracslice.viewer.need_screen", lambda: None)
+    words = shlex.split(line)[1:]
+    if words[0] in ("scenes", "formulas") or words[:2] == ["check", "my.stl"] or words[-1] == "list":
         assert run(words) == 0
         return
     with pytest.raises(BegunError):
         print(run(words), capfd.readouterr().err)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_option_that_is_named_is_there(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
-    quoted = " ".join(re.findall(r"`([^`\n]*)`", text))
+@each_page
+def test_options_exist(page: Path) -> None:
+    quoted = " ".join(re.findall(r"`([^`\n]*)`", BARE[page]))
     named = set(re.findall(r"(?<!\S)--[a-z-]+", quoted))
     parameters = [p for command in commands.commands.values() for p in command.params]
     known = {option for p in parameters for option in (*p.opts, *p.secondary_opts)}
-    ours = {"--cpp", "--write", "--info"}  # of our benchmarks, and of a slicer
-    assert named - known - ours <= {"--help"}
+    others = {"--help", "--write", "--info"}  # click's, the benchmarks' and a slicer's
+    assert named - known - others == set()
+
+
+def test_modules_and_make_targets_exist() -> None:
+    text = "\n".join(TEXT.values())
+    modules = set(re.findall(r"python -m (tests[\w.]*\w)", text))
+    assert len(modules) > 10
+    assert {name for name in modules if find_spec(name) is None} == set()
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"(?:`|^ {4}|^)make ([a-z]+)", text, re.MULTILINE)) <= targets
+
+
+def test_pages_that_the_code_names_exist() -> None:
+    files = [file for folder in ("fracslice", "cli", "tests") for file in (ROOT / folder).rglob("*.[pch]*")]
+    text = "\n".join(
+        file.read_text(encoding="utf-8") for file in files if file.suffix in (".py", ".h", ".cpp")
+    )
+    named = set(re.findall(r"\bdocs/[\w/]+\.md\b", text))
+    assert {name for name in named if not (ROOT / name).exists()} == set()

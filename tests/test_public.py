@@ -16,7 +16,18 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 @pytest.mark.parametrize(
-    "name", ["fracslice", "fracslice.scene.lengths", "fracslice.scene.model", "fracslice.nearest"]
+    "name",
+    [
+        "fracslice",
+        "fracslice.api.meshing",
+        "fracslice.api.pictures",
+        "fracslice.api.slices",
+        "fracslice.formulas.operators",
+        "fracslice.mesh.model",
+        "fracslice.nearest",
+        "fracslice.scene.lengths",
+        "fracslice.scene.model",
+    ],
 )
 def test_docstrings_say_what_happens(name):
     tested = doctest.testmod(importlib.import_module(name))

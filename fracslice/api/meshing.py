@@ -70,7 +70,10 @@ class Result(Mesh):
     @property
     def bricks(self) -> Bricks:
         """Samples of the field where the mesh was made, scene units; taken when first asked for."""
-        return self.made.bricks
+        found = self.made.bricks
+        for array in (found.ijk, found.values, found.index):
+            array.flags.writeable = False
+        return found
 
 
 @keywords

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
 from ..formulas import Node
 from ..rendering import Renderer
-from ..scene.view import Camera, Film, View
+from ..scene.view import Camera, Film, Light, View
 from .options import WorkOptions, keywords, work_of
 from .sources import Source, found
 
@@ -38,6 +39,7 @@ def render(
     size: tuple[int, int] | None = None,
     samples: int | None = None,
     camera: Camera | None = None,
+    lights: Sequence[Light] | None = None,
     **options: Unpack[WorkOptions],
 ) -> Picture:
     """Render a picture of a shape.
@@ -52,6 +54,8 @@ def render(
         The most samples of a pixel; the scene's, or 16 of a shape.
     camera : Camera, optional
         From where to look, in scene units; the scene's, or one that has the whole shape in view.
+    lights : sequence of Light, optional
+        What lights it; the scene's, or a sun and a sky.
     threads : int, optional
         How many threads to use; one for each core if not given.
     progress : callable, optional
@@ -84,7 +88,8 @@ def render(
     """
     what, work = found(shape), work_of(options)
     root, view = (what, View(film=FILM)) if isinstance(what, Node) else (what.root, what.view)
-    view = view if camera is None else replace(view, camera=camera)
+    given: dict[str, Any] = {"camera": camera, "lights": None if lights is None else tuple(lights)}
+    view = replace(view, **{name: value for name, value in given.items() if value is not None})
     renderer = Renderer(root, view, size, work, options.get("device") or "auto")
     most = view.film.samples if samples is None else samples
     seen = renderer.seen()

@@ -102,7 +102,7 @@ class Slices(Layers[NDArray[np.uint8]]):
     @property
     def contours(self) -> Layers[Contours]:
         """The layers as closed polylines, without shapely."""
-        return Layers(self.stack, self.chosen, lambda layer: layer.contours, self.work)
+        return Layers(self.stack, self.chosen, _contours, self.work)
 
 
 @keywords
@@ -174,6 +174,13 @@ def slice_layers(
 
 def _coverage(layer: Layer) -> NDArray[np.uint8]:
     return _frozen(layer.coverage)
+
+
+def _contours(layer: Layer) -> Contours:
+    found = layer.contours
+    for array in (found.points, found.starts, found.parent):
+        _frozen(array)
+    return found
 
 
 def _frozen(array: NDArray[S]) -> NDArray[S]:

@@ -11,7 +11,6 @@ import numpy as np
 from fracslice.errors import ExportError
 from fracslice.mesh.model import Mesh
 
-TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 BLOCK = 1 << 18
 
 
@@ -36,22 +35,7 @@ def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, 
 
 
 def _write_triangles(mesh: Mesh, file: BinaryIO) -> None:
-    vertices = mesh.vertices.astype(np.float32)
+    from fracslice._native import stl
+
     for begin in range(0, len(mesh.triangles), BLOCK):
-        corners = vertices[mesh.triangles[begin : begin + BLOCK]]
-        records = np.zeros(len(corners), TRIANGLE)
-        records["corners"] = corners
-        records["normal"] = _unit_normals(corners.astype(np.float64))
-        file.write(records.tobytes())
-
-
-def _unit_normals(corners: np.ndarray) -> np.ndarray:
-    """Normals of length one, zero for a triangle without area; float64 [m, 3]."""
-    u, v = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    normals = np.stack(
-        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]], axis=1
-    )
-    length = np.sqrt(np.einsum("ij,ij->i", normals, normals))
-    length[length == 0] = 1
-    normals /= length[:, None]
-    return normals
+        file.write(stl(mesh.vertices, mesh.triangles[begin : begin + BLOCK], 1).data)

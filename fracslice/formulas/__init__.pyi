@@ -170,8 +170,8 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
     1989, "Ray Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is
     Koebe's bound for connected complex Julia sets; one that falls apart has its derivative taken at a larger
-    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/accuracy.md`. What is returned is
-    held still from the escape on; w itself runs on, and its lanes are not looked at.
+    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/how/accuracy.md`. What is returned
+    is held still from the escape on; w itself runs on, and its lanes are not looked at.
 
     Parameters
     ----------
@@ -200,8 +200,8 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
     it is taken here, as far out as a point of the solid can come (`escape.farthest`). Beyond, each step leads
     farther away whatever its direction, so that only how radii stretch matters; there it is faded out.
-    There is no theorem for three dimensions; L = 2 is measured (`docs/accuracy.md`). Where a set falls apart
-    (a constant far out) that fails, and the field is also kept below twice a sure distance,
+    There is no theorem for three dimensions; L = 2 is measured (`docs/how/accuracy.md`). Where a set falls
+    apart (a constant far out) that fails, and the field is also kept below twice a sure distance,
     `escape.sure_distance`. A power that is not whole tears space where the azimuth jumps from pi to -pi: no
     bound holds across the tear, and the guarded field stays below the sure distance from it.
 

@@ -35,25 +35,25 @@ def bounds(child, x, y, z, centre, half, margin):  # type: ignore[no-untyped-def
 
 
 @bounds.check
-def _(node: Node) -> None:
+def bounds_check(node: Node) -> None:
     if any(a >= b for a, b in zip(node["min"], node["max"], strict=True)):
         raise node.fail("min and max: expected min < max on every axis")
 
 
 @bounds.arguments
-def _(node: Node) -> dict[str, object]:
+def bounds_arguments(node: Node) -> dict[str, object]:
     box = Box(node["min"], node["max"])
     half = tuple(s / 2 for s in box.size)
     return {"centre": box.centre, "half": half, "margin": max(half) / 4}
 
 
 @bounds.bounds
-def _(node: Node) -> Box:
+def bounds_bounds(node: Node) -> Box:
     return Box(node["min"], node["max"]) & node.children[0].bounds.box
 
 
 @bounds.slope
-def _(node: Node) -> float:
+def bounds_slope(node: Node) -> float:
     return max(1.0, node.children[0].bounds.lipschitz)
 
 
@@ -75,23 +75,23 @@ def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-d
 
 
 @offset.arguments
-def _(node: Node) -> dict[str, object]:
+def offset_arguments(node: Node) -> dict[str, object]:
     only_grown = node.is_conservative and node.bounds.exterior_only
     distance = max(node["distance"], 0.0) if only_grown else node["distance"]
     return {"distance": distance, **_frame(node.bounds.box)}
 
 
 @offset.bounds
-def _(node: Node) -> Box:
+def offset_bounds(node: Node) -> Box:
     return node.children[0].bounds.box.grown(node["distance"])
 
 
 @offset.slope
-def _(node: Node) -> float:
-    return max(1.0, offset_slope(node.children[0].bounds, node["distance"]))
+def offset_slope(node: Node) -> float:
+    return max(1.0, moved_slope(node.children[0].bounds, node["distance"]))
 
 
-def offset_slope(inner: Bounds, distance: float) -> float:
+def moved_slope(inner: Bounds, distance: float) -> float:
     """The Lipschitz bound of a field less a constant."""
     n = inner.steepening
     # By how steeply the stretch along circles of latitude ends: within 1/n, in narrow rings within 3/n^2.
@@ -99,7 +99,7 @@ def offset_slope(inner: Bounds, distance: float) -> float:
 
 
 @offset.identity
-def _(node: Node) -> bool:
+def offset_identity(node: Node) -> bool:
     return bool(node["distance"] == 0)
 
 
@@ -169,7 +169,7 @@ def _window(node: Node, axis: int) -> int:
 
 
 @repeat.arguments
-def _(node: Node) -> dict[str, object]:
+def repeat_arguments(node: Node) -> dict[str, object]:
     box, period, count = node.children[0].bounds.box, node["period"], node["count"]
     windows = [_window(node, axis) for axis in range(3)]
     number = [c or ENDLESS for c in count]
@@ -200,10 +200,10 @@ def _lattice(node: Node) -> Box:
 
 
 @repeat.bounds
-def _(node: Node) -> Box:
+def repeat_bounds(node: Node) -> Box:
     return _lattice(node)
 
 
 @repeat.slope
-def _(node: Node) -> float:
+def repeat_slope(node: Node) -> float:
     return max(1.0, node.children[0].bounds.lipschitz)

@@ -88,19 +88,19 @@ def _needs_conservative(node: Node) -> bool:
 @union.unordered
 @intersection.unordered
 @difference.unordered
-def _(node: Node) -> bool:
+def csg_unordered(node: Node) -> bool:
     return _is_sharp(node)
 
 
 @union.select
-def _(node: Node):  # type: ignore[no-untyped-def]
+def union_select(node: Node):  # type: ignore[no-untyped-def]
     return (
         hard_union if _is_sharp(node) else conservative_union if _needs_conservative(node) else union.function
     )
 
 
 @union.arguments
-def _(node: Node) -> dict[str, object]:
+def union_arguments(node: Node) -> dict[str, object]:
     if _is_sharp(node):
         return {}
     steepest = 1 + node.bounds.steepening / 8
@@ -108,12 +108,12 @@ def _(node: Node) -> dict[str, object]:
 
 
 @intersection.select
-def _(node: Node):  # type: ignore[no-untyped-def]
+def intersection_select(node: Node):  # type: ignore[no-untyped-def]
     return hard_intersection if _is_cut_sharp(node) else intersection.function
 
 
 @difference.select
-def _(node: Node):  # type: ignore[no-untyped-def]
+def difference_select(node: Node):  # type: ignore[no-untyped-def]
     if node.is_conservative and any(child.bounds.exterior_only for child in node.children[1:]):
         return conservative_difference
     return hard_difference if _is_cut_sharp(node) else difference.function
@@ -124,19 +124,19 @@ def _is_cut_sharp(node: Node) -> bool:
     return _is_sharp(node) or _needs_conservative(node)
 
 
-def _cut_arguments(node: Node) -> dict[str, object]:
+def cut_arguments(node: Node) -> dict[str, object]:
     return {} if _is_cut_sharp(node) else {"smooth": node["smooth"]}
 
 
-intersection.arguments(_cut_arguments)
-difference.arguments(_cut_arguments)
+intersection.arguments(cut_arguments)
+difference.arguments(cut_arguments)
 
 
-def _slope(node: Node) -> float:
+def csg_slope(node: Node) -> float:
     """Minimum, maximum and their quadratic seams weigh the gradients with weights whose sum is 1: L = max.
 
     A seam follows level sets other than the surface, where the field of an escape-time fractal is steeper
-    than its bound says. How much is measured (`docs/accuracy.md`): for one such field, and for several.
+    than its bound says. How much is measured (`docs/how/accuracy.md`): for one such field, and for several.
     """
     fields = [child.bounds for child in node.children]
     exterior_only = (
@@ -146,22 +146,22 @@ def _slope(node: Node) -> float:
 
 
 for _blend in (union, intersection, difference):
-    _blend.slope(_slope)
+    _blend.slope(csg_slope)
 
 
 @union.bounds
-def _(node: Node) -> Box:
+def union_bounds(node: Node) -> Box:
     seams = len(node.children) - 1
     return reduce(Box.__or__, (c.bounds.box for c in node.children)).grown(seams * node["smooth"] / 4)
 
 
 @intersection.bounds
-def _(node: Node) -> Box:
+def intersection_bounds(node: Node) -> Box:
     return reduce(Box.__and__, (c.bounds.box for c in node.children))
 
 
 @difference.bounds
-def _(node: Node) -> Box:
+def difference_bounds(node: Node) -> Box:
     return node.children[0].bounds.box
 
 
@@ -182,10 +182,10 @@ def conservative_shell(a, thickness):  # type: ignore[no-untyped-def]
 
 
 @shell.select
-def _(node: Node):  # type: ignore[no-untyped-def]
+def shell_select(node: Node):  # type: ignore[no-untyped-def]
     return conservative_shell if node.is_conservative and node.bounds.exterior_only else shell.function
 
 
 @shell.bounds
-def _(node: Node) -> Box:
+def shell_bounds(node: Node) -> Box:
     return node.children[0].bounds.box

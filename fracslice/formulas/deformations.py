@@ -59,18 +59,18 @@ def _twist_radius(node: Node) -> float:
 
 
 @twist.identity
-def _(node: Node) -> bool:
+def twist_identity(node: Node) -> bool:
     return bool(abs(node["degrees"]) < SMALLEST)
 
 
 @twist.arguments
-def _(node: Node) -> dict[str, object]:
+def twist_arguments(node: Node) -> dict[str, object]:
     radius = _twist_radius(node)
     return {"rate": math.radians(node["degrees"]), "radius": radius, "margin": radius / 4, **along(node)}
 
 
 @twist.bounds
-def _(node: Node) -> Box:
+def twist_bounds(node: Node) -> Box:
     axis, radius, box = "xyz".index(node["axis"]), _twist_radius(node), node.children[0].bounds.box
     lo, hi = [-radius] * 3, [radius] * 3
     lo[axis], hi[axis] = box.lo[axis], box.hi[axis]
@@ -78,7 +78,7 @@ def _(node: Node) -> Box:
 
 
 @twist.slope
-def _(node: Node) -> float:
+def twist_slope(node: Node) -> float:
     shear = abs(math.radians(node["degrees"])) * 1.25 * _twist_radius(node)
     return max(1.0, node.children[0].bounds.lipschitz * (shear + math.sqrt(shear * shear + 4)) / 2)
 
@@ -147,12 +147,12 @@ def _bend_frame(node: Node) -> tuple[float, float, float, float]:
 
 
 @bend.identity
-def _(node: Node) -> bool:
+def bend_identity(node: Node) -> bool:
     return bool(abs(node["degrees"]) < SMALLEST)
 
 
 @bend.arguments
-def _(node: Node) -> dict[str, object]:
+def bend_arguments(node: Node) -> dict[str, object]:
     curvature, side, inner_radius, half = _bend_frame(node)
     slope = curvature * inner_radius / math.pi
     margin = min(inner_radius / 2, slope * (math.pi / curvature - half))
@@ -169,7 +169,7 @@ def _(node: Node) -> dict[str, object]:
 
 
 @bend.bounds
-def _(node: Node) -> Box:
+def bend_bounds(node: Node) -> Box:
     if node.is_identity:
         return node.children[0].bounds.box
     curvature, side, inner_radius, half = _bend_frame(node)
@@ -190,7 +190,7 @@ def _(node: Node) -> Box:
 
 
 @bend.slope
-def _(node: Node) -> float:
+def bend_slope(node: Node) -> float:
     if node.is_identity:
         return node.children[0].bounds.lipschitz
     curvature, _, inner_radius, _ = _bend_frame(node)

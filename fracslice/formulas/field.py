@@ -28,7 +28,7 @@ class Bounds:
     distance to the surface, and bound nothing: the inside cannot be recognised from afar.
     steepening: of such a field, the highest power n in it. Along circles of latitude the derivative changes
     n times within 2/n of the poles; so level sets other than the surface are steeper: how much is measured
-    (`docs/accuracy.md`).
+    (`docs/how/accuracy.md`).
     boxless: the names of the formulas in it that state no box.
     """
 

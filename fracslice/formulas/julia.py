@@ -39,8 +39,8 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat,
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
     1989, "Ray Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is
     Koebe's bound for connected complex Julia sets; one that falls apart has its derivative taken at a larger
-    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/accuracy.md`. What is returned is
-    held still from the escape on; w itself runs on, and its lanes are not looked at.
+    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/how/accuracy.md`. What is returned
+    is held still from the escape on; w itself runs on, and its lanes are not looked at.
     """
     cr, ci, cj, ck = c
     imaginary2 = y * y + z * z
@@ -71,7 +71,7 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat,
 
 
 @julia.arguments
-def _(node: Node) -> dict[str, object]:
+def julia_arguments(node: Node) -> dict[str, object]:
     first, last, escape2, least = levels(2, node["iterations"], node["bailout"], ESCAPED)
     flat = Fixed(node["c"][3] == 0)
     return {
@@ -97,12 +97,12 @@ def _falls_apart(c: Sequence[float], iterations: int, bailout: float, escape2: f
 
 
 @julia.steepening
-def _(node: Node) -> float:
+def julia_steepening(node: Node) -> float:
     return 2.0
 
 
 @julia.bounds
-def _(node: Node) -> Box:
+def julia_bounds(node: Node) -> Box:
     # |w_n+1| >= |w_n|^2 - |c|, so |w_N| <= R bounds |w_n| backwards, down to the point itself.
     radius, steps = node["bailout"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
     for _ in range(steps):

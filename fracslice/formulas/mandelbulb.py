@@ -94,8 +94,8 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
     it is taken here, as far out as a point of the solid can come (`escape.farthest`). Beyond, each step leads
     farther away whatever its direction, so that only how radii stretch matters; there it is faded out.
-    There is no theorem for three dimensions; L = 2 is measured (`docs/accuracy.md`). Where a set falls apart
-    (a constant far out) that fails, and the field is also kept below twice a sure distance,
+    There is no theorem for three dimensions; L = 2 is measured (`docs/how/accuracy.md`). Where a set falls
+    apart (a constant far out) that fails, and the field is also kept below twice a sure distance,
     `escape.sure_distance`. A power that is not whole tears space where the azimuth jumps from pi to -pi: no
     bound holds across the tear, and the guarded field stays below the sure distance from it.
     """
@@ -200,7 +200,7 @@ def _digits(n: int) -> tuple[int, ...]:
 
 
 @mandelbulb.arguments
-def _(node: Node) -> dict[str, object]:
+def mandelbulb_arguments(node: Node) -> dict[str, object]:
     power = node["power"]
     first, last, escape2, least_r2 = levels(power, node["iterations"], node["bailout"], ESCAPED)
     loose, torn = _falls_apart(node, escape2), bool(node.is_conservative and power % 1)
@@ -269,12 +269,12 @@ def _products(power: float) -> dict[str, Fixed]:
 
 
 @mandelbulb.steepening
-def _(node: Node) -> float:
+def mandelbulb_steepening(node: Node) -> float:
     return float(node["power"])
 
 
 @mandelbulb.check
-def _(node: Node) -> None:
+def mandelbulb_check(node: Node) -> None:
     if node["bailout"] ** node["power"] > 1e15:
         raise node.fail(
             f"bailout={node['bailout']:g}: expected at most {1e15 ** (1 / node['power']):.4g} "
@@ -283,7 +283,7 @@ def _(node: Node) -> None:
 
 
 @mandelbulb.bounds
-def _(node: Node) -> Box:
+def mandelbulb_bounds(node: Node) -> Box:
     # |w_n+1| >= |w_n|^power - |c|, c the start point or the constant: backwards from |w_N| <= R, from above.
     power, steps = node["power"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
     constant = math.hypot(*node["julia"]) if node["julia"] else None

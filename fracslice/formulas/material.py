@@ -38,10 +38,10 @@ def material(child, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @material.bounds
-def _(node: Node) -> Box:
+def material_bounds(node: Node) -> Box:
     return node.children[0].bounds.box
 
 
 @material.identity
-def _(node: Node) -> bool:
+def material_identity(node: Node) -> bool:
     return True

@@ -53,12 +53,12 @@ def menger(x, y, z, level):  # type: ignore[no-untyped-def]
 
 
 @menger.bounds
-def _(node: Node) -> Box:
+def menger_bounds(node: Node) -> Box:
     return Box.centred(1.0)
 
 
 @menger.visible
-def _(node: Node, voxel: float) -> Node:
+def menger_visible(node: Node, voxel: float) -> Node:
     """The deepest level whose bars, a cell wide, are wider than a voxel: thinner ones fall between samples.
 
     The sponge has all edges of its cells, so that no point of the solid shown is farther than sqrt(2) / 6

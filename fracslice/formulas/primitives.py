@@ -20,7 +20,7 @@ def sphere(x, y, z, radius):  # type: ignore[no-untyped-def]
 
 
 @sphere.bounds
-def _(node: Node) -> Box:
+def sphere_bounds(node: Node) -> Box:
     return Box.centred(node["radius"])
 
 
@@ -41,7 +41,7 @@ def box(x, y, z, half, round):  # type: ignore[no-untyped-def]
 
 
 @box.check
-def _(node: Node) -> None:
+def box_check(node: Node) -> None:
     if 2 * node["round"] > min(node["size"]):
         raise node.fail(
             f"round={node['round']:g}: expected at most half the shortest edge, {min(node['size']) / 2:g}"
@@ -49,12 +49,12 @@ def _(node: Node) -> None:
 
 
 @box.arguments
-def _(node: Node) -> dict[str, object]:
+def box_arguments(node: Node) -> dict[str, object]:
     return {"half": tuple(s / 2 - node["round"] for s in node["size"]), "round": node["round"]}
 
 
 @box.bounds
-def _(node: Node) -> Box:
+def box_bounds(node: Node) -> Box:
     return Box.centred(*(s / 2 for s in node["size"]))
 
 
@@ -69,7 +69,7 @@ def torus(x, y, z, radius, tube):  # type: ignore[no-untyped-def]
 
 
 @torus.bounds
-def _(node: Node) -> Box:
+def torus_bounds(node: Node) -> Box:
     outer = node["radius"] + node["tube"]
     return Box.centred(outer, outer, node["tube"])
 
@@ -88,12 +88,12 @@ def cylinder(x, y, z, radius, half):  # type: ignore[no-untyped-def]
 
 
 @cylinder.arguments
-def _(node: Node) -> dict[str, object]:
+def cylinder_arguments(node: Node) -> dict[str, object]:
     return {"radius": node["radius"], "half": node["height"] / 2}
 
 
 @cylinder.bounds
-def _(node: Node) -> Box:
+def cylinder_bounds(node: Node) -> Box:
     return Box.centred(node["radius"], node["radius"], node["height"] / 2)
 
 
@@ -120,7 +120,7 @@ def capsule(x, y, z, start, along, scale, radius):  # type: ignore[no-untyped-de
 
 
 @capsule.arguments
-def _(node: Node) -> dict[str, object]:
+def capsule_arguments(node: Node) -> dict[str, object]:
     along = tuple(b - a for a, b in zip(node["from"], node["to"], strict=True))
     length2 = sum(a * a for a in along)
     return {
@@ -132,7 +132,7 @@ def _(node: Node) -> dict[str, object]:
 
 
 @capsule.bounds
-def _(node: Node) -> Box:
+def capsule_bounds(node: Node) -> Box:
     return Box.around([node["from"], node["to"]]).grown(node["radius"])
 
 
@@ -155,13 +155,13 @@ def cone(x, y, z, radius, half, scale):  # type: ignore[no-untyped-def]
 
 
 @cone.arguments
-def _(node: Node) -> dict[str, object]:
+def cone_arguments(node: Node) -> dict[str, object]:
     radius, height = node["radius"], node["height"]
     return {"radius": radius, "half": height / 2, "scale": 1.0 / (radius * radius + height * height)}
 
 
 @cone.bounds
-def _(node: Node) -> Box:
+def cone_bounds(node: Node) -> Box:
     return Box.centred(node["radius"], node["radius"], node["height"] / 2)
 
 
@@ -176,13 +176,13 @@ def plane(x, y, z, normal, offset):  # type: ignore[no-untyped-def]
 
 
 @plane.arguments
-def _(node: Node) -> dict[str, object]:
+def plane_arguments(node: Node) -> dict[str, object]:
     length = math.hypot(*node["normal"])
     return {"normal": tuple(n / length for n in node["normal"]), "offset": node["offset"]}
 
 
 @plane.bounds
-def _(node: Node) -> Box:
+def plane_bounds(node: Node) -> Box:
     lo, hi = [-math.inf] * 3, [math.inf] * 3
     used = [axis for axis in range(3) if node["normal"][axis]]
     if len(used) == 1:
@@ -214,5 +214,5 @@ def octahedron(x, y, z, radius):  # type: ignore[no-untyped-def]
 
 
 @octahedron.bounds
-def _(node: Node) -> Box:
+def octahedron_bounds(node: Node) -> Box:
     return Box.centred(node["radius"])

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from inspect import Signature
 from types import MappingProxyType
 from typing import Any, Literal
@@ -42,7 +43,7 @@ class Fixed:
 Hook = Callable[..., Any]
 
 
-@dataclass(eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Formula:
     """A registered formula. Its hooks take a `Node` and tell what the kernel and the sampler need to know."""
 
@@ -56,12 +57,21 @@ class Formula:
     hooks: dict[str, Hook] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.__name__ = self.__qualname__ = self.name
-        self.__module__ = self.function.__module__
-        self.__doc__ = signatures.docstring(self)
+        for name, value in (
+            ("__name__", self.name),
+            ("__qualname__", self.name),
+            ("__module__", self.function.__module__),
+            ("__doc__", signatures.docstring(self)),
+        ):
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         return f"<{self.kind} {self.name}{signatures.signature(self)}>"
+
+    @cached_property
+    def names(self) -> Mapping[str, str]:
+        """The parameters by their names in Python, in the order of positional arguments."""
+        return MappingProxyType({signatures.python_name(name): name for name in signatures.ordered(self)})
 
     @property
     def __signature__(self) -> Signature:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 from collections.abc import Mapping, Sequence
 from inspect import Parameter, Signature
 from keyword import iskeyword
@@ -36,7 +37,7 @@ def bound(
     Positional arguments of a shape fill its parameters in order; those of other formulas are elements.
     Raises `SceneError` for an unknown name, and for a value that is given twice or has no parameter.
     """
-    names = {python_name(name): name for name in ordered(formula)}
+    names = formula.names
     given = {names.get(name, name): value for name, value in keywords.items()}
     for name in given:
         if name not in formula.parameters:
@@ -130,8 +131,6 @@ from typing import Literal, Union
 
 def _function(formula: Formula) -> str:
     """A formula in a stub file."""
-    text = str(signature(formula))
-    for module in ("fracslice.formulas.registry.", "collections.abc."):
-        text = text.replace(module, "")
+    text = re.sub(r"\b(?:fracslice\.formulas\.\w+|collections\.abc)\.", "", str(signature(formula)))
     body = docstring(formula).replace("\n", "\n    ").replace("\n    \n", "\n\n")
     return f'def {formula.name}{text}:\n    """{body}\n    """'

@@ -64,7 +64,7 @@ def affine(node: Node) -> tuple[np.ndarray, np.ndarray]:
 
 
 @transform.check
-def _(node: Node) -> None:
+def transform_check(node: Node) -> None:
     if node["rotate"] and not max(map(abs, node["rotate"][:3])) >= SMALLEST:
         raise node.fail("rotate: expected an axis that is not zero, then degrees")
     if node["matrix"] and len(node["matrix"]) == 16 and node["matrix"][12:] != (0, 0, 0, 1):
@@ -75,18 +75,18 @@ def _(node: Node) -> None:
 
 
 @transform.identity
-def _(node: Node) -> bool:
+def transform_identity(node: Node) -> bool:
     linear, offset = affine(node)
     return bool((linear == np.eye(3)).all() and not offset.any())
 
 
 @transform.select
-def _(node: Node):  # type: ignore[no-untyped-def]
+def transform_select(node: Node):  # type: ignore[no-untyped-def]
     return moved if (affine(node)[0] == np.eye(3)).all() else transform.function
 
 
 @transform.arguments
-def _(node: Node) -> dict[str, object]:
+def transform_arguments(node: Node) -> dict[str, object]:
     linear, offset = affine(node)
     if node.function is moved:
         return {"offset": tuple(offset.tolist())}
@@ -96,7 +96,7 @@ def _(node: Node) -> dict[str, object]:
 
 
 @transform.bounds
-def _(node: Node) -> Box:
+def transform_bounds(node: Node) -> Box:
     box = node.children[0].bounds.box
     if box.empty:
         return box
@@ -129,12 +129,12 @@ def mirror(child, x, y, z, along_x, along_y):  # type: ignore[no-untyped-def]
 
 
 @mirror.arguments
-def _(node: Node) -> dict[str, object]:
+def mirror_arguments(node: Node) -> dict[str, object]:
     return along(node)
 
 
 @mirror.bounds
-def _(node: Node) -> Box:
+def mirror_bounds(node: Node) -> Box:
     axis, box = "xyz".index(node["axis"]), node.children[0].bounds.box
     lo, hi = list(box.lo), list(box.hi)
     lo[axis] = -hi[axis]

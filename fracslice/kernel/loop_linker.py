@@ -11,8 +11,7 @@ from __future__ import annotations
 import ast
 import builtins
 import copy
-import inspect
-import textwrap
+import linecache
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -78,19 +77,17 @@ class _Resolver(ast.NodeTransformer):
     def __init__(self, linker: _LoopLinker, function: Callable[..., Any], fixed: dict[str, Any]) -> None:
         self.linker, self.function, self.fixed = linker, function, fixed
         self.scope = language.scope(function)
-        self.local: set[str] = set()
+        self.local = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - fixed.keys()
 
     def tree(self, name: str) -> ast.FunctionDef:
         """The function under another name, without its fixed arguments."""
         tree = _parsed(self.function)
-        stored = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
         arguments = [a.arg for a in tree.args.args if a.arg not in self.fixed]
-        self.local = {*stored, *arguments}
         tree.name, tree.returns = name, None
         tree.args = ast.arguments([], [ast.arg(a) for a in arguments], None, [], [], None, [])
         tree.body = self.statements(tree.body[1:] if ast.get_docstring(tree) is not None else tree.body)
         tree.decorator_list = [mark for mark in tree.decorator_list if isinstance(mark, ast.Name)]
-        return ast.fix_missing_locations(tree)
+        return tree
 
     def fail(self, node: ast.AST, message: str) -> NoReturn:
         code = self.function.__code__
@@ -117,7 +114,7 @@ class _Resolver(ast.NodeTransformer):
         return self.generic_visit(node) if local else self.resolved(node)
 
     def is_local(self, node: ast.Name) -> bool:
-        return node.id in self.local and node.id not in self.fixed
+        return node.id in self.local and node.id not in self.fixed  # the counter of a tuple is, for a while
 
     def resolved(self, node: ast.Name | ast.Attribute) -> ast.AST:
         value = self.known(node)
@@ -203,8 +200,21 @@ class _Resolver(ast.NodeTransformer):
 
 def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
     """A function's own tree, with the lines of its file."""
-    lines, first = inspect.getsourcelines(function)
-    (tree,) = ast.parse(textwrap.dedent("".join(lines))).body
+    code = function.__code__
+    lines, first = linecache.getlines(code.co_filename), code.co_firstlineno
+    last = _functions("".join(lines)).get(first)
+    if last is None:
+        raise KernelError(f"{code.co_filename}:{first}: loop {function.__name__}: expected a def in a module")
+    (tree,) = ast.parse("\n" * (first - 1) + "".join(lines[first - 1 : last])).body
     assert isinstance(tree, ast.FunctionDef)
-    ast.increment_lineno(tree, first - 1)
     return tree
+
+
+@lru_cache(maxsize=32)
+def _functions(text: str) -> dict[int, int]:
+    """The first and the last line of each function of a file, decorators included."""
+    found = {}
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.FunctionDef):
+            found[min([node.lineno, *(mark.lineno for mark in node.decorator_list)])] = node.end_lineno or 0
+    return found

@@ -77,8 +77,9 @@ def _mended(
     for _ in range(PASSES):
         for triangle in sorted(bad):
             surface.mend(triangle)
-    same = (surface.triangles == mesh.triangles).all(axis=1)
-    certificate = replace(certificate, holds=certificate.holds & same).selected(surface.alive)
+    holds = certificate.holds.copy()
+    holds[list(surface.changed)] = False
+    certificate = replace(certificate, holds=holds).selected(surface.alive)
     return Mesh(mesh.vertices, surface.triangles[surface.alive]), certificate
 
 
@@ -95,6 +96,7 @@ class _Surface:
         self.triangles = triangles.copy()
         self.alive = np.ones(len(triangles), dtype=bool)
         self.stars: dict[int, set[int]] = {}
+        self.changed: set[int] = set()
         near = np.array(sorted(bad))
         for _ in range(2):
             marked = np.zeros(len(points), bool)
@@ -146,6 +148,7 @@ class _Surface:
         if min(dot(self.normal(first), old), dot(self.normal(second), old)) <= 0:
             return False
         self.triangles[triangle], self.triangles[other] = first, second
+        self.changed |= {triangle, other}
         self.bad -= {triangle, other}
         self.star(c).discard(triangle)
         self.star(a).discard(other)
@@ -171,6 +174,7 @@ class _Surface:
             if normal.any() and not old.any():
                 opened.add(triangle)
         self.bad -= shared | opened
+        self.changed |= moved
         for triangle, corners in new.items():
             self.triangles[triangle] = corners
         for vertex in common:

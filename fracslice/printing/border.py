@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..compiled import compiled
+from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
 from .components import Connected
 from .samples import Samples
@@ -23,13 +24,28 @@ def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
     the border lies midway between them, and the surfaces of both stay as they are.
     """
     solid, components = found.solid, found.components
-    mine, tiles = components.masks(these)
-    to_these, to_others = (
-        _steps(solid.index, solid.ijk, seeds) for seeds in (mine, components.masks(others)[0])
-    )
+    rows, _ = components.samples(these)
+    near, index = _around(solid, rows, np.isin(components.tiles, these))
+    labels, ijk = components.labels[near], solid.ijk[near]
+    to_these, to_others = (_steps(index, ijk, np.isin(labels, those)) for those in (these, others))
     half = np.clip((to_these.astype(np.float32) - to_others) / 2, -REACH, REACH)
-    index = np.where(solid.index >= 0, solid.index, np.where(tiles, INSIDE, OUTSIDE)).astype(np.int32)
-    return Samples(replace(solid, values=half * np.float32(solid.voxel), index=index))
+    values = half * np.float32(solid.voxel)
+    return Samples(replace(solid, ijk=ijk, values=values, index=index))
+
+
+def _around(solid: Bricks, rows: np.ndarray, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rows of the bricks in and around some rows and some bricks without samples, and their index: these
+    bricks are inside, all others outside.
+    """
+    from scipy.ndimage import binary_dilation
+
+    near = tiles.copy()
+    near[tuple(solid.ijk[rows].T >> 3)] = True
+    near = binary_dilation(near, np.ones((3, 3, 3))) & (solid.index >= 0)
+    index = np.where(tiles, INSIDE, OUTSIDE).astype(np.int32)
+    chosen = np.sort(solid.index[near])
+    index[tuple(solid.ijk[chosen].T >> 3)] = np.arange(len(chosen))
+    return chosen, index
 
 
 @compiled

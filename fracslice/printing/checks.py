@@ -18,7 +18,7 @@ from ..work import Work
 from .components import components_of
 from .connectivity import resolved, shown
 from .faces import projected
-from .samples import lengths
+from .samples import Samples
 from .thin_features import thin_features
 from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
@@ -132,7 +132,7 @@ def check_solid(
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
     most = float(BINS[-1]) / scale
-    solid = lengths(bricks, root.bounds, most)
+    solid = Samples(bricks)
     work.check()
     thin, tight = thin_features(root, solid, work)
 

@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from ..compiled import compiled
-from ..disjoint import find, roots, unite
+from ..disjoint import roots, unite, unite_all
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
+from .samples import positions
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,14 @@ class Components:
         numbers = np.flatnonzero(chosen)
         return np.asarray(numbers[np.argsort(-self.count[numbers], kind="stable")])
 
+    def samples(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The rows and the offsets of the samples of these components, int64 [n] each."""
+        chosen = np.zeros(len(self.inside), np.bool_)
+        chosen[numbers] = True
+        flat = np.empty(self.count[numbers].sum(), np.int64)
+        found = flat[: _samples(self.labels, chosen, flat)]
+        return found >> 9, found & 511
+
     def masks(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where these parts are: bool like labels, and like tiles."""
         chosen = np.zeros(len(self.inside) + 1, bool)
@@ -54,10 +63,52 @@ class Connected:
     solid: Bricks
     components: Components
 
-    def filled(self) -> Connected:
-        """As they are once the cavities are solid: what floats in one is of the body around it."""
-        solid = self._turned(self.components.cavities, -1.0, INSIDE)
-        return Connected(solid, components_of(solid))
+    @classmethod
+    def of(cls, solid: Bricks) -> Connected:
+        """What is connected in a sampled solid."""
+        return cls(solid, components_of(solid))
+
+    def filled(self, cavities: np.ndarray) -> Connected:
+        """As they are once these cavities are solid: what floats in one is of the body around it."""
+        place = self._places(cavities)
+        beside = [self._at(place + step) for step in np.vstack([np.eye(3, dtype=int), -np.eye(3, dtype=int)])]
+        parent = np.arange(len(self.components.inside))
+        unite_all(parent, np.tile(self._at(place), 6), np.concatenate(beside))
+        names, number = np.unique(roots(parent), return_inverse=True)
+        labels, tiles = self.components.labels, self.components.tiles
+        inside = self.components.inside.copy()
+        inside[cavities] = True
+        merged = Components(
+            number.astype(np.int32)[labels],
+            np.where(tiles >= 0, number[tiles], -1).astype(np.int32),
+            inside[names],
+            np.bincount(number, self.components.count).astype(np.int64),
+        )
+        return Connected(self._turned(cavities, -1.0, INSIDE), merged)
+
+    def sealed(self, before: Connected) -> np.ndarray:
+        """The numbers of the cavities that were none before, of a solid that may be sampled otherwise."""
+        cavities = self.components.cavities
+        place = self._places(cavities)
+        points = np.array(self.solid.origin) + self.solid.voxel * place
+        there = np.round((points - before.solid.origin) / before.solid.voxel).astype(np.int64)
+        known = np.isin(before._at(there), before.components.cavities)
+        return np.setdiff1d(cavities, self._at(place)[known])
+
+    def _places(self, numbers: np.ndarray) -> np.ndarray:
+        """The grid indices of the samples of some components, int64 [n, 3]."""
+        return positions(self.solid, *self.components.samples(numbers))
+
+    def _at(self, place: np.ndarray) -> np.ndarray:
+        """The components at grid indices [n, 3], int64 [n]."""
+        brick = place >> 3
+        within = np.all((brick >= 0) & (brick < self.solid.index.shape), axis=1)
+        at = tuple(np.where(within[:, None], brick, 0).T)
+        row = self.solid.index[at]
+        label = np.where(
+            row >= 0, self.components.labels[row, (place & 7) @ (64, 8, 1)], self.components.tiles[at]
+        )
+        return np.where(within, label, 0).astype(np.int64)
 
     def without(self, bodies: np.ndarray) -> Bricks:
         """The samples of the solid without some bodies."""
@@ -82,38 +133,78 @@ def components_of(bricks: Bricks) -> Components:
     empty = bricks.index < 0
     tiles = np.full(bricks.index.shape, -1, np.int64)
     tiles[empty] = first[-1] + 1 + np.arange(empty.sum())
-    labels += (first[:-1, None] + 1).astype(np.int32)
     total = int(first[-1] + 1 + empty.sum())
-    parent, inside = np.arange(total), np.zeros(total, bool)
-    inside[labels.ravel()] = bricks.values.ravel() < 0
-    inside[tiles[empty]] = bricks.index[empty] == INSIDE
+    count, inside = np.zeros(total, np.int64), np.zeros(total, np.bool_)
+    _tally(bricks.values, labels, first, count, inside)
+    count[tiles[empty]], inside[tiles[empty]] = 512, bricks.index[empty] == INSIDE
+    parent = np.arange(total)
     _unite_faces(bricks.index, labels, tiles, inside, parent)
-    root = roots(parent)
-    names, number = np.unique(root, return_inverse=True)
-    count = np.bincount(number[labels.ravel()], minlength=len(names))
-    count += 512 * np.bincount(number[tiles[empty]], minlength=len(names))
+    names, number = np.unique(roots(parent), return_inverse=True)
     found = np.where(empty, number[tiles], -1).astype(np.int32)
-    return Components(number.astype(np.int32)[labels], found, inside[names], count)
+    _renumber(labels, number)
+    sizes = np.zeros(len(names), np.int64)
+    np.add.at(sizes, number, count)
+    return Components(labels, found, inside[names], sizes)
+
+
+@compiled
+def _samples(labels, chosen, flat):  # type: ignore[no-untyped-def]
+    n = 0
+    for row in range(len(labels)):
+        for s in range(512):
+            if chosen[labels[row, s]]:
+                flat[n] = 512 * row + s
+                n += 1
+    return n
+
+
+@compiled
+def _tally(values, labels, first, count, inside):  # type: ignore[no-untyped-def]
+    """Numbers the components of all bricks, from 1 on; of each, its samples and whether it is solid."""
+    for row in range(len(labels)):
+        for s in range(512):
+            label = labels[row, s] + first[row] + 1
+            labels[row, s] = label
+            count[label] += 1
+            inside[label] = values[row, s] < 0
+
+
+@compiled
+def _renumber(labels, number):  # type: ignore[no-untyped-def]
+    for row in range(len(labels)):
+        for s in range(512):
+            labels[row, s] = number[labels[row, s]]
 
 
 @compiled
 def _label(values, labels, first):  # type: ignore[no-untyped-def]
-    """The parts of each brick alone, numbered from 0, and how many there are before each brick."""
-    parent = np.empty(512, np.int64)
+    """The components of each brick alone, numbered from 0, and how many there are before each brick."""
+    parent = np.empty(512, np.int32)
     for row in range(len(values)):
         f = values[row]
         for s in range(512):
-            parent[s] = s
+            here = f[s] < 0
+            root = s
             for step, at in ((64, s >> 6), (8, (s >> 3) & 7), (1, s & 7)):
-                if at and (f[s] < 0) == (f[s - step] < 0):
-                    unite(parent, s, s - step)
+                if at and here == (f[s - step] < 0):
+                    other = s - step
+                    while parent[other] != other:
+                        parent[other] = parent[parent[other]]
+                        other = parent[other]
+                    if root == s:
+                        root = other
+                    elif root != other:
+                        low, high = min(root, other), max(root, other)
+                        parent[high] = low
+                        root = low
+            parent[s] = root
         count = 0
         for s in range(512):
             if parent[s] == s:
                 labels[row, s] = count
                 count += 1
             else:
-                labels[row, s] = labels[row, find(parent, s)]
+                labels[row, s] = labels[row, parent[s]]
         first[row + 1] = first[row] + count
 
 

@@ -16,7 +16,7 @@ from ..errors import VolumeError
 from ..formulas import Box, Node, box, cylinder, plane, transform, union
 from ..kernel import Field
 from ..scene import Print
-from ..volume import Bricks, Plan, extent
+from ..volume import Bricks, Plan, extent, sample_scene
 from ..volume.grid import from_grid, to_grid
 from ..work import Work
 from .edits import edited
@@ -103,16 +103,18 @@ class _Run:
             if self.thing is not before:
                 self.bound()
         self.scale = self.size / max(self.planned.box.size)
-        if how.bridge:
-            yield "bridging", self.bridged
         if how.gap:
             yield "closing gaps", self.closed
         if how.thickness:
             yield "thickening", self.thickened
+        if how.bridge:
+            yield "bridging", self.bridged
         if self.grown:
             middle = self.planned.outer.centre
             self.bound()
             self.planned = replace(self.planned, outer=self.planned.outer.about(middle))
+            if how.thickness and self.known and self.known.solid.voxel < self.planned.voxel:
+                yield "filling pores", self.unsealed
         if how.hollow:
             yield "hollowing", self.hollowed
 
@@ -140,71 +142,97 @@ class _Run:
         return self.known
 
     def seen(self, length: float) -> Samples:
-        """The same, as distances by which walls and gaps are measured."""
-        from .samples import lengths
+        """The same, as a field between the samples."""
+        from .samples import Samples
 
-        return lengths(self.sampled(length), self.thing.bounds, length / self.scale)
+        return Samples(self.sampled(length))
 
     def filled(self) -> Field:
         """The space that nothing reaches becomes solid."""
+        return self.without(self.connected().components.cavities)
+
+    def without(self, cavities: np.ndarray) -> Field:
+        """These become solid."""
         from .border import nearer
 
-        found = self.connected()
-        cavities = found.components.cavities
         if not len(cavities):
             return self.thing
-        self.known = found.filled() if self.how.chooses else None
+        found = self.connected()
+        self.known = found.filled(cavities)
         return edited(self.thing, "add", nearer(found, cavities, np.array([0])))
 
     def largest(self) -> Field:
         """Only the largest body stays."""
-        return self.only(self.connected().components.bodies[:1])
-
-    def only(self, bodies: np.ndarray) -> Field:
-        """Only these bodies stay."""
         from .border import nearer
 
         found = self.connected()
-        others = np.setdiff1d(found.components.bodies, bodies)
-        return edited(self.thing, "keep", nearer(found, bodies, others)) if len(others) else self.thing
+        first, others = np.split(found.components.bodies, [1])
+        return edited(self.thing, "keep", nearer(found, first, others)) if len(others) else self.thing
 
     def bridged(self) -> Field:
         """Struts between bodies, as few and as short as can be, and no dust."""
+        from .border import nearer
         from .bridges import struts
+        from .capsules import capsules
 
         found = self.connected()
         large = _large(found.components)
-        ends = struts(found.solid, found.components, large)
-        self.put(self.only(large))
-        return self.added(*ends, self.how.bridge / self.scale / 2, self.sampled())
+        dust = np.setdiff1d(found.components.bodies, large)
+        start, end = struts(found.solid, found.components, large)
+        if len(dust):
+            self.put(edited(self.thing, "cut", nearer(found, dust, large)))
+        if not len(start):
+            return self.thing
+        width = max(self.how.bridge, self.how.thickness) / self.scale
+        return self.with_capsules(capsules(start, end, width / 2, found.solid), width)
+
+    def unsealed(self) -> Field:
+        """What only samples as far apart as a mesh's seal becomes solid."""
+        from .components import Connected
+
+        fine, self.known = self.known, Connected.of(sample_scene(self.planned, self.work))
+        return self.without(self.known.sealed(fine)) if fine else self.thing
 
     def closed(self) -> Field:
         """Gaps are filled from face to face."""
+        from .capsules import capsules
         from .thin_features import all_walls
 
         solid = self.seen(self.how.gap)
         found = all_walls(self.thing, solid, self.how.gap / self.scale, self.work, gaps=True)
         one = _apart(found.middle, solid.bricks.voxel)
-        return self.added(found.start[one], found.end[one], solid.bricks.voxel, solid.bricks)
+        if not len(one):
+            return self.thing
+        radius = solid.bricks.voxel
+        made = capsules(found.start[one], found.end[one], radius, solid.bricks)
+        return self.with_capsules(made, 2 * radius)
 
     def thickened(self) -> Field:
         """Balls as wide as the least thickness along the middle of all walls that are thinner: what opening
         with such a ball would take away (Serra 1982), along the part of the medial axis between opposite
-        faces.
+        faces. Pores that they seal are filled.
         """
+        from .capsules import capsules
+        from .components import Connected
+        from .samples import together
         from .thin_features import all_walls
 
         solid, least = self.seen(self.how.thickness), self.how.thickness / self.scale
         middle = all_walls(self.thing, solid, least, self.work).middle
         middle = middle[_apart(middle, solid.bricks.voxel)]
-        return self.added(middle, middle, least / 2, solid.bricks)
+        if not len(middle):
+            return self.thing
+        balls = capsules(middle, middle, least / 2, solid.bricks)
+        self.put(self.with_capsules(balls, least))
+        before = Connected.of(solid.bricks)
+        self.known = Connected.of(together(solid.bricks, balls.bricks))
+        return self.without(self.known.sealed(before))
 
-    def added(self, start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Field:
-        """With strokes, if there are any."""
-        from .capsules import capsules
-
-        self.planned = replace(self.planned, outer=self.planned.outer.grown(2 * radius))
-        return edited(self.thing, "add", capsules(start, end, radius, like)) if len(start) else self.thing
+    def with_capsules(self, made: Samples, width: float) -> Field:
+        """With capsules so wide, which may join what was apart."""
+        self.known = None
+        self.planned = replace(self.planned, outer=self.planned.outer.grown(width))
+        return edited(self.thing, "add", made)
 
     def hollowed(self) -> Field:
         """Everything farther inside than the walls are thick is taken away, and two holes made into each part

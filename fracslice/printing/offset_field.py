@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..formulas.confining import offset_slope
+from ..formulas.confining import moved_slope
 from ..formulas.field import Bounds, Device, Precision
 from ..kernel import Field, Kernel
 from ..kernel.arrays import ArrayField
@@ -27,7 +27,7 @@ class OffsetField(ArrayField):
         box.
         """
         own = self.root.bounds
-        return replace(own, box=own.box.grown(self.by), lipschitz=offset_slope(own, self.by))
+        return replace(own, box=own.box.grown(self.by), lipschitz=moved_slope(own, self.by))
 
     @property
     def key(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -14,8 +13,11 @@ from ..kernel import Kernel
 from ..kernel.arrays import ArrayField
 from ..keys import key
 from ..volume import Bricks
-from ..volume.bricks import INSIDE
+from ..volume.bricks import INSIDE, OUTSIDE
 from ..volume.lattice import BRICK
+
+STRIDE = 0.5
+"""Voxels from point to point along a ray."""
 
 NEAR = 1.5
 """Voxels from the surface: the least that a point without samples is away from it."""
@@ -23,6 +25,10 @@ NEAR = 1.5
 LIPSCHITZ = 1.8
 """Of samples of a distance, interpolated: each of the three slopes is at most 1, and they are never all so.
 """
+
+
+SIDE = 11
+"""Samples along each axis of a brick with the layer before it and the two after it."""
 
 
 class Samples(ArrayField):
@@ -51,6 +57,22 @@ class Samples(ArrayField):
         """`Field.kernel`, always on the CPU."""
         return _Interpolated(self, np.dtype(precision))
 
+    @cached_property
+    def beside(self) -> np.ndarray:
+        """Which samples have one on the other side of the surface among the 26 around them, bool [n, 512]."""
+        b = self.bricks
+        found = np.empty(b.values.shape, np.bool_)
+        _beside(b.ijk, b.index, self.brick_bounds, b.values, found)
+        return found
+
+    def free(self, start: np.ndarray, ways: np.ndarray, far: np.ndarray) -> np.ndarray:
+        """How far it is from points along unit vectors, [n, 3], to the first samples beside the surface, or
+        `far`, [n], where that is nearer.
+        """
+        b, out = self.bricks, np.empty(len(far))
+        _free(start, ways, far, *b.origin, b.voxel, b.index, self.beside, out)
+        return out
+
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Values at points, float64 of their shape."""
         b, out = self.bricks, np.empty(np.shape(x))
@@ -70,16 +92,34 @@ class _Interpolated(Kernel):
         return self._samples.points(x, y, z).astype(self.dtype, copy=False)
 
 
-def lengths(bricks: Bricks, bounds: Bounds, limit: float) -> Samples:
-    """Samples of a field as distances that none is larger than, for walls and gaps up to `limit` scene units:
-    its own values, or where those are far from distances, as of escape-time fractals, measured ones.
-    """
-    from .distances import distances
+def together(solid: Bricks, added: Bricks) -> Bricks:
+    """The samples of the union of two fields that are sampled on one grid, maybe in other bricks."""
+    shift = np.round((np.array(added.origin) - solid.origin) / (8 * solid.voxel)).astype(int)
+    low = np.minimum(shift, 0)
+    shape = np.maximum(shift + added.index.shape, solid.index.shape) - low
+    rows, others = np.full((2, *shape), OUTSIDE, np.int32)
+    for bricks, to, first in ((solid, rows, -low), (added, others, shift - low)):
+        to[tuple(slice(f, f + n) for f, n in zip(first, bricks.index.shape, strict=True))] = bricks.index
+    index = np.where((rows == INSIDE) | (others == INSIDE), INSIDE, np.maximum(rows, others)).astype(np.int32)
+    sampled = index >= 0
+    index[sampled] = np.arange(np.count_nonzero(sampled))
+    values = np.empty((np.count_nonzero(sampled), 512), np.float32)
+    _least(solid.values, rows[sampled], added.values, others[sampled], values)
+    x, y, z = (np.array(solid.origin) + 8 * solid.voxel * low).tolist()
+    ijk = np.ascontiguousarray(8 * np.argwhere(sampled), np.int32)
+    return Bricks((x, y, z), solid.voxel, ijk, values, index)
 
-    if bounds.exterior_only:
-        reach = limit / 2 + bricks.voxel
-        return Samples(distances(bricks, reach, reach))
-    return Samples(replace(bricks, values=bricks.values / np.float32(bounds.lipschitz)))
+
+@compiled
+def _least(some, rows, more, others, out):  # type: ignore[no-untyped-def]
+    """Of each row of two fields the lesser samples, or those of the one field that has it."""
+    for n in range(len(out)):
+        if rows[n] < 0:
+            out[n] = more[others[n]]
+        elif others[n] < 0:
+            out[n] = some[rows[n]]
+        else:
+            out[n] = np.minimum(some[rows[n]], more[others[n]])
 
 
 def _brick_bounds(bricks: Bricks) -> np.ndarray:
@@ -99,25 +139,32 @@ def _interpolate(xs, ys, zs, x0, y0, z0, voxel, index, brick_bounds, values, out
 
 @compiled
 def interpolated(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
-    """The value at one point."""
+    """The value at one point, scene units."""
     u, v, w = (x - x0) / voxel, (y - y0) / voxel, (z - z0) / voxel
+    return between(u, v, w, voxel, index, brick_bounds, values)
+
+
+@compiled
+def between(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
+    """The value at one point, given in voxels from the origin of the grid."""
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
     u, v, w = u - i, v - j, w - k
-    total = 0.0
     p, q, r = i & 7, j & 7, k & 7
+    bi, bj, bk = i >> 3, j >> 3, k >> 3
     nx, ny, nz = index.shape
-    known = 0 <= i < 8 * nx and 0 <= j < 8 * ny and 0 <= k < 8 * nz and max(p, q, r) < 7
-    row = index[i >> 3, j >> 3, k >> 3] if known else 0
-    if known and row < 0:
-        return float(brick_bounds[i >> 3, j >> 3, k >> 3])
-    first = 64 * p + 8 * q + r
+    if max(p, q, r) < 7 and 0 <= bi < nx and 0 <= bj < ny and 0 <= bk < nz:
+        row = index[bi, bj, bk]
+        if row < 0:
+            return float(brick_bounds[bi, bj, bk])
+        f, s = values[row], 64 * p + 8 * q + r
+        a, b = (1 - w) * f[s] + w * f[s + 1], (1 - w) * f[s + 8] + w * f[s + 9]
+        c, d = (1 - w) * f[s + 64] + w * f[s + 65], (1 - w) * f[s + 72] + w * f[s + 73]
+        return (1 - u) * ((1 - v) * a + v * b) + u * ((1 - v) * c + v * d)
+    total = 0.0
     for corner in range(8):
         a, b, c = corner >> 2, (corner >> 1) & 1, corner & 1
         share = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w)
-        if known:
-            total += share * values[row, first + 64 * a + 8 * b + c]
-        else:
-            total += share * sample_at(index, brick_bounds, values, voxel, i + a, j + b, k + c)
+        total += share * sample_at(index, brick_bounds, values, voxel, i + a, j + b, k + c)
     return total
 
 
@@ -133,6 +180,66 @@ def sample_at(index, brick_bounds, values, voxel, i, j, k):  # type: ignore[no-u
     if row < 0:
         return float(brick_bounds[bi, bj, bk])
     return float(values[row, (i & 7) * 64 + (j & 7) * 8 + (k & 7)])
+
+
+@compiled
+def gather(ijk, index, brick_bounds, values, row, f):  # type: ignore[no-untyped-def]
+    """A brick's samples with one layer before them and two after them along each axis, [SIDE^3]."""
+    x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
+    nx, ny, nz = index.shape
+    for a in range(3):
+        for b in range(3):
+            for c in range(3):
+                u, v, w = x + a - 1, y + b - 1, z + c - 1
+                known = 0 <= u < nx and 0 <= v < ny and 0 <= w < nz
+                there = index[u, v, w] if known else -1
+                flat = brick_bounds[u, v, w] if known else brick_bounds[x, y, z]
+                for i in range((0, 1, 9)[a], (1, 9, 11)[a]):
+                    for j in range((0, 1, 9)[b], (1, 9, 11)[b]):
+                        to = (i * SIDE + j) * SIDE
+                        at = (((i + 7) & 7) << 6) + (((j + 7) & 7) << 3)
+                        for k in range((0, 1, 9)[c], (1, 9, 11)[c]):
+                            f[to + k] = values[there, at + ((k + 7) & 7)] if there >= 0 else flat
+
+
+@compiled
+def _beside(ijk, index, brick_bounds, values, found):  # type: ignore[no-untyped-def]
+    f = np.empty(SIDE**3, np.float32)
+    one, two = np.empty(SIDE**3, np.uint8), np.empty(SIDE**3, np.uint8)
+    for row in range(len(ijk)):
+        gather(ijk, index, brick_bounds, values, row, f)
+        for s in range(SIDE**3):
+            one[s] = 1 if f[s] < 0 else 2
+        for step in (1, SIDE, SIDE * SIDE):
+            for s in range(step, SIDE**3 - step):
+                two[s] = one[s - step] | one[s] | one[s + step]
+            one, two = two, one
+        for s in range(512):
+            at = ((s >> 6) + 1) * SIDE * SIDE + (((s >> 3) & 7) + 1) * SIDE + (s & 7) + 1
+            found[row, s] = one[at] == 3
+
+
+@compiled
+def _free(start, ways, far, x0, y0, z0, voxel, index, beside, out):  # type: ignore[no-untyped-def]
+    for n in range(len(far)):
+        x, y, z = (start[n, 0] - x0) / voxel, (start[n, 1] - y0) / voxel, (start[n, 2] - z0) / voxel
+        s = 0.0
+        while s < far[n] / voxel:
+            u, v, w = x + s * ways[n, 0], y + s * ways[n, 1], z + s * ways[n, 2]
+            if is_beside(u, v, w, index, beside):
+                break
+            s += STRIDE
+        out[n] = min(voxel * s, far[n])
+
+
+@compiled
+def is_beside(u, v, w, index, beside):  # type: ignore[no-untyped-def]
+    """Whether the nearest sample is `Samples.beside`, of a point in voxels from the origin of the grid."""
+    i, j, k = int(np.floor(u + 0.5)), int(np.floor(v + 0.5)), int(np.floor(w + 0.5))
+    nx, ny, nz = index.shape
+    x, y, z = i >> 3, j >> 3, k >> 3
+    row = index[x, y, z] if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz else -1
+    return row >= 0 and beside[row, ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)]
 
 
 def positions(bricks: Bricks, rows: np.ndarray, offsets: np.ndarray) -> np.ndarray:

@@ -28,8 +28,8 @@ from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, walls
 NEAR = 0.9
 """Voxels: more than from any point to the nearest sample, half the diagonal."""
 
-AWAY = 0.75
-"""Voxels from the surface that the samples know, at least, that make another surface."""
+BEFORE = 0.8
+"""Voxels from where a ray begins in which it enters nothing."""
 
 THIN = 3.0
 """Voxels: what is thicker is measured by samples, too."""
@@ -66,7 +66,7 @@ class ThinFeatures:
 def thin_features(root: Field, seen: Samples, work: Work) -> tuple[ThinFeatures, ThinFeatures]:
     """The thin walls and gaps of an object, also those that its samples miss.
 
-    root: all depths known. seen: the distances that were sampled of it. The values of escape-time fractals
+    root: all depths known. seen: samples of it. The values of escape-time fractals
     are far from distances: there the samples are better, and only what they miss is looked for. A gap between
     walls that are themselves thin is found behind them.
     """
@@ -160,19 +160,23 @@ class _Look:
 
         def look(rows: slice) -> _Rays:
             start, normals, area = crossed(offset_field, rows)
-            rays = self.narrow(_Rays(start, -sign * normals, area, 0 * area, 0 * area), sign)
-            far, none = 2 * (reach + self.voxel), np.zeros(len(rays.start))
-            rays = replace(rays, enter=self.first(rays, none, none + far, sign))
-            rays = rays.chosen(rays.enter < far)
-            rays = self.missed(rays, rays.enter)
+            far = np.full(len(start), 2 * (reach + self.voxel))
+            rays = self.limited(_Rays(start, -sign * normals, area, 0 * area, far), sign)
+            enter = self.first(rays, np.full(len(rays.start), BEFORE * self.voxel), rays.leave, sign)
+            rays = replace(rays, enter=enter).chosen(enter < rays.leave)
             return self.stretch(rays, rays.enter, -sign)
 
         return gathered(look, len(offset_field.bricks), AT_ONCE, self.work)
 
-    def narrow(self, rays: _Rays, sign: float) -> _Rays:
-        """Those that may leave within `most` what they enter, `NEAR` voxels from where they begin at least:
-        most others are as far from any surface halfway.
+    def limited(self, rays: _Rays, sign: float) -> _Rays:
+        """Those that may enter something thin, up to where they leave. Of a field whose values tell distances
+        these are all that may leave within `most` what they enter, `NEAR` voxels from where they begin at
+        least: most others are as far from any surface halfway. Of a fractal they end where the samples know
+        of a surface.
         """
+        if self.root.bounds.exterior_only:
+            end = self.seen.free(rays.start, rays.ways, rays.leave)
+            return replace(rays, leave=end).chosen(end > BEFORE * self.voxel)
         half = self.most / 2
         middle = np.full(len(rays.start), (NEAR + SLACK) * self.voxel + half)
         f = sign * self.field(rays.points(middle))
@@ -182,8 +186,8 @@ class _Look:
         """Those that are to be looked at so far along: of a fractal, at what its samples miss."""
         if not self.root.bounds.exterior_only:
             return rays
-        known = np.abs(self.seen.points(*rays.points(s))) <= AWAY * self.voxel
-        return rays.chosen(~known)
+        begin = rays.points(s).T
+        return rays.chosen(self.seen.free(begin, rays.ways, np.full(len(begin), self.voxel)) > 0)
 
     def offset_field(self, by: float) -> Samples:
         """Samples of the field less `by`: the flatter it is, the farther its inside reaches from the box."""

@@ -18,7 +18,7 @@ import numpy as np
 from ..compiled import compiled
 from ..rows import Rows
 from ..work import Work, chunks
-from .samples import Samples, interpolated, sample_at
+from .samples import SIDE, STRIDE, Samples, between, gather, interpolated, is_beside
 
 OPPOSITE = -0.5
 """The cosine between the normals of two faces of a wall is at most this: wedges up to 60 degrees are walls.
@@ -29,6 +29,9 @@ AT_ONCE = 512
 
 ROOM = 8
 """Samples for each crossing that room is made for at first."""
+
+FIRST = 0.1
+"""Voxels along a ray to the first point that is looked at, off the surface that it begins on."""
 
 Direction = tuple[float, float, float]
 R = TypeVar("R", bound=Rows)
@@ -72,7 +75,7 @@ def walls(
     gaps: bool = False,
     direction: Direction | None = None,
 ) -> Walls:
-    """Walls, or gaps, up to `limit` scene units thick, of a field of distances.
+    """Walls, or gaps, up to `limit` scene units thick.
 
     direction: measure along it instead of the normal, through faces that look along it or against it. Right
     within a voxel; what is thinner than one shows only where a sample lies in it, see `thin_features`.
@@ -86,7 +89,17 @@ def walls(
             ways = np.copysign(1, (ways * direction).sum(1))[:, None] * np.array(direction)
         width = np.empty(len(points))
         _through(
-            points, ways, limit, towards, *b.origin, b.voxel, b.index, solid.brick_bounds, b.values, width
+            points,
+            ways,
+            limit,
+            towards,
+            *b.origin,
+            b.voxel,
+            b.index,
+            solid.brick_bounds,
+            b.values,
+            solid.beside,
+            width,
         )
         thin = (width < limit) & (np.abs((normals * ways).sum(1)) > -OPPOSITE)
         ends = points + width[:, None] * ways
@@ -107,14 +120,24 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
     normals there, [n, 3], and how much of it each crossing stands for, [n], scene units.
     """
     b = solid.bricks
-    own = b.values[rows]
-    n, room = own.size // ROOM, -1
+    begin, end, _ = rows.indices(len(b))
+    n, room = (end - begin) * 512 // ROOM, -1
     while n > room:
         room = n
         points, normals = np.empty((2, room, 3))
         area = np.empty(room)
         n = _cross(
-            b.ijk[rows], own, *b.origin, b.voxel, b.index, solid.brick_bounds, b.values, points, normals, area
+            begin,
+            end,
+            *b.origin,
+            b.voxel,
+            b.ijk,
+            b.index,
+            solid.brick_bounds,
+            b.values,
+            points,
+            normals,
+            area,
         )
     return points[:n].copy(), normals[:n].copy(), area[:n].copy()
 
@@ -127,38 +150,49 @@ def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def _cross(ijk, own, x0, y0, z0, voxel, index, brick_bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
+def _cross(begin, end, x0, y0, z0, voxel, ijk, index, brick_bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
     """Writes what `crossed` returns, as much as there is room for, and returns how much there is."""
-    n = 0
-    for row in range(len(ijk)):
+    n, f = 0, np.empty(SIDE**3, np.float32)
+    for row in range(begin, end):
+        gather(ijk, index, brick_bounds, values, row, f)
         for s in range(512):
-            f = float(own[row, s])
+            u, v, w = s >> 6, (s >> 3) & 7, s & 7
+            at = (u + 1) * SIDE * SIDE + (v + 1) * SIDE + w + 1
             for axis in range(3):
-                shift = 6 - 3 * axis
-                u, v, w = _place(ijk, row, s)
-                if (s >> shift) & 7 < 7:
-                    g = float(own[row, s + (1 << shift)])
-                else:
-                    there = u + (axis == 0), v + (axis == 1), w + (axis == 2)
-                    g = sample_at(index, brick_bounds, values, voxel, *there)
-                if (f < 0) == (g < 0):
+                step = (SIDE * SIDE, SIDE, 1)[axis]
+                if (f[at] < 0) == (f[at + step] < 0):
                     continue
-                if n >= len(area):
-                    n += 1
-                    continue
-                points[n] = x0 + voxel * u, y0 + voxel * v, z0 + voxel * w
-                points[n, axis] += voxel * f / (f - g)
-                x, y, z = points[n]
-                normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
-                area[n] = voxel * voxel * abs(normals[n, axis])
+                if n < len(area):
+                    share = float(f[at]) / (float(f[at]) - float(f[at + step]))
+                    points[n, 0] = x0 + voxel * (ijk[row, 0] + u)
+                    points[n, 1] = y0 + voxel * (ijk[row, 1] + v)
+                    points[n, 2] = z0 + voxel * (ijk[row, 2] + w)
+                    points[n, axis] += voxel * share
+                    _across(f, at, axis, share, normals[n])
+                    area[n] = voxel * voxel * abs(normals[n, axis])
                 n += 1
     return n
 
 
 @compiled
-def _place(ijk, row, s):  # type: ignore[no-untyped-def]
-    """The grid index of a sample."""
-    return ijk[row, 0] + (s >> 6), ijk[row, 1] + ((s >> 3) & 7), ijk[row, 2] + (s & 7)
+def _across(f, at, axis, share, normal):  # type: ignore[no-untyped-def]
+    """The unit normal so far along an edge, by central differences over a voxel of what is interpolated."""
+    along = (SIDE * SIDE, SIDE, 1)[axis]
+    total = 0.0
+    for k in range(3):
+        step = (SIDE * SIDE, SIDE, 1)[k]
+        if k != axis:
+            here, there = f[at + step] - f[at - step], f[at + along + step] - f[at + along - step]
+            slope = ((1 - share) * here + share * there) / 2
+        elif share < 0.5:
+            middle = f[at] + (share + 0.5) * (f[at + along] - f[at])
+            slope = middle - f[at - along] - (share + 0.5) * (f[at] - f[at - along])
+        else:
+            middle = f[at] + (share - 0.5) * (f[at + along] - f[at])
+            slope = f[at + along] + (share - 0.5) * (f[at + 2 * along] - f[at + along]) - middle
+        normal[k] = slope
+        total += slope * slope
+    normal /= max(np.sqrt(total), 1e-30)
 
 
 @compiled
@@ -182,19 +216,18 @@ def _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: i
 
 
 @compiled
-def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, brick_bounds, values, width):  # type: ignore[no-untyped-def]
+def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, brick_bounds, values, beside, width):  # type: ignore[no-untyped-def]
     """How far it is to the other side; twice the limit where that is farther."""
     for n in range(len(points)):
-        (x, y, z), (u, v, w) = points[n], ways[n]
-        s, f, before = 0.1 * voxel, 0.0, 0.0
+        x, y, z = (points[n, 0] - x0) / voxel, (points[n, 1] - y0) / voxel, (points[n, 2] - z0) / voxel
+        s, before = FIRST, 0.0
         width[n] = 2 * limit
-        while s < limit + voxel:
-            f = towards * interpolated(
-                x + s * u, y + s * v, z + s * w, x0, y0, z0, voxel, index, brick_bounds, values
-            )
+        while s < limit / voxel + 1:
+            u, v, w = x + s * ways[n, 0], y + s * ways[n, 1], z + s * ways[n, 2]
+            f = -1.0
+            if is_beside(u, v, w, index, beside):
+                f = towards * between(u, v, w, voxel, index, brick_bounds, values)
             if f >= 0:
+                width[n] = voxel * (s - (STRIDE * f / (f - before) if before < 0 else 0.0))
                 break
-            before, s = -f, s + max(-f, 0.1 * voxel)
-        if f >= 0 and s < limit + voxel:
-            step = max(before, 0.1 * voxel) if before > 0 else 0.0
-            width[n] = s - step * f / (f + before) if before + f > 0 else s
+            before, s = f, s + STRIDE

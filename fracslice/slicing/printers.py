@@ -1,4 +1,4 @@
-"""Resin printers: their screens, as published. docs/printers.md says where each figure is from."""
+"""Resin printers: their screens, as published. docs/reference/printers.md says where each figure is from."""
 
 from __future__ import annotations
 

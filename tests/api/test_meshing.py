@@ -163,12 +163,14 @@ def test_a_mesh_goes_to_a_file(made: Result, tmp_path: Path) -> None:
 
 
 def test_results_cannot_be_changed(made: Result) -> None:
-    for array in (made.vertices, made.triangles, made.faces, made.mesh.vertices):
+    for array in (made.vertices, made.triangles, made.faces, made.mesh.vertices, made.bricks.values):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
     for name in ("vertices", "report"):
         with pytest.raises(FrozenInstanceError):
             setattr(made, name, None)
+    with pytest.raises(FrozenInstanceError):
+        sphere.lipschitz = 2.0  # type: ignore[misc]
     with pytest.raises(TypeError):
         made.report.seconds["total"] = 0.0  # type: ignore[index]
     assert made.report.as_dict()["seconds"]["total"] > 0

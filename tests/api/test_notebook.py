@@ -19,7 +19,7 @@ def egg(x, y, z, radius, height):
 
 
 @egg.bounds
-def _(node):
+def egg_bounds(node):
     return Box.centred(node["radius"], node["radius"], node["height"] / 2)
 """,
     """

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fracslice import Picture, box, render, sphere
+from fracslice import Camera, Light, Picture, box, render, sphere
 from fracslice.errors import Cancelled, RenderError, SceneError
 from fracslice.scene import scene
-from fracslice.scene.view import Camera, Film, View
+from fracslice.scene.view import Film, View
 
 SHAPE = (box() - sphere(0.6)).material(colour=(0.9, 0.1, 0.1))
 SMALL = {"size": (48, 32), "samples": 1, "device": "cpu"}
@@ -40,6 +40,8 @@ def test_the_scene_and_the_keywords_say_how() -> None:
     view = View(film=Film(width=20, height=10, samples=1), camera=Camera(eye=(0, -5, 1)))
     by_scene = render(scene(SHAPE, size=10, view=view), device="cpu")
     assert by_scene.shape == (10, 20, 3)
+    dark = render(SHAPE, size=(20, 10), samples=1, lights=[Light(strength=0.0)], device="cpu")
+    assert dark[3:7, 8:12].max() < by_scene[3:7, 8:12].mean()
     assert np.array_equal(by_scene, render(SHAPE, size=(20, 10), samples=1, camera=view.camera, device="cpu"))
 
 

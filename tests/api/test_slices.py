@@ -24,7 +24,7 @@ def test_layers_are_arrays(slices: Slices) -> None:
     assert {image.dtype.name for image in images} == {"uint8"}
     assert np.array_equal(np.stack(slices), images)
     assert images[3].sum() / 255 * 0.1**2 == pytest.approx(RING, rel=1e-3)
-    assert not images[0].flags.writeable
+    assert not images[0].flags.writeable and not slices.contours[0].points.flags.writeable
     assert slices.tops[-1] == pytest.approx(2) and slices.heights.sum() == pytest.approx(2)
     assert slices.size == pytest.approx((6, 6, 2)) and slices.pixel == (0.1, 0.1)
 

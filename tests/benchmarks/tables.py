@@ -1,4 +1,4 @@
-"""Tables of measured numbers, printed and, with `--write`, put where docs/measurements.md marks their place."""
+"""Tables of measurements, printed and, with `--write`, put into docs/measurements.md at their marks."""
 
 from __future__ import annotations
 

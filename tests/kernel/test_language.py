@@ -127,7 +127,7 @@ from fracslice.formulas import Number, shape
 def slab(x, y, z, far, near):
     return x * far + y * near
 @slab.arguments
-def _(node):
+def slab_arguments(node):
     return {arguments}
 """
 

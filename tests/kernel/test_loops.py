@@ -161,3 +161,11 @@ def test_lanes_that_were_loaded_are_values() -> None:
     lanes = load(array, 0)
     store(array, 0, lanes + 1.0)
     assert lanes.max() == 0.0 and array.min() == 1.0
+
+
+def test_a_loop_is_a_function_of_a_module() -> None:
+    def inner(A):  # type: ignore[no-untyped-def]
+        A[0] = 1.0
+
+    with pytest.raises(KernelError, match=r"test_loops.py:\d+: loop inner: expected a def in a module"):
+        loop_source([Loop(inner, "r")])

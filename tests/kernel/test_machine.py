@@ -7,17 +7,22 @@ import re
 import weakref
 from ctypes import ArgumentError
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import fracslice
 from fracslice._native import RootLoops
-from fracslice._slices import Compiled
+from fracslice._slices import Memory, ProbeBounds, Slab
 from fracslice.formulas import box, sphere
 from fracslice.kernel import CpuKernel, link
 from fracslice.kernel.loops import bricks, points
 from fracslice.volume.roots import Roots
+
+
+def slab_of(entry: Any) -> Slab:
+    return Slab(Memory(), entry, ProbeBounds(1, 1, 1, 1, 1, False), (0, 0, 1, 1), [0.0], 9, 9)
 
 
 def test_arrays_of_another_kind_are_refused() -> None:
@@ -40,11 +45,11 @@ def test_native_objects_hold_the_code_and_the_arrays() -> None:
     fast, slow = Roots(box(), "float32", 0.1), Roots(box(), "float64", 0.1)
     given = fast.native("find"), slow.native("find"), slow.native("polish"), exact.entry
     held = [weakref.ref(part) for tuple_ in (kernel.entry, exact.entry) for part in tuple_]
-    field, loops = Compiled(kernel.entry), RootLoops(16, 1024, *given, (8, 48), 1e-4)
+    slab, loops = slab_of(kernel.entry), RootLoops(16, 1024, *given, (8, 48), 1e-4)
     del kernel, exact, fast, slow, given
     gc.collect()
     assert all(part() is not None for part in held)
-    del field, loops
+    del slab, loops
     gc.collect()
     assert all(part() is None for part in held)
 
@@ -52,9 +57,9 @@ def test_native_objects_hold_the_code_and_the_arrays() -> None:
 def test_native_objects_refuse_other_loops() -> None:
     kernel = CpuKernel(link(sphere()))
     with pytest.raises(TypeError, match="other arguments"):
-        Compiled((kernel._bricks, kernel._parameters))
+        slab_of((kernel._bricks, kernel._parameters))
     with pytest.raises(RuntimeError):
-        Compiled((kernel._points, kernel._parameters.astype(np.float64)))
+        slab_of((kernel._points, kernel._parameters.astype(np.float64)))
     assert (bricks.arguments, points.arguments) == ("rrrrrirn", "rrrrrn")
 
 

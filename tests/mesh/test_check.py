@@ -154,7 +154,7 @@ def test_pairs_of_triangles_meet_as_integers_say(shared: int) -> None:
 
 def test_self_intersections_agree_with_meshlab() -> None:
     """On surfaces in general position, where MeshLab's test is not blind."""
-    import pymeshlab
+    pymeshlab = pytest.importorskip("pymeshlab", reason="it is GPL, and nobody needs it")
 
     rough = sphere(level=4)
     noise = np.random.default_rng(3).normal(0, 0.25, rough.vertices.shape)

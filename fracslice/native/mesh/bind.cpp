@@ -11,6 +11,7 @@
 #include "quantise.h"
 #include "selection.h"
 #include "self_intersections.h"
+#include "stl.h"
 #include "tree.h"
 #include "weld.h"
 
@@ -114,6 +115,13 @@ nb::object bind_surroundings(const Rows<double>& vertices, const Rows<int32_t>& 
     }));
 }
 
+nb::object bind_stl(const Rows<double>& vertices, const Rows<int32_t>& triangles, int threads) {
+    size_t count = triangles.shape(0);
+    Array<uint8_t> bytes(count, kStlBytes);
+    unlocked(threads, [&] { write_stl(mesh_of(vertices, triangles), bytes.data.get()); });
+    return to_numpy(std::move(bytes), {count, kStlBytes});
+}
+
 nb::tuple bind_weld(const Rows<float>& points) {
     size_t count = points.shape(0);
     Welded found = unlocked(1, [&] { return weld(reinterpret_cast<const uint32_t*>(points.data()), count); });
@@ -172,6 +180,7 @@ void bind_mesh(nb::module_& module) {
     module.def("selected", &bind_selected, "vertices"_a, "triangles"_a, "keep"_a, "threads"_a = 0);
     module.def("touching", &bind_touching, "triangles"_a, "vertices"_a, "threads"_a = 0);
     module.def("surroundings", &bind_surroundings, "vertices"_a, "triangles"_a, "of"_a, "threads"_a = 0);
+    module.def("stl", &bind_stl, "vertices"_a, "triangles"_a, "threads"_a = 0);
     module.def("weld", &bind_weld, "points"_a);
     module.def("tree", &bind_tree, "vertices"_a, "triangles"_a, "threads"_a = 0);
     module.def("self_intersecting_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,

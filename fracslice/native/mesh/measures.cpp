@@ -49,7 +49,8 @@ std::vector<int64_t> pointed(const MeshView& mesh, double sine) {
         double least = sine * std::sqrt(dot(up, up));
         for (int64_t corner : corners) {
             Vec3 edge = at(mesh.corner(size_t(corner / 3), int((corner + 1) % 3))) - at(mesh.point(int32_t(v)));
-            if (!(-dot(edge, up) > least * std::sqrt(dot(edge, edge)))) return false;
+            double down = -dot(edge, up);
+            if (!(down > 0) || !(down > least * std::sqrt(dot(edge, edge)))) return false;
         }
         return !corners.empty();
     };

@@ -25,54 +25,55 @@ int winding_of(const MeshView& mesh, size_t t, const double* p) {
     return side_of_plane(mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2), p) * turn > 0 ? turn : 0;
 }
 
-// The starts of the rays, by cells of a grid across them.
+// The start of a shell's ray.
+struct Start {
+    double at[3];
+    size_t shell;
+};
+
+// The starts, by cells of a grid across the rays.
 class Starts {
   public:
-    Starts(const MeshView& mesh, std::span<const int64_t> first) : mesh_(mesh), first_(first) {
-        std::vector<size_t> rays;
+    Starts(const MeshView& mesh, std::span<const int64_t> first) {
         for (size_t shell = 0; shell < first.size(); ++shell) {
             if (first[shell] < 0) continue;
-            rays.push_back(shell);
-            for (int k = 0; k < 2; ++k) {
-                low_[k] = std::min(low_[k], point(shell)[k]);
-                high_[k] = std::max(high_[k], point(shell)[k]);
-            }
+            const double* p = mesh.point(int32_t(first[shell]));
+            starts_.push_back({{p[0], p[1], p[2]}, shell});
+            for (size_t k = 0; k < 2; ++k) low_[k] = std::min(low_[k], p[k]), high_[k] = std::max(high_[k], p[k]);
         }
-        side_ = std::clamp(int(std::sqrt(double(rays.size()))), 1, kMostCells);
-        for (int k = 0; k < 2; ++k) scale_[k] = high_[k] > low_[k] ? side_ / (high_[k] - low_[k]) : 0;
-        rays_.resize(size_t(side_) * size_t(side_));
-        for (size_t shell : rays) rays_[cell(place(point(shell), 0), place(point(shell), 1))].push_back(shell);
+        side_ = std::clamp(int(kFine * std::sqrt(double(starts_.size()))), 1, kMostCells);
+        for (size_t k = 0; k < 2; ++k) scale_[k] = high_[k] > low_[k] ? side_ / (high_[k] - low_[k]) : 0;
+        auto cell_of = [&](const Start& start) { return cell(place(start.at[0], 0), place(start.at[1], 1)); };
+        std::sort(starts_.begin(), starts_.end(), [&](const Start& a, const Start& b) { return cell_of(a) < cell_of(b); });
+        cells_.resize(size_t(side_) * size_t(side_) + 1, 0);
+        for (const Start& start : starts_) ++cells_[cell_of(start) + 1];
+        for (size_t i = 1; i < cells_.size(); ++i) cells_[i] += cells_[i - 1];
     }
 
-    const double* point(size_t shell) const { return mesh_.point(int32_t(first_[shell])); }
-
-    // Calls act(shell) for the rays that may pass a box: those that start in its cells below its top.
+    // Calls act(start) for the rays that may pass a box: those that start in its cells below its top.
     template <class Do>
     void for_each_in(const double* low, const double* high, const Do& act) const {
         if (low[0] > high_[0] || low[1] > high_[1] || high[0] < low_[0] || high[1] < low_[1]) return;
-        int x0 = place(low, 0), x1 = place(high, 0), y0 = place(low, 1), y1 = place(high, 1);
-        for (int x = x0; x <= x1; ++x) {
-            for (int y = y0; y <= y1; ++y) {
-                for (size_t shell : rays_[cell(x, y)]) {
-                    const double* p = point(shell);
-                    if (low[0] <= p[0] && p[0] <= high[0] && low[1] <= p[1] && p[1] <= high[1] && p[2] <= high[2]) act(shell);
-                }
+        int y0 = place(low[1], 1), y1 = place(high[1], 1);
+        for (int x = place(low[0], 0), last = place(high[0], 0); x <= last; ++x) {
+            for (size_t i = cells_[cell(x, y0)], end = cells_[cell(x, y1) + 1]; i < end; ++i) {
+                const double* p = starts_[i].at;
+                if (low[0] <= p[0] && p[0] <= high[0] && low[1] <= p[1] && p[1] <= high[1] && p[2] <= high[2]) act(starts_[i]);
             }
         }
     }
 
   private:
-    static constexpr int kMostCells = 512;
+    static constexpr int kFine = 4, kMostCells = 1024;  // cells per start, its root; along a side
 
     // Of the cell along an axis: the same or a higher one for a greater coordinate.
-    int place(const double* p, int k) const { return int(std::clamp((p[k] - low_[k]) * scale_[k], 0.0, side_ - 1.0)); }
+    int place(double x, size_t k) const { return int(std::clamp((x - low_[k]) * scale_[k], 0.0, side_ - 1.0)); }
     size_t cell(int x, int y) const { return size_t(x) * size_t(side_) + size_t(y); }
 
-    const MeshView& mesh_;
-    std::span<const int64_t> first_;
     std::array<double, 2> low_{HUGE_VAL, HUGE_VAL}, high_{-HUGE_VAL, -HUGE_VAL}, scale_{};
     int side_ = 1;
-    std::vector<std::vector<size_t>> rays_;
+    std::vector<Start> starts_;
+    std::vector<size_t> cells_;  // the first start of each, and behind the last
 };
 
 // A triangle that a shell's ray passes.
@@ -90,9 +91,9 @@ std::vector<Hit> hits(const MeshView& mesh, std::span<const int32_t> labels, con
             double low[2], high[3];
             for (int k = 0; k < 2; ++k) low[k] = std::min({a[k], b[k], c[k]});
             for (int k = 0; k < 3; ++k) high[k] = std::max({a[k], b[k], c[k]});
-            starts.for_each_in(low, high, [&](size_t shell) {
-                int winding = size_t(labels[t]) == shell ? 0 : winding_of(mesh, t, starts.point(shell));
-                if (winding != 0) found.push_back({shell, labels[t], winding});
+            starts.for_each_in(low, high, [&](const Start& start) {
+                int winding = size_t(labels[t]) == start.shell ? 0 : winding_of(mesh, t, start.at);
+                if (winding != 0) found.push_back({start.shell, labels[t], winding});
             });
         }
         return found;

@@ -26,24 +26,31 @@ std::vector<size_t> counted(size_t count, const Do& holds) {
 // Cells of a grid around a mesh, some of them marked.
 class CoarseGrid {
   public:
-    explicit CoarseGrid(const Bounds& box) : low_(box.low), marked_(size_t(kSide) * kSide * kSide, false) {
+    explicit CoarseGrid(const MeshView& mesh) : mesh_(mesh), cells_(mesh.vertices, 1), marked_(kSide * kSide * kSide, false) {
+        Bounds box = bounds(mesh.positions, mesh.vertices);
         double size = 0;
-        for (int k = 0; k < 3; ++k) size = std::max(size, box.high[k] - box.low[k]);
-        scale_ = size > 0 ? kSide / size : 0;
+        for (size_t k = 0; k < 3; ++k) size = std::max(size, box.high[k] - box.low[k]);
+        double scale = size > 0 ? kSide / size : 0;
+        for_each_block(mesh.vertices, [&](size_t, size_t first, size_t last) {
+            for (size_t v = first; v < last; ++v) {
+                const double* p = mesh.point(int32_t(v));
+                for (size_t k = 0; k < 3; ++k) cells_.data[v][k] = uint8_t(std::min((p[k] - box.low[k]) * scale, kSide - 1.0));
+                cells_.data[v][3] = 0;
+            }
+        });
     }
 
     // Calls act(marked) for the cells of a triangle's box, until it returns true, and whether it did.
     template <class Do>
-    bool any(const MeshView& mesh, size_t t, const Do& act) {
-        std::array<int, 3> first, last;
-        for (size_t k = 0; k < 3; ++k) {
-            const double a = mesh.corner(t, 0)[k], b = mesh.corner(t, 1)[k], c = mesh.corner(t, 2)[k];
-            first[k] = place(std::min({a, b, c}), k), last[k] = place(std::max({a, b, c}), k);
-        }
-        for (int x = first[0]; x <= last[0]; ++x) {
-            for (int y = first[1]; y <= last[1]; ++y) {
-                for (int z = first[2]; z <= last[2]; ++z) {
-                    if (act(marked_[size_t((x * kSide + y) * kSide + z)])) return true;
+    bool any(size_t t, const Do& act) {
+        const Cell &a = cell(t, 0), &b = cell(t, 1), &c = cell(t, 2);
+        if (a == b && b == c) return act(marked_[at(a[0], a[1], a[2])]);
+        std::array<size_t, 3> first, last;
+        for (size_t k = 0; k < 3; ++k) first[k] = std::min({a[k], b[k], c[k]}), last[k] = std::max({a[k], b[k], c[k]});
+        for (size_t x = first[0]; x <= last[0]; ++x) {
+            for (size_t y = first[1]; y <= last[1]; ++y) {
+                for (size_t z = first[2]; z <= last[2]; ++z) {
+                    if (act(marked_[at(x, y, z)])) return true;
                 }
             }
         }
@@ -51,12 +58,14 @@ class CoarseGrid {
     }
 
   private:
-    static constexpr int kSide = 64;
+    static constexpr size_t kSide = 64;
+    using Cell = std::array<uint8_t, 4>;
 
-    int place(double x, size_t k) const { return int(std::clamp((x - low_[k]) * scale_, 0.0, kSide - 1.0)); }
+    static size_t at(size_t x, size_t y, size_t z) { return (x * kSide + y) * kSide + z; }
+    const Cell& cell(size_t t, int k) const { return cells_.data[size_t(mesh_[t][k])]; }
 
-    Vec3 low_;
-    double scale_;
+    const MeshView& mesh_;
+    Array<Cell> cells_;  // of the vertices
     std::vector<uint8_t> marked_;
 };
 
@@ -102,11 +111,11 @@ std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> 
 
 std::vector<int64_t> surroundings(const MeshView& mesh, std::span<const bool> of) {
     assert(of.size() == mesh.count);
-    CoarseGrid grid(bounds(mesh.positions, mesh.vertices));
+    CoarseGrid grid(mesh);
     for (int64_t t : chosen(mesh.count, [&](size_t t) { return of[t]; })) {
-        grid.any(mesh, size_t(t), [](uint8_t& marked) { return marked = true, false; });
+        grid.any(size_t(t), [](uint8_t& marked) { return marked = true, false; });
     }
-    return chosen(mesh.count, [&](size_t t) { return grid.any(mesh, t, [](uint8_t marked) { return marked != 0; }); });
+    return chosen(mesh.count, [&](size_t t) { return grid.any(t, [](uint8_t marked) { return marked != 0; }); });
 }
 
 }  // namespace fracslice::mesh

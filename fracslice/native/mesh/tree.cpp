@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "blocks.h"
 #include "measures.h"
 
 namespace fracslice::mesh {
@@ -45,21 +46,31 @@ Array<uint64_t> keys(const MeshView& mesh) {
     return keys;
 }
 
-// The keys in the order of their places, then of their numbers: sorted by digits, the last first.
+// The keys in the order of their places, then of their numbers: sorted by digits, the last first. Each block knows where its keys
+// with a digit go.
 Array<uint64_t> sorted(Array<uint64_t> keys) {
     constexpr int bits = 11, digits = 3 * kPlaceBits / bits;
-    constexpr size_t values = size_t(1) << bits;
-    size_t n = keys.rows;
-    std::vector<std::array<size_t, values>> before(digits);
-    auto digit = [](uint64_t key, int d) { return key >> (kNumberBits + bits * d) & (values - 1); };
-    for (size_t i = 0; i < n; ++i) {
-        for (int d = 0; d < digits; ++d) ++before[d][digit(keys.data[i], d)];
-    }
+    constexpr size_t values = size_t(1) << bits, parts = 64;
+    size_t n = keys.rows, size = (n + parts - 1) / parts;
     Array<uint64_t> next(n, 1);
+    std::vector<std::array<size_t, values>> before(parts);
     for (int d = 0; d < digits; ++d) {
+        auto for_each = [&](size_t part, const auto& act) {
+            for (size_t i = std::min(n, part * size), last = std::min(n, i + size); i < last; ++i) {
+                act(keys.data[i], before[part][keys.data[i] >> (kNumberBits + bits * d) & (values - 1)]);
+            }
+        };
+        tbb::parallel_for(size_t(0), parts, [&](size_t part) {
+            before[part].fill(0);
+            for_each(part, [](uint64_t, size_t& count) { ++count; });
+        });
         size_t total = 0;
-        for (size_t& count : before[d]) total += std::exchange(count, total);
-        for (size_t i = 0; i < n; ++i) next.data[before[d][digit(keys.data[i], d)]++] = keys.data[i];
+        for (size_t value = 0; value < values; ++value) {
+            for (auto& part : before) total += std::exchange(part[value], total);
+        }
+        tbb::parallel_for(size_t(0), parts, [&](size_t part) {
+            for_each(part, [&](uint64_t key, size_t& place) { next.data[place++] = key; });
+        });
         std::swap(keys, next);
     }
     return keys;
@@ -83,7 +94,9 @@ Tree build_tree(const MeshView& mesh) {
     if (mesh.count >> kNumberBits) throw std::invalid_argument("more than 2^31 triangles");
     Array<uint64_t> order = sorted(keys(mesh));
     tree.order = {mesh.count, 1};
-    for (size_t i = 0; i < mesh.count; ++i) tree.order.data[i] = int64_t(order.data[i] & ((uint64_t(1) << kNumberBits) - 1));
+    for_each_block(mesh.count, [&](size_t, size_t first, size_t last) {
+        for (size_t i = first; i < last; ++i) tree.order.data[i] = int64_t(order.data[i] & ((uint64_t(1) << kNumberBits) - 1));
+    });
     size_t leaves = 1;
     while (leaves * kLeaf < mesh.count) leaves *= 2;
     tree.low = {2 * leaves, 3}, tree.high = {2 * leaves, 3};
@@ -94,10 +107,14 @@ Tree build_tree(const MeshView& mesh) {
         size_t first = std::min(leaf * kLeaf, mesh.count), last = std::min(first + kLeaf, mesh.count);
         set_leaf(mesh, all + first, all + last, low + 3 * (leaves + leaf), high + 3 * (leaves + leaf));
     });
-    for (size_t i = 3 * leaves; i-- > 3;) {
-        size_t child = 6 * (i / 3) + i % 3;
-        low[i] = std::min(low[child], low[child + 3]);
-        high[i] = std::max(high[child], high[child + 3]);
+    for (size_t level = leaves / 2; level > 0; level /= 2) {
+        for_each_block(level, [&](size_t, size_t first, size_t last) {
+            for (size_t i = 3 * (level + first); i < 3 * (level + last); ++i) {
+                size_t child = 6 * (i / 3) + i % 3;
+                low[i] = std::min(low[child], low[child + 3]);
+                high[i] = std::max(high[child], high[child + 3]);
+            }
+        });
     }
     return tree;
 }

@@ -1,6 +1,6 @@
 """Run time against error, ours and all peers that are installed: ``python -m tests.benchmarks.peers``.
 
-The C++ programs are built first. With --write the table and the picture go where docs/measurements.md shows them.
+The C++ programs are built first. With --write the table and the picture go to docs/measurements.md.
 """
 
 from __future__ import annotations

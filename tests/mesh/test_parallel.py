@@ -1,0 +1,143 @@
+"""What native code finds of a mesh in blocks, against NumPy and SciPy; the same for any number of threads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components as components_of_a_graph
+
+from fracslice._native import quantise, selected, stl, surroundings, touching
+from fracslice.mesh import Mesh
+from fracslice.mesh.nesting import nesting
+from fracslice.mesh.reading import joined
+from fracslice.mesh.self_intersections import self_intersecting_triangles
+from fracslice.mesh.topology import component_sizes, connected_components, corners_by_vertex
+
+from .shapes import cube, inverted
+
+THREADS = 1, 2, 5
+RNG = np.random.default_rng(11)
+N, M = 200_000, 50_000
+"""Vertices and triangles: more than two blocks of each."""
+LOOSE = Mesh(RNG.normal(size=(N, 3)), RNG.integers(0, N, (M, 3)).astype(np.int32))
+"""Triangles of which many hang together and many do not, in no order."""
+SOME = RNG.random(M) < 0.4
+
+
+@pytest.mark.parametrize("threads", THREADS)
+def test_connected_components(threads: int) -> None:
+    labels, count = connected_components(LOOSE.triangles, N, threads)
+    edges = np.concatenate([LOOSE.triangles[:, :2], LOOSE.triangles[:, 1:]])
+    _, of_vertex = components_of_a_graph(coo_array((np.ones(2 * M), edges.T), shape=(N, N)))
+    _, first, which = np.unique(of_vertex[LOOSE.triangles[:, 0]], return_index=True, return_inverse=True)
+    assert 1000 < count == len(first)
+    assert (labels == np.argsort(np.argsort(first))[which]).all()
+
+
+def test_sizes_of_components() -> None:
+    labels, count = connected_components(LOOSE.triangles, N)
+    a, b, c = (LOOSE.vertices[LOOSE.triangles[:, k]] for k in range(3))
+    origin = a[np.unique(labels, return_index=True)[1]][labels]
+    expected = np.bincount(labels, (np.cross(a - origin, b - origin) * (c - origin)).sum(1)) / 6
+    found = [component_sizes(LOOSE.vertices, LOOSE.triangles, labels, count, k) for k in THREADS]
+    for volumes, areas in found:
+        assert np.allclose(volumes, expected, rtol=1e-9, atol=1e-9)
+        assert np.allclose(areas, np.bincount(labels, np.linalg.norm(LOOSE.normals, axis=1)) / 2)
+        assert (volumes.tobytes(), areas.tobytes()) == (found[0][0].tobytes(), found[0][1].tobytes())
+
+
+@pytest.mark.parametrize("threads", THREADS)
+def test_corners_by_vertex(threads: int) -> None:
+    start, corner = corners_by_vertex(LOOSE.triangles, N, threads)
+    assert (corner == np.argsort(LOOSE.triangles.ravel(), kind="stable")).all()
+    assert (np.diff(start) == np.bincount(LOOSE.triangles.ravel(), minlength=N)).all()
+
+
+@pytest.mark.parametrize("threads", THREADS)
+def test_selected(threads: int) -> None:
+    found = selected(LOOSE.vertices, LOOSE.triangles, SOME, threads)
+    assert found is not None
+    used = np.unique(LOOSE.triangles[SOME])
+    assert (found[0] == LOOSE.vertices[used]).all()
+    assert (found[1] == np.searchsorted(used, LOOSE.triangles[SOME])).all()
+    assert LOOSE.selected(SOME, threads).selected(np.ones(SOME.sum(), bool)).triangles is not None
+    whole = cube()
+    assert whole.selected(np.ones(12, bool)) is whole
+
+
+@pytest.mark.parametrize("threads", THREADS)
+def test_touching(threads: int) -> None:
+    marked = RNG.random(N) < 0.01
+    found = touching(LOOSE.triangles, marked, threads)
+    assert (found == np.flatnonzero(marked[LOOSE.triangles].any(axis=1))).all()
+
+
+def test_the_surroundings_of_triangles_hold_all_that_they_meet() -> None:
+    """Small triangles by the ten thousand, of which some meet."""
+    corners = RNG.random((4000, 1, 3)) + RNG.normal(0, 0.01, (4000, 3, 3))
+    mesh = Mesh(corners.reshape(-1, 3), np.arange(12_000, dtype=np.int32).reshape(-1, 3))
+    among = np.zeros(4000, bool)
+    among[RNG.integers(4000, size=40)] = True
+    near = surroundings(mesh.vertices, mesh.triangles, among)
+    assert among[near].sum() == among.sum() and len(near) < 1000
+    whole = self_intersecting_triangles(mesh)
+    found = self_intersecting_triangles(mesh, among=among)
+    assert 0 < (found & among).sum() == (whole & among).sum()
+    assert not self_intersecting_triangles(mesh, among=~among & among).any()
+
+
+@pytest.mark.parametrize("threads", THREADS)
+def test_quantised_coordinates_and_what_is_displaced(threads: int) -> None:
+    planes = np.linspace(-8, 8, 2**20 + 1)[:, None] + np.zeros(3)  # 2 to 32 steps of float32 apart
+    points = LOOSE.vertices.copy()
+    points[:1000, 0] = planes[RNG.integers(len(planes), size=1000), 0]
+    points[1000:2000] = -0.0
+    found, displaced = quantise(points, planes, threads)
+    assert (found == points.astype(np.float32)).all() and not np.signbit(found[1000:2000]).any()
+    low = planes[np.searchsorted(planes[:, 0], points, "right") - 1, 0].astype(np.float32)
+    high = planes[np.searchsorted(planes[:, 0], points, "left"), 0].astype(np.float32)
+    kept = np.where(low == high, found == low, (low < found) & (found < high)).all(axis=1)
+    assert 0 < displaced.sum() < N / 2 and (displaced == ~kept).all()
+    assert quantise(points, np.empty((0, 3)), threads)[1].all()
+    assert quantise(points * 10, planes, threads)[1][np.abs(points).max(axis=1) > 0.8].all()
+
+
+def test_shells_in_shells() -> None:
+    """Cubes of cubes, each in the cavity of the one around it, or beside it in the way of its rays."""
+    depth, parts = 6, list[Any]()
+    for number in range(60):
+        x, y, _ = 30.0 * RNG.permutation(3)
+        for k in range(depth):
+            size = 2.0 * (depth - k)
+            solid = cube(size, at=(x - size / 2 + number / 100, y - size / 2, 20 * number - size / 2))
+            parts.append(inverted(solid) if k % 2 else solid)
+    order = RNG.permutation(len(parts))
+    mesh = joined([parts[k] for k in order])
+    labels, count = connected_components(mesh.triangles, len(mesh.vertices))
+    volumes, _ = component_sizes(mesh.vertices, mesh.triangles, labels, count)
+    at = np.empty(count, int)
+    at[order] = np.arange(count)
+    outside = np.where(order % depth == 0, -1, at[order - 1])
+    for threads in THREADS:
+        winding, parent = nesting(mesh, labels, volumes, threads=threads)
+        assert (parent == outside).all()
+        assert (winding == order % depth % 2).all()
+
+
+def test_stl_records() -> None:
+    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    flat = Mesh(LOOSE.vertices, np.concatenate([LOOSE.triangles, [[5, 5, 7]]]).astype(np.int32))
+    found = [stl(flat.vertices, flat.triangles, threads) for threads in THREADS]
+    assert all((other == found[0]).all() for other in found)
+    records = found[0].view(kind)[:, 0]
+    corners = flat.vertices.astype(np.float32)[flat.triangles]
+    assert (records["corners"] == corners).all() and not records["attribute"].any()
+    lengths = np.linalg.norm(records["normal"].astype(float), axis=1)
+    assert lengths[-1] == 0 and np.allclose(lengths[flat.normals.any(axis=1)], 1)
+    u, v = (corners[:, k].astype(float) - corners[:, 0] for k in (1, 2))
+    assert np.allclose(
+        records["normal"] * np.linalg.norm(np.cross(u, v), axis=1)[:, None], np.cross(u, v), atol=1e-6
+    )

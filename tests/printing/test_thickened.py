@@ -1,0 +1,107 @@
+"""What thickening makes of its surroundings: nothing loose, nothing sealed, and as thick as asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import Node, box, cylinder, difference, julia, shell, sphere, transform, union
+from fracslice.printing import printable
+from fracslice.printing.components import Components, components_of
+from fracslice.printing.samples import Samples, together
+from fracslice.printing.walls import walls
+from fracslice.scene import Print
+from fracslice.volume import Plan, plan, sample_scene
+from fracslice.work import Work
+
+SIZE = 20.0
+
+
+def at(node: Node, x: float, y: float, z: float) -> Node:
+    return transform(node, translate=(x, y, z))
+
+
+def made(root: Node, **printing: float | str) -> Plan:
+    """Of 20 mm, on 0.2 mm samples."""
+    return printable(plan(root, 100), SIZE, Print(**printing))[0]  # type: ignore[arg-type]
+
+
+def connected(planned: Plan) -> Components:
+    return components_of(sample_scene(planned))
+
+
+CHAMBER = box(size=(0.5, 0.5, 0.5))
+PORE = cylinder(radius=0.04, height=0.3)
+POROUS = difference(
+    box(size=(2, 2, 2)), at(CHAMBER, 0, 0, 0.7), at(PORE, 0, 0, 1), at(sphere(radius=0.2), 0, 0, -0.5)
+)
+"""A chamber below a lid of half a millimetre with a pore in it, and a cavity that is closed."""
+
+
+def test_pores_that_thickening_seals_are_filled() -> None:
+    """And only they: what nothing reached before stays as it is."""
+    assert len(connected(plan(POROUS, 100)).cavities) == 1
+    after = connected(made(POROUS, thickness=1.5))
+    assert len(after.cavities) == 1
+    assert after.count[after.cavities[0]] == pytest.approx(4 / 3 * np.pi * 10**3, rel=0.05)
+
+
+def test_crumbs_that_thickening_shows_are_joined() -> None:
+    """Of 0.1 mm, smaller than the samples that tell what is loose; one in the air, one on the way to it."""
+    crumbs = union(
+        box(size=(2, 2, 2)), at(sphere(radius=0.005), 0, 0, 1.2), at(sphere(radius=0.005), 1.3, 0, 0)
+    )
+    after = connected(made(crumbs, thickness=1.5, bridge=1.0))
+    assert len(after.bodies) == 1
+
+
+def test_a_strut_is_no_thinner_than_the_least_thickness() -> None:
+    planned = made(union(box(size=(2, 2, 2)), at(sphere(radius=0.3), 0, 0, 1.8)), thickness=1.6, bridge=0.8)
+    across = np.linspace(-1, 1, 2001) * 0.3
+    found = sample_points(planned, across, 0 * across, 1.25 + 0 * across) < 0
+    assert found.sum() * 0.3e-3 * SIZE / 3.1 == pytest.approx(1.6, abs=0.1)
+
+
+def sample_points(planned: Plan, *points: np.ndarray) -> np.ndarray:
+    from fracslice.kernel import compile_scene
+
+    return np.asarray(compile_scene(planned.root, "float64").points(*points))
+
+
+def test_pores_that_only_a_coarse_mesh_seals_are_filled() -> None:
+    """A chamber whose pore is wide enough for the samples of thickening, not for those of the mesh."""
+    planned = plan(POROUS, 24)
+    thick = union(planned.root, at(box(size=(0.05, 0.4, 0.4)), 1, 0, 0))
+    coarse = plan(thick, 24)
+    after, _ = printable(coarse, SIZE, Print(thickness=0.6))
+    assert len(connected(after).cavities) == 1
+
+
+def test_thin_walls_of_a_fractal_are_found_by_coarse_samples_as_by_fine_ones() -> None:
+    """By swept distances a sixth of them was lost."""
+    root, areas = julia(iterations=6), []
+    limit = 3 * plan(root, 48).voxel
+    for resolution in (96, 192):
+        found = walls(Samples(sample_scene(plan(root, resolution))), limit, Work())
+        areas.append(found.area.sum())
+    assert areas[0] == pytest.approx(areas[1], rel=0.08)
+
+
+def test_walls_of_a_fractal_become_as_thick_as_asked() -> None:
+    root = shell(julia(iterations=6), thickness=0.03)
+    after, scale = printable(plan(root, 100), SIZE, Print(thickness=1.2))
+    found = walls(Samples(sample_scene(after)), 3 / scale, Work())
+    order = np.argsort(found.width)
+    share = np.cumsum(found.area[order]) / found.area.sum()
+    assert found.width[order][np.searchsorted(share, 0.05)] * scale > 1.2 - 0.2
+
+
+def test_samples_of_a_union_are_those_of_both() -> None:
+    small, large = (sample_scene(plan(sphere(radius=r), 2 * r / 0.05)) for r in (0.4, 1.0))
+    moved = type(small)(
+        tuple(np.array(large.origin) - 8 * large.voxel), large.voxel, small.ijk, small.values, small.index
+    )
+    both = together(large, moved)
+    points = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 2000))
+    parts = [Samples(bricks).points(*points) < 0 for bricks in (large, moved)]
+    assert (Samples(both).points(*points) < 0).sum() == pytest.approx((parts[0] | parts[1]).sum(), abs=20)
