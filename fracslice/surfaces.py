@@ -20,14 +20,12 @@ if TYPE_CHECKING:
     from .mesh.survey import WholeShells
     from .volume import Plan, SignBricks
 
-BYTES_A_BRICK = 60_000
+BYTES_A_BRICK = 30_000
 """Peak memory for each brick of samples, its triangles in all their stages included; measured."""
 
 BRICKS = 1 << 13
-"""In a piece of a mesh that does not fit in memory: half a gigabyte at most, in all its stages."""
-
-ALWAYS_FIT = 1 << 15
-"""Bricks, about 256 voxels along the longest side."""
+"""In a piece of a mesh that does not fit in memory, and in one that always does: 256 voxels along the longest
+side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +60,7 @@ def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:
     boxes of one and of two bricks.
     """
     needed, free = len(signs) * BYTES_A_BRICK, available_bytes()
-    if len(signs) <= ALWAYS_FIT or needed <= free:
+    if len(signs) <= BRICKS or needed <= free:
         return
     boxes = len(np.unique(signs.ijk >> 4, axis=0))
     dimension = min(max(math.log2(len(signs) / boxes), 2.0), 3.0)

@@ -61,7 +61,6 @@ CASES = [
 def pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """No mesh fits in memory, and pieces are small."""
     monkeypatch.setattr(surfaces, "available_bytes", lambda: 1)
-    monkeypatch.setattr(surfaces, "ALWAYS_FIT", 0)
     monkeypatch.setattr(surfaces, "BRICKS", 40)
 
 
