@@ -25,13 +25,14 @@ from .summary import summary
 from .working import working
 
 if TYPE_CHECKING:
-    from fracslice.job import MeshJob, Result
+    from fracslice.job import Result
+    from fracslice.meshjob import MeshJob
     from fracslice.report import Report
     from fracslice.scene import Scene
     from fracslice.store import Store
     from fracslice.work import Work
 
-GRID, STL = ".vdb", ".stl"
+GRID = ".vdb"
 
 
 @click.command()
@@ -83,7 +84,6 @@ def mesh(
     Exit status: 1 if the mesh would not print; the file is written. A mesh
     that does not fit in memory is made piece after piece if it goes to an .stl file.
     """
-    from fracslice.errors import TooLargeError
     from fracslice.kernel.devices import chosen
     from fracslice.work import Work
 
@@ -94,12 +94,7 @@ def mesh(
     job = job_of(scene, **options)
     how = Work(threads, store=store_in(cache), device=chosen(device))
     with working(how, quiet) as work:
-        try:
-            told = made(scene, job, output, picture, work)
-        except TooLargeError:
-            if Path(output).suffix.lower() != STL or picture or job.chord_mm or job.simplify_mm:
-                raise
-            told = streamed(scene, job, output, work)
+        told = made(scene, job, output, picture, work)
         if report is not None:
             write_report(told, report)
     if not quiet:
@@ -119,29 +114,23 @@ def store_in(folder: str | None) -> Store | None:
 
 
 def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> Report:
-    """Makes the mesh in memory and writes the files that are wanted."""
-    from fracslice.job import make_mesh
+    """Make the mesh and write the files that are wanted."""
+    from fracslice.export import write
+    from fracslice.job import make_mesh, metadata
 
+    if picture is None and Path(output).suffix.lower() != GRID:
+        return make_mesh(scene, job, work, path=output).report
     result = make_mesh(scene, job, work)
     work.check()
     if Path(output).suffix.lower() == GRID:
         write_grid(result, output, metadata(scene))
     else:
-        from fracslice.export import write
-
         write(result.mesh, output, metadata(scene))
     if picture is not None:
         from fracslice.viewer import picture as draw
 
         draw(result.mesh, picture)
     return result.report
-
-
-def streamed(scene: Scene, job: MeshJob, output: str, work: Work) -> Report:
-    """Writes a mesh that does not fit in memory, piece after piece."""
-    from fracslice.streaming import stream_mesh
-
-    return stream_mesh(scene, output, job, work, metadata(scene))
 
 
 def check_outputs(source: str, output: str, report: str | None, picture: str | None) -> None:
@@ -178,8 +167,3 @@ def write_report(report: Report, path: str) -> None:
 
     with replacing(path) as file:
         file.write((json.dumps(report.as_dict(), indent=2) + "\n").encode())
-
-
-def metadata(scene: Scene) -> dict[str, str]:
-    """What files are told about themselves."""
-    return {"Title": scene.name, "scene_hash": scene.hash}

@@ -13,7 +13,7 @@ import click
 from fracslice.errors import SceneError
 
 if TYPE_CHECKING:
-    from fracslice.job import MeshJob
+    from fracslice.meshjob import MeshJob
     from fracslice.scene import Print, Scene
 
 
@@ -186,7 +186,7 @@ def job_of(
     scene: Scene, size: float | None, voxel: float | None, resolution: int | None, **others: Any
 ) -> MeshJob:
     """The job that the options ask for."""
-    from fracslice.job import MeshJob
+    from fracslice.meshjob import MeshJob
 
     return MeshJob(
         size_mm=size,

@@ -95,8 +95,8 @@ if TYPE_CHECKING:
         twist,
         union,
     )
-    from .job import MeshJob
     from .mesh import Mesh
+    from .meshjob import MeshJob
     from .report import Report
     from .scene import Print, Scene, read, reads, to_xml
     from .scene.view import Camera, Light
@@ -133,7 +133,7 @@ _WHERE = {
     "FracsliceError": "errors",
     "Light": "scene.view",
     "Mesh": "mesh",
-    "MeshJob": "job",
+    "MeshJob": "meshjob",
     "Node": "formulas",
     "Picture": "api.pictures",
     "Print": "scene",

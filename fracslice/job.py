@@ -2,120 +2,68 @@
 
 from __future__ import annotations
 
-import math
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .errors import SceneError, TooLargeError, VolumeError
-from .formulas import Box
-from .formulas.parameters import Number, validate
-from .memory import available_bytes, peak_rss_mb
+from . import surfaces
+from .errors import SceneError, TooLargeError
+from .finishing import Check, Finish, Placement
+from .memory import peak_rss_mb
+from .meshjob import MeshJob
 from .report import Report, SurfaceError, SurfaceToMesh, version
 from .scene import Print, Scene
-from .scene.lengths import Length
 from .work import Clock, Work
 
 if TYPE_CHECKING:
     from .kernel import Field
     from .mesh import Mesh
-    from .mesh.certificate import Certificate
-    from .mesh.components import Removed
+    from .mesh.simplify import Simplified
+    from .surfaces import Surface
     from .volume import Bricks, Plan
 
-RESOLUTION = 256.0
-COARSEST, FINEST = 8, 16384
-"""Voxels along the longest side."""
-
-ALWAYS_FITS = 256
-BYTES_A_BRICK = 60_000
-"""Peak memory for each brick of samples, its triangles in all their stages included; measured."""
-
-DUST = 1e-5
-"""The share of the whole below which a body is dust, as it comes off the rim of a fractal of finite depth."""
-
-
-@dataclass(frozen=True)
-class MeshJob:
-    """What to make of a scene. Lengths are numbers of mm, or text such as "0.5mm"; the fields hold mm.
-
-    size_mm: the longest side, if not what the scene says. voxel_mm or resolution (voxels along the longest
-    side): how fine; 256 along the longest side if neither is given. dust_mm3: bodies with less material are
-    dropped; if not given, those under 1e-5 of the whole. printing: what makes it printable, if not what the
-    scene says. chord_mm: more triangles where a smooth surface is farther than this from them. simplify_mm:
-    fewer triangles, nowhere farther than this from all of them. Raises `SceneError` for values that cannot
-    be.
-    """
-
-    size_mm: float | None = None
-    voxel_mm: float | None = None
-    resolution: float | None = None
-    dust_mm3: float | None = None
-    printing: Print | None = None
-    chord_mm: float | None = None
-    simplify_mm: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.voxel_mm is not None and self.resolution is not None:
-            raise SceneError("voxel and resolution: expected one of them")
-        validate(self, _KINDS, SceneError)
-
-    def size(self, scene: Scene) -> float:
-        """The longest side in mm."""
-        return scene.size_mm if self.size_mm is None else self.size_mm
-
-    def how(self, scene: Scene) -> Print:
-        """What makes it printable."""
-        return scene.printing if self.printing is None else self.printing
-
-    def dust(self, volume: float) -> float:
-        """The volume below which a body of an object of `volume` is dropped, mm3."""
-        dust = DUST * volume if self.dust_mm3 is None else self.dust_mm3
-        if dust > volume:
-            raise SceneError(f"dust {dust:.4g}mm3: expected at most the object's volume, {volume:.4g}mm3")
-        return dust
-
-    def voxels(self, scene: Scene) -> float:
-        """How many voxels the longest side has."""
-        if self.voxel_mm is None:
-            return RESOLUTION if self.resolution is None else self.resolution
-        size = self.size(scene)
-        if not COARSEST <= size / self.voxel_mm <= FINEST:
-            low, high = size / FINEST, size / COARSEST
-            raise SceneError(
-                f"voxel {self.voxel_mm:g}mm: expected {low:.4g}mm to {high:.4g}mm for an object of {size:g}mm"
-            )
-        return size / self.voxel_mm
-
-
-_KINDS = {
-    **dict.fromkeys(("size_mm", "voxel_mm", "chord_mm", "simplify_mm"), Length(None, "a length")),
-    "resolution": Number(None, "voxels along the longest side", least=COARSEST, most=FINEST),
-    "dust_mm3": Number(None, "a volume", least=0),
-}
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Where the scene is in print space: ``mm = scale * scene units + offset``."""
-
-    scale: float
-    offset: tuple[float, float, float]
+STL = ".stl"
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """mesh: in mm, standing on z = 0, coordinates as a file holds them. bricks: its samples, in scene units.
-    root: the field that they are samples of. place: the map from there to the mesh."""
+    """A mesh that was made, and what is told of it. place: the map from the scene to the mesh. planned: what
+    was sampled. whole: the mesh, unless it is larger than memory and only in the file.
+    """
 
-    mesh: Mesh
     report: Report
-    bricks: Bricks
-    root: Field
     place: Placement
+    planned: Plan
+    whole: Mesh | None
+    work: Work
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh in mm, standing on z = 0, coordinates as a file holds them.
+
+        Raises `TooLargeError` for one that was written piece after piece.
+        """
+        if self.whole is None:
+            raise TooLargeError("the mesh does not fit in memory; it is in the file that was written")
+        return self.whole
+
+    @property
+    def root(self) -> Field:
+        """The field that was meshed."""
+        return self.planned.root
+
+    @cached_property
+    def bricks(self) -> Bricks:
+        """Samples of the field where the mesh was made, scene units; taken when first asked for."""
+        from .volume import sample_scene
+
+        return sample_scene(self.planned, self.work)
 
     @property
     def bricks_mm(self) -> Bricks:
@@ -130,210 +78,208 @@ class Result:
         )
 
 
-def make_mesh(scene: Scene, what: MeshJob | None = None, work: Work | None = None) -> Result:
-    """Samples, meshes, cleans, scales and checks a scene.
+def make_mesh(
+    scene: Scene, what: MeshJob | None = None, work: Work | None = None, path: str | Path | None = None
+) -> Result:
+    """Sample, mesh, clean, scale and check a scene.
 
-    Raises `SceneError`, `VolumeError`, `MeshError` or `Cancelled`. A mesh that would not print as it is is
-    returned all the same; its report says what is wrong.
+    Parameters
+    ----------
+    scene
+        The scene to mesh.
+    what, work
+        What to make of it, and how.
+    path
+        The file to write, of the kind that its name ends in. An .stl file may be larger than memory: it is
+        then made piece after piece, and its folder must have room for it twice.
+
+    Returns
+    -------
+    Result
+        The mesh and its report. A mesh that would not print as it is is returned all the same; its report
+        says what is wrong.
+
+    Raises
+    ------
+    SceneError, VolumeError, MeshError, ExportError, Cancelled
+        For a scene or job that cannot be meshed or a file that cannot be written; nothing is left of a file
+        that is not whole. `TooLargeError`, a `VolumeError`, for a mesh that needs more memory than there is.
     """
-    what, work = what or MeshJob(), work or Work()
-    voxels, clock = what.voxels(scene), Clock(work)
-    from .mesh.certificate import Certificate
-    from .mesh.check import check_quantised
-    from .mesh.missed import surface_to_mesh
-    from .mesh.refine import refine
-    from .mesh.simplify import simplify
-    from .shown import mesh_amount
-    from .volume import plan
-    from .volume.accuracy import surface_error
+    job = _Job(scene, what or MeshJob(), Clock(work or Work()), None if path is None else Path(path))
+    job.refuse()
+    with job.aside() as folder:
+        return job.result(*job.surface(folder))
 
-    how = what.how(scene)
-    with clock("planning"):
-        refuse_what_does_not_fit(scene, voxels, what.size(scene), work)
-        planned, scale = plan(scene.root, voxels, work), None
-    left = how  # to do on the mesh
-    if not how.whole:
-        with clock("changing"):
-            planned, scale, left = _changed(planned, what, how, what.size(scene), work)
-    bricks, raw, certificate, pieces = _surface(planned, clock)
-    if how.whole and how.sorts and pieces:  # what is one body only the field tells
-        with clock("changing"):
-            planned, scale, left = _changed(planned, what, how, what.size(scene), work)
-        bricks, raw, certificate, pieces = _surface(planned, clock)
-    refined = None
-    if what.chord_mm is not None:
-        with clock("refining"):
-            unit = 1 / (scale or what.size(scene) / max(planned.box.size))
-            raw, done = refine(planned.root, raw, what.chord_mm * unit, planned.voxel, work)
-            certificate = Certificate.none(len(raw.triangles))
-            refined = done.scaled(1 / unit)
-    with clock("finishing"):
-        left = replace(left, keep="all") if pieces else left
-        mesh, proved, removed, place = _finished(
-            planned, raw, certificate, what, left, what.size(scene), scale, work
+
+@dataclass(frozen=True)
+class _Sized:
+    """A plan; mm per scene unit, if that is known; and what is left to choose among its bodies."""
+
+    planned: Plan
+    scale: float | None
+    left: Print
+
+
+@dataclass(frozen=True)
+class _Job:
+    """The stages of a job."""
+
+    scene: Scene
+    what: MeshJob
+    clock: Clock
+    path: Path | None
+
+    def refuse(self) -> None:
+        """Raise an error for what cannot be done, before any of it is."""
+        self.what.voxels(self.scene)
+        if self.path is not None:
+            from .export import check_format, check_target
+
+            check_format(self.path)
+            check_target(self.path)
+
+    @contextmanager
+    def aside(self) -> Iterator[Path | None]:
+        """A folder for pieces beside the file, if one may be made of them."""
+        if self.path is None or self.path.suffix.lower() != STL:
+            yield None
+            return
+        from .export import check_target
+
+        beside = check_target(self.path).parent
+        with tempfile.TemporaryDirectory(prefix=".fracslice-", dir=beside) as folder:
+            yield Path(folder)
+
+    def planned(self) -> _Sized:
+        """The field to be meshed, edited if it is to be."""
+        from .volume import plan
+
+        how = self.what.how(self.scene)
+        with self.clock("planning"):
+            planned = plan(self.scene.root, self.what.voxels(self.scene), self.clock.work)
+        return _Sized(planned, None, how) if how.whole else self.edited(planned)
+
+    def edited(self, planned: Plan) -> _Sized:
+        """The field with all edits that make it printable."""
+        from .printing import printable
+
+        how = self.what.how(self.scene)
+        with self.clock("changing"):
+            made, scale = printable(planned, self.what.size(self.scene), how, self.clock.work)
+        # Of walls thinner than a voxel a mesh has crumbs only: bodies are chosen in the field where it tells.
+        keep = how.keep if planned.root.bounds.exterior_only else "all"
+        # A hollow is a cavity, too.
+        return _Sized(made, scale, Print(keep=keep, cavities=how.cavities if how.whole else "keep"))
+
+    def surface(self, folder: Path | None) -> tuple[_Sized, Surface, str]:
+        """The surface of what stays; and a note on walls that are thinner than a voxel."""
+        sized = self.planned()
+        surface = self.meshed(sized, folder)
+        thin, how = surface.thin, self.what.how(self.scene)
+        if thin and how.whole and how.sorts:  # what is one body only the field tells
+            sized = self.edited(sized.planned)
+            surface = self.meshed(sized, folder)
+            thin = surface.thin
+        return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, surface, thin
+
+    def meshed(self, sized: _Sized, folder: Path | None) -> Surface:
+        """The surface, in one piece if it fits in memory."""
+        signs = surfaces.sampled(sized.planned, self.clock)
+        most, voxel = len(signs), self.what.size(self.scene) / self.what.voxels(self.scene)
+        try:
+            surfaces.refuse_what_does_not_fit(signs, voxel)
+        except TooLargeError as error:
+            for name, length in (("chord", self.what.chord_mm), ("simplify", self.what.simplify_mm)):
+                if length is not None:
+                    raise SceneError(f"{name} {length:g}mm needs the whole mesh: {error}") from None
+            if folder is None:
+                raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
+            most = surfaces.BRICKS
+        return surfaces.made(sized.planned, signs, most, folder if most < len(signs) else None, self.clock)
+
+    def result(self, sized: _Sized, surface: Surface, thin: str) -> Result:
+        """The finished mesh, and what is told of it."""
+        from .mesh.missed import surface_to_mesh
+        from .shown import mesh_amount
+
+        what, clock, size, refined = self.what, self.clock, self.what.size(self.scene), None
+        planned, signs = surface.planned, surface.signs
+        if what.chord_mm is not None:
+            unit = sized.scale or size / max(planned.box.size)
+            surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)
+            refined = done.scaled(unit)
+        with clock("finishing"):
+            finish = Finish(surface, sized.left, what.dust, size, sized.scale, clock)
+        scale = finish.place.scale
+        with clock("checking"):
+            back = surface_to_mesh(planned, surface.pieces.meshes, scale, clock.work)
+        check = Check(finish, len(signs))
+        whole, simplified = self.written(finish, check, finish.place.mm(surface.tips))
+        with clock("checking"):
+            amount, off = mesh_amount(planned, finish.volume, scale, clock.work)
+        fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
+        report = Report(
+            scene=self.scene.name,
+            scene_hash=self.scene.hash,
+            version=version(),
+            size_mm=size,
+            voxel_mm=planned.voxel * scale,
+            mesh=check.mesh,
+            removed=finish.removed,
+            surface_error_mm=SurfaceError.of(check.errors),
+            surface_to_mesh_mm=SurfaceToMesh.of(back),
+            evaluations=signs.evaluations,
+            bricks=len(signs),
+            seconds=clock.seconds,
+            peak_rss_mb=peak_rss_mb(),
+            amount_mm3=amount,
+            refined=refined,
+            simplified=simplified,
+            notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
+            depths=planned.depths,
         )
-        made = mesh.measured(work.threads)[1] + removed.bodies_mm3 - removed.filled_mm3
-    simplified = None
-    if what.simplify_mm is not None:
-        with clock("simplifying"):
-            mesh, simplified = simplify(mesh, what.simplify_mm, work)
-            proved = np.zeros(len(mesh.triangles), bool)
-    with clock("checking"):
-        checked = check_quantised(mesh, proved, work.threads)
-        points = (mesh.vertices - np.array(place.offset)) / place.scale
-        error = place.scale * surface_error(planned.root, points, planned.voxel, work)
-        back = surface_to_mesh(planned, lambda: [raw], place.scale, work)
-        amount, off = mesh_amount(planned, made, place.scale, work)
-    report = Report(
-        scene=scene.name,
-        scene_hash=scene.hash,
-        version=version(),
-        size_mm=what.size(scene),
-        voxel_mm=bricks.voxel * place.scale,
-        mesh=checked,
-        removed=removed,
-        surface_error_mm=SurfaceError.of(error),
-        surface_to_mesh_mm=SurfaceToMesh.of(back),
-        evaluations=bricks.evaluations,
-        bricks=len(bricks),
-        seconds=clock.seconds,
-        peak_rss_mb=peak_rss_mb(),
-        amount_mm3=amount,
-        refined=refined,
-        simplified=simplified,
-        notes=(
-            *planned.notes,
-            *_thinner(pieces, bricks.voxel * place.scale),
-            *(refined.notes if refined else ()),
-            *off,
-        ),
-        depths=planned.depths,
-    )
-    return Result(mesh, report, bricks, planned.root, place)
+        return Result(report, finish.place, planned, whole, clock.work)
+
+    def written(
+        self, finish: Finish, check: Check, tips: np.ndarray
+    ) -> tuple[Mesh | None, Simplified | None]:
+        """The mesh, if it is one piece, and what was done to have fewer triangles; the file is written."""
+        from .export import write
+
+        finished, simplified = finish.finished(), None
+        if len(finish.pieces) > 1:
+            self.streamed(check.passing(finished), tips)
+            return None, None
+        if self.what.simplify_mm is not None:
+            from .mesh.simplify import simplify
+            from .mesh.window import Finished
+
+            (piece,) = finished
+            with self.clock("simplifying"):
+                mesh, simplified = simplify(piece.mesh, self.what.simplify_mm, self.clock.work)
+            finished = iter([Finished.whole(mesh)])
+        (mesh,) = check.passing(finished)
+        if self.path is not None:
+            with self.clock("writing"):
+                write(mesh, self.path, metadata(self.scene))
+        return mesh, simplified
+
+    def streamed(self, meshes: Iterator[Mesh], tips: np.ndarray) -> None:
+        """Write an STL piece after piece."""
+        from .export import application, replacing
+        from .export.stl import write_pieces
+        from .mesh.window import tips_last
+
+        def timed() -> Iterator[Mesh]:
+            for mesh in tips_last(meshes, tips) if len(tips) else meshes:
+                with self.clock("writing"):  # what is done between pieces
+                    yield mesh
+
+        assert self.path is not None
+        with replacing(self.path) as file:
+            write_pieces(timed(), file, {"Application": application()} | metadata(self.scene))
 
 
-def _surface(planned: Plan, clock: Clock) -> tuple[Bricks, Mesh, Certificate, str]:
-    """The samples of a planned scene, their mesh, in scene units, what is known of it, and what of it fell to
-    pieces.
-    """
-    from .mesh.certificate import Certificate
-    from .mesh.components import in_pieces
-    from .mesh.extract import contour
-    from .mesh.tips import with_tips
-    from .volume import sample_scene
-
-    with clock("sampling"):
-        bricks = sample_scene(planned, clock.work)
-    with clock("meshing"):
-        mesh = contour(planned.root, bricks, clock.work)
-        mesh, new = with_tips(planned.root, mesh, planned.voxel, clock.work)
-        certificate = replace(Certificate.of(bricks, len(new)), holds=~new)
-        return bricks, mesh, certificate, in_pieces(mesh, planned.voxel, clock.work.threads)
-
-
-def _changed(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> tuple[Plan, float, Print]:
-    """The plan of what is changed in the field to be printable, mm per scene unit, and what is left to do on
-    the mesh.
-    """
-    from .printing import printable
-
-    # Of walls thinner than a voxel a mesh has crumbs only: bodies are chosen in the field where it tells.
-    left = how if planned.root.bounds.exterior_only else replace(how, keep="all")
-    size_of = partial(_box_of_mesh, what=what, how=left, size=size, work=work)
-    return *printable(planned, size, how, work, size_of), left
-
-
-def refuse_what_does_not_fit(scene: Scene, voxels: float, size: float, work: Work) -> None:
-    """Raises `TooLargeError`, naming a voxel that fits, if the mesh would take more memory than there is.
-
-    The number of bricks grows like a power of the resolution, about the surface's dimension; two coarse
-    samplings show it. Coarse jobs are not looked at: they always fit.
-    """
-    if voxels <= ALWAYS_FITS:
-        return
-    few, many = (_bricks(scene, n, work) for n in (ALWAYS_FITS / 4, ALWAYS_FITS / 2))
-    dimension = min(max(math.log2(max(many, 1) / max(few, 1)), 2.0), 3.0)
-    needed = many * (2 * voxels / ALWAYS_FITS) ** dimension * BYTES_A_BRICK
-    free = available_bytes()
-    if needed > free:
-        fits = size / voxels * (needed / free) ** (1 / dimension)
-        raise TooLargeError(
-            f"a voxel of {size / voxels:.3g}mm needs about {needed / 1e9:.1f} GB of memory, "
-            f"and {free / 1e9:.1f} GB are free; a voxel of {fits * 1.02:.3g}mm fits"
-        )
-
-
-def _bricks(scene: Scene, resolution: float, work: Work) -> int:
-    """How many bricks a scene has at a coarse resolution: none where all of it falls between samples."""
-    from .volume import plan, sample_scene
-
-    planned = plan(scene.root, resolution, work)
-    try:
-        return len(sample_scene(planned, work))
-    except VolumeError:
-        return 0
-
-
-def _thinner(pieces: str, voxel: float) -> tuple[str, ...]:
-    """What walls came to that are thinner than a voxel, mm, and what would hold them."""
-    return (f"{pieces}; expected a smaller voxel, or a thickness of {2 * voxel:.2g} mm",) if pieces else ()
-
-
-def _finished(
-    planned: Plan,
-    raw: Mesh,
-    certificate: Certificate,
-    what: MeshJob,
-    how: Print,
-    size: float,
-    scale: float | None,
-    work: Work,
-) -> tuple[Mesh, NDArray[np.bool_], Removed, Placement]:
-    """The mesh that is wanted, in mm on the bed, as a file will hold it, and which of its triangles are
-    proved not to intersect. scale: mm per scene unit; without one, what stays is made to be of that size.
-    """
-    from .mesh.clean import cleaned
-    from .mesh.solid import place_on_bed
-
-    rough = scale or size / max(planned.box.size)
-    kept, stays, removed = _kept(raw.scaled(rough), what, how, work)
-    box = _box_of_kept(planned, raw, kept, rough, work)
-    exact = scale or size / max(box.size)
-    mesh = kept.scaled(exact / rough)
-    known = certificate.selected(stays).scaled(rough).scaled(exact / rough)
-    placed, known = place_on_bed(mesh, (exact * box.centre[0], exact * box.centre[1]), known)
-    x, y, z = (placed.bounds[0] - mesh.bounds[0]).tolist()
-    made = cleaned(placed, known, threads=work.threads)
-    return made.mesh, made.proved, removed, Placement(exact, (x, y, z))
-
-
-def _kept(mesh: Mesh, what: MeshJob, how: Print, work: Work) -> tuple[Mesh, NDArray[np.bool_], Removed]:
-    """The bodies of a mesh in mm that are wanted, and which triangles these are."""
-    from .mesh.components import choose, shells
-
-    cavities = how.cavities if how.whole else "keep"  # a hollow is one, too
-    found, dust = shells(mesh, work.threads), what.dust(mesh.measured(work.threads)[1])
-    staying, removed = choose(found, keep=how.keep, dust_mm3=dust, cavities=cavities)
-    stays = staying[found.labels]
-    return mesh.selected(stays, work.threads), stays, removed
-
-
-def _box_of_mesh(planned: Plan, what: MeshJob, how: Print, size: float, work: Work) -> Box:
-    """The box of what would stay in the mesh of a planned scene, scene units."""
-    from .mesh.components import in_pieces
-    from .mesh.extract import contour
-    from .volume import sample_scene
-
-    raw = contour(planned.root, sample_scene(planned, work), work)
-    how = replace(how, keep="all") if in_pieces(raw, planned.voxel, work.threads) else how
-    rough = size / max(planned.box.size)
-    kept, *_ = _kept(raw.scaled(rough), what, how, work)
-    return _box_of_kept(planned, raw, kept, rough, work)
-
-
-def _box_of_kept(planned: Plan, raw: Mesh, kept: Mesh, scale: float, work: Work) -> Box:
-    """kept: of `raw`, `scale` times as large."""
-    from .volume.rest import box_of_the_rest, outermost
-
-    tips = partial(outermost, kept.vertices / scale)
-    return box_of_the_rest(planned, scale * raw.bounds, kept.bounds, tips, work)
+def metadata(scene: Scene) -> dict[str, str]:
+    """What files say of the scene that they were made of."""
+    return {"Title": scene.name, "scene_hash": scene.hash}

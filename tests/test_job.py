@@ -161,14 +161,14 @@ def test_scenes_without_a_finite_surface_are_refused(node, message):
         make_mesh(scene(node, size="40mm"), MeshJob(resolution=32))
 
 
-def test_what_does_not_fit_in_memory_is_refused_before_it_starts(monkeypatch):
-    monkeypatch.setattr("fracslice.job.available_bytes", lambda: 1 << 30)
+def test_what_does_not_fit_in_memory_is_refused_before_it_is_meshed(monkeypatch):
+    monkeypatch.setattr("fracslice.surfaces.available_bytes", lambda: 1 << 28)
     with pytest.raises(
         VolumeError, match=r"a voxel of .*mm needs about .* GB .* a voxel of ([0-9.]+)mm fits"
     ) as caught:
-        make_mesh(BALL, MeshJob(resolution=16000))
+        make_mesh(BALL, MeshJob(resolution=600))
     fits = float(str(caught.value).split("a voxel of ")[2].split("mm")[0])
-    assert 40 / 16000 < fits < 1
+    assert 40 / 600 < fits < 1
 
 
 def test_there_is_memory():

@@ -8,14 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fracslice import MeshJob, make_mesh
-from fracslice import streaming as module
-from fracslice.errors import Cancelled, ExportError, SceneError
-from fracslice.export import write
-from fracslice.formulas import box, difference, mandelbulb, menger, sphere, transform, union
+from fracslice import MeshJob, make_mesh, surfaces
+from fracslice.errors import Cancelled, ExportError, SceneError, TooLargeError
+from fracslice.formulas import (
+    box,
+    cone,
+    difference,
+    mandelbulb,
+    menger,
+    octahedron,
+    shell,
+    sphere,
+    transform,
+    union,
+)
 from fracslice.mesh.reading import read_mesh
-from fracslice.scene import Print, Scene, scene
-from fracslice.streaming import stream_mesh
+from fracslice.scene import Print, scene
 from fracslice.work import Work
 
 
@@ -32,44 +40,83 @@ SCENES = {
     "fractal": scene(mandelbulb(iterations=5), size="40mm", name="bulb"),
     "corners": scene(menger(level=2), size="30mm", name="sponge"),
     "nested": scene(HOLLOW, size="40mm", name="nested"),
+    "tips": scene(union(octahedron(radius=0.5), moved(cone(radius=0.3, height=1.2), 0.9, 0, 0)), size="40mm"),
+    "thin": scene(shell(sphere(), thickness=0.01), size="40mm"),
 }
 JOBS = {
     "plain": MeshJob(resolution=64),
     "largest": MeshJob(resolution=48, printing=Print(keep="largest")),
     "filled": MeshJob(resolution=48, printing=Print(cavities="fill")),
     "dust": MeshJob(resolution=48, dust_mm3=900),
+    "base": MeshJob(resolution=48, printing=Print(base=2, raft=2)),
 }
+CASES = [
+    *((name, "plain") for name in ("fractal", "corners", "nested", "tips")),
+    *(("nested", job) for job in JOBS if job != "plain"),
+    ("thin", "filled"),
+]
 
 
-@pytest.mark.parametrize(
-    ("name", "job"), [("fractal", "plain"), ("corners", "plain"), *(("nested", job) for job in JOBS)]
-)
+@pytest.fixture
+def pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No mesh fits in memory, and pieces are small."""
+    monkeypatch.setattr(surfaces, "available_bytes", lambda: 1)
+    monkeypatch.setattr(surfaces, "BRICKS", 40)
+
+
+@pytest.mark.parametrize(("name", "job"), CASES)
 def test_streamed_is_what_would_have_been_made_in_memory(
-    name: str, job: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, job: str, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    monkeypatch.setattr(module, "BRICKS", 40)
+    """The same bytes, and the same report."""
     what = JOBS[job]
     streamed, whole = tmp_path / "streamed.stl", tmp_path / "whole.stl"
-    report, made = stream_mesh(SCENES[name], streamed, what), make_mesh(SCENES[name], what)
-    write(made.mesh, whole)
-    assert len(read_mesh(streamed).triangles) == report.mesh.triangles
-    assert report.amount_mm3.object == pytest.approx(made.report.amount_mm3.object, rel=1e-6)
-    told, expected = report.mesh.as_dict(), made.report.mesh.as_dict()
+    made = make_mesh(SCENES[name], what, path=whole)
+    assert len(made.mesh.triangles) == made.report.mesh.triangles
+    request.getfixturevalue("pieces")
+    result = make_mesh(SCENES[name], what, path=streamed)
+    assert streamed.read_bytes() == whole.read_bytes()
+    told, expected = result.report.as_dict(), made.report.as_dict()
     for key in ("volume_mm3", "area_mm2"):
-        assert told.pop(key) == pytest.approx(expected.pop(key), rel=1e-6)
-    assert np.allclose(told.pop("bbox_mm"), expected.pop("bbox_mm"), atol=1e-5)
-    assert told == expected
-    assert told["printable"]
-    assert report.removed.bodies == made.report.removed.bodies
-    assert report.removed.cavities == made.report.removed.cavities
+        assert told.pop(key) == pytest.approx(expected.pop(key), rel=1e-9)
+    for one in (told, expected):
+        for key in ("surface_error_mm", "amount_mm3", "removed", "seconds", "peak_rss_mb"):
+            one.pop(key)
+    assert told == expected and told["printable"]
+    removed, there = result.report.removed, made.report.removed
+    assert (removed.bodies, removed.cavities) == (there.bodies, there.cavities)
+    assert result.report.amount_mm3.made == pytest.approx(made.report.amount_mm3.made, rel=1e-6)
+    error = result.report.surface_error_mm
+    assert error.max == pytest.approx(made.report.surface_error_mm.max, rel=1e-6)
+    assert result.bricks.ijk.tobytes() == made.bricks.ijk.tobytes()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["streamed.stl", "whole.stl"]
+
+
+def test_tips_are_in_streamed_meshes(pieces: None, tmp_path: Path) -> None:
+    """An octahedron ended a voxel short on all sides."""
+    path = tmp_path / "x.stl"
+    make_mesh(
+        scene(transform(octahedron(), rotate=(1, 2, 3, 37)), size=50), MeshJob(resolution=64), path=path
+    )
+    mesh = read_mesh(path)
+    assert mesh.volume == pytest.approx(4 / 3 * (50 / np.ptp(corners(37), axis=0).max()) ** 3, rel=2e-4)
+    assert mesh.size.max() == pytest.approx(50, abs=1e-4)
+
+
+def corners(degrees: float) -> np.ndarray:
+    """Of a turned octahedron."""
+    from scipy.spatial.transform import Rotation
+
+    axis = np.array([1, 2, 3]) / np.sqrt(14)
+    matrix = Rotation.from_rotvec(np.radians(degrees) * axis).as_matrix()
+    return np.concatenate([matrix.T, -matrix.T])
 
 
 def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Triangles taken out of every piece: each open edge is counted once, wherever the pieces end."""
     from fracslice.mesh.check import check_mesh
     from fracslice.mesh.extract import contour_pieces
-    from fracslice.mesh.window import Window
+    from fracslice.mesh.window import Tally, Window
     from fracslice.volume import plan, sample_scene_signs
 
     planned = plan(menger(level=2), 40)
@@ -77,56 +124,69 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
     whole = next(p.mesh for p in contour_pieces(planned.root, signs, most=10**6))
     lost = np.random.default_rng(1).random(len(whole.triangles)) < 0.01
     centres = {tuple(c) for c in whole.corners[lost].mean(axis=1).tolist()}
-    window, passed = Window(planned.voxel), 0
+    window, tally, passed = Window(planned.voxel), Tally(), 0
     pieces = list(contour_pieces(planned.root, signs, most=1))
-    for number, piece in enumerate(pieces):
+    for piece in pieces:
         keep = np.array([tuple(c) not in centres for c in piece.mesh.corners.mean(axis=1).tolist()])
-        end = piece.end if number < len(pieces) - 1 else np.inf
-        passed += len(window.add(piece.mesh.selected(keep), end).triangles)
-    truth, told = check_mesh(whole.selected(~lost)), window.report(1, 0, 0)
+        finished = window.add(piece.mesh.selected(keep), piece.end)
+        tally.add(finished)
+        passed += len(finished.passed.triangles)
+    truth, told = check_mesh(whole.selected(~lost)), tally.report(1, 0, 0)
     assert len(pieces) > 4 and passed == truth.triangles == told.triangles
     assert told.open_edges == truth.open_edges > 100
     assert (told.vertices, told.nonmanifold_vertices) == (truth.vertices, truth.nonmanifold_vertices)
     assert not told.watertight and told.genus is None
 
 
-def test_what_needs_the_whole_is_refused_before_any_work(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="<print> cannot change a mesh that does not fit in memory"):
-        stream_mesh(SCENES["corners"], tmp_path / "x.stl", MeshJob(printing=Print(base=2)))
-    with pytest.raises(ExportError, match="does not exist"):
-        stream_mesh(SCENES["corners"], tmp_path / "missing" / "x.stl")
+@pytest.mark.parametrize(("name", "job"), [("chord", {"chord_mm": 0.1}), ("simplify", {"simplify_mm": 0.1})])
+def test_what_needs_the_whole_is_refused(name: str, job: dict, pieces: None, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=rf"{name} 0\.1mm needs the whole mesh: a voxel of .* .* fits$"):
+        make_mesh(SCENES["corners"], MeshJob(resolution=48, **job), path=tmp_path / "x.stl")
+    assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("stage", ["sampling", "meshing", "finishing"])
-def test_cancelled_leaves_nothing(stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "BRICKS", 40)
+@pytest.mark.parametrize("name", [None, "x.3mf"])
+def test_a_mesh_too_large_for_memory_goes_to_an_stl_only(
+    name: str | None, pieces: None, tmp_path: Path
+) -> None:
+    with pytest.raises(TooLargeError, match=r"an \.stl file is written piece after piece"):
+        make_mesh(SCENES["corners"], MeshJob(resolution=48), path=name and tmp_path / name)
+    assert not list(tmp_path.iterdir())
+    result = make_mesh(SCENES["corners"], MeshJob(resolution=48), path=tmp_path / "x.stl")
+    assert len(read_mesh(tmp_path / "x.stl").triangles) == result.report.mesh.triangles
+    with pytest.raises(TooLargeError, match="it is in the file"):
+        _ = result.mesh
+
+
+def test_a_path_that_cannot_be_is_refused_before_any_work(tmp_path: Path) -> None:
+    def begun(stage: str, _: float) -> None:
+        raise AssertionError(stage)
+
+    for path, message in (("missing/x.stl", "does not exist"), ("x.txt", "unknown kind of file")):
+        with pytest.raises(ExportError, match=message):
+            make_mesh(SCENES["corners"], work=Work(progress=begun), path=tmp_path / path)
+
+
+@pytest.mark.parametrize("stage", ["sampling", "meshing", "finishing", "checking", "writing"])
+def test_cancelled_leaves_nothing(stage: str, pieces: None, tmp_path: Path) -> None:
     work = Work()
 
     def stop(now: str, _: float) -> None:
         if now == stage:
             work.cancel.set()
 
+    how = replace(work, progress=stop)
     with pytest.raises(Cancelled):
-        stream_mesh(
-            SCENES["fractal"], tmp_path / "x.stl", MeshJob(resolution=64), replace(work, progress=stop)
-        )
+        make_mesh(SCENES["fractal"], MeshJob(resolution=64), how, path=tmp_path / "x.stl")
     assert not list(tmp_path.iterdir())
-
-
-def test_size_and_place(tmp_path: Path) -> None:
-    path = tmp_path / "ball.stl"
-    ball: Scene = scene(moved(sphere(radius=2), 3, 1, 7), size="25mm", name="ball")
-    stream_mesh(ball, path, MeshJob(resolution=40))
-    low, high = read_mesh(path).bounds
-    assert low[2] == 0 and high[2] == pytest.approx(25, rel=1e-3)  # the mesh lies within the ball
-    assert np.allclose((low + high)[:2], 0, atol=1e-5)
 
 
 @pytest.mark.parametrize("most", [1, 10**6])
 def test_the_volume_of_a_speck_far_from_the_origin(most: int) -> None:
     """A single sample inside: the octahedron around it has 1e-12 of a voxel, and its sign."""
     from fracslice.mesh.extract import contour_pieces
-    from fracslice.mesh.survey import Survey
+    from fracslice.mesh.pieces import Pieces
+    from fracslice.mesh.survey import survey
     from fracslice.volume import SignBricks
 
     signs = np.zeros((2, 8, 8), np.uint8)
@@ -134,8 +194,9 @@ def test_the_volume_of_a_speck_far_from_the_origin(most: int) -> None:
     ijk, index = np.array([[0, 0, 0], [8, 0, 0]], np.int32), np.array([[[0]], [[1]]], np.int32)
     bricks, voxel = SignBricks((1.0, 1.0, 1.0), 1e-3, ijk, signs, index), 1e-3
     x, y, z = 1 + voxel * np.array([8, 3, 4])
-    survey, speck = Survey(), transform(sphere(radius=1e-6), translate=(x, y, z))
-    pieces = [p for p in contour_pieces(speck, bricks, most=most) if survey.add(p) is not None]
-    (volume,) = survey.shells().volumes
+    pieces, speck = Pieces(), transform(sphere(radius=1e-6), translate=(x, y, z))
+    for piece in contour_pieces(speck, bricks, most=most):
+        pieces.add(piece)
+    (volume,) = survey(pieces, voxel).volumes
     assert len(pieces) == (2 if most == 1 else 1)
     assert volume == pytest.approx(4 / 3 * 1e-18, rel=1e-6)

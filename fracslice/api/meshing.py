@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ..errors import SceneError
-from ..job import MeshJob
 from ..job import Result as Made
 from ..job import make_mesh as make_mesh_job
 from ..mesh import Mesh
+from ..meshjob import MeshJob
 from ..scene import Scene, parse_length
 from ..work import Work
 from .options import Length, Options, keywords, print_of, work_of
@@ -19,15 +20,18 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ..finishing import Placement
     from ..formulas.field import Field
-    from ..job import Placement
     from ..report import Report
     from ..volume import Bricks
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Result(Mesh):
-    """A mesh in mm, standing on z = 0, with what is known of it."""
+    """A mesh in mm, standing on z = 0, with its report.
+
+    A mesh larger than memory is only in the file that was written: its vertices raise `TooLargeError`.
+    """
 
     made: Made
 
@@ -66,16 +70,11 @@ class Result(Mesh):
 
     @property
     def bricks(self) -> Bricks:
-        """The samples of the field, in scene units."""
-        bricks = self.made.bricks
-        for array in (bricks.ijk, bricks.values, bricks.index):
+        """Samples of the field where the mesh was made, scene units; taken when first asked for."""
+        found = self.made.bricks
+        for array in (found.ijk, found.values, found.index):
             array.flags.writeable = False
-        return bricks
-
-    @property
-    def bricks_mm(self) -> Bricks:
-        """The samples in the mesh's space, in mm."""
-        return self.made.bricks_mm
+        return found
 
 
 @keywords
@@ -90,6 +89,7 @@ def make_mesh(
     chord: Length | None = None,
     simplify: Length | None = None,
     dust: float | None = None,
+    path: str | Path | None = None,
     **options: Unpack[Options],
 ) -> Result:
     """Make a printable mesh of a shape.
@@ -118,6 +118,9 @@ def make_mesh(
         Fewer triangles, nowhere farther off than this.
     dust : float, optional
         Bodies of less volume are dropped, mm3; 1e-5 of the whole if not given.
+    path : str or path, optional
+        The file to write, of the kind that its name ends in. An .stl file may be larger than memory: the
+        mesh is then in that file only, and `TooLargeError` is raised where its vertices are asked for.
     cavities, keep, bridge, gap, thickness, hollow, drain, base, raft : optional
         What makes the object printable, as the fields of `Print`.
     threads : int, optional
@@ -140,6 +143,8 @@ def make_mesh(
         For a shape, a name or a value that cannot be.
     VolumeError, MeshError
         For a field without a surface, or too large a job.
+    ExportError
+        For a file that cannot be written.
     TypeError
         For an unknown keyword.
     Cancelled
@@ -168,4 +173,4 @@ def make_mesh(
     printing = print_of(replace(scene, printing=job.how(scene)), options)
     if printing.keep == "largest" and job.size_mm is None and not isinstance(source, Scene):
         raise SceneError("keep='largest': expected a size, too, such as size='40mm', of the body that stays")
-    return Result(make_mesh_job(scene, replace(job, printing=printing), how))
+    return Result(make_mesh_job(scene, replace(job, printing=printing), how, path))

@@ -67,25 +67,6 @@ def shells(mesh: Mesh, threads: int = 0) -> Shells:
     return Shells(labels, volumes, parent)
 
 
-def in_pieces(mesh: Mesh, voxel: float, threads: int = 0) -> str:
-    """What walls came to that are thinner than the voxel of a mesh, in words; empty where all are thicker.
-
-    Between samples such walls are missed: they have holes, or fall to pieces. A body counts if on average it
-    is thinner than a voxel; the dust around a fractal is such, too, but less than `PIECES` of the material.
-    """
-    from fracslice.mesh.topology import component_sizes, connected_components
-
-    area, volume, _ = mesh.measured(threads)
-    if voxel * area < 2 * PIECES * volume:  # such bodies would have more surface
-        return ""
-    labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
-    volumes, areas = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)
-    thin, bodies = (volumes > 0) & (2 * volumes < voxel * areas), int((volumes > 0).sum())
-    share = float(volumes[thin].sum() / volume)
-    holes = "have holes" if bodies == 1 else f"fell to pieces: {thin.sum()} of {bodies} bodies"
-    return f"walls thinner than a voxel {holes}, {share:.0%} of the material" if share >= PIECES else ""
-
-
 def select(
     mesh: Mesh,
     *,

@@ -65,19 +65,11 @@ class Piece:
     """The part of a surface in some layers of bricks, scene units.
 
     mesh: open where the surface goes on; pieces in turn meet in equal points, bit by bit. end: the x where
-    this piece ends. used: bool [n], which of the crossings of the grid's edges with the whole surface, from
-    number `first` on, are its first vertices; the others are in cells and cells' faces.
+    this piece ends, infinite for the last one.
     """
 
     mesh: Mesh
     end: float
-    first: int
-    used: np.ndarray
-
-    @property
-    def crossings(self) -> np.ndarray:
-        """The numbers of its first vertices among these crossings, the same in all pieces, int64 [k]."""
-        return self.first + np.flatnonzero(self.used)
 
 
 def contour_pieces(
@@ -101,13 +93,11 @@ def contour_pieces(
         trust_regions = partial(_trust_regions, features, cases, to_means, signs)
         moved, places = project(root, features, trust_regions, signs.voxel, work)
         features[moved] = places
-        mesh, used = Mesh(vertices, triangles), np.ones(count, bool)
+        mesh, border = Mesh(vertices, triangles), np.inf
         if last < len(signs.index):  # The next piece has what this one numbers and does not use.
-            used = np.zeros(len(vertices), bool)
-            used[triangles] = True
-            mesh, used = mesh.selected(np.ones(len(triangles), bool)), used[:count]
-        border = signs.origin[0] + signs.voxel * BRICK * last
-        yield Piece(mesh, border, cells.crossings_before(first), used)
+            mesh = mesh.selected(np.ones(len(triangles), bool))
+            border = signs.origin[0] + signs.voxel * BRICK * last
+        yield Piece(mesh, border)
 
 
 def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[int, int]]:

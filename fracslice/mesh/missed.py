@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fracslice.mesh.model import Mesh
 from fracslice.mesh.nearest import Nearest
+from fracslice.mesh.pieces import Around
 from fracslice.volume import Plan
 from fracslice.volume.accuracy import NEAR, surface_error, surface_points
 from fracslice.work import Work
@@ -41,8 +42,9 @@ def distances(
     pieces: of the mesh, as often as asked for. Of each the triangles around the points are looked at, and for
     points that are not near any of these, all triangles. Raises `Cancelled`.
     """
-    around = _Around(points, CELL * voxel)
-    found = _least((around.part(mesh) for mesh in pieces()), points, work)
+    around = Around(points, CELL * voxel)
+    near = (Mesh(mesh.vertices, mesh.triangles[around.triangles(mesh)]) for mesh in pieces())
+    found = _least(near, points, work)
     # Triangles lie within a grid cell: one nearer than this has a corner that was seen.
     far = np.flatnonzero(found > (CELL - np.sqrt(3)) * voxel)
     if len(far):
@@ -58,25 +60,3 @@ def _least(meshes: Iterable[Mesh], points: NDArray[np.float64], work: Work) -> N
         if len(mesh.triangles):
             found = np.minimum(found, Nearest(mesh).samples(spots, 1.0, work))
     return found
-
-
-class _Around:
-    """The cells of some size around points: their own and all next to it."""
-
-    def __init__(self, points: NDArray[np.float64], size: float) -> None:
-        self.low = points.min(axis=0) - 2 * size
-        self.size = max(size, float(np.ptp(points, axis=0).max()) / 256)
-        own = self.cells(points)
-        self.near = np.zeros(own.max(axis=0) + 3, bool)
-        for step in np.ndindex(3, 3, 3):
-            self.near[tuple((own + step).T - 1)] = True
-
-    def cells(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        found: NDArray[np.int64] = np.floor((points - self.low) / self.size).astype(np.int64)
-        return found
-
-    def part(self, mesh: Mesh) -> Mesh:
-        """Its triangles that have a corner there."""
-        cells = np.clip(self.cells(mesh.vertices), 0, np.array(self.near.shape) - 1)
-        seen = self.near[tuple(cells.T)]
-        return Mesh(mesh.vertices, mesh.triangles[seen[mesh.triangles].any(axis=1)])

@@ -1,69 +1,83 @@
-"""The shells of a surface that comes in pieces: what the whole must be known for, found without having it."""
+"""The shells of a surface in pieces, found with one piece in memory at a time."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .components import Shells
-from .extract import Piece
+from ..errors import MeshError
+from .components import PIECES, Shells
 from .model import Mesh
+from .pieces import Pieces, rows
 
 
-class Survey:
-    """Adds up pieces, in turn. A label is the number of a connected part of one piece, counted from the first
-    piece on; `shells` tells which parts are one shell.
-    """
+def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
+    """The shells of a surface, and the labels of its pieces: each connected component of a piece has one."""
+    found = _Survey(voxel, threads)
+    for number, mesh in enumerate(pieces.meshes()):
+        pieces.label(number, found.add(mesh, pieces.ends[number]))
+    return found.shells()
 
-    def __init__(self) -> None:
+
+class _Survey:
+    """Sums over pieces, in turn. Labels are numbered from the first piece on."""
+
+    def __init__(self, voxel: float, threads: int) -> None:
+        self.voxel, self.threads, self.count, self.end = voxel, threads, 0, -np.inf
+        self.sizes: list[NDArray[np.float64]] = []
         self.cones: list[NDArray[np.float64]] = []
         self.areas: list[NDArray[np.float64]] = []
         self.low: list[NDArray[np.float64]] = []
         self.high: list[NDArray[np.float64]] = []
         self.same: list[NDArray[np.int64]] = []
-        self.count = 0
-        self.border: tuple[NDArray[np.int64], NDArray[np.int64]] = (np.empty(0, int), np.empty(0, int))
+        self.border: tuple[NDArray[np.void], NDArray[np.int64]] = rows(np.empty((0, 3))), np.empty(0, int)
 
-    def add(self, piece: Piece) -> NDArray[np.int64]:
-        """Takes in a piece. Returns the label of each of its triangles, int64 [m]."""
-        from .topology import connected_components
+    def add(self, mesh: Mesh, end: float) -> NDArray[np.int64]:
+        """Take in a piece; return the label of each of its triangles, int64 [m]."""
+        from .topology import component_sizes, connected_components
 
-        mesh = piece.mesh
-        local, count = connected_components(mesh.triangles, len(mesh.vertices))
-        labels = local.astype(np.int64) + self.count
+        local, count = connected_components(mesh.triangles, len(mesh.vertices), self.threads)
         of_vertex = np.empty(len(mesh.vertices), np.int64)
-        of_vertex[mesh.triangles] = labels[:, None]
-        low, high = _boxes(mesh.vertices, mesh.vertices, of_vertex - self.count, count)
-        near = Mesh(mesh.vertices - low[of_vertex - self.count], mesh.triangles)
-        cones, areas = _cones(near, local, count)
-        self.cones.append(cones)
+        of_vertex[mesh.triangles] = local[:, None]
+        low, high = _boxes(mesh.vertices, mesh.vertices, of_vertex, count)
+        whole = not np.isfinite([self.end, end]).any()
+        areas = np.zeros((count, 3)) if whole else _areas(mesh, local, count)
+        # Cones over the first corner of a component, moved to the corner of its box: dust keeps its digits.
+        first = np.searchsorted(np.maximum.accumulate(local), np.arange(count))
+        tips = mesh.vertices[mesh.triangles[first, 0]]
+        cones, sizes = component_sizes(mesh.vertices, mesh.triangles, local, count, self.threads)
+        self.cones.append(cones + ((tips - low) * areas).sum(axis=1) / 3)
         self.areas.append(areas)
         self.low.append(low)
         self.high.append(high)
-        self._join_to_last(piece.crossings, of_vertex)
+        self.sizes.append(sizes)
+        self._join_to_last(mesh, of_vertex + self.count, end)
         self.count += count
-        return labels
+        return local + np.int64(self.count - count)
 
-    def _join_to_last(self, crossings: NDArray[np.int64], labels: NDArray[np.int64]) -> None:
-        """Parts that share a crossing with the piece before are one; the surface passes no seam without."""
-        numbers, before = self.border
-        _, theirs, mine = np.intersect1d(numbers, crossings, assume_unique=True, return_indices=True)
-        pairs = np.stack([before[theirs], labels[mine]], axis=1)
+    def _join_to_last(self, mesh: Mesh, labels: NDArray[np.int64], end: float) -> None:
+        """Components that share a vertex with the piece before are one: no surface passes a seam without."""
+        x = mesh.vertices[:, 0]
+        here, there = (np.flatnonzero(np.abs(x - seam) < self.voxel / 2) for seam in (self.end, end))
+        points, before = self.border
+        _, theirs, mine = np.intersect1d(points, rows(mesh.vertices[here]), return_indices=True)
+        pairs = np.stack([before[theirs], labels[here[mine]]], axis=1)
         self.same.append(np.unique(pairs, axis=0))
-        self.border = crossings, labels[: len(crossings)]
+        self.border = rows(mesh.vertices[there]), labels[there]
+        self.end = end
 
     def shells(self) -> WholeShells:
         """What all pieces together are made of."""
         of_label, count = self._united()
         lows, areas = np.concatenate(self.low), np.concatenate(self.areas)
         low, high = _boxes(lows, np.concatenate(self.high), of_label, count)
-        # Cones over the corner of a part, moved to the corner of its shell.
+        # Cones over the corner of a component, moved to the corner of its shell.
         cones = np.concatenate(self.cones) + np.einsum("ij,ij->i", lows - low[of_label], areas) / 3
         volumes = np.bincount(of_label, cones, minlength=count).astype(np.float64)
-        return WholeShells(of_label, volumes, low, high)
+        sizes = np.bincount(of_label, np.concatenate(self.sizes), minlength=count).astype(np.float64)
+        return WholeShells(of_label, volumes, sizes, low, high)
 
     def _united(self) -> tuple[NDArray[np.int32], int]:
         """The shell of each label."""
@@ -82,26 +96,31 @@ class Survey:
 class WholeShells:
     """The shells of all pieces together.
 
-    of_label: int32, the shell of each label. volumes: float64 [s], signed. low, high: float64 [s, 3], the
-    corners of their bounding boxes.
+    of_label: int32, the shell of each label. volumes: float64 [s], signed. areas: float64 [s]. low, high:
+    float64 [s, 3], the corners of their bounding boxes.
     """
 
     of_label: NDArray[np.int32]
     volumes: NDArray[np.float64]
+    areas: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
 
-    def nested(self, pieces: Iterable[tuple[Mesh, NDArray[np.int64]]]) -> tuple[Shells, int]:
+    def bounds(self, which: NDArray[np.bool_] | slice = slice(None)) -> NDArray[np.float64]:
+        """The box around some shells, or all of them, [2, 3]."""
+        return np.stack([self.low[which].min(axis=0), self.high[which].max(axis=0)])
+
+    def nested(self, pieces: Pieces, threads: int = 0) -> tuple[Shells, int]:
         """Which shell is in which, and how many are where they should not be.
 
-        pieces: the same once more, with their labels. Each shell is looked up from where its x is least: that
-        point lies within a cell, so that a ray across x from it stays in one piece.
+        Each shell is looked up from where its x is least: that point lies within a cell, so that a ray across
+        x from it stays in one piece. Raises `MeshError` for a cavity that no body is around.
         """
         from .nesting import nesting
 
-        count = len(self.volumes)
+        count, hollow = len(self.volumes), self.volumes < 0
         parent, winding = np.full(count, -1, np.int64), np.zeros(count, np.int64)
-        for mesh, labels in pieces if count > 1 else ():
+        for mesh, labels in pieces.labelled() if count > 1 else ():
             shell = self.of_label[labels]
             first = np.full(count, -1, np.int64)
             of_vertex = np.empty(len(mesh.vertices), np.int64)
@@ -109,11 +128,25 @@ class WholeShells:
             here = np.flatnonzero(mesh.vertices[:, 0] == self.low[of_vertex, 0])
             first[of_vertex[here]] = here
             if (first >= 0).any():
-                found = nesting(mesh, shell, self.volumes, first=first)
+                found = nesting(mesh, shell, self.volumes, first, threads)
                 parent = np.where(first >= 0, found.parent, parent)
                 winding = np.where(first >= 0, found.winding, winding)
-        misplaced = int((winding != (self.volumes < 0)).sum())
-        return Shells(np.empty(0, np.int32), self.volumes, parent), misplaced
+        if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
+            raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
+        return Shells(np.empty(0, np.int32), self.volumes, parent), int((winding != hollow).sum())
+
+    def thin_walls(self, voxel: float) -> str:
+        """What walls came to that are thinner than a voxel, in words; empty where all are thicker.
+
+        Between samples such walls are missed: they have holes, or fall to pieces. A body counts if on average
+        it is thinner than a voxel; the dust around a fractal is such, too, but less than `PIECES` of the
+        material.
+        """
+        whole, bodies = self.volumes.sum(), self.volumes > 0
+        thin = bodies & (2 * self.volumes < voxel * self.areas)
+        share, many = float(self.volumes[thin].sum() / whole), int(bodies.sum())
+        holes = "have holes" if many == 1 else f"fell to pieces: {thin.sum()} of {many} bodies"
+        return f"walls thinner than a voxel {holes}, {share:.0%} of the material" if share >= PIECES else ""
 
 
 def _boxes(
@@ -127,14 +160,7 @@ def _boxes(
     return low.T.copy(), high.T.copy()
 
 
-def _cones(
-    mesh: Mesh, labels: NDArray[np.int32], count: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Of each part, float64 [s]: the signed volume between its triangles and the origin, which is near by, so
-    that dust keeps its digits; and the sum of its normals, each as long as its triangle's area, [s, 3].
-    """
+def _areas(mesh: Mesh, labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
+    """The sum of the normals of each component, each as long as its triangle's area, float64 [count, 3]."""
     normals = mesh.normals / 2
-    tips = mesh.vertices[mesh.triangles[:, 0]]
-    cones = np.bincount(labels, np.einsum("ij,ij->i", tips, normals), minlength=count) / 3
-    areas = [np.bincount(labels, normals[:, k], minlength=count) for k in range(3)]
-    return cones, np.stack(areas, axis=1)
+    return np.stack([np.bincount(labels, normals[:, k], minlength=count) for k in range(3)], axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import product
 from typing import NamedTuple
 
@@ -9,15 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import pointed
-from ..kernel import Field
+from ..volume import Plan
 from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
 from ..work import Work
-from .fit import OFF, UPRIGHT, Fit
+from .caps import Cap, Rings, apart, best, capped
+from .extract import Piece
+from .fit import Fit
 from .model import Mesh
+from .pieces import NOTHING, Pieces, joined
 from .quantisation import quantise
 from .self_intersections import self_intersecting_triangles
-from .topology import corners_by_vertex
 
 POINTED = 0.15
 """The sine of the angle by which all edges at a pointed vertex fall off, at least."""
@@ -37,69 +40,119 @@ ROUGHLY, EXACT = 0.03, 1e-7
 SAME = 0.05
 """Voxels: a mesh that ends so near a tip reaches it."""
 
-ANGLES = 0.6, 0.3, 0.1
-"""Sines of angles at which a tip is above the planes of triangles that it replaces, at least."""
-
-THIN = 0.01
-"""Voxels: the height of new triangles, at least: rounding turns none over."""
-
-MOST = 64
-"""Triangles that a tip replaces."""
+REACH = 8.0
+"""Voxels around pointed vertices and tips: triangles that are looked at."""
 
 
-class Cap(NamedTuple):
-    """Triangles, by number, int64 [k], whose place others take: from the edges around them, int32 [e, 2], to
-    a tip, float64 [3]."""
+class Pointed:
+    """The pointed vertices of a surface that comes in pieces."""
 
-    old: NDArray[np.int64]
-    rim: NDArray[np.int32]
-    tip: NDArray[np.float64]
+    def __init__(self, voxel: float, threads: int = 0) -> None:
+        self._voxel, self._threads, self._points = voxel, threads, list[NDArray[np.float64]]()
+        self._near, self._seam = NOTHING, -np.inf
 
-    def corners(self, mesh: Mesh) -> NDArray[np.float64]:
-        """Of the new triangles, [e, 3, 3]."""
-        rim = mesh.vertices[self.rim]
-        return np.concatenate([rim, np.broadcast_to(self.tip, (len(rim), 1, 3))], axis=1)
+    def add(self, piece: Piece) -> None:
+        """Take in a piece: vertices near its end are looked at with the next one."""
+        mesh, voxel = piece.mesh, self._voxel
+        if len(self._near.triangles):
+            mesh = joined(self._near, mesh, self._seam, voxel / 2)
+        at = mesh.vertices[pointed(mesh.vertices, mesh.triangles, POINTED, self._threads)]
+        low, high = self._seam - 2 * voxel, piece.end - 2 * voxel
+        self._points.append(at[(low <= at[:, 0]) & (at[:, 0] < high)])
+        self._seam = piece.end
+        if np.isfinite(piece.end):
+            top = mesh.vertices[mesh.triangles, 0].max(axis=1)
+            self._near = mesh.selected(top > piece.end - 5 * voxel)
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """Where they are, [n, 3]; none of a rough surface."""
+        found = np.concatenate(self._points)
+        return found if len(found) <= MANY else found[:0]
 
 
 def with_tips(
-    root: Field, mesh: Mesh, voxel: float, work: Work | None = None
-) -> tuple[Mesh, NDArray[np.bool_]]:
-    """The mesh with the solid's own tips in place of blunt ends, and which triangles are new, bool [m].
+    planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work
+) -> tuple[Pieces, NDArray[np.float64]]:
+    """The surface with the solid's own tips in place of blunt ends; and these, [k, 3].
 
-    mesh: closed, an oriented 2-manifold, scene units, its vertices on the zero set of root's field, a voxel
-    apart. Where the solid goes on above a triangle at a pointed vertex, its farthest point is looked for, and
-    what that sees from above is replaced by a fan around it, if the fan is nowhere farther from the surface
-    than what it replaces. The surface stays closed, and does not cross itself. A rough surface, as of a
-    fractal, stays as it is. Raises `Cancelled`.
+    pieces: of a closed, oriented 2-manifold, its vertices on the zero set of the plan's field, a voxel apart.
+    points: its pointed vertices. Where the solid goes on above a triangle at one, its farthest point is
+    looked for, and what that sees from above is replaced by a fan around it, if the fan is nowhere farther
+    from the surface than what it replaces. The surface stays closed, and does not cross itself. A rough
+    surface, as of a fractal, stays as it is. The fans are the last triangles of their pieces; pieces that a
+    fan spans become one. Raises `Cancelled`.
     """
-    work = work or Work()
-    at = pointed(mesh.vertices, mesh.triangles, POINTED, work.threads)
-    if not 0 < len(at) <= MANY:
-        return mesh, np.zeros(len(mesh.triangles), bool)
+    caps = _caps(planned, pieces, points, work) if len(points) else []
+    if not caps:
+        return pieces, np.empty((0, 3))
+    made, near = Pieces(pieces.folder), planned.voxel / 2
+    for first, last in _spans(caps, pieces, near):
+        mesh, start = pieces.together(first, last, near), pieces.starts[first]
+        own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(mesh.triangles)]
+        fresh = sum(len(cap.fan) for cap in own)
+        made.add(Piece(capped(mesh, own) if own else mesh, pieces.ends[last - 1]), fresh)
+    return made, np.array([cap.fan[0, 2] for cap in caps])
+
+
+def _caps(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work) -> list[Cap]:
+    """What is replaced, by the numbers of triangles from the first piece on."""
+    root, voxel = planned.root, planned.voxel
+    tips = _found(planned, pieces, points, work)
+    if not tips:
+        return []
+    ends, places = (np.array(rows) for rows in list(zip(*tips, strict=True))[1:])
+    mesh, numbers = pieces.near(_between(ends, places, REACH * voxel), REACH * voxel)
     rings, fit = Rings(mesh), Fit(root, STEP * voxel, voxel, work)
     found = [
-        _best(rings.caps(end, tip), gain, mesh, fit, voxel)
-        for gain, end, tip in _found(root, rings, at, voxel, work)
+        best(rings.caps(vertex, tip.place), tip.gain, mesh, fit, voxel)
+        for vertex, tip in zip(rings.at(ends), tips, strict=True)
     ]
-    caps = _apart([cap for cap in found if cap], len(mesh.triangles))
+    caps = apart([cap for cap in found if cap], len(mesh.triangles))
     while caps:
         work.check()
-        made, of_cap = _capped(mesh, caps)
-        as_written = Mesh(quantise(made, threads=work.threads)[0], made.triangles)
-        wrong = of_cap[self_intersecting_triangles(as_written, threads=work.threads, among=of_cap >= 0)]
-        if not (wrong >= 0).any():
-            return made, of_cap >= 0
+        wrong = _crossing(mesh, caps, work)
+        if not wrong:
+            break
         caps = [cap for number, cap in enumerate(caps) if number not in wrong]
-    return mesh, np.zeros(len(mesh.triangles), bool)
+    return [Cap(numbers[cap.old], cap.fan) for cap in caps]
 
 
-def _found(
-    root: Field, rings: Rings, at: NDArray[np.int64], voxel: float, work: Work
-) -> list[tuple[float, int, NDArray[np.float64]]]:
-    """Tips that the mesh does not reach: how far it is from them, the nearest vertex, and where they are; the
-    farthest one first."""
-    kernel, mesh = root.kernel("cpu", "float64"), rings.mesh
-    exact = EXACT * float(mesh.size.max())
+def _crossing(mesh: Mesh, caps: list[Cap], work: Work) -> set[int]:
+    """The caps whose fans cross others or the mesh, as a file holds them."""
+    made = capped(mesh, caps)
+    of_cap = np.repeat(np.arange(len(caps)), [len(cap.fan) for cap in caps])
+    of_cap = np.concatenate([np.full(len(made.triangles) - len(of_cap), -1), of_cap])
+    as_written = Mesh(quantise(made, threads=work.threads)[0], made.triangles)
+    crossing = self_intersecting_triangles(as_written, threads=work.threads, among=of_cap >= 0)
+    return set(of_cap[crossing].tolist()) - {-1}
+
+
+def _spans(caps: list[Cap], pieces: Pieces, near: float) -> Iterator[tuple[int, int]]:
+    """Which pieces, first to last - 1, become one: those that a fan, or what it replaces, spans."""
+    x = np.array([(cap.fan[..., 0].min() - near, cap.fan[..., 0].max() + near) for cap in caps])
+    old = np.array([(cap.old.min(), cap.old.max()) for cap in caps])
+    own = np.searchsorted(pieces.ends, x), np.searchsorted(pieces.starts, old, side="right") - 1
+    firsts, lasts = np.minimum(*own)[:, 0], np.maximum(*own)[:, 1]
+    begin = 0
+    for number in range(1, len(pieces) + 1):
+        if not ((firsts < number) & (number <= lasts)).any():
+            yield begin, number
+            begin = number
+
+
+class Tip(NamedTuple):
+    """A tip beyond the mesh: how far it is from the nearest vertex, that, and where the tip is."""
+
+    gain: float
+    end: NDArray[np.float64]
+    place: NDArray[np.float64]
+
+
+def _found(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work) -> list[Tip]:
+    """Tips beyond pointed vertices, the farthest one first."""
+    kernel, voxel = planned.root.kernel("cpu", "float64"), planned.voxel
+    exact = EXACT * max(planned.box.size)
 
     def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:
         found: NDArray[np.bool_] = values_at(kernel, np.ascontiguousarray(points), work) < 0
@@ -109,25 +162,50 @@ def _found(
         ways = np.einsum("nij,jw->inw", _frames(_unit(ups)), SLANTS)
         return climb(inside, starts.T[..., None], ways, STEP * voxel, last)[..., 0].T
 
-    seats = rings.around(at)
-    corners = mesh.vertices[mesh.triangles[seats]]
-    ups = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    starts = corners.mean(axis=1) + ABOVE * voxel * ups
+    ends, starts, ups = _above(pieces, points, voxel)
     on = inside(starts.T)
-    tips = climbed(starts[on], ups[on], ROUGHLY * voxel)
-    ends = mesh.triangles[seats[on], 0].astype(np.int64)
+    if not on.any():
+        return []
+    ends, tips = ends[on], climbed(starts[on], ups[on], ROUGHLY * voxel)
     for last in (ROUGHLY * voxel, exact, exact):
-        ends = rings.nearest(ends, tips)
-        ends, tips, ups = _highest(ends, tips, tips - rings.middles(ends))
+        ends, tips, ups = _nearest(pieces, ends, tips, voxel)
         tips = climbed(tips, ups, last)
-    ends = rings.nearest(ends, tips)
-    ends, tips, ups = _highest(ends, tips, tips - rings.middles(ends))
-    gain = ((tips - mesh.vertices[ends]) * ups).sum(axis=1)
+    ends, tips, ups = _nearest(pieces, ends, tips, voxel)
+    gain = ((tips - ends) * ups).sum(axis=1)
     aside = tips.T[..., None] + STEP * voxel * np.einsum("nij,jw->inw", _frames(ups), ASIDE)
     falls = ~inside(aside.reshape(3, -1)).reshape(aside.shape[1:]).any(axis=1)
-    order = np.argsort(-gain, kind="stable")
+    order = np.lexsort([*tips.T[::-1], -gain])
     order = order[((gain > SAME * voxel) & falls)[order]][:MOST_TIPS]
-    return [(float(gain[k]), int(ends[k]), tips[k]) for k in order]
+    return [Tip(float(gain[k]), ends[k], tips[k]) for k in order]
+
+
+def _above(
+    pieces: Pieces, points: NDArray[np.float64], voxel: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Of the triangles at some vertices, [n, 3] each: a corner, a point just above, and what is upwards."""
+    mesh, _ = pieces.near(points, REACH * voxel)
+    rings = Rings(mesh)
+    seats = mesh.corners[rings.around(rings.at(points))]
+    ups = _unit(np.cross(seats[:, 1] - seats[:, 0], seats[:, 2] - seats[:, 0]))
+    return seats[:, 0], seats.mean(axis=1) + ABOVE * voxel * ups, ups
+
+
+def _nearest(
+    pieces: Pieces, ends: NDArray[np.float64], tips: NDArray[np.float64], voxel: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """The vertices near tips that ways from `ends` lead to, each once, with the highest of its tips; and what
+    is upwards there."""
+    mesh, _ = pieces.near(_between(ends, tips, REACH * voxel), REACH * voxel)
+    rings = Rings(mesh)
+    found = rings.nearest(rings.at(ends), tips)
+    once, tips, ups = _highest(found, tips, tips - rings.middles(found))
+    return mesh.vertices[once], tips, ups
+
+
+def _between(starts: NDArray[np.float64], ends: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Points on the ways between others, no farther apart than a step."""
+    count = 2 + int(np.linalg.norm(ends - starts, axis=1).max() / step)
+    return np.linspace(starts, ends, count).reshape(-1, 3)
 
 
 def _highest(
@@ -153,123 +231,3 @@ def _frames(ups: NDArray[np.float64]) -> NDArray[np.float64]:
     aside = np.eye(3)[np.abs(ups).argmin(axis=1)]
     first = _unit(np.cross(aside, ups))
     return np.stack([first, np.cross(ups, first), ups], axis=2)
-
-
-class Rings:
-    """A mesh, and the triangles around its vertices."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self.mesh = mesh
-        self._start, self._corner = corners_by_vertex(mesh.triangles, len(mesh.vertices))
-
-    def around(self, vertices: NDArray[np.integer]) -> NDArray[np.int64]:
-        """The triangles at some vertices, ascending."""
-        corners = [self._corner[self._start[v] : self._start[v + 1]] for v in vertices]
-        return np.unique(np.concatenate(corners) // 3)
-
-    def nearest(self, vertices: NDArray[np.integer], points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The vertices near points that ways over nearer and nearer ones lead to."""
-        found = np.empty(len(points), np.int64)
-        for k, (best, point) in enumerate(zip(vertices, points, strict=True)):
-            last = -1
-            while best != last:
-                last, ring = best, self.ring(best)
-                best = ring[np.linalg.norm(self.mesh.vertices[ring] - point, axis=1).argmin()]
-            found[k] = best
-        return found
-
-    def middles(self, vertices: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Of the vertices around each, and itself."""
-        return np.array([self.mesh.vertices[self.ring(v)].mean(axis=0) for v in vertices]).reshape(-1, 3)
-
-    def ring(self, vertex: int) -> NDArray[np.int32]:
-        """The vertices around one, and itself."""
-        return np.unique(self.mesh.triangles[self.around(np.array([vertex]))])
-
-    def caps(self, vertex: int, tip: NDArray[np.float64]) -> list[Cap]:
-        """Disks of triangles near a vertex that a tip sees from above, at several angles; with all of those
-        around the vertex, with those around its neighbours too, and without."""
-        own = self.around(np.array([vertex]))
-        seeds = own[:0], own, self.around(self.ring(vertex))
-        disks = (self._disk(seed, vertex, tip, sine) for sine in ANGLES for seed in seeds)
-        return list({cap.old.tobytes(): cap for cap in disks if cap}.values())
-
-    def _disk(
-        self, seed: NDArray[np.int64], vertex: int, tip: NDArray[np.float64], sine: float
-    ) -> Cap | None:
-        seen, near = seed, self.around(np.array([vertex]))
-        while len(seen) <= MOST:
-            corners = self.mesh.vertices[self.mesh.triangles[near]]
-            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            ways = tip - corners.mean(axis=1)
-            sizes = np.linalg.norm(normals, axis=1) * np.linalg.norm(ways, axis=1)
-            more = np.union1d(near[(normals * ways).sum(axis=1) > sine * sizes], seen)
-            if len(more) == len(seen):
-                rim = _rim(self.mesh.triangles[seen])
-                return None if rim is None else Cap(seen, rim, tip)
-            seen, near = more, self.around(np.unique(self.mesh.triangles[more]))
-        return None
-
-
-def _rim(triangles: NDArray[np.int32]) -> NDArray[np.int32] | None:
-    """The edges around triangles, in turn; None if these are no disk."""
-    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    known = set(map(tuple, sides.tolist()))
-    following = {a: b for a, b in sides.tolist() if (b, a) not in known}
-    first = here = next(iter(following), -1)
-    rim = []
-    while here in following:
-        rim.append((here, following.pop(here)))
-        here = rim[-1][1]
-    edges = (3 * len(triangles) + len(rim)) // 2
-    disk = here == first and not following and len(np.unique(triangles)) - edges + len(triangles) == 1
-    return np.array(rim, np.int32) if rim and disk else None
-
-
-def _best(caps: list[Cap], gain: float, mesh: Mesh, fit: Fit, voxel: float) -> Cap | None:
-    """The one that is nearest to the surface, if it is nowhere farther than what it replaces, or than the tip
-    was; and nowhere thin or turned away."""
-    if not caps:
-        return None
-    old = fit.triangles(mesh.vertices[mesh.triangles[np.concatenate([cap.old for cap in caps])]])
-    corners = np.concatenate([cap.corners(mesh) for cap in caps])
-    new = fit.triangles(corners)
-    olds, rims = (
-        np.cumsum([0, *map(len, sets)])[:-1] for sets in zip(*(cap[:2] for cap in caps), strict=True)
-    )
-    before, after = np.maximum.reduceat(old[:, OFF], olds), np.maximum.reduceat(new[:, OFF], rims)
-    good = after <= np.maximum(before, min(gain, fit.reach))
-    fine = (new[:, UPRIGHT] > 0) & (_heights(corners) > THIN * voxel)
-    good &= np.minimum.reduceat(fine, rims)
-    return caps[int(np.where(good, after, np.inf).argmin())] if good.any() else None
-
-
-def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The least height of triangles, [m]."""
-    sides = corners - np.roll(corners, 1, axis=1)
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    found: NDArray[np.float64] = area / np.linalg.norm(sides, axis=2).max(axis=1)
-    return found
-
-
-def _apart(caps: list[Cap], count: int) -> list[Cap]:
-    """Those of which no two have a triangle in common, the first ones first."""
-    taken, kept = np.zeros(count, bool), []
-    for cap in caps:
-        if not taken[cap.old].any():
-            taken[cap.old] = True
-            kept.append(cap)
-    return kept
-
-
-def _capped(mesh: Mesh, caps: list[Cap]) -> tuple[Mesh, NDArray[np.int64]]:
-    """The mesh with caps, and of each triangle the number of its cap, -1 for the others."""
-    keep = np.ones(len(mesh.triangles), bool)
-    keep[np.concatenate([cap.old for cap in caps])] = False
-    tips = len(mesh.vertices) + np.arange(len(caps), dtype=np.int32)
-    of_cap = np.repeat(np.arange(len(caps)), [len(cap.rim) for cap in caps])
-    fans = np.column_stack([np.concatenate([cap.rim for cap in caps]), tips[of_cap]])
-    vertices = np.concatenate([mesh.vertices, [cap.tip for cap in caps]])
-    triangles = np.concatenate([mesh.triangles[keep], fans])
-    made = Mesh(vertices, triangles).selected(np.ones(len(triangles), bool))
-    return made, np.concatenate([np.full(keep.sum(), -1), of_cap])

@@ -42,30 +42,22 @@ THIN = 1.0
 """mm2 of walls or gaps that samples may miss, from which finer ones are taken."""
 
 
-Measure = Callable[[Plan], Box]
-
-
-def printable(
-    planned: Plan, size: float, how: Print, work: Work | None = None, measure: Measure | None = None
-) -> tuple[Plan, float]:
+def printable(planned: Plan, size: float, how: Print, work: Work | None = None) -> tuple[Plan, float]:
     """A planned scene made printable, and its scale in mm per scene unit.
 
-    size: mm, the longest side of what stays. measure: of an object, what box will be called its size, if not
-    that of its field: a mesh has not all tips of a fractal. Samples with the voxel of `planned` are at the
+    size: mm, the longest side of what stays, by its field. Samples with the voxel of `planned` are at the
     same points before and after. Raises `VolumeError` where nothing would be left, or a length is too small
     to be measured or larger than the object, `Cancelled`.
     """
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
         if (length := getattr(how, name)) > size and (name != "drain" or how.hollow):
             raise VolumeError(f"{name} {length:g} mm: expected at most the object's size, {size:g} mm")
-    run = _Run(planned, size, how, work or Work(), measure)
+    run = _Run(planned, size, how, work or Work())
     for stage, change in run.changes():
         run.work.check()
         run.work.progress(stage, 0.0)
         run.put(change())
         run.work.progress(stage, 1.0)
-    if (how.base or how.raft) and run.grown:
-        run.weigh()
     return _standing(run.planned, how, run.scale), run.scale
 
 
@@ -77,7 +69,6 @@ class _Run:
     size: float
     how: Print
     work: Work
-    measure: Measure | None
     scale: float = 1.0
     """mm per scene unit, known when it is known which bodies stay."""
     known: Connected | None = None
@@ -96,11 +87,6 @@ class _Run:
         found = extent(self.thing, max(self.planned.box.size) / self.planned.voxel, self.work)
         self.planned = replace(self.planned, box=found.box, outer=found.outer, tips=found.tips)
 
-    def weigh(self) -> None:
-        """Its box is what is called its size."""
-        if self.measure:
-            self.planned = replace(self.planned, box=self.measure(self.planned))
-
     @property
     def grown(self) -> bool:
         """Whether something is added to its outside."""
@@ -116,7 +102,6 @@ class _Run:
             yield "keeping the largest", self.largest
             if self.thing is not before:
                 self.bound()
-        self.weigh()
         self.scale = self.size / max(self.planned.box.size)
         if how.gap:
             yield "closing gaps", self.closed

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -35,6 +37,8 @@ __all__ = [
     "with_depths",
 ]
 
+
+AnyBricks = TypeVar("AnyBricks", Bricks, SignBricks)
 
 DETAIL = 256
 """The finest detail of automatic depths, along the object's longest side: a mesh shows it if nothing else is
@@ -97,33 +101,32 @@ def with_depths(root: Node, work: Work | None = None) -> Node:
 
 
 def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
-    """Samples a planned scene around its surface, or takes the samples that were kept of it.
+    """Samples of a planned scene around its surface, taken now or kept in the store.
 
     Raises `VolumeError`, `Cancelled`.
     """
-    work = work or Work()
-    lattice = planned.lattice
-
-    fresh: list[Bricks] = []
-
-    def made() -> Arrays:
-        kernel, bounds, conservative = _fields(planned, work)
-        bricks = sample(kernel, bounds, lattice, work, conservative)
-        fresh.append(bricks)
-        return {"ijk": bricks.ijk, "values": bricks.values, "index": bricks.index}
-
-    kept = stored(work.store, ("samples", work.device, lattice), planned.root, made)
-    if fresh:
-        return fresh[0]
-    return Bricks(lattice.origin, lattice.voxel, kept["ijk"], kept["values"], kept["index"])
+    return _sampled(planned, work or Work(), sample, Bricks, "values")
 
 
 def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
-    """As `sample_scene`, of each sample only its sign."""
-    work = work or Work()
-    lattice = planned.lattice
-    kernel, bounds, conservative = _fields(planned, work)
-    return sample_signs(kernel, bounds, lattice, work, conservative)
+    """As `sample_scene`; of each sample only its sign, which is all that the exact surface takes."""
+    return _sampled(planned, work or Work(), sample_signs, SignBricks, "signs")
+
+
+def _sampled(
+    planned: Plan, work: Work, take: Callable[..., AnyBricks], kind: type[AnyBricks], held: str
+) -> AnyBricks:
+    """held: the name of the arrays that the bricks hold besides their places."""
+    lattice, fresh = planned.lattice, list[AnyBricks]()
+
+    def made() -> Arrays:
+        kernel, bounds, conservative = _fields(planned, work)
+        bricks = take(kernel, bounds, lattice, work, conservative)
+        fresh.append(bricks)
+        return {name: getattr(bricks, name) for name in ("ijk", held, "index")}
+
+    kept = stored(work.store, ("samples", held, work.device, lattice), planned.root, made)
+    return fresh[0] if fresh else kind(lattice.origin, lattice.voxel, kept["ijk"], kept[held], kept["index"])
 
 
 def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:

@@ -130,10 +130,10 @@ def test_command_lines(arguments, message, folder, capfd):
 
 
 def test_a_voxel_count_that_does_not_fit_in_memory(folder, capfd, monkeypatch):
-    monkeypatch.setattr("fracslice.job.available_bytes", lambda: 1 << 30)
-    line = refused(capfd, folder, "mesh", "ball.xml", "-o", "out/x.3mf", "--resolution", "4000")
+    monkeypatch.setattr("fracslice.surfaces.available_bytes", lambda: 1 << 28)
+    line = refused(capfd, folder, "mesh", "ball.xml", "-o", "out/x.3mf", "--resolution", "800")
     assert "GB of memory" in line
-    assert line.endswith("mm fits")
+    assert line.endswith("mm fits, and an .stl file is written piece after piece")
 
 
 def test_a_full_disk(folder, capfd, monkeypatch):

@@ -38,8 +38,8 @@ def test_mesh_writes_the_model_and_its_report(ball, tmp_path, capfd):
 
 def test_a_mesh_larger_than_memory_goes_to_stl(ball, tmp_path, capfd, monkeypatch):
     model, report = tmp_path / "ball.stl", tmp_path / "ball.json"
-    monkeypatch.setattr("fracslice.job.available_bytes", lambda: 1 << 20)
-    assert fracslice("mesh", ball, "-o", model, "--resolution", 300, "--report", report) == 0
+    monkeypatch.setattr("fracslice.surfaces.available_bytes", lambda: 1 << 20)
+    assert fracslice("mesh", ball, "-o", model, "--resolution", 400, "--report", report) == 0
     told = json.loads(report.read_text())
     assert (told["printable"], told["components"], told["genus"]) == (True, 1, 0)
     assert model.stat().st_size == 84 + 50 * told["triangles"]

@@ -10,8 +10,11 @@ import pytest
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
-from fracslice.mesh.components import Removed, in_pieces, select, shells
+from fracslice.mesh.components import Removed, select, shells
+from fracslice.mesh.extract import Piece
+from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.reading import joined
+from fracslice.mesh.survey import survey
 
 from .shapes import cube, inverted, sphere
 
@@ -92,11 +95,17 @@ def test_thousands_of_parts_take_no_time() -> None:
     assert np.isclose(kept.volume, sphere(50, level=6).volume - sphere(40, level=6).volume)
 
 
+def thin_walls(mesh: Mesh, voxel: float) -> str:
+    pieces = Pieces()
+    pieces.add(Piece(mesh, np.inf))
+    return survey(pieces, voxel).thin_walls(voxel)
+
+
 def test_bodies_thinner_than_a_voxel_are_pieces_unless_they_are_dust() -> None:
     """The wall of a cube is a third of its side, by volume and area."""
     thick, thin = cube(10), [cube(1, at=(20 + 2 * k, 0, 0)) for k in range(60)]
-    assert in_pieces(joined([thick, *thin]), 0.33) == ""
-    told = in_pieces(joined([thick, *thin]), 0.34)
+    assert thin_walls(joined([thick, *thin]), 0.33) == ""
+    told = thin_walls(joined([thick, *thin]), 0.34)
     assert told == "walls thinner than a voxel fell to pieces: 60 of 61 bodies, 6% of the material"
-    assert in_pieces(joined([thick, *thin[:40]]), 0.34) == ""
-    assert in_pieces(thin[0], 0.34) == "walls thinner than a voxel have holes, 100% of the material"
+    assert thin_walls(joined([thick, *thin[:40]]), 0.34) == ""
+    assert thin_walls(thin[0], 0.34) == "walls thinner than a voxel have holes, 100% of the material"

@@ -271,12 +271,16 @@ def test_pieces_are_the_whole_bit_by_bit(root: Node, most: int) -> None:
     bricks = sample_scene(planned)
     whole, pieces = contour(planned.root, bricks), list(contour_pieces(planned.root, bricks, most=most))
     assert len(pieces) > 3
-    assert triangle_set(pieces) == triangle_set([Piece(whole, 0.0, 0, np.empty(0, bool))])
+    assert triangle_set(pieces) == triangle_set([Piece(whole, np.inf)])
     for one, other in itertools.pairwise(pieces):
         low, high = one.mesh.vertices[:, 0].max(), other.mesh.vertices[:, 0].min()
         assert low <= one.end + 1e-12 and high >= one.end - 1e-12
-        _, mine, theirs = np.intersect1d(one.crossings, other.crossings, return_indices=True)
-        assert len(mine) and (one.mesh.vertices[mine] == other.mesh.vertices[theirs]).all()
+        mine, theirs = (
+            {tuple(v) for v in mesh.vertices.tolist() if abs(v[0] - one.end) < 1e-9}
+            for mesh in (one.mesh, other.mesh)
+        )
+        assert mine and mine == theirs
+    assert np.isinf(pieces[-1].end)
 
 
 def triangle_set(pieces: list[Piece]) -> list[bytes]:

@@ -7,11 +7,10 @@ import pytest
 
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.certificate import Certificate
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.clean import clean
 from fracslice.mesh.quantisation import quantised
-from fracslice.mesh.solid import place_on_bed, to_manifold
+from fracslice.mesh.solid import to_manifold
 
 from .shapes import GOOD, cube, sphere, with_flipped, without
 
@@ -27,21 +26,6 @@ def test_manifold3d_takes_good_meshes_as_they_are(name: str) -> None:
 def test_manifold3d_refuses_in_plain_words(spoil) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(MeshError, match="not closed"):
         to_manifold(spoil(sphere(), 7))
-
-
-def test_a_mesh_is_put_on_the_bed() -> None:
-    ball = sphere(10, at=(5, 6, 7))
-    placed, _ = place_on_bed(ball, (5, 6), Certificate.none(len(ball.triangles)))
-    low, high = placed.bounds
-    assert low[2] == 0
-    assert low[:2] + high[:2] == pytest.approx((0, 0), abs=1e-6)
-    lifted = placed.vertices + [0, 0, 1e-6] * (np.arange(len(placed.vertices))[:, None] % 2)
-    planes = np.tile(np.array([[-5.0], [5e-6], [15.0]]), 3)
-    known = Certificate(planes, np.ones(len(placed.triangles), bool))
-    again, known = place_on_bed(Mesh(lifted, placed.triangles), (0, 0), known)
-    flat = lifted[:, 2] < 1e-5
-    assert np.array_equal(again.vertices[:, 2] == 0, flat)
-    assert np.array_equal(known.holds, ~flat[placed.triangles].any(axis=1))
 
 
 def test_rounding_is_done_once() -> None:

@@ -1,0 +1,178 @@
+"""From a surface in scene units to finished triangles in mm, and what is told of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scene import Print
+from .work import Clock
+
+if TYPE_CHECKING:
+    from .formulas import Box
+    from .mesh import Mesh
+    from .mesh.certificate import Certificate
+    from .mesh.check import MeshReport
+    from .mesh.components import Removed
+    from .mesh.window import Finished
+    from .surfaces import Surface
+
+MOST_ERRORS = 1 << 22
+"""Vertices whose distance from the surface is measured, about, evenly spread over it."""
+
+VERTICES_A_BRICK = 40
+
+FLAT = 1e-6
+"""Of the mesh's size: what is not higher than this above the bed lies on it, so that a flat base is flat."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the scene is in print space: ``mm = scale * scene units + offset``."""
+
+    scale: float
+    offset: tuple[float, float, float]
+
+    def mm(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points in print space, [n, 3]."""
+        found: NDArray[np.float64] = points * self.scale + np.array(self.offset)
+        return found
+
+    def units(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points of print space in the scene, [n, 3]."""
+        found: NDArray[np.float64] = (points - np.array(self.offset)) / self.scale
+        return found
+
+
+class Finish:
+    """The bodies of a surface that stay, and their place: decided once, for all pieces.
+
+    how: which bodies and cavities stay. dust: the volume below which a body goes, mm3, from the whole's.
+    size: mm, the longest side of what stays; scale: mm per scene unit, if that is known. Raises `MeshError`
+    if nothing would stay.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        how: Print,
+        dust: Callable[[float], float],
+        size: float,
+        scale: float | None,
+        clock: Clock,
+    ) -> None:
+        from .mesh.certificate import Certificate
+        from .mesh.components import choose
+
+        planned, pieces, shells = surface.planned, surface.pieces, surface.shells
+        self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
+        unit = (scale or size / max(planned.box.size)) ** 3
+        nested, self.misplaced = shells.nested(pieces, clock.work.threads)
+        sized = replace(nested, volumes=nested.volumes * unit)
+        limit = dust(float(sized.volumes.sum()))
+        self.stays, removed = choose(sized, keep=how.keep, dust_mm3=limit, cavities=how.cavities)
+        rest, box = shells.bounds(self.stays), self._box()
+        exact = scale or size / max(box.size)
+        x, y, _ = box.centre
+        self.place = Placement(exact, (-exact * x, -exact * y, -exact * float(rest[0, 2])))
+        self.removed: Removed = removed
+        self.volume = float(nested.volumes[self.stays].sum()) * exact**3
+        """mm3, of all bodies, those that were dropped included."""
+        self.volume += removed.bodies_mm3 - removed.filled_mm3
+        grid = Certificate.of(surface.signs, 0)
+        self._grid = replace(grid, planes=self.place.mm(grid.planes))
+        self._flat = FLAT * exact * float(np.ptp(rest, axis=0).max())
+
+    def _box(self) -> Box:
+        from .volume.rest import box_of_the_rest
+
+        whole, rest = self.shells.bounds(), self.shells.bounds(self.stays)
+        return box_of_the_rest(self.planned, whole, rest, self._outermost, self.clock.work)
+
+    def _outermost(self) -> NDArray[np.float64]:
+        """The outermost vertices of what stays, of each piece."""
+        from .volume.rest import outermost
+
+        kept = map(self._kept, range(len(self.pieces)))
+        return np.concatenate([outermost(mesh.vertices) for mesh in kept if len(mesh.vertices)])
+
+    def _stay(self, number: int) -> NDArray[np.bool_]:
+        """Which triangles of a piece stay, bool [m]."""
+        found: NDArray[np.bool_] = self.stays[self.shells.of_label[self.pieces.labels(number)]]
+        return found
+
+    def _kept(self, number: int) -> Mesh:
+        """What stays of a piece, scene units."""
+        mesh = self.pieces.mesh(number)
+        return mesh if self.stays.all() else mesh.selected(self._stay(number), self.clock.work.threads)
+
+    def finished(self) -> Iterator[Finished]:
+        """What is finished by each piece, mm; pieces held in memory are let go."""
+        from .mesh.window import Window
+
+        voxel, threads = self.planned.voxel * self.place.scale, self.clock.work.threads
+        window, count = Window(voxel, threads), len(self.pieces)
+        for number in range(count):
+            with self.clock("finishing"):
+                self.clock.work.progress("finishing", number / count)
+                mesh, known = self._placed(number)
+                self.pieces.drop(number)
+                end = self.place.scale * self.pieces.ends[number] + self.place.offset[0]
+                made = window.add(mesh, end, known)
+                del mesh  # it would stay while what was made of it is checked
+            self.clock.work.progress("finishing", (number + 1) / count)
+            yield made
+
+    def _placed(self, number: int) -> tuple[Mesh, Certificate]:
+        """What stays of a piece, mm, and what is certified of it: nothing of what is moved to the bed."""
+        mesh = self._kept(number)
+        points = self.place.mm(mesh.vertices)
+        points[points[:, 2] < self._flat, 2] = 0
+        stay = self._stay(number)
+        holds = (np.arange(len(stay)) < len(stay) - self.pieces.fresh[number])[stay]
+        planes = self._grid.planes[:, 2]
+        if ((planes >= 0) & (planes < self._flat)).any():  # some vertices are below it now
+            holds &= (points[:, 2] > 0)[mesh.triangles].all(axis=1)
+        return replace(mesh, vertices=points), replace(self._grid, holds=holds)
+
+
+class Check:
+    """What is told of finished triangles as they pass."""
+
+    def __init__(self, finish: Finish, bricks: int) -> None:
+        from .mesh.window import Tally
+
+        self._finish, self._tally = finish, Tally(finish.clock.work.threads)
+        self._stride = max(1, round(VERTICES_A_BRICK * bricks / MOST_ERRORS))
+        self._errors: list[NDArray[np.float64]] = []
+
+    def passing(self, pieces: Iterable[Finished]) -> Iterator[Mesh]:
+        """The finished triangles, piece after piece."""
+        for piece in pieces:
+            with self._finish.clock("checking"):
+                self._tally.add(piece)
+                passed = piece.passed
+                self._errors.append(self._off(passed.vertices[:: self._stride]))
+            yield passed
+
+    def _off(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+        from .volume.accuracy import surface_error
+
+        planned, place = self._finish.planned, self._finish.place
+        return surface_error(planned.root, place.units(vertices), planned.voxel, self._finish.clock.work)
+
+    @property
+    def mesh(self) -> MeshReport:
+        """The whole mesh, once all of it has passed."""
+        hollow, stays = self._finish.shells.volumes < 0, self._finish.stays
+        bodies, cavities = int((stays & ~hollow).sum()), int((stays & hollow).sum())
+        return self._tally.report(bodies, cavities, self._finish.misplaced)
+
+    @property
+    def errors(self) -> NDArray[np.float64]:
+        """Distances of vertices from the surface, mm."""
+        return self._finish.place.scale * np.concatenate(self._errors)
