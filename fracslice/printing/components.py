@@ -102,7 +102,7 @@ class Connected:
     def _at(self, place: np.ndarray) -> np.ndarray:
         """The components at grid indices [n, 3], int64 [n]."""
         brick = place >> 3
-        within = ((brick >= 0) & (brick < self.solid.index.shape)).all(1)
+        within = np.all((brick >= 0) & (brick < np.array(self.solid.index.shape)), axis=1)
         at = tuple(np.where(within[:, None], brick, 0).T)
         row = self.solid.index[at]
         label = np.where(

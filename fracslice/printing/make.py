@@ -1,7 +1,6 @@
 """From an object to one that prints: each change is measured on samples of what the ones before it left.
 
-Distances come from the field where it tells them, else from its samples by fast sweeping (Zhao 2004), so a
-millimetre is a millimetre for any formula.
+Lengths are measured on samples, never taken from values, so a millimetre is a millimetre for any formula.
 """
 
 from __future__ import annotations
@@ -181,8 +180,10 @@ class _Run:
         from .border import nearer
 
         found = self.connected()
-        (first, *others) = found.components.bodies.tolist()
-        return edited(self.thing, "keep", nearer(found, [first], others)) if others else self.thing
+        bodies = found.components.bodies
+        if len(bodies) == 1:
+            return self.thing
+        return edited(self.thing, "keep", nearer(found, bodies[:1], bodies[1:]))
 
     def bridged(self) -> Node | Compilable:
         """Struts between bodies, as few and as short as can be, and no dust."""
