@@ -66,11 +66,12 @@ class Samples(ArrayField):
         return found
 
     def free(self, start: np.ndarray, ways: np.ndarray, far: np.ndarray) -> np.ndarray:
-        """How far it is from points along unit vectors, [n, 3], to the first samples beside the surface, or
-        `far`, [n], where that is nearer.
+        """How far it is from points along unit vectors, [n, 3], to the first cell of the grid with the
+        surface in it, or `far`, [n], where that is nearer.
         """
         b, out = self.bricks, np.empty(len(far))
-        _free(start, ways, far, *b.origin, b.voxel, b.index, self.beside, out)
+        grid = b.index, self.brick_bounds, b.values, self.beside
+        _free(start, ways, far, *b.origin, b.voxel, *grid, out)
         return out
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -221,16 +222,27 @@ def _beside(ijk, index, brick_bounds, values, found):  # type: ignore[no-untyped
 
 
 @compiled
-def _free(start, ways, far, x0, y0, z0, voxel, index, beside, out):  # type: ignore[no-untyped-def]
+def _free(start, ways, far, x0, y0, z0, voxel, index, brick_bounds, values, beside, out):  # type: ignore[no-untyped-def]
     for n in range(len(far)):
         x, y, z = (start[n, 0] - x0) / voxel, (start[n, 1] - y0) / voxel, (start[n, 2] - z0) / voxel
         s = 0.0
         while s < far[n] / voxel:
             u, v, w = x + s * ways[n, 0], y + s * ways[n, 1], z + s * ways[n, 2]
-            if is_beside(u, v, w, index, beside):
+            if is_beside(u, v, w, index, beside) and _is_mixed(u, v, w, voxel, index, brick_bounds, values):
                 break
             s += STRIDE
         out[n] = min(voxel * s, far[n])
+
+
+@compiled
+def _is_mixed(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
+    """Whether the corners of the cell around a point, in voxels from the origin, are on both sides."""
+    i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
+    inside = 0
+    for corner in range(8):
+        at = i + (corner >> 2), j + ((corner >> 1) & 1), k + (corner & 1)
+        inside += sample_at(index, brick_bounds, values, voxel, *at) < 0
+    return 0 < inside < 8
 
 
 @compiled
