@@ -26,8 +26,9 @@ MOST_ERRORS = 1 << 22
 
 VERTICES_A_BRICK = 40
 
-FLAT = 1e-6
-"""Of the mesh's size: what is not higher than this above the bed lies on it, so that a flat base is flat."""
+FLAT = 0.1
+"""Share of the least distance between vertices: what is lower than this above the bed is put on it, so that a
+flat base is flat. More would fold the small triangles around a lowest vertex."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ class Finish:
     ) -> None:
         from .mesh.certificate import Certificate
         from .mesh.components import choose
+        from .mesh.extract import minimum_edge_parameter
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
         self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
@@ -85,7 +87,7 @@ class Finish:
         self.volume += removed.bodies_mm3 - removed.filled_mm3
         grid = Certificate.of(surface.signs, 0)
         self._grid = replace(grid, planes=self.place.mm(grid.planes))
-        self._flat = FLAT * exact * float(np.ptp(rest, axis=0).max())
+        self._flat = FLAT * minimum_edge_parameter(surface.signs) * planned.voxel * exact
 
     def _box(self) -> Box:
         from .volume.rest import box_of_the_rest
