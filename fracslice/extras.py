@@ -1,4 +1,4 @@
-"""Packages that only some uses need, and what to install where one is missing."""
+"""Optional dependencies, and the command that installs a missing one."""
 
 from __future__ import annotations
 
