@@ -1,4 +1,4 @@
-"""What the sampler knows of each brick of a lattice."""
+"""State of each brick during sampling."""
 
 from __future__ import annotations
 
@@ -11,10 +11,15 @@ EMPTY, CANDIDATE, FULL, QUEUED, BORDER = range(5)
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """The bricks of a lattice with one more around, each addressed by one number.
+    """States of a lattice's bricks with one layer of border around them, addressed by flat index.
 
-    flat: uint8 [(bx + 2) (by + 2) (bz + 2)], z the fastest; those outside the lattice are `BORDER`, so that
-    every brick has six neighbours, a fixed number away. shape: (bx + 2, by + 2, bz + 2).
+    Attributes
+    ----------
+    flat
+        States, uint8 [(bx + 2) (by + 2) (bz + 2)], z fastest. Those outside the lattice are `BORDER`, so that
+        every brick has six neighbours at constant offsets.
+    shape
+        Dimensions (bx + 2, by + 2, bz + 2).
     """
 
     flat: np.ndarray
@@ -22,26 +27,28 @@ class States:
 
     @classmethod
     def within(cls, grid: np.ndarray) -> States:
-        """grid: the states [bx, by, bz] of the lattice's bricks."""
+        """Pad the states [bx, by, bz] of a lattice's bricks by a border."""
         padded = np.pad(grid, 1, constant_values=BORDER)
         return cls(padded.reshape(-1), padded.shape)
 
     def step(self, axis: int, step: int) -> int:
-        """How much farther the number is of a brick that is so many bricks farther."""
+        """Flat offset of the brick that is `step` bricks farther along an axis."""
         return step * (self.shape[1] * self.shape[2], self.shape[2], 1)[axis]
 
     def places(self, numbers: np.ndarray) -> np.ndarray:
-        """The bricks of these numbers, [3, n]."""
+        """Brick coordinates [3, n] of flat indices [n]."""
         return np.stack(np.unravel_index(numbers, self.shape)) - 1
 
     def distinct(self, numbers: np.ndarray) -> np.ndarray:
-        """Numbers in order, each once."""
+        """Sorted unique flat indices."""
         those = np.zeros(self.flat.shape, bool)
         those[numbers] = True
         return np.flatnonzero(those)
 
     def beside(self, those: np.ndarray) -> np.ndarray:
-        """Which bricks have one of `those` on a face, for bool arrays like `flat`; anything at the border."""
+        """Mask of the bricks that share a face with a brick of the mask `those`; both like `flat`. Undefined
+        at the border.
+        """
         found = np.zeros_like(those)
         for axis in range(3):
             step = self.step(axis, 1)
@@ -50,5 +57,5 @@ class States:
         return found
 
     def inner(self, flat: np.ndarray) -> np.ndarray:
-        """An array like `flat` without the border, [bx, by, bz], C-contiguous."""
+        """Array like `flat` without the border, [bx, by, bz], C-contiguous."""
         return np.ascontiguousarray(flat.reshape(self.shape)[1:-1, 1:-1, 1:-1])
