@@ -56,7 +56,7 @@ def sample(
     kernel
         Float32 kernel of the scene.
     bounds
-        Bounds of the field that prunes; their Lipschitz bound prunes.
+        Bounds of the field to prune by; cells are pruned by its Lipschitz bound.
     lattice
         Sampling grid.
     work
@@ -109,7 +109,7 @@ def sample_signs(
     kernel
         Float32 kernel of the scene.
     bounds
-        Bounds of the field that prunes.
+        Bounds of the field to prune by.
     lattice
         Sampling grid.
     work
@@ -209,7 +209,7 @@ class _Run:
 
     # --- outside in -----------------------------------------------------------------------------------------
     def explore(self, states: States, front: np.ndarray) -> None:
-        """Sample the front and every neighbour that has a sign change, until the samples are closed."""
+        """Sample the front, then each neighbour that must be sampled too, until the samples are closed."""
         flat = states.flat
         while len(front):
             empty = self.emptied(states.places(front)) & (flat[front] == CANDIDATE)

@@ -75,7 +75,7 @@ class FreeSpace:
         return found
 
     def free(self, points: np.ndarray) -> np.ndarray:
-        """Radius of a free ball around each of the points [3, n]; zero if none is proven."""
+        """Radius of a free ball around each of the points [3, n]; at most zero if none is proven."""
         f = values_at(self.conservative, points, self.work).astype(np.float64)
         rounding = ROUNDING * np.abs(points).max(initial=0.0)
         return np.where(f > 0, f / self.lipschitz - rounding, 0.0)
