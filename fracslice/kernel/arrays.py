@@ -58,5 +58,16 @@ class ArrayLoop:
             self.loop.function(self.kernel.points, frame, *rows, *out, *numbers, rows.shape[1])
 
     def native(self, frame: np.ndarray) -> Callable[..., None]:
-        """Return the loop as a Python function with a given frame, for native code."""
+        """Return the loop for native code.
+
+        Parameters
+        ----------
+        frame
+            Frame of the loop.
+
+        Returns
+        -------
+        Callable
+            Python function of the loop's other arguments.
+        """
         return partial(self, frame)

@@ -55,7 +55,18 @@ class CpuKernel(Kernel):
         return self._points, self._parameters
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Evaluate the field at points; see `Kernel.points`."""
+        """Evaluate the field at points.
+
+        Parameters
+        ----------
+        x, y, z
+            Coordinates in scene units: arrays of one shape, of any float type.
+
+        Returns
+        -------
+        ndarray
+            Values of that shape in the kernel's dtype; NaN at a point with a NaN.
+        """
         shape, n = np.shape(x), np.size(x)
         padded = -(-max(n, 1) // self.width) * self.width
         coordinates = np.empty((4, padded), self.dtype)
@@ -69,7 +80,17 @@ class CpuKernel(Kernel):
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """Evaluate the field on bricks; see `Kernel.bricks`."""
+        """Evaluate the field on bricks of 8 x 8 x 8 grid points.
+
+        Parameters
+        ----------
+        corners
+            Grid index of the first sample of each brick, int32 [n, 3], C-contiguous.
+        origin, voxel
+            Position of grid point (0, 0, 0) and grid spacing, scene units.
+        out
+            Receives the values, [n, 512] of the kernel's dtype, C-contiguous.
+        """
         assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
         frame = np.array([*origin, voxel], self.dtype)
         self._bricks(self._parameters, frame, *self._offsets, corners, out, len(corners))
@@ -123,7 +144,18 @@ class CompiledLoop:
         self.function(self.parameters, frame, *rows, *out, *numbers, rows.shape[1])
 
     def native(self, frame: np.ndarray) -> tuple[Function, np.ndarray, np.ndarray]:
-        """Return machine code, parameters and frame for native code."""
+        """Return the loop for native code.
+
+        Parameters
+        ----------
+        frame
+            Frame of the loop.
+
+        Returns
+        -------
+        tuple
+            Machine code, parameters and frame.
+        """
         return self.function, self.parameters, frame
 
 

@@ -139,7 +139,18 @@ class CudaKernel(Kernel):
         self._parameters = parameters(linked, precision)
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Evaluate the field at points; see `Kernel.points`."""
+        """Evaluate the field at points.
+
+        Parameters
+        ----------
+        x, y, z
+            Coordinates in scene units: arrays of one shape, of any float type.
+
+        Returns
+        -------
+        ndarray
+            Values of that shape in the kernel's dtype; NaN at a point with a NaN.
+        """
         shape = np.shape(x)
         if np.size(x) == 0:
             return np.empty(shape, self.dtype)
@@ -156,8 +167,17 @@ class CudaKernel(Kernel):
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """Evaluate the field on bricks; see `Kernel.bricks`. Values can differ from those of `points` in the
-        last place.
+        """Evaluate the field on bricks of 8 x 8 x 8 grid points. Values can differ from those of `points` in
+        the last place.
+
+        Parameters
+        ----------
+        corners
+            Grid index of the first sample of each brick, int32 [n, 3], C-contiguous.
+        origin, voxel
+            Position of grid point (0, 0, 0) and grid spacing, scene units.
+        out
+            Receives the values, [n, 512] of the kernel's dtype, C-contiguous.
         """
         assert corners.dtype == np.int32 and corners.flags.c_contiguous and out.flags.c_contiguous
         assert out.dtype == self.dtype and out.shape == (len(corners), 512)

@@ -151,10 +151,12 @@ else:
 
     @device
     def where(mask, a, b):  # type: ignore[no-untyped-def]
+        """Return a where the mask is set, else b."""
         return a if mask else b
 
     @device
     def any_of(mask):  # type: ignore[no-untyped-def]
+        """Return the mask: a thread has one point."""
         return mask
 
     @device

@@ -15,12 +15,34 @@ from .loops import Loop
 
 
 def kernel(function: Callable[..., None]) -> Loop:
-    """Decorate a loop that threads are launched on."""
+    """Decorate a loop that threads are launched on.
+
+    Parameters
+    ----------
+    function
+        Function of the loop.
+
+    Returns
+    -------
+    Loop
+        Loop without declared arguments.
+    """
     return Loop(function)
 
 
 def device(function: Function) -> Function:
-    """Decorate a function that loops call and whose numbers are typed by hand."""
+    """Decorate a function that loops call and whose numbers are typed by hand.
+
+    Parameters
+    ----------
+    function
+        Function to decorate.
+
+    Returns
+    -------
+    Callable
+        The function itself.
+    """
     return function
 
 

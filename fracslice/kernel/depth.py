@@ -149,11 +149,11 @@ def _depth(node: Node, detail: float) -> int:
 
 @lru_cache(maxsize=256)
 def _step(before: Known, after: Known) -> float | None:
-    """Largest displacement of nine tenths of the surface by one more iteration, scene units; None if a solid
-    is empty.
+    """Largest displacement of nine tenths of the surface by one more iteration, scene units.
 
-    Exterior values measure it: where the iteration removes material, those of the deeper solid on the surface
-    of the other; where it adds material, those of the other solid on the surface of the deeper one.
+    None if the shallower solid is empty. Exterior values measure it: where the iteration removes material,
+    those of the deeper solid on the surface of the other; where it adds material, those of the other solid on
+    the surface of the deeper one.
     """
     surfaces = [_surface_points(solid) for solid in (before, after)]
     if not surfaces[0].shape[1]:
@@ -168,8 +168,9 @@ def _step(before: Known, after: Known) -> float | None:
 
 @lru_cache(maxsize=16)
 def _surface_points(solid: Known) -> np.ndarray:
-    """Points [3, n] on the surface, the same in every run: bisected between random points inside and outside,
-    in cells that may be inside. None if nothing is inside.
+    """Points [3, n] on the surface, the same in every run; n = 0 if nothing is inside.
+
+    They are bisected between random points inside and outside, in cells that may be inside.
     """
     kernel, bounds = compile_scene(solid.node, "float64"), solid.node.bounds
     cells, _, step = possible_cells(lambda p: kernel.points(*p), bounds.lipschitz, bounds.box, CELLS)

@@ -137,6 +137,7 @@ class Body(Expressions):
         function.return_value.type = result
 
     def fail(self, node: ast.AST, message: str) -> KernelError:
+        """Return an error with the place of a node."""
         line, file = ast.unparse(node).splitlines()[0], self.emitter.files.get(self.name)
         name = self.name.removeprefix("f_").removeprefix("l_")
         where = f"{file}:{getattr(node, 'lineno', 1)}: loop" if file else "formula"
@@ -144,6 +145,7 @@ class Body(Expressions):
 
     # --- statements: each returns True if the next statement is reachable ---
     def statements(self, body: Sequence[ast.stmt]) -> bool:
+        """Emit statements; return True if the next statement is reachable."""
         for statement in body:
             try:
                 reached = self.statement(statement)
@@ -154,6 +156,7 @@ class Body(Expressions):
         return True
 
     def statement(self, node: ast.stmt) -> bool:
+        """Emit a statement; return True if the next one is reachable."""
         match node:
             case ast.Assign([target], value):
                 self.assign(target, self.value(value))
@@ -186,6 +189,7 @@ class Body(Expressions):
         return True
 
     def assign(self, target: ast.expr, value: Value) -> None:
+        """Emit an assignment."""
         match target:
             case ast.Name(name):
                 self.names[name], self.blocks[name] = value, self.builder.block
@@ -201,6 +205,7 @@ class Body(Expressions):
                 raise MismatchError("a name is expected to assign to")
 
     def branch(self, test: Any, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> bool:
+        """Emit an ``if`` statement; return True if the next statement is reachable."""
         names, ends = dict(self.names), []
         blocks = [self.builder.append_basic_block() for _ in range(2)]
         self.builder.cbranch(test, *blocks)
@@ -212,7 +217,7 @@ class Body(Expressions):
         return self.joined(ends)
 
     def joined(self, ends: Sequence[tuple[Any, Names]]) -> bool:
-        """Join blocks: continue with the names that all of them have. False if there are none."""
+        """Join blocks and continue with the names that all of them have; return False without blocks."""
         if not ends:
             return False
         first, *others = (names for _, names in ends)
@@ -276,6 +281,7 @@ class Body(Expressions):
         own: tuple[str, ...],
         kinds: dict[str, Kind],
     ) -> bool:
+        """Emit a loop once, with given kinds for some names; raise `_WiderError` if others are needed."""
         for name, kind in kinds.items():
             self.names[name] = as_kind(self.names[name], kind, self.lanes, self.builder)
         start, head = self.builder.block, self.builder.append_basic_block()

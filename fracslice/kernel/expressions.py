@@ -67,7 +67,7 @@ class Expressions:
     blocks: dict[str, Any]
 
     def value(self, node: ast.expr) -> Value:
-        """Emit an expression."""
+        """Emit an expression; return its value."""
         match node:
             case ast.Constant(value):
                 return self.constant(value)
@@ -94,6 +94,7 @@ class Expressions:
         raise MismatchError("it is not in the language")
 
     def constant(self, value: object) -> Value:
+        """Emit a constant."""
         if isinstance(value, bool):
             return ir.Constant(BOOL, int(value))
         if isinstance(value, (int, float)):
@@ -110,9 +111,11 @@ class Expressions:
         return value
 
     def condition(self, node: ast.expr) -> Any:
+        """Emit an expression as a scalar condition."""
         return truth(self.builder, self.value(node))
 
     def unary(self, op: ast.unaryop, value: Value) -> Value:
+        """Emit a unary operator."""
         if isinstance(op, ast.Not):
             return self.builder.not_(truth(self.builder, value))
         if isinstance(value, Vec):
@@ -122,12 +125,14 @@ class Expressions:
         return self.builder.fneg(value)
 
     def binary(self, op: ast.operator, a: Value, b: Value) -> Value:
+        """Emit a binary operator."""
         if isinstance(op, (ast.BitAnd, ast.BitOr)) and (is_mask(a) or is_mask(b)):
             a, b = (self.lanes.condition(self.builder, v) for v in (a, b))
             return a.each(self.builder.and_ if isinstance(op, ast.BitAnd) else self.builder.or_, b)
         return self.on_lanes(op, a, b) or operate(self.builder, op, a, b)
 
     def comparison(self, op: ast.cmpop, a: Value, b: Value) -> Value:
+        """Emit a comparison."""
         return self.on_lanes(op, a, b) or compare(self.builder, op, a, b)
 
     def on_lanes(self, op: ast.AST, a: Value, b: Value) -> Vec | None:
@@ -180,6 +185,7 @@ class Expressions:
         return made_of(kind, phis, self.lanes, self.builder)
 
     def address(self, place: Any, index: Value) -> Any:
+        """Emit the address of an array element."""
         return self.builder.gep(place, [number(self.builder, index, WHOLE)])
 
     def element(self, place: Value, index: Value) -> Value:
@@ -200,6 +206,7 @@ class Expressions:
         return found
 
     def call(self, name: str, given: list[Value]) -> Value:
+        """Emit a call of a function or an intrinsic."""
         if name in self.emitter.functions:
             count = len(self.emitter.functions[name].args.args)
         elif name in _INTRINSICS or name in _OWN:
@@ -216,6 +223,7 @@ class Expressions:
         return found
 
     def called(self, name: str, given: Sequence[Value]) -> Value:
+        """Emit a call of a function of the text."""
         function, kind = self.emitter.function(name, tuple(map(kind_of, given)))
         result = self.builder.call(function, [part for value in given for part in parts_of(value)])
         count = len(types_of(kind, self.lanes))
@@ -224,10 +232,12 @@ class Expressions:
 
     # --- intrinsics that are not functions of lanes only ---
     def word_where(self, mask: Value, yes: Value, no: Value) -> Vec:
+        """Emit `where`."""
         yes, no = (self.lanes.vec(self.builder, v) for v in (yes, no))
         return self.lanes.condition(self.builder, mask).choose(yes, no)
 
     def word_any_of(self, mask: Value) -> Any:
+        """Emit `any_of`: one bit test of the joined mask registers."""
         if not isinstance(mask, Vec):
             return truth(self.builder, mask)
         parts = self.lanes.condition(self.builder, mask).parts
@@ -236,15 +246,19 @@ class Expressions:
         return self.builder.icmp_unsigned("!=", bits, word(0))
 
     def word_int(self, value: Value) -> Any:
+        """Emit a conversion to an integer."""
         return number(self.builder, value, WHOLE)
 
     def word_min(self, a: Value, b: Value) -> Any:
+        """Emit the minimum of two scalars."""
         return self.extreme("min", a, b)
 
     def word_max(self, a: Value, b: Value) -> Any:
+        """Emit the maximum of two scalars."""
         return self.extreme("max", a, b)
 
     def extreme(self, which: str, a: Any, b: Any) -> Any:
+        """Emit the minimum or maximum of two scalars."""
         if any(isinstance(v, (Vec, tuple)) for v in (a, b)):
             raise MismatchError("this is for numbers that are the same everywhere")
         kind = common(a.type, b.type)

@@ -21,29 +21,87 @@ _INTRINSICS: set[Callable[..., Any]] = set()
 
 
 def intrinsic(function: Function) -> Function:
-    """Decorate a function that the compiler or the linked scene provides under the same name."""
+    """Decorate a function that the compiler or the linked scene provides under the same name.
+
+    Parameters
+    ----------
+    function
+        NumPy implementation.
+
+    Returns
+    -------
+    Callable
+        The function itself.
+    """
     _INTRINSICS.add(function)
     return function
 
 
 def is_intrinsic(value: Any) -> bool:
-    """Return True if a value is an intrinsic, which loops may call."""
+    """Return True if a value is an intrinsic, which loops may call.
+
+    Parameters
+    ----------
+    value
+        Any value.
+
+    Returns
+    -------
+    bool
+        True for an intrinsic.
+    """
     return callable(value) and value in _INTRINSICS
 
 
 @intrinsic
 def load(array: np.ndarray, i: int) -> Any:
-    """Return the lanes that start at element i."""
+    """Load lanes.
+
+    Parameters
+    ----------
+    array
+        Array, [n].
+    i
+        First element.
+
+    Returns
+    -------
+    Any
+        Copy of the elements from i on, at most WIDTH.
+    """
     return array[i : i + WIDTH].copy()
 
 
 @intrinsic
 def store(array: np.ndarray, i: int, lanes: Any) -> None:
-    """Write lanes, starting at element i."""
+    """Store lanes.
+
+    Parameters
+    ----------
+    array
+        Array to modify, [n].
+    i
+        First element.
+    lanes
+        Values, WIDTH of them.
+    """
     array[i : i + WIDTH] = lanes
 
 
 @intrinsic
 def field(x: Any, y: Any, z: Any, P: Any) -> Any:
-    """Evaluate the scene's signed field."""
+    """Evaluate the scene's signed field.
+
+    Parameters
+    ----------
+    x, y, z
+        Coordinates, scene units.
+    P
+        Parameters of the scene; in Python the field itself.
+
+    Returns
+    -------
+    Any
+        Field values.
+    """
     return P(x, y, z)

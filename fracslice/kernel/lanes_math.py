@@ -33,14 +33,17 @@ def _polynomial_in_pairs(x: Vec, coefficients: Sequence[float]) -> Vec:
 
 
 def sqrt(a: Vec) -> Vec:
+    """Return the square root."""
     return a.call("sqrt")
 
 
 def floor(a: Vec) -> Vec:
+    """Return the largest integer not above a."""
     return a.call("floor")
 
 
 def absolute(a: Vec) -> Vec:
+    """Return the absolute value."""
     return a.call("fabs")
 
 
@@ -172,10 +175,12 @@ def _sine(x: Vec, quarter_turns: int) -> Vec:
 
 
 def sin(x: Vec) -> Vec:
+    """Return the sine for |x| up to about 10^4."""
     return _sine(x, 0)
 
 
 def cos(x: Vec) -> Vec:
+    """Return the cosine for |x| up to about 10^4."""
     return _sine(x, 1)
 
 

@@ -1,5 +1,4 @@
-"""Linking of a scene to one self-contained Python module: only the functions it uses, with its numbers as
-arguments.
+"""Linking of a scene to a self-contained Python module: only the functions it uses, its numbers as arguments.
 
 Parts of a scene that differ in numbers only share one function, ``N0(x, y, z, P, P0)``. Their numbers lie in
 the parameter array P from offset P0, followed by those of their child elements. A union of a hundred spheres
@@ -106,26 +105,75 @@ class Linker:
     _shared: dict[Any, str] = field(default_factory=dict)
 
     def field(self, root: Node) -> None:
-        """Write the field of a scene tree."""
+        """Write the field of a scene tree.
+
+        Parameters
+        ----------
+        root
+            Scene with resolved depths.
+
+        Raises
+        ------
+        KernelError
+            If a depth is "auto" or a formula is not in the language.
+        """
         call = link_tree(self, root, FieldDialect(self))
         self.functions[FIELD] = f"def {FIELD}(x, y, z, P):\n    return {call}"
 
     def part(self, prefix: str, key: tuple[Any, ...], write: Callable[[str], Subroutine]) -> Subroutine:
-        """Return the function of a structure; write it once."""
+        """Return the function of a structure; write it once.
+
+        Parameters
+        ----------
+        prefix
+            Prefix of its name.
+        key
+            Structure.
+        write
+            Writes the function under a name.
+
+        Returns
+        -------
+        Subroutine
+            Function of the structure.
+        """
         if (prefix, *key) not in self._parts:
             self._parts[prefix, *key] = write(f"{prefix}{len(self._parts)}")
         return self._parts[prefix, *key]
 
     def argument(self, value: Any) -> str:
-        """Append a number or a tuple of numbers to P; return the expression that reads it back."""
+        """Append a value to P.
+
+        Parameters
+        ----------
+        value
+            Number or nested tuple of numbers.
+
+        Returns
+        -------
+        str
+            Expression that reads the value back.
+        """
         return read(value, self.parameters)
 
     def share(
         self, function: Callable[..., Any], fixed: Sequence[tuple[str, Any]] = (), prefix: str = ""
     ) -> str:
-        """Write a copy of the function with its fixed arguments substituted, once; return its name.
+        """Write a copy of the function with its fixed arguments substituted, once.
 
-        `prefix` precedes its name and those of the functions it calls.
+        Parameters
+        ----------
+        function
+            Formula or helper.
+        fixed
+            Names and values of the fixed arguments.
+        prefix
+            Prefix of its name and of those of the functions it calls.
+
+        Returns
+        -------
+        str
+            Name of the copy.
         """
         suffix = "".join(f"_{k}_{v}" for k, v in sorted(fixed))
         name = prefix + function.__name__ + "".join(c if c.isalnum() else "_" for c in suffix)
@@ -133,7 +181,24 @@ class Linker:
         return self.add((prefix, function, tuple(fixed)), name, copy, prefix)
 
     def add(self, key: tuple[Any, ...], name: str, copy: source.Copy, prefix: str) -> str:
-        """Write a copy and the functions it calls, once per key; return its name, numbered if in use."""
+        """Write a copy and the functions it calls, once per key.
+
+        Parameters
+        ----------
+        key
+            Identity of the copy.
+        name
+            Preferred name.
+        copy
+            Text and called functions.
+        prefix
+            Prefix of the names of the functions it calls.
+
+        Returns
+        -------
+        str
+            Name of the copy, numbered if `name` is in use.
+        """
         if key not in self._shared:
             taken = {*self._shared.values()}
             number = next(
@@ -158,6 +223,15 @@ class Linker:
         arguments open.
 
         An argument of the function named P receives P.
+
+        Parameters
+        ----------
+        name
+            Name of the new function.
+        function
+            Function to call.
+        values
+            Values of some arguments by name.
         """
         fixed = {k: v.value for k, v in values.items() if isinstance(v, Fixed)}
         called = self.share(function, tuple(fixed.items()))
@@ -186,11 +260,15 @@ class FieldDialect:
     prefix: str = "N"
 
     def kept(self, node: Node) -> Node:
+        """Return the first node at or below this one that is neither an identity nor a CSG operator of one
+        element.
+        """
         while node.is_identity or (node.formula.kind == "csg" and _folds(node) and len(node.children) == 1):
             node = node.children[0]
         return node
 
     def arguments(self, node: Node) -> Arguments:
+        """Return the function of a node and its arguments. Raises `KernelError` if a depth is "auto"."""
         if AUTO in [v for v in node.values.values() if isinstance(v, str)]:
             raise KernelError(
                 f"<{node.formula.name}>: the depth is still auto; resolve it for a voxel size first"
@@ -206,17 +284,20 @@ class FieldDialect:
         return sorted(places, key=lambda k: first.index(parts[k].name))
 
     def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
+        """Return the text of a node's function."""
         write = {"shape": self.shape, "csg": self.csg_operator, "domain": self.domain_operator}[
             node.formula.kind
         ]
         return write(name, given, runs)
 
     def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
+        """Return the text of a shape's function."""
         called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
         passed = ", ".join(["x", "y", "z", *given.passed])
         return function(name, [f"return {called}({passed})"])
 
     def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        """Return the text of a CSG operator's function."""
         called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
         lines = [f"f = {runs[0].call()}"]
         if sum(run.count for run in runs) == 1:
@@ -228,6 +309,7 @@ class FieldDialect:
         return function(name, [*lines, "return f"])
 
     def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        """Return the text of a domain operator's function."""
         tree = source.specialised(given.function, dict(given.fixed))
         arguments = [a.arg for a in tree.args.args][4:]
         tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]

@@ -1,5 +1,4 @@
-"""Linking of loops and the functions that they call to syntax trees for the compilers, with the line numbers
-of their files.
+"""Linking of loops and the functions that they call to syntax trees that keep their files' line numbers.
 
 Numbers from outside a function (of its module, of an enumeration, of a fixed record) become constants, and
 branches on constants are resolved. A function called with fixed arguments is copied for them. Intrinsics keep
@@ -71,7 +70,23 @@ def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
 
 
 def loop_source(loops: Sequence[Loop]) -> str:
-    """Return the text of loops and of the functions that they call."""
+    """Return the text of loops and of the functions that they call.
+
+    Parameters
+    ----------
+    loops
+        Loops to link.
+
+    Returns
+    -------
+    str
+        Source text.
+
+    Raises
+    ------
+    KernelError
+        If a loop is not in the language.
+    """
     return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
 
 

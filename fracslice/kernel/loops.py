@@ -44,13 +44,36 @@ class Loop:
 
 
 def loop(arguments: str) -> Callable[[Callable[..., None]], Loop]:
-    """Return a decorator that makes a function a `Loop` with these arguments."""
+    """Return a decorator that makes a function a `Loop`.
+
+    Parameters
+    ----------
+    arguments
+        Arguments of the loop, one letter each.
+
+    Returns
+    -------
+    Callable
+        Decorator.
+    """
     return lambda function: Loop(function, arguments)
 
 
 @loop("rrrrrn")
 def points(P, X, Y, Z, F, n):
-    """Evaluate the field at n points, n a multiple of WIDTH; NaN at a point with a NaN."""
+    """Evaluate the field at points; NaN at a point with a NaN.
+
+    Parameters
+    ----------
+    P
+        Parameters of the scene.
+    X, Y, Z
+        Coordinates, [n] each, scene units.
+    F
+        Receives the values, [n].
+    n
+        Number of points, a multiple of WIDTH.
+    """
     for i in range(0, n, WIDTH):
         x = load(X, i)
         y = load(Y, i)
@@ -62,7 +85,23 @@ def points(P, X, Y, Z, F, n):
 
 @loop("rrrrrirn")
 def bricks(P, FRAME, IX, IY, IZ, corners, F, n):
-    """Evaluate the 512 samples of each of n bricks, at ``FRAME[:3] + FRAME[3] * (corner + (IX, IY, IZ))``."""
+    """Evaluate the 512 samples of bricks, at ``FRAME[:3] + FRAME[3] * (corner + (IX, IY, IZ))``.
+
+    Parameters
+    ----------
+    P
+        Parameters of the scene.
+    FRAME
+        Position of grid point (0, 0, 0), then grid spacing, [4], scene units.
+    IX, IY, IZ
+        Offsets of the samples from the corner, [512] each.
+    corners
+        Grid index of the first sample of each brick, int32 [n, 3].
+    F
+        Receives the values, [n, 512].
+    n
+        Number of bricks.
+    """
     h = FRAME[3]
     for b in range(n):
         x0 = corners[3 * b]

@@ -44,10 +44,12 @@ class Vec:
 
     @property
     def register(self) -> ir.VectorType:
+        """LLVM type of a register."""
         return self.parts[0].type
 
     @property
     def bits(self) -> int:
+        """Width of an element: 1, 32 or 64."""
         element = self.register.element
         return (
             element.width
@@ -59,13 +61,16 @@ class Vec:
 
     @property
     def whole(self) -> ir.VectorType:
+        """LLVM type of a register of integers of the same width."""
         return ir.VectorType(ir.IntType(self.bits), self.register.count)
 
     @property
     def real(self) -> ir.VectorType:
+        """LLVM type of a register of floats of the same width."""
         return ir.VectorType(ir.FloatType() if self.bits == 32 else ir.DoubleType(), self.register.count)
 
     def const(self, number: float) -> Vec:
+        """Return a constant of this type."""
         constant = ir.Constant(self.register, [number] * self.register.count)
         return Vec(self.builder, (constant,) * len(self.parts))
 
@@ -161,21 +166,27 @@ class Vec:
         return self.each(lambda register: conversion(register, kind))
 
     def plus(self, n: int | Vec) -> Vec:
+        """Add integers."""
         return self.each(self.builder.add, n)
 
     def masked(self, n: int) -> Vec:
+        """Bitwise and of integers."""
         return self.each(self.builder.and_, n)
 
     def left(self, n: int) -> Vec:
+        """Shift integers left."""
         return self.each(self.builder.shl, n)
 
     def right(self, n: int) -> Vec:
+        """Shift integers right, arithmetically."""
         return self.each(self.builder.ashr, n)
 
     def is_set(self) -> Vec:
+        """Return a mask of the non-zero integers."""
         return self.each(partial(self.builder.icmp_signed, "!="), 0)
 
 
 def declare(module: Any, function: ir.FunctionType, name: str) -> Any:
+    """Return the declaration of an external function in a module; add it if missing."""
     known = module.globals.get(name)
     return known if known is not None else ir.Function(module, function, name)

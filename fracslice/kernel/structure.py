@@ -61,7 +61,20 @@ class Run:
     start: int
 
     def call(self, k: str = "", points: str = "x, y, z") -> str:
-        """Return the call of the first element, or of the one k after it."""
+        """Return the call of one element.
+
+        Parameters
+        ----------
+        k
+            Expression of the element's index; default: the first element.
+        points
+            Expressions of the coordinates.
+
+        Returns
+        -------
+        str
+            Expression.
+        """
         place = f"P0 + {self.start}" + (f" + {self.part.size} * {k}" if k else "")
         return f"{self.part.name}({points}, P, {place})"
 
@@ -106,15 +119,56 @@ class Dialect(Protocol):
     prefix: str
 
     def kept(self, node: Node) -> Node:
-        """Return the first node at or below this one that is no identity."""
+        """Return the node that represents this one.
+
+        Parameters
+        ----------
+        node
+            Node of a scene.
+
+        Returns
+        -------
+        Node
+            The first node at or below it that is no identity.
+        """
 
     def arguments(self, node: Node) -> Arguments: ...
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
-        """Return an order in which the children may be evaluated."""
+        """Return an order in which the children may be evaluated.
+
+        Parameters
+        ----------
+        node
+            Node of a scene.
+        parts
+            Functions of its children.
+
+        Returns
+        -------
+        sequence of int
+            Indices of the children.
+        """
 
     def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
-        """Return the text of a node's function."""
+        """Return the text of a node's function.
+
+        Parameters
+        ----------
+        name
+            Name of the function.
+        node
+            Node of a scene.
+        given
+            Function of its formula and arguments.
+        runs
+            Its children.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
 
 
 def link_tree(linker: Linker, root: Node, dialect: Dialect) -> str:

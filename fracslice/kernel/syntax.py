@@ -25,8 +25,19 @@ def _names(tree: ast.AST) -> Iterator[ast.Name]:
 
 
 def point_names(tree: ast.FunctionDef, first: set[str]) -> set[str]:
-    """Return the names whose values differ from point to point: the names `first`, and those computed from
-    them.
+    """Return the names whose values differ from point to point.
+
+    Parameters
+    ----------
+    tree
+        Function.
+    first
+        Names of points.
+
+    Returns
+    -------
+    set of str
+        These names, and those computed from them.
     """
     found = set(first)
     while True:
@@ -53,7 +64,20 @@ def _assigned_points(target: ast.expr, value: ast.expr, points: set[str]) -> Ite
 
 
 def depends_on_points(node: ast.expr, points: set[str]) -> bool:
-    """Return True if a value may differ from point to point; ``any_of`` does not, ``child`` does."""
+    """Return True if a value may differ from point to point; ``any_of`` does not, ``child`` does.
+
+    Parameters
+    ----------
+    node
+        Expression.
+    points
+        Names whose values differ from point to point.
+
+    Returns
+    -------
+    bool
+        True if the value may differ.
+    """
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("any_of", CHILD):
         return node.func.id == CHILD
     if isinstance(node, ast.Name):

@@ -48,18 +48,39 @@ class Lanes:
 
     @property
     def scalar(self) -> ir.Type:
+        """LLVM type of a float."""
         return FLOAT if self.bits == 32 else DOUBLE
 
     @property
     def register(self) -> ir.VectorType:
+        """LLVM type of a register of floats."""
         return ir.VectorType(self.scalar, self.width // self.registers)
 
     @property
     def mask(self) -> ir.VectorType:
+        """LLVM type of a register of booleans."""
         return ir.VectorType(BOOL, self.width // self.registers)
 
     def vec(self, builder: ir.IRBuilder, value: Value) -> Vec:
-        """Return lanes unchanged; broadcast a scalar."""
+        """Return lanes unchanged; broadcast a scalar.
+
+        Parameters
+        ----------
+        builder
+            LLVM IR builder.
+        value
+            Lanes or scalar.
+
+        Returns
+        -------
+        Vec
+            Lanes.
+
+        Raises
+        ------
+        MismatchError
+            For a mask or a tuple.
+        """
         if isinstance(value, Vec):
             if is_mask(value):
                 raise MismatchError(
@@ -72,7 +93,25 @@ class Lanes:
         return Vec(builder, (one,) * self.registers)
 
     def condition(self, builder: ir.IRBuilder, value: Value) -> Vec:
-        """Return a mask unchanged; broadcast a boolean."""
+        """Return a mask unchanged; broadcast a boolean.
+
+        Parameters
+        ----------
+        builder
+            LLVM IR builder.
+        value
+            Mask or scalar.
+
+        Returns
+        -------
+        Vec
+            Mask.
+
+        Raises
+        ------
+        MismatchError
+            For lanes of numbers or a tuple.
+        """
         if isinstance(value, Vec):
             if not is_mask(value):
                 raise MismatchError("a number where a condition is expected")
@@ -81,11 +120,32 @@ class Lanes:
 
 
 def is_mask(value: Value) -> bool:
+    """Return True for a mask."""
     return isinstance(value, Vec) and value.register.element == BOOL
 
 
 def number(builder: ir.IRBuilder, value: Value, kind: ir.Type) -> Any:
-    """Convert a scalar to another type."""
+    """Convert a scalar to another type.
+
+    Parameters
+    ----------
+    builder
+        LLVM IR builder.
+    value
+        Scalar.
+    kind
+        LLVM type.
+
+    Returns
+    -------
+    Any
+        LLVM value of that type.
+
+    Raises
+    ------
+    MismatchError
+        If the value is no scalar.
+    """
     if not isinstance(getattr(value, "type", None), (ir.IntType, ir.FloatType, ir.DoubleType)):
         raise MismatchError("a number is expected")
     given = value.type
@@ -101,18 +161,48 @@ def number(builder: ir.IRBuilder, value: Value, kind: ir.Type) -> Any:
 
 
 def widened(builder: ir.IRBuilder, value: Any, kind: ir.IntType) -> Any:
+    """Extend an integer to a wider type; booleans become 0 or 1."""
     return builder.zext(value, kind) if value.type == BOOL else builder.sext(value, kind)
 
 
 def common(a: ir.Type, b: ir.Type) -> ir.Type:
-    """Return the type in which two scalar types are computed."""
+    """Return the type in which two scalar types are computed.
+
+    Parameters
+    ----------
+    a, b
+        LLVM types.
+
+    Returns
+    -------
+    ir.Type
+        The type itself if both are equal and not boolean, else a 64-bit integer or float.
+    """
     if a == b and a != BOOL:
         return a
     return WHOLE if isinstance(a, ir.IntType) and isinstance(b, ir.IntType) else DOUBLE
 
 
 def truth(builder: ir.IRBuilder, value: Value) -> Any:
-    """Convert a scalar to a condition: True if it is not zero."""
+    """Convert a scalar to a condition: True if it is not zero.
+
+    Parameters
+    ----------
+    builder
+        LLVM IR builder.
+    value
+        Scalar.
+
+    Returns
+    -------
+    Any
+        LLVM boolean.
+
+    Raises
+    ------
+    MismatchError
+        For lanes, a mask or a tuple.
+    """
     if isinstance(value, (Vec, tuple)):
         raise MismatchError("it may differ from point to point; expected where(...), or if any_of(...)")
     if value.type == BOOL:
@@ -132,7 +222,27 @@ _REAL = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
 
 
 def operate(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
-    """Emit arithmetic on two scalars."""
+    """Emit arithmetic on two scalars.
+
+    Parameters
+    ----------
+    builder
+        LLVM IR builder.
+    op
+        Operator.
+    a, b
+        Scalars.
+
+    Returns
+    -------
+    Any
+        LLVM value.
+
+    Raises
+    ------
+    MismatchError
+        For an integer operator on floats.
+    """
     if isinstance(op, (ast.BitAnd, ast.BitOr, ast.BitXor)) and a.type == b.type == BOOL:
         return getattr(builder, _WHOLE[type(op)])(a, b)
     kind = common(a.type, b.type)
@@ -159,7 +269,22 @@ def _floored(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
 
 
 def compare(builder: ir.IRBuilder, op: ast.cmpop, a: Any, b: Any) -> Any:
-    """Emit a comparison of two scalars."""
+    """Emit a comparison of two scalars.
+
+    Parameters
+    ----------
+    builder
+        LLVM IR builder.
+    op
+        Operator.
+    a, b
+        Scalars.
+
+    Returns
+    -------
+    Any
+        LLVM boolean.
+    """
     kind = common(a.type, b.type)
     a, b = number(builder, a, kind), number(builder, b, kind)
     how = _COMPARISONS[type(op)]
@@ -174,6 +299,7 @@ Kind = Any
 
 
 def kind_of(value: Value) -> Kind:
+    """Return the kind of a value."""
     if isinstance(value, tuple):
         return tuple(map(kind_of, value))
     return ("mask" if is_mask(value) else "lanes") if isinstance(value, Vec) else value.type
@@ -211,7 +337,23 @@ def made_of(kind: Kind, parts: Sequence[Any], lanes: Lanes, builder: ir.IRBuilde
 
 
 def joined(a: Kind, b: Kind) -> Kind:
-    """Return the common kind of two kinds."""
+    """Return the common kind of two kinds.
+
+    Parameters
+    ----------
+    a, b
+        Kinds.
+
+    Returns
+    -------
+    Kind
+        Kind that values of both can be converted to.
+
+    Raises
+    ------
+    MismatchError
+        If there is none.
+    """
     if a == b:
         return a
     if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
@@ -229,7 +371,29 @@ def joined(a: Kind, b: Kind) -> Kind:
 
 
 def as_kind(value: Value, kind: Kind, lanes: Lanes, builder: ir.IRBuilder) -> Value:
-    """Convert a value to another kind."""
+    """Convert a value to another kind.
+
+    Parameters
+    ----------
+    value
+        Value.
+    kind
+        Kind that the value can be converted to.
+    lanes
+        Layout of the lanes.
+    builder
+        LLVM IR builder.
+
+    Returns
+    -------
+    Value
+        Value of that kind.
+
+    Raises
+    ------
+    MismatchError
+        If the value cannot be converted.
+    """
     if isinstance(kind, tuple):
         return tuple(as_kind(v, k, lanes, builder) for v, k in zip(value, kind, strict=True))
     if kind == "lanes":

@@ -15,13 +15,25 @@ from ..kernel.loops import loop
 
 @loop("rrrrrrrrrnn")
 def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
-    """Find the root T on each of n segments, which run from (X, Y, Z) along (DX, DY, DZ), as a fraction of
-    the segment. If both ends have the same sign, T is the end nearer to zero. If more than `steps` steps are
-    needed, 2 is added to T.
+    """Find one root on each of n segments.
 
     Fields are steep on one side of their surface and flat on the other, so the secant goes through the last
     two points on one side. If it leaves the bracket, the bracket is halved; after many steps every other step
     halves it too.
+
+    Parameters
+    ----------
+    P, FRAME
+        Parameters of the scene, and of the loop.
+    X, Y, Z, DX, DY, DZ
+        Starts of the segments and vectors to their ends, [n] each, scene units.
+    T
+        Receives the roots as fractions of the segments, [n]. If both ends have the same sign, the end nearer
+        to zero; 2 is added to a root that needs more than `steps` steps.
+    steps
+        Largest number of steps.
+    n
+        Number of segments, a multiple of WIDTH.
     """
     over, small, near, close = FRAME[0], FRAME[1], FRAME[2], FRAME[5]
     for i in range(0, n, WIDTH):
@@ -64,8 +76,22 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
 
 @loop("rrrrrrrrrrrrrn")
 def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
-    """Take one Newton step along the segment from T; store its length in MISS, and in (NX, NY, NZ) the unit
-    normal at the start.
+    """Take one Newton step along each of n segments.
+
+    Parameters
+    ----------
+    P, FRAME
+        Parameters of the scene, and of the loop.
+    X, Y, Z, DX, DY, DZ
+        Starts of the segments and vectors to their ends, [n] each, scene units.
+    T
+        Roots as fractions of the segments, [n]; modified in place.
+    NX, NY, NZ
+        Receive the unit normals where the steps started, [n] each.
+    MISS
+        Receives the lengths of the steps as fractions of the segments, [n].
+    n
+        Number of segments, a multiple of WIDTH.
     """
     e = FRAME[3]
     for i in range(0, n, WIDTH):
@@ -92,8 +118,20 @@ def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
 
 @loop("rrrrrrrrrrn")
 def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
-    """Take one Newton step along the segment from T if it comes nearer to zero; store |f| at its end in MISS,
-    in voxels.
+    """Take one Newton step along each of n segments if it comes nearer to zero.
+
+    Parameters
+    ----------
+    P, FRAME
+        Parameters of the scene, and of the loop.
+    X, Y, Z, DX, DY, DZ
+        Starts of the segments and vectors to their ends, [n] each, scene units.
+    T
+        Roots as fractions of the segments, [n]; modified in place.
+    MISS
+        Receives |f| at the new roots in voxels, [n].
+    n
+        Number of segments, a multiple of WIDTH.
     """
     over = FRAME[0]
     for i in range(0, n, WIDTH):
@@ -116,17 +154,34 @@ def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
 
 @loop("rrrrrrrrrrrrrrrrrrrrn")
 def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, DY, DZ, n):
-    """Compute the direction D from each of n points to the surface.
+    """Compute the vector from each of n points towards the surface.
 
-    D follows the gradient, by central differences so that neither side is preferred at an edge. Its length is
-    four Newton steps, limited by L and H, the distances to the lower and upper sides of the point's trust
-    region. If it does not reach the surface (within rounding), D is O, unless that is NaN. A coordinate
-    without clearance is kept. Slopes below 0.1 count as 0.1, so that no step is longer than ten times |f|.
+    The vector follows the gradient, by central differences so that neither side is preferred at an edge. Its
+    length is four Newton steps, limited by the point's trust region. If it does not reach the surface (within
+    rounding), the vector O replaces it, unless that is NaN. A coordinate without clearance is kept. Slopes
+    below 0.1 count as 0.1, so that no step is longer than ten times |f|.
 
     If the slopes on both sides of a point differ little (by less than 25 degrees: their difference is then 2
     tan(12.5 deg) of their mean, its square 0.05 of theirs) the field is smooth there and no edge is near. The
-    planes that met in the point then belong to a bend that is rounder, or folded finer, than they indicate. D
-    is then M, to the middle of the known part of the surface, if the surface lies between.
+    planes that met in the point then belong to a bend that is rounder, or folded finer, than they indicate.
+    The vector is then M, if the surface lies between.
+
+    Parameters
+    ----------
+    P, FRAME
+        Parameters of the scene, and of the loop.
+    X, Y, Z
+        Points, [n] each, scene units.
+    LX, LY, LZ, HX, HY, HZ
+        Distances to the lower and upper sides of the trust regions, [n] each, scene units.
+    OX, OY, OZ
+        Vectors to points of opposite sign, [n] each, scene units, or NaN.
+    MX, MY, MZ
+        Vectors to the middle of the known part of the surface, [n] each, scene units, or NaN.
+    DX, DY, DZ
+        Receive the vectors, [n] each, scene units.
+    n
+        Number of points, a multiple of WIDTH.
     """
     e, tight = FRAME[3], FRAME[4]
     for i in range(0, n, WIDTH):

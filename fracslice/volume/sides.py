@@ -70,12 +70,34 @@ class FreeSpace:
     work: Work
 
     def inside(self, points: np.ndarray) -> np.ndarray:
-        """Mask of the interior points, bool [n], among points [3, n]."""
+        """Test points.
+
+        Parameters
+        ----------
+        points
+            Points, [3, n], scene units.
+
+        Returns
+        -------
+        ndarray
+            Mask of the interior points, bool [n].
+        """
         found: np.ndarray = values_at(self.kernel, points, self.work) < 0
         return found
 
     def free(self, points: np.ndarray) -> np.ndarray:
-        """Radius of a free ball around each of the points [3, n]; at most zero if none is proven."""
+        """Return radii of free balls.
+
+        Parameters
+        ----------
+        points
+            Centres, [3, n], scene units.
+
+        Returns
+        -------
+        ndarray
+            Radii, float64 [n], scene units; at most zero if no free ball is proven.
+        """
         f = values_at(self.conservative, points, self.work).astype(np.float64)
         rounding = ROUNDING * np.abs(points).max(initial=0.0)
         return np.where(f > 0, f / self.lipschitz - rounding, 0.0)
@@ -123,7 +145,13 @@ class Side:
         self.columns = np.vstack([middles, np.ones(cells.shape[1]), np.full(cells.shape[1], self.above)])
 
     def learn(self, points: np.ndarray) -> None:
-        """Add interior points [3, n]."""
+        """Add interior points.
+
+        Parameters
+        ----------
+        points
+            Interior points, [3, n], scene units.
+        """
         found = np.hstack([self.best, points])
         order = np.argsort(-self.sign * found[self.axis], kind="stable")  # NaN comes last
         self.best = found[:, order[:STARTS]]
@@ -136,15 +164,29 @@ class Side:
         return self.best[:, 0]
 
     def guess(self, share: float, aim: float, most: int) -> None:
-        """Search for tips with a fraction `share` of the Lipschitz bound."""
+        """Search for tips with a reduced Lipschitz bound.
+
+        Parameters
+        ----------
+        share
+            Fraction of the Lipschitz bound.
+        aim, most
+            As for `prove`.
+        """
         bold = replace(self.field, lipschitz=share * self.field.lipschitz)
         other = Side(bold, self.region, self.axis, self.sign, self.best)
         other.prove(aim, most)
         self.best = other.best
 
     def prove(self, aim: float, most: int) -> None:
-        """Lower ceilings until none is more than `aim` above the highest interior point, or `most` columns
-        were processed.
+        """Lower the ceilings and set `above`.
+
+        Parameters
+        ----------
+        aim
+            Allowed height of a ceiling above the highest interior point, scene units.
+        most
+            Number of columns to process at most.
         """
         while self.spent < most:
             self.columns = self.columns[:, self.columns[3] > max(self.known, self.floor)]
@@ -159,12 +201,38 @@ class Side:
         self.above = max(self.columns[3].max(initial=self.floor), self.known)
 
     def high(self, columns: np.ndarray, aim: float) -> np.ndarray:
-        """Mask of the ceilings to lower."""
+        """Return a mask of the ceilings to lower.
+
+        Parameters
+        ----------
+        columns
+            Columns, [4, n].
+        aim
+            Allowed height of a ceiling above the highest interior point, scene units.
+
+        Returns
+        -------
+        ndarray
+            Mask, bool [n].
+        """
         found: np.ndarray = columns[3] > max(self.known + aim, self.floor)
         return found
 
     def lowered(self, columns: np.ndarray, aim: float) -> np.ndarray:
-        """Lower the ceilings of columns; split in four those not lowered much."""
+        """Lower the ceilings of columns; split in four those not lowered much.
+
+        Parameters
+        ----------
+        columns
+            Columns, [4, n].
+        aim
+            Allowed height of a ceiling above the highest interior point, scene units.
+
+        Returns
+        -------
+        ndarray
+            New columns, [4, m].
+        """
         self.spent += columns.shape[1]
         top, radius = columns[3], columns[2] * np.hypot(*self.half)
         lower = np.minimum(top, self.bottom(columns, radius, top))
@@ -178,8 +246,21 @@ class Side:
         return np.hstack([columns[:, ~stuck], self.quarters(columns[:, stuck])])
 
     def bottom(self, columns: np.ndarray, radius: np.ndarray, heights: np.ndarray) -> np.ndarray:
-        """Height down to which free balls at these heights empty the columns; infinite where the ball does
-        not span its column.
+        """Return the heights down to which free balls empty columns.
+
+        Parameters
+        ----------
+        columns
+            Columns, [4, n].
+        radius
+            Radii of the columns, [n], scene units.
+        heights
+            Heights of the balls' centres, [n], scene units.
+
+        Returns
+        -------
+        ndarray
+            Heights, [n], scene units; infinite where the ball does not span its column.
         """
         free = self.field.free(self.points(columns, heights))
         depth = np.sqrt(np.maximum(free**2 - radius**2, 0.0))
@@ -188,6 +269,13 @@ class Side:
     def probe(self, columns: np.ndarray, radius: np.ndarray) -> None:
         """Search for interior points slightly below the ceilings, and on segments from the highest of them up
         to the ceilings.
+
+        Parameters
+        ----------
+        columns
+            Columns, [4, n].
+        radius
+            Radii of the columns, [n], scene units.
         """
         for depth in DEPTHS:
             deep = columns[3] - depth * radius
@@ -200,13 +288,37 @@ class Side:
                 self.learn(way[:, self.field.inside(way)])
 
     def points(self, columns: np.ndarray, heights: np.ndarray) -> np.ndarray:
-        """Points on the axes of columns at given heights, [3, n]."""
+        """Return points on the axes of columns.
+
+        Parameters
+        ----------
+        columns
+            Columns, [4, n].
+        heights
+            Heights, [n], scene units.
+
+        Returns
+        -------
+        ndarray
+            Points, float64 [3, n], scene units.
+        """
         found = np.empty((3, columns.shape[1]))
         found[self.across], found[self.axis] = columns[:2], self.sign * heights
         return found
 
     def quarters(self, columns: np.ndarray) -> np.ndarray:
-        """Split each column in four."""
+        """Split each column in four.
+
+        Parameters
+        ----------
+        columns
+            Columns, [4, n].
+
+        Returns
+        -------
+        ndarray
+            Columns, [4, 4 n].
+        """
         corners = np.array([(-0.5, -0.5, 0.5, 0.5), (-0.5, 0.5, -0.5, 0.5)])[:, None]
         middles = columns[:2, :, None] + corners * self.half[:, None, None] * columns[2, :, None]
         widths, tops = np.repeat(columns[2] / 2, 4), np.repeat(columns[3], 4)

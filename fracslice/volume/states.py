@@ -27,27 +27,80 @@ class States:
 
     @classmethod
     def within(cls, grid: np.ndarray) -> States:
-        """Pad the states [bx, by, bz] of a lattice's bricks by a border."""
+        """Pad the states of a lattice's bricks by a border.
+
+        Parameters
+        ----------
+        grid
+            States, uint8 [bx, by, bz].
+
+        Returns
+        -------
+        States
+            Padded states.
+        """
         padded = np.pad(grid, 1, constant_values=BORDER)
         return cls(padded.reshape(-1), padded.shape)
 
     def step(self, axis: int, step: int) -> int:
-        """Flat offset of the brick that is `step` bricks farther along an axis."""
+        """Return the flat offset between bricks.
+
+        Parameters
+        ----------
+        axis, step
+            Axis, and distance along it in bricks.
+
+        Returns
+        -------
+        int
+            Offset of the flat index.
+        """
         return step * (self.shape[1] * self.shape[2], self.shape[2], 1)[axis]
 
     def places(self, numbers: np.ndarray) -> np.ndarray:
-        """Brick coordinates [3, n] of flat indices [n]."""
+        """Convert flat indices to brick coordinates.
+
+        Parameters
+        ----------
+        numbers
+            Flat indices, int [n].
+
+        Returns
+        -------
+        ndarray
+            Brick coordinates, int [3, n].
+        """
         return np.stack(np.unravel_index(numbers, self.shape)) - 1
 
     def distinct(self, numbers: np.ndarray) -> np.ndarray:
-        """Sorted unique flat indices."""
+        """Sort flat indices and remove duplicates.
+
+        Parameters
+        ----------
+        numbers
+            Flat indices, int [n].
+
+        Returns
+        -------
+        ndarray
+            Sorted unique indices, int [m].
+        """
         those = np.zeros(self.flat.shape, bool)
         those[numbers] = True
         return np.flatnonzero(those)
 
     def beside(self, those: np.ndarray) -> np.ndarray:
-        """Mask of the bricks that share a face with a brick of the mask `those`; both like `flat`. Undefined
-        at the border.
+        """Return a mask of the bricks that share a face with given bricks.
+
+        Parameters
+        ----------
+        those
+            Mask of the given bricks, bool, like `flat`.
+
+        Returns
+        -------
+        ndarray
+            Mask, bool, like `flat`; undefined at the border.
         """
         found = np.zeros_like(those)
         for axis in range(3):
@@ -57,5 +110,16 @@ class States:
         return found
 
     def inner(self, flat: np.ndarray) -> np.ndarray:
-        """Array like `flat` without the border, [bx, by, bz], C-contiguous."""
+        """Remove the border of an array like `flat`.
+
+        Parameters
+        ----------
+        flat
+            Array like `flat`, of any dtype.
+
+        Returns
+        -------
+        ndarray
+            Array [bx, by, bz], C-contiguous.
+        """
         return np.ascontiguousarray(flat.reshape(self.shape)[1:-1, 1:-1, 1:-1])
