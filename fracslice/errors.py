@@ -1,5 +1,6 @@
-"""Exceptions and warnings, one exception class per pipeline stage. Each message is one line that the user can
-act on.
+"""Exceptions and warnings, one exception class per pipeline stage.
+
+Each message is one line that the user can act on.
 """
 
 
@@ -47,7 +48,7 @@ class BenchError(FracsliceError):
     """Invalid or impossible benchmark."""
 
 
-class Cancelled(FracsliceError):  # noqa: N818  it is no fault
+class Cancelled(FracsliceError):  # noqa: N818  cancellation is no error
     """Cancellation requested by the caller."""
 
 

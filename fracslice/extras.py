@@ -6,7 +6,7 @@ import importlib.util
 
 
 def lacking(module: str, use: str, package: str | None = None) -> str:
-    """Return what to install for a use.
+    """Return the package to install for a use.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ def lacking(module: str, use: str, package: str | None = None) -> str:
     Returns
     -------
     str
-        One line; empty if the module is installed.
+        Advice of one line; empty if the module is installed.
 
     Examples
     --------

@@ -167,8 +167,9 @@ class CudaKernel(Kernel):
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """Evaluate the field on bricks of 8 x 8 x 8 grid points. Values can differ from those of `points` in
-        the last place.
+        """Evaluate the field on bricks of 8 x 8 x 8 grid points.
+
+        Values can differ from those of `points` in the last place.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Source text of the CUDA module of a linked scene: one thread per point, all numbers of the kernel's float
+"""Source text of the CUDA module of a linked scene: one thread per point, numbers of the kernel's float
 width.
 
 Numba types a literal as float64 or int64. Arithmetic with float32 then happens in float64, which is up to 64
@@ -62,8 +62,7 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
 
 
 def typed(source: str) -> str:
-    """Rewrite functions in the language of formulas as device functions whose numbers are all ``real`` or
-    ``whole``.
+    """Rewrite formulas as device functions whose numbers are all ``real`` or ``whole``.
 
     Parameters
     ----------
@@ -143,8 +142,9 @@ class _Typed(ast.NodeTransformer):
         return node
 
     def visit_For(self, node: ast.For) -> Any:
-        """Rewrite as a loop over a 32-bit counter: Numba's own iterator costs several instructions per
-        iteration.
+        """Rewrite as a loop over a 32-bit counter.
+
+        Numba's own iterator costs several instructions per iteration.
         """
         match node:
             case ast.For(ast.Name(i), ast.Call(ast.Name("range"), [end])):

@@ -65,8 +65,9 @@ def _extreme(a: Vec, b: Vec, which: str) -> Vec:
 
 
 def ratio(a: Vec, b: Vec) -> Vec:
-    """Return a/b by division: the divider is mostly idle, while an estimate with Newton steps takes
-    multiplications.
+    """Return a/b by division.
+
+    The divider is mostly idle, while an estimate with Newton steps takes multiplications.
     """
     return a / b
 

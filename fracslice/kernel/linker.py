@@ -219,10 +219,10 @@ class Linker:
         return self.renamed(copy, name, OF_FORMULAS)
 
     def bind(self, name: str, function: Callable[..., Any], values: dict[str, Any]) -> None:
-        """Write ``name(rest..., P)``: the function with `values` read from P (or fixed) and its other
-        arguments open.
+        """Write the function ``name(rest..., P)`` that calls a given function.
 
-        An argument of the function named P receives P.
+        Its arguments in `values` are read from P or fixed; the others stay open. An argument named P receives
+        P.
 
         Parameters
         ----------
@@ -260,9 +260,7 @@ class FieldDialect:
     prefix: str = "N"
 
     def kept(self, node: Node) -> Node:
-        """Return the first node at or below this one that is neither an identity nor a CSG operator of one
-        element.
-        """
+        """Return the first node from this one on that is no identity and no CSG operator of one element."""
         while node.is_identity or (node.formula.kind == "csg" and _folds(node) and len(node.children) == 1):
             node = node.children[0]
         return node

@@ -25,8 +25,10 @@ def splat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Vec:
-    """LLVM vectors of floats (or integers of the same width, or booleans), one per register, with Python's
-    operators. An operator acts on one register after the other, so that several are in flight.
+    """LLVM vectors of floats, of integers of the same width, or of booleans, with Python's operators.
+
+    Each vector is one register. An operator acts on one register after the other, so that several are in
+    flight.
 
     Attributes
     ----------

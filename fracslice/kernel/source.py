@@ -42,8 +42,9 @@ class Copy:
 
 
 def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.FunctionDef:
-    """Return a function's tree without decorators, docstring and annotations, its fixed arguments
-    substituted.
+    """Return a function's tree with its fixed arguments substituted.
+
+    Decorators, docstring and annotations are removed.
 
     Parameters
     ----------
@@ -98,8 +99,9 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
 
 
 def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str]) -> Copy:
-    """Return the cached copy of a function. Scenes are linked anew for every camera; this is nine tenths of
-    the time.
+    """Return the cached copy of a function.
+
+    Scenes are linked anew for every camera; copying is nine tenths of the time.
 
     Parameters
     ----------

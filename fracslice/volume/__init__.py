@@ -181,8 +181,9 @@ def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
 
 
 def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
-    """Sample a planned scene as `sample_scene` does, but keep only signs, which suffice to extract the exact
-    surface.
+    """Sample a planned scene as `sample_scene` does, but keep only the signs.
+
+    Signs suffice to extract the exact surface.
 
     Parameters
     ----------

@@ -77,8 +77,9 @@ class Refiner:
         self._first, self._end = 0, 0  # computed intersections: first in memory, one past the last
 
     def between(self, begin: int, end: int) -> Crossings:
-        """Return the intersections of whole bricks from number `begin` to `end` - 1, or further where already
-        computed.
+        """Return the intersections from number `begin` to at least `end` - 1.
+
+        Both numbers lie between bricks. Intersections beyond `end` that an earlier call computed are included.
 
         Parameters
         ----------

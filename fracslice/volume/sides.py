@@ -267,8 +267,9 @@ class Side:
         return np.where(free > radius, heights - depth, np.inf)
 
     def probe(self, columns: np.ndarray, radius: np.ndarray) -> None:
-        """Search for interior points slightly below the ceilings, and on segments from the highest of them up
-        to the ceilings.
+        """Search for interior points slightly below the ceilings.
+
+        From the highest ones found, the segments up to the ceilings are searched too.
 
         Parameters
         ----------
