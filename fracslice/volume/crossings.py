@@ -79,7 +79,7 @@ class Refiner:
     def between(self, begin: int, end: int) -> Crossings:
         """Return the intersections from number `begin` to at least `end` - 1.
 
-        Both numbers lie between bricks. Intersections beyond `end` that an earlier call computed are included.
+        Both numbers lie between bricks. Intersections beyond `end` are included if already computed.
 
         Parameters
         ----------

@@ -13,7 +13,7 @@ from .roots import Roots
 
 NEAR, FOUND = 1e-9, 1e-8
 """Values of |f| in voxels: below `NEAR` a point needs no projection (a corner has no gradient to follow); a
-projected point must be below `FOUND`.
+projected point should be below `FOUND`.
 """
 
 
