@@ -17,9 +17,20 @@ CONFIG: Any = numba.config
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Decorates a function that Numba is to compile, when it is first called; it releases the interpreter.
+    """Compile a function with Numba at its first call; it runs without the GIL.
 
-    The machine code is kept where kernels are, as long as nobody else can write there: Numba would take any.
+    Machine code is cached in the folder of the kernels unless other users can write there: Numba would load
+    any file.
+
+    Parameters
+    ----------
+    function
+        Function to compile.
+
+    Returns
+    -------
+    Callable
+        Numba dispatcher of the function.
     """
     folder = _folder()
     if folder is None:
@@ -33,9 +44,8 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 @cache
 def _folder() -> Path | None:
-    """One for the text of all of them: they call each other, and Numba looks at a function's own file only.
-
-    None if none can be trusted.
+    """Cache folder of all compiled loops, keyed by their joint text: they call each other, and Numba checks
+    only the file of the function itself. None if the folder cannot be trusted.
     """
     own = [path for path in sorted(HERE.rglob("*.py")) if b"@compiled\n" in path.read_bytes()]
     return Kept(cache_folder() / "loops" / texts(*own)).place()

@@ -1,4 +1,4 @@
-"""Disjoint sets as an array of parents: union by the smaller root, paths halved (Tarjan, van Leeuwen 1984).
+"""Disjoint sets as an array of parents: union by the smaller root, path halving (Tarjan, van Leeuwen 1984).
 
 Importing this module imports Numba.
 """
@@ -12,7 +12,20 @@ from .compiled import compiled
 
 @compiled
 def find(parent, i):  # type: ignore[no-untyped-def]
-    """The root of i."""
+    """Return the root of element i; halve its path.
+
+    Parameters
+    ----------
+    parent
+        Parent of each element, int [n]; modified in place.
+    i
+        Element index.
+
+    Returns
+    -------
+    int
+        Root of the set of i.
+    """
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -21,7 +34,15 @@ def find(parent, i):  # type: ignore[no-untyped-def]
 
 @compiled
 def unite(parent, a, b):  # type: ignore[no-untyped-def]
-    """One set from two; the smaller root stays."""
+    """Merge the sets of a and b; the smaller root remains.
+
+    Parameters
+    ----------
+    parent
+        Parent of each element, int [n]; modified in place.
+    a, b
+        Element indices.
+    """
     a, b = find(parent, a), find(parent, b)
     if a < b:
         parent[b] = a
@@ -31,14 +52,33 @@ def unite(parent, a, b):  # type: ignore[no-untyped-def]
 
 @compiled
 def unite_all(parent, some, others):  # type: ignore[no-untyped-def]
-    """The sets of each pair become one."""
+    """Merge the sets of each pair.
+
+    Parameters
+    ----------
+    parent
+        Parent of each element, int [n]; modified in place.
+    some, others
+        Element indices of the pairs, int [k] each.
+    """
     for i in range(len(some)):
         unite(parent, some[i], others[i])
 
 
 @compiled
 def roots(parent):  # type: ignore[no-untyped-def]
-    """The root of each."""
+    """Return the root of each element.
+
+    Parameters
+    ----------
+    parent
+        Parent of each element, int [n]; modified in place.
+
+    Returns
+    -------
+    ndarray
+        Roots, [n], of the dtype of `parent`.
+    """
     root = np.empty_like(parent)
     for i in range(len(parent)):
         root[i] = find(parent, i)

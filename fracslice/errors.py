@@ -1,53 +1,56 @@
-"""What can go wrong, one class per stage. The message is one line that a person can act on."""
+"""Exceptions and warnings, one exception class per pipeline stage.
+
+Each message is one line that the user can act on.
+"""
 
 
 class FracsliceError(Exception):
-    """Base of every error the library raises on purpose."""
+    """Base class of every error that the library raises on purpose."""
 
 
 class SceneError(FracsliceError):
-    """A scene cannot be read or makes no sense; the message names file and line where known."""
+    """Unreadable or invalid scene. The message names file and line where known."""
 
 
 class KernelError(FracsliceError):
-    """A distance kernel cannot be linked or compiled."""
+    """Failure to link or compile the kernel of a distance field."""
 
 
 class DeviceError(KernelError):
-    """There is no such device to compute on."""
+    """Unknown or unavailable compute device."""
 
 
 class VolumeError(FracsliceError):
-    """A volume cannot be sampled, read or written."""
+    """Failure to sample, read or write a volume."""
 
 
 class TooLargeError(VolumeError):
-    """A job needs more memory than there is."""
+    """Job that needs more memory than is available."""
 
 
 class MeshError(FracsliceError):
-    """A mesh cannot be built, read or made into a solid."""
+    """Failure to build, read or repair a mesh."""
 
 
 class ExportError(FracsliceError):
-    """A file cannot be written."""
+    """Failure to write a file."""
 
 
 class RenderError(FracsliceError):
-    """A picture cannot be made."""
+    """Failure to render an image."""
 
 
 class SliceError(FracsliceError):
-    """Layers cannot be cut or written."""
+    """Failure to cut or write layers."""
 
 
 class BenchError(FracsliceError):
-    """A benchmark cannot be run as asked."""
+    """Invalid or impossible benchmark."""
 
 
-class Cancelled(FracsliceError):  # noqa: N818  it is no fault
-    """The caller asked to stop."""
+class Cancelled(FracsliceError):  # noqa: N818  cancellation is no error
+    """Cancellation requested by the caller."""
 
 
 class FracsliceWarning(UserWarning):
-    """Something was done another way than might be expected; the result is right."""
+    """Fallback to another method; the result is correct."""

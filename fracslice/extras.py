@@ -1,4 +1,4 @@
-"""Packages that only some uses need, and what to install where one is missing."""
+"""Optional dependencies, and the command that installs a missing one."""
 
 from __future__ import annotations
 
@@ -6,8 +6,24 @@ import importlib.util
 
 
 def lacking(module: str, use: str, package: str | None = None) -> str:
-    """What to install for a use, in one line; nothing where the module is installed.
+    """Return the package to install for a use.
 
+    Parameters
+    ----------
+    module
+        Module that the use needs.
+    use
+        Use, with its verb.
+    package
+        Package of the module, if its name differs.
+
+    Returns
+    -------
+    str
+        Advice of one line; empty if the module is installed.
+
+    Examples
+    --------
     >>> lacking("json", "files need")
     ''
     >>> lacking("no_such_module", "windows need", "no-such-package")

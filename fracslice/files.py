@@ -1,4 +1,4 @@
-"""Files that appear whole, and files that nobody else can have written."""
+"""Atomic file writes, and files that no other user can have written."""
 
 from __future__ import annotations
 
@@ -24,15 +24,25 @@ FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 class NotPrivateError(PermissionError):
-    """Somebody else can write there."""
+    """Another user can write to this place."""
 
 
 @contextmanager
 def replacing(target: Path) -> Iterator[BinaryIO]:
-    """Opens a file that appears at `target` complete when the block ends, and never otherwise.
+    """Write a file atomically: it appears at `target` complete when the block ends, or not at all.
 
-    It is this user's alone, and lies beside the target until then; any error, KeyboardInterrupt too, removes
-    it.
+    The temporary file lies beside the target, with permissions for its owner only. Any error,
+    KeyboardInterrupt included, removes it.
+
+    Parameters
+    ----------
+    target
+        Final path.
+
+    Yields
+    ------
+    BinaryIO
+        Temporary file, open for writing.
     """
     part = target.with_name(f".{target.name[:100]}.{token_hex(8)}.part")
     handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, OWNER_ONLY)
@@ -48,16 +58,33 @@ def replacing(target: Path) -> Iterator[BinaryIO]:
 
 @dataclass(frozen=True)
 class Kept:
-    """Files that are kept in a folder for later, for as long as nobody else can write there.
+    """Cache files in a folder that no other user can write to.
 
-    folder: made when first looked into, for this user alone. A folder or a file that others can write is not
-    used, and a warning says so, once.
+    A folder or file that others can write to is ignored, with one warning.
+
+    Attributes
+    ----------
+    folder
+        Cache folder, created at first use for this user alone.
     """
 
     folder: Path
 
     def get(self, name: str, read: Callable[[BinaryIO], T]) -> T | None:
-        """What `read` makes of a file; None if there is none, or none to be trusted."""
+        """Read a cached file.
+
+        Parameters
+        ----------
+        name
+            File name.
+        read
+            Reads the open file.
+
+        Returns
+        -------
+        object
+            Result of `read`; None if the file is missing or not trusted.
+        """
         try:
             with _private_folder(self.folder) as here, opened(name, "rb", folder=here) as file:
                 return read(file)
@@ -68,7 +95,13 @@ class Kept:
         return None
 
     def place(self) -> Path | None:
-        """The folder itself, for what has to be given a path; None if there is none to be trusted."""
+        """Return the path of the folder, for code that needs one.
+
+        Returns
+        -------
+        Path
+            Resolved path; None if the folder cannot be opened or is not trusted.
+        """
         try:
             with _private_folder(self.folder):
                 return Path(os.path.realpath(self.folder))
@@ -79,7 +112,20 @@ class Kept:
         return None
 
     def put(self, name: str, write: Callable[[BinaryIO], object]) -> None:
-        """Keeps a file. Raises OSError where that cannot be, other than for what `get` warns of."""
+        """Write a cached file atomically; ignore a folder that is not trusted.
+
+        Parameters
+        ----------
+        name
+            File name.
+        write
+            Writes to the open file.
+
+        Raises
+        ------
+        OSError
+            If writing fails for another reason than that.
+        """
         target = Path(os.path.realpath(self.folder), name)
         with suppress(NotPrivateError), _private_folder(self.folder), replacing(target) as file:
             write(file)
@@ -92,12 +138,32 @@ class Kept:
 def opened(
     path: str | Path, mode: Literal["rb", "r+b"], flags: int = 0, folder: int | None = None
 ) -> Iterator[BinaryIO]:
-    """Opens a file that nobody else can write, and follows no link to it.
+    """Open a file that no other user can write; do not follow a symbolic link.
 
-    flags: of `os.open`; a file that they make is for this user alone. folder: an open folder that `path` is
-    in. Raises `NotPrivateError` and OSError.
+    Parameters
+    ----------
+    path
+        File.
+    mode
+        "rb" or "r+b".
+    flags
+        Further flags for `os.open`. A file that they create is for its owner only.
+    folder
+        Descriptor of the open folder that `path` is relative to.
+
+    Yields
+    ------
+    BinaryIO
+        Open file.
+
+    Raises
+    ------
+    NotPrivateError
+        If another user can write the file.
+    OSError
+        If it cannot be opened.
     """
-    flags |= os.O_NOFOLLOW | os.O_NONBLOCK  # a pipe in its place would wait for its other end
+    flags |= os.O_NOFOLLOW | os.O_NONBLOCK  # opening a pipe would otherwise block
 
     def opener(name: str, by_mode: int) -> int:
         return os.open(name, by_mode | flags, OWNER_ONLY, dir_fd=folder)
@@ -111,10 +177,10 @@ def opened(
 
 @contextmanager
 def _private_folder(folder: Path) -> Iterator[int]:
-    """Opens a folder that nobody else can change: neither what is in it, nor where its path leads.
+    """Open a folder whose contents and path no other user can change; create it if it does not exist.
 
-    It is made if it is not there. Goes down from the root, holding each folder while it looks at the next:
-    what was looked at cannot be exchanged.
+    Descends from the root and keeps each folder open while it checks the next one, so that nothing already
+    checked can be exchanged.
     """
     path = Path(os.path.realpath(folder))
     here = os.open(path.anchor, FOLDER)
@@ -133,7 +199,7 @@ def _private_folder(folder: Path) -> Iterator[int]:
 
 
 def _folder(name: str, within: int) -> int:
-    """Opens a folder, made for this user alone if it is not there."""
+    """Open a folder; create it for this user alone if it does not exist."""
     try:
         return os.open(name, FOLDER, dir_fd=within)
     except FileNotFoundError:
@@ -143,18 +209,20 @@ def _folder(name: str, within: int) -> int:
 
 
 def _trusted() -> tuple[int, int]:
-    """Whose files are this user's own: root could change any."""
+    """User ids whose files are trusted: this user's and root's, which could change any file anyway."""
     return 0, os.geteuid()
 
 
 def _lets_exchange(status: os.stat_result) -> bool:
-    """Whether others can put something of theirs in the place of what this user has in a folder."""
+    """True if others can replace an entry of this user in a folder."""
     others = status.st_mode & stat.S_IWOTH or (status.st_mode & stat.S_IWGRP and not _alone_in(status.st_gid))
     return status.st_uid not in _trusted() or bool(others and not status.st_mode & stat.S_ISVTX)
 
 
 def _alone_in(group: int) -> bool:
-    """Whether a group is the user's own: Debian gives each user one, which may write what its user makes."""
+    """True if a group is the user's private group. Debian creates one per user, with write permission on the
+    user's files.
+    """
     try:
         user, found = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
     except KeyError:
@@ -164,14 +232,30 @@ def _alone_in(group: int) -> bool:
 
 @cache
 def warn(text: str) -> None:
-    """Says something, in one line, once."""
+    """Issue a `FracsliceWarning` once.
+
+    Parameters
+    ----------
+    text
+        Message of one line.
+    """
     warnings.warn(text, FracsliceWarning, stacklevel=2)
 
 
 def users_folder(variable: str, default: str) -> Path:
-    """The program's folder in one of the user's, which an environment variable names or else is `default`.
+    """Return the folder of this program within one of the user's folders.
 
-    A user without a home gets one that cannot be.
+    Parameters
+    ----------
+    variable
+        Environment variable that names the user's folder.
+    default
+        Folder used if the variable is not set.
+
+    Returns
+    -------
+    Path
+        Folder; a path that cannot exist if the user has no home.
     """
     base = os.path.expanduser(os.environ.get(variable) or default)
     return Path(base if os.path.isabs(base) else os.devnull, "fracslice")

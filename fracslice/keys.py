@@ -1,4 +1,4 @@
-"""Names of what is kept: hashes of everything that it follows from."""
+"""Cache keys: hashes of everything that a result depends on."""
 
 from __future__ import annotations
 
@@ -14,9 +14,17 @@ HERE = Path(__file__).parent
 
 
 def key(*parts: object) -> str:
-    """Equal for equal parts in the same order, and different otherwise.
+    """Hash some values: equal for equal values in the same order, different otherwise.
 
-    parts: arrays, bytes, texts, and what `repr` tells all of: numbers, records, tuples of such.
+    Parameters
+    ----------
+    *parts
+        Arrays, bytes, text, and values that `repr` describes completely: numbers, records, tuples of these.
+
+    Returns
+    -------
+    str
+        First 32 hexadecimal digits of a SHA-256 digest.
     """
     digest = hashlib.sha256()
     for part in parts:
@@ -27,6 +35,7 @@ def key(*parts: object) -> str:
 
 
 def _told(part: object) -> tuple[bytes | memoryview, ...]:
+    """Bytes that identify a value: type and shape, then contents."""
     if isinstance(part, np.ndarray):
         array = np.ascontiguousarray(part)
         return f"{part.dtype.str} {part.shape}".encode(), array.reshape(-1).view(np.uint8).data
@@ -34,13 +43,30 @@ def _told(part: object) -> tuple[bytes | memoryview, ...]:
 
 
 def texts(*paths: Path) -> str:
-    """The key of what is in these files."""
+    """Hash the contents of files.
+
+    Parameters
+    ----------
+    *paths
+        Files to read.
+
+    Returns
+    -------
+    str
+        Key of their contents.
+    """
     return key(*(path.read_bytes() for path in paths))
 
 
 @cache
 def program() -> str:
-    """The key of the whole program and of what computes for it."""
+    """Hash the program, its native modules and the libraries that it computes with.
+
+    Returns
+    -------
+    str
+        Key of this installation.
+    """
     native = (find_spec(f"{__package__}.{name}") for name in ("_native", "_slices"))
     compiled = (Path(found.origin) for found in native if found and found.origin)
     versions = (version(name) for name in ("numpy", "scipy"))

@@ -1,4 +1,4 @@
-"""How much memory there is, and how much a job takes."""
+"""Memory available on this machine, and memory used by this process."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ from pathlib import Path
 
 
 def peak_rss_mb() -> float:
-    """The most memory this process has used so far, in MB."""
+    """Return the peak resident set size of this process.
+
+    Returns
+    -------
+    float
+        Peak memory, MiB.
+    """
     import resource
     import sys
 
@@ -16,7 +22,13 @@ def peak_rss_mb() -> float:
 
 
 def available_bytes() -> int:
-    """The memory that can still be had: what is free, within the limits set on this process's group."""
+    """Return the memory that this process can still allocate.
+
+    Returns
+    -------
+    int
+        Free memory in bytes, within the limits of the process's control group.
+    """
     free = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     for line in _lines("/proc/meminfo"):
         if line.startswith("MemAvailable:"):

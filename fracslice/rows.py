@@ -1,4 +1,4 @@
-"""Records of arrays that run side by side."""
+"""Records of arrays of equal length."""
 
 from __future__ import annotations
 
@@ -9,18 +9,40 @@ import numpy as np
 
 
 class Rows:
-    """A dataclass of nothing but arrays with a row for each of n things, [n, ...]."""
+    """Base of dataclasses whose fields are all arrays with one row per item, [n, ...]."""
 
     def chosen(self, which: np.ndarray | slice) -> Self:
-        """Some of them: bool [n], numbers or a slice."""
+        """Select rows.
+
+        Parameters
+        ----------
+        which
+            Mask, bool [n]; row indices; or a slice.
+
+        Returns
+        -------
+        Self
+            The selected rows of every array.
+        """
         return type(self)(*(values[which] for values in vars(self).values()))
 
     def __add__(self, more: Self) -> Self:
-        """These, then those."""
+        """Append the rows of another record."""
         return type(self).joined([self, more])
 
     @classmethod
     def joined(cls, records: Sequence[Self]) -> Self:
-        """All of them, one after the other; at least one."""
+        """Concatenate records.
+
+        Parameters
+        ----------
+        records
+            At least one record.
+
+        Returns
+        -------
+        Self
+            The rows of all records, in order.
+        """
         arrays = zip(*(vars(record).values() for record in records), strict=True)
         return cls(*(np.concatenate(some) for some in arrays))

@@ -1,4 +1,4 @@
-"""Marks that only this user can make: who carries one was not written by anybody else."""
+"""Marks that only this user can make. A text with a valid mark was written by this user."""
 
 from __future__ import annotations
 
@@ -9,16 +9,28 @@ from functools import cache
 from .files import Kept, users_folder, warn
 
 SIZE = 32
+"""Length of the secret, bytes."""
 
 
 def seal(text: str) -> str:
-    """The mark of a text: its hash, keyed by this user's secret."""
+    """Return the mark of a text: its hash, keyed by this user's secret.
+
+    Parameters
+    ----------
+    text
+        Text to mark.
+
+    Returns
+    -------
+    str
+        BLAKE2b digest of 16 bytes, hexadecimal.
+    """
     return hashlib.blake2b(text.encode(), key=_secret(), digest_size=16).hexdigest()
 
 
 @cache
 def _secret() -> bytes:
-    """The same in every process of this user, kept in the user's configuration folder."""
+    """Secret of this user, the same in every process, stored in the user's configuration folder."""
     kept = Kept(users_folder("XDG_CONFIG_HOME", "~/.config"))
     found = kept.get("secret", lambda file: file.read())
     if found is None or len(found) != SIZE:

@@ -1,4 +1,4 @@
-"""Finished work that is kept in a folder, for the next job that asks for the same."""
+"""Cache of finished results in a folder, for later jobs with the same input."""
 
 from __future__ import annotations
 
@@ -23,19 +23,38 @@ Arrays = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Store:
-    """Arrays in files named by the hash of all that they follow from.
+    """Cache of arrays in files named by the hash of everything that they depend on.
 
-    folder: made when first written to. A file that cannot be read, or is not whole, is made again; a folder
-    that others can write is not used (`files.Kept`).
+    An unreadable or incomplete file is recomputed. A folder that other users can write to is not used
+    (`files.Kept`).
+
+    Attributes
+    ----------
+    folder
+        Cache folder, created by the first write.
     """
 
     folder: Path
 
     def get(self, made_of: tuple[object, ...], make: Callable[[], Arrays]) -> Arrays:
-        """The arrays made of these parts: those kept, or made now and kept.
+        """Return cached arrays, or compute and cache them.
 
-        made_of: as `keys.key` takes them; the program's own text counts too. Raises `VolumeError` if the
-        folder cannot be written.
+        Parameters
+        ----------
+        made_of
+            Values that the arrays depend on, as for `keys.key`; the program's own text is added.
+        make
+            Computes the arrays.
+
+        Returns
+        -------
+        Mapping
+            Arrays by name.
+
+        Raises
+        ------
+        VolumeError
+            If the folder cannot be written.
         """
         kept, name = Kept(self.folder), f"{key(program(), toolchain(), *made_of)}.npz"
         found = kept.get(name, _read)
@@ -50,12 +69,34 @@ class Store:
 
 
 def stored(store: Store | None, parts: tuple[object, ...], root: Field, make: Callable[[], Arrays]) -> Arrays:
-    """What `make` makes of a field and other parts, kept in the store if there is one."""
+    """Return the arrays of a field: cached if there is a store, else computed.
+
+    Parameters
+    ----------
+    store
+        Cache, or None to compute without one.
+    parts
+        Values that the arrays depend on, besides the field.
+    root
+        Field.
+    make
+        Computes the arrays.
+
+    Returns
+    -------
+    Mapping
+        Arrays by name.
+
+    Raises
+    ------
+    VolumeError
+        If the folder of the store cannot be written.
+    """
     return make() if store is None else store.get((*parts, root.key), make)
 
 
 def _read(file: BinaryIO) -> Arrays | None:
-    """The arrays in a file; None where it is not whole."""
+    """Read the arrays of a file; None if it is incomplete."""
     try:
         with np.load(file, allow_pickle=False) as arrays:
             return dict(arrays)

@@ -1,4 +1,4 @@
-"""How work is done, apart from what is done: threads, progress, and a way to stop it."""
+"""Execution of a job: threads, progress and cancellation."""
 
 from __future__ import annotations
 
@@ -22,20 +22,35 @@ R = TypeVar("R")
 
 
 _POOL = ThreadPoolExecutor(256, "fracslice")
-"""Threads that help, started when first needed and kept: starting one takes longer than many a task."""
+"""Worker threads, started on demand and kept: starting a thread takes longer than many tasks."""
 
 
 def _silent(stage: str, done: float) -> None:
-    """Progress that nobody looks at."""
+    """Ignore progress."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """threads: how many to use (default: all cores). progress: called as ``progress(stage, fraction)`` from
-    time to time. cancel: set it from anywhere and the work stops within a fraction of a second with
-    `Cancelled`. store: where samples and surfaces are kept and looked for, if anywhere. device:
-    what samples bricks; a GPU's samples can differ from the CPU's in the last place. Raises `SceneError` for
-    a number of threads that cannot be."""
+    """Execution settings of a job.
+
+    Attributes
+    ----------
+    threads
+        Number of threads, at most 1024; default: all cores.
+    progress
+        Called as ``progress(stage, fraction)`` from time to time.
+    cancel
+        Event that any thread may set; the job then raises `Cancelled` within a fraction of a second.
+    store
+        Cache of samples and surfaces, or None.
+    device
+        Device that samples bricks. Samples of a GPU can differ from those of the CPU in the last place.
+
+    Raises
+    ------
+    SceneError
+        For an invalid number of threads.
+    """
 
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
     progress: Callable[[str, float], None] = _silent
@@ -44,17 +59,41 @@ class Work:
     device: Device = "cpu"
 
     def __post_init__(self) -> None:
-        from .formulas.parameters import Count, validate  # loads NumPy, which help does without
+        from .formulas.parameters import Count, validate  # imports NumPy, which --help does not need
 
         validate(self, {"threads": Count(1, "how many", least=1, most=1024)}, SceneError)
 
     def check(self) -> None:
-        """Raises `Cancelled` once somebody asked to stop."""
+        """Raise `Cancelled` if cancellation was requested.
+
+        Raises
+        ------
+        Cancelled
+            If `cancel` is set.
+        """
         if self.cancel.is_set():
             raise Cancelled("cancelled")
 
     def collect(self, task: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """As `map`; returns what the tasks do, in the order of the items."""
+        """Run a task on every item, as `map` does, and return the results.
+
+        Parameters
+        ----------
+        task
+            Function of one item.
+        items
+            Items.
+
+        Returns
+        -------
+        list
+            Results in the order of the items.
+
+        Raises
+        ------
+        Cancelled
+            If `cancel` is set.
+        """
         found: dict[int, R] = {}
 
         def numbered(index: int) -> None:
@@ -64,8 +103,21 @@ class Work:
         return [found[index] for index in range(len(items))]
 
     def map(self, task: Callable[[T], None], items: Sequence[T]) -> None:
-        """Runs `task` on every item, in this thread and others. Tasks write to places of their own, and their
-        order must not matter.
+        """Run a task on every item, in this thread and in workers.
+
+        Tasks must write to disjoint places and must not depend on their order.
+
+        Parameters
+        ----------
+        task
+            Function of one item.
+        items
+            Items.
+
+        Raises
+        ------
+        Cancelled
+            If `cancel` is set.
         """
         if self.threads == 1 or len(items) <= 1:
             for item in items:
@@ -103,19 +155,52 @@ class Work:
 
 
 def chunks(count: int, size: int) -> list[slice]:
-    """The slices that cut `count` things into pieces of at most `size`."""
+    """Split a range of indices into slices.
+
+    Parameters
+    ----------
+    count
+        Number of items.
+    size
+        Largest number of items per slice.
+
+    Returns
+    -------
+    list of slice
+        Consecutive slices that cover all items.
+    """
     return [slice(i, min(i + size, count)) for i in range(0, count, size)]
 
 
 @dataclass(frozen=True)
 class Clock:
-    """The stages of a job: tells of each as it begins, stops between them when asked to, takes the time."""
+    """Stage timer of a job: reports progress, checks for cancellation between stages and measures time.
+
+    Attributes
+    ----------
+    work
+        Execution settings.
+    seconds
+        Wall-clock time per stage, and "total", in seconds.
+    """
 
     work: Work
     seconds: dict[str, float] = field(default_factory=lambda: {"total": 0.0})
 
     @contextmanager
     def __call__(self, stage: str) -> Iterator[None]:
+        """Time a stage; a repeated stage adds up.
+
+        Parameters
+        ----------
+        stage
+            Name of the stage.
+
+        Raises
+        ------
+        Cancelled
+            If cancellation was requested before the stage began.
+        """
         self.work.check()
         self.work.progress(stage, 0.0)
         started = time.perf_counter()

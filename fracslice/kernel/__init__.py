@@ -1,4 +1,4 @@
-"""A scene's distance field as something that can be called: the NumPy reference and the CPU's SIMD lanes."""
+"""Compiled kernels of a scene's distance field: the NumPy reference and SIMD lanes of the CPU."""
 
 from ..formulas.field import Field, Kernel
 from .cpu import CpuKernel, compile_scene

@@ -1,4 +1,4 @@
-"""Fields that are no tree of formulas: NumPy runs their loops."""
+"""Fields that are no tree of formulas; NumPy runs their loops."""
 
 from __future__ import annotations
 
@@ -13,21 +13,42 @@ from ..formulas.field import Field, Kernel, Loops, Precision
 from .loops import Loop
 
 BATCH = 1 << 14
-"""Points that a loop is run on together."""
+"""Points per call of a loop."""
 
 
 class ArrayField(Field, Protocol):
-    """A field whose kernel is called on arrays."""
+    """Field whose kernel evaluates arrays."""
 
     def loops(self, loops: Sequence[Loop], precision: Precision) -> Loops:
-        """The same functions run by NumPy: all points are one vector."""
+        """Run loops over the field by NumPy, with all points as one vector.
+
+        Parameters
+        ----------
+        loops
+            Loops to run.
+        precision
+            "float32" or "float64".
+
+        Returns
+        -------
+        Loops
+            Loops by name, with one lane.
+        """
         kernel = self.kernel("cpu", precision)
         return Loops(1, BATCH, {loop.name: ArrayLoop(loop, kernel) for loop in loops})
 
 
 @dataclass(frozen=True, eq=False)
 class ArrayLoop:
-    """A `formulas.field.Run` in Python."""
+    """Python implementation of `formulas.field.Run`.
+
+    Attributes
+    ----------
+    loop
+        Loop to run.
+    kernel
+        Kernel of the field.
+    """
 
     loop: Loop
     kernel: Kernel
@@ -37,4 +58,16 @@ class ArrayLoop:
             self.loop.function(self.kernel.points, frame, *rows, *out, *numbers, rows.shape[1])
 
     def native(self, frame: np.ndarray) -> Callable[..., None]:
+        """Return the loop for native code.
+
+        Parameters
+        ----------
+        frame
+            Frame of the loop.
+
+        Returns
+        -------
+        Callable
+            Python function of the loop's other arguments.
+        """
         return partial(self, frame)

@@ -1,4 +1,4 @@
-"""Where an object can be: cells of its box that are not proven empty, by branch and bound."""
+"""Branch and bound: cells of a box that are not proven empty."""
 
 from __future__ import annotations
 
@@ -10,18 +10,38 @@ from ..formulas.algebra import length
 from ..formulas.box import Box
 
 FIRST = 8
-"""Cells along the box' longest side on the first level."""
+"""Cells along the longest side of the box on the first level."""
 
 LEVELS = 12
+"""Largest number of levels."""
 
 
 def possible_cells(
     field: Callable[[np.ndarray], np.ndarray], lipschitz: float, box: Box, most: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The cells of a box where a field may be negative, cut in eight as long as there are at most `most`.
+    """Return the cells of a box where a field may be negative.
 
-    field: values [n] at points [3, n], scene units. lipschitz: its bound. Returns the cells' centres [3, n],
-    the values there [n], and the size of each cell [3].
+    Cells are split in eight while their number stays at most `most`.
+
+    Parameters
+    ----------
+    field
+        Function of points [3, n], scene units, returns values [n].
+    lipschitz
+        Lipschitz bound of the field.
+    box
+        Box to search, scene units.
+    most
+        Largest number of cells.
+
+    Returns
+    -------
+    centres : ndarray
+        Centres of the cells, float64 [3, n], scene units.
+    values : ndarray
+        Field values at the centres, [n].
+    step : ndarray
+        Size of each cell, float64 [3], scene units.
     """
     size = np.maximum(np.array(box.size), 1e-6 * max(box.size))
     counts = np.ceil(FIRST * size / size.max()).astype(int)

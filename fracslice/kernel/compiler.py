@@ -1,4 +1,4 @@
-"""From a linked scene to machine code, by LLVM. Imported only when a kernel is not in the cache."""
+"""Compilation of a linked scene to machine code by LLVM. Imported only if the kernel is not cached."""
 
 from __future__ import annotations
 
@@ -19,12 +19,24 @@ from .loops import Loop
 from .values import DOUBLE, FLOAT, WHOLE, Lanes
 
 PART = ["x", "y", "z", "P", "P0"]
-"""The arguments of a part's function."""
+"""Arguments of a part's function."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """What code is made for: float width, lanes and the registers they fill, CPU name and features."""
+    """Compilation target.
+
+    Attributes
+    ----------
+    bits
+        Width of a float: 32 or 64.
+    width
+        Lanes.
+    registers
+        Vector registers per value.
+    cpu, features
+        CPU name and features, as LLVM spells them.
+    """
 
     bits: int
     width: int
@@ -34,7 +46,27 @@ class Target:
 
 
 def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> bytes:
-    """An object file with one C function per loop over the scene's field. Raises `KernelError`."""
+    """Compile loops over a scene's field to an object file with one C function per loop.
+
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    target
+        Compilation target.
+    loops
+        Loops to compile.
+
+    Returns
+    -------
+    bytes
+        Object file.
+
+    Raises
+    ------
+    KernelError
+        If a loop or formula is not in the language.
+    """
     lanes_math.HOST_FEATURES = frozenset(f[1:] for f in target.features.split(",") if f.startswith("+"))
     module = llvm.parse_assembly(_text(linked, target, loops))
     _optimise(module, _target_machine(target))
@@ -42,10 +74,10 @@ def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> byt
 
 
 def _text(linked: Linked, target: Target, loops: Sequence[Loop]) -> str:
-    """The loops in LLVM's language, and the functions of the scene that they call.
+    """LLVM IR of the loops and of the scene's functions that they call.
 
-    Their stack is aligned to whole registers: those that are kept there would lie across two cache lines
-    else.
+    Stack frames are aligned to whole registers; otherwise registers spilled to the stack would straddle two
+    cache lines.
     """
     trees = [tree for tree in ast.parse(linked.source).body if isinstance(tree, ast.FunctionDef)]
     called = frozenset(tree.name for tree in trees if CALLED in map(ast.unparse, tree.decorator_list))
@@ -55,7 +87,7 @@ def _text(linked: Linked, target: Target, loops: Sequence[Loop]) -> str:
     emitter = Emitter(lanes, functions, called, {name: linked.file for name, linked in own.items()})
     real = FLOAT if target.bits == 32 else DOUBLE
     kinds = {"r": real.as_pointer(), "i": ir.IntType(32).as_pointer(), "n": WHOLE}
-    for tree in trees:  # those of the innermost elements stand first, so that nothing is as deep as the scene
+    for tree in trees:  # innermost elements first, so that the recursion is not as deep as the scene
         if [a.arg for a in tree.args.args] == PART:
             emitter.function(tree.name, ("lanes", "lanes", "lanes", kinds["r"], WHOLE))
     for loop in loops:
@@ -83,5 +115,5 @@ def _target_machine(target: Target) -> llvm.TargetMachine:
 
 
 def _machine(target: Target) -> Any:
-    """What emits the object file."""
+    """Target machine that emits the object file."""
     return _target_machine(target)

@@ -1,7 +1,6 @@
-"""The CPU back end: a scene's field as machine code.
+"""CPU back end: a scene's field as machine code.
 
-Loading it takes milliseconds; its functions (`machine`) are called with the interpreter unlocked, so plain
-threads scale.
+Loading it takes milliseconds. Its functions (`machine`) release the GIL, so plain threads scale.
 """
 
 from __future__ import annotations
@@ -21,11 +20,26 @@ from .machine import Function, constant, loaded
 from .objects import object_code
 
 BATCH = 1 << 10
-"""Points that a loop is run on together: they stay in the fastest memory."""
+"""Points per call of a loop: few enough to stay in the fastest cache."""
 
 
 class CpuKernel(Kernel):
-    """The compiled field of one scene."""
+    """Compiled field of one scene.
+
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    precision
+        "float32" or "float64".
+
+    Attributes
+    ----------
+    dtype
+        Floating-point type.
+    width
+        Lanes.
+    """
 
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
@@ -37,11 +51,22 @@ class CpuKernel(Kernel):
 
     @property
     def entry(self) -> tuple[Function, np.ndarray]:
-        """`loops.points` as compiled, and its parameters."""
+        """Compiled `loops.points` and its parameters."""
         return self._points, self._parameters
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """`Kernel.points`."""
+        """Evaluate the field at points.
+
+        Parameters
+        ----------
+        x, y, z
+            Coordinates in scene units: arrays of one shape, of any float type.
+
+        Returns
+        -------
+        ndarray
+            Values of that shape in the kernel's dtype; NaN at a point with a NaN.
+        """
         shape, n = np.shape(x), np.size(x)
         padded = -(-max(n, 1) // self.width) * self.width
         coordinates = np.empty((4, padded), self.dtype)
@@ -55,7 +80,17 @@ class CpuKernel(Kernel):
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """`Kernel.bricks`."""
+        """Evaluate the field on bricks of 8 x 8 x 8 grid points.
+
+        Parameters
+        ----------
+        corners
+            Grid index of the first sample of each brick, int32 [n, 3], C-contiguous.
+        origin, voxel
+            Position of grid point (0, 0, 0) and grid spacing, scene units.
+        out
+            Receives the values, [n, 512] of the kernel's dtype, C-contiguous.
+        """
         assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
         frame = np.array([*origin, voxel], self.dtype)
         self._bricks(self._parameters, frame, *self._offsets, corners, out, len(corners))
@@ -67,14 +102,40 @@ def _kernel(source: str, parameters: bytes, precision: Precision) -> CpuKernel:
 
 
 def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
-    """The kernel of a scene tree whose depths are resolved. Raises `KernelError`."""
+    """Compile the kernel of a scene tree.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    CpuKernel
+        Compiled field.
+
+    Raises
+    ------
+    KernelError
+        If the scene cannot be linked or compiled.
+    """
     linked = link(root)
     return _kernel(linked.source, linked.parameters.tobytes(), precision)
 
 
 @dataclass(frozen=True, eq=False)
 class CompiledLoop:
-    """A `formulas.field.Run` in machine code."""
+    """Machine-code implementation of `formulas.field.Run`.
+
+    Attributes
+    ----------
+    function
+        Compiled loop.
+    parameters
+        Parameters P of the scene.
+    """
 
     function: Function
     parameters: np.ndarray
@@ -83,12 +144,46 @@ class CompiledLoop:
         self.function(self.parameters, frame, *rows, *out, *numbers, rows.shape[1])
 
     def native(self, frame: np.ndarray) -> tuple[Function, np.ndarray, np.ndarray]:
+        """Return the loop for native code.
+
+        Parameters
+        ----------
+        frame
+            Frame of the loop.
+
+        Returns
+        -------
+        tuple
+            Machine code, parameters and frame.
+        """
         return self.function, self.parameters, frame
 
 
 @lru_cache(maxsize=32)
 def compile_loops(source: str, numbers: bytes, loops: tuple[Loop, ...], precision: Precision) -> Loops:
-    """Loops over a linked scene, given as its text and its parameters. Raises `KernelError`."""
+    """Compile loops over a linked scene.
+
+    Parameters
+    ----------
+    source
+        Text of the linked scene.
+    numbers
+        Parameters P, float64, as bytes.
+    loops
+        Loops to compile.
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    Loops
+        Compiled loops by name.
+
+    Raises
+    ------
+    KernelError
+        If the scene or a loop cannot be compiled.
+    """
     parameters = constant(np.frombuffer(numbers), precision)
     bits = parameters.dtype.itemsize * 8
     width = lane_count(bits)
@@ -97,5 +192,27 @@ def compile_loops(source: str, numbers: bytes, loops: tuple[Loop, ...], precisio
 
 
 def load_functions(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:
-    """The functions of loops over a linked scene, by name. Raises `KernelError`."""
+    """Load or compile the functions of loops over a linked scene.
+
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    bits
+        Width of a float: 32 or 64.
+    width
+        Lanes.
+    loops
+        Loops to load.
+
+    Returns
+    -------
+    dict
+        Functions by name.
+
+    Raises
+    ------
+    KernelError
+        If the scene or a loop cannot be compiled.
+    """
     return loaded(object_code(linked, bits, width, loops), loops, np.dtype(f"float{bits}"))

@@ -1,8 +1,8 @@
-"""The CUDA back end: a scene's field on an NVIDIA GPU, by numba-cuda.
+"""CUDA back end: a scene's field on an NVIDIA GPU, by numba-cuda.
 
-Importing this is cheap and always possible. `available` says whether there is a GPU; what needs one raises
-`KernelError` with a line that says what is missing. The machine code is kept in the cache folder, beside
-the text that it was made of.
+Importing this module is cheap and always possible. `available` tests for a GPU; functions that need one raise
+`KernelError` with a line that names what is missing. Machine code is cached in the cache folder, next to its
+source text.
 """
 
 from __future__ import annotations
@@ -39,18 +39,28 @@ from .loops import Loop
 from .objects import cache_folder
 
 BLOCK = 128
-"""Threads of a block."""
+"""Threads per block."""
 
 _LAUNCH = threading.Lock()
-"""Numba's first launch of a kernel may happen once only, and launching holds the interpreter anyway."""
+"""Lock around kernel launches: Numba's first launch of a kernel must happen only once, and launching holds
+the GIL anyway.
+"""
 
 LOOPS = points, bricks
+"""Loops of every CUDA kernel."""
 
 NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
+"""Message for a missing GPU or driver."""
 
 
 def missing() -> str | None:
-    """What keeps this process from using CUDA, in one line; None if nothing does."""
+    """Return the reason why this process cannot use CUDA.
+
+    Returns
+    -------
+    str
+        One line; None if CUDA can be used.
+    """
     if reason := lacking("numba_cuda", "CUDA needs", "numba-cuda[cu13]"):
         return reason
     if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1" and not _driver():
@@ -63,7 +73,7 @@ def missing() -> str | None:
 
 
 def _driver() -> bool:
-    """Whether NVIDIA's driver is there: known at once, without Numba."""
+    """True if NVIDIA's driver is installed: a fast test without Numba."""
     try:
         ctypes.CDLL("nvcuda.dll" if os.name == "nt" else "libcuda.so.1")
     except OSError:
@@ -72,12 +82,23 @@ def _driver() -> bool:
 
 
 def available() -> bool:
-    """Whether there is a GPU to compile for."""
+    """Return True if there is a GPU to compile for."""
     return missing() is None
 
 
 def require() -> Any:
-    """Numba's ``cuda`` module. Raises `KernelError` if there is no GPU to use."""
+    """Return Numba's ``cuda`` module.
+
+    Returns
+    -------
+    module
+        Module `numba.cuda`.
+
+    Raises
+    ------
+    KernelError
+        If no GPU can be used.
+    """
     reason = missing()
     if reason:
         raise KernelError(reason)
@@ -87,7 +108,27 @@ def require() -> Any:
 
 
 class CudaKernel(Kernel):
-    """The compiled field of one scene on the GPU."""
+    """Compiled field of one scene on the GPU.
+
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    precision
+        "float32" or "float64".
+
+    Attributes
+    ----------
+    dtype
+        Floating-point type.
+    batch
+        Samples per call that amortise its overhead.
+
+    Raises
+    ------
+    KernelError
+        If no GPU can be used.
+    """
 
     batch = 1 << 22
 
@@ -98,7 +139,18 @@ class CudaKernel(Kernel):
         self._parameters = parameters(linked, precision)
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """`Kernel.points`."""
+        """Evaluate the field at points.
+
+        Parameters
+        ----------
+        x, y, z
+            Coordinates in scene units: arrays of one shape, of any float type.
+
+        Returns
+        -------
+        ndarray
+            Values of that shape in the kernel's dtype; NaN at a point with a NaN.
+        """
         shape = np.shape(x)
         if np.size(x) == 0:
             return np.empty(shape, self.dtype)
@@ -115,7 +167,19 @@ class CudaKernel(Kernel):
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """`Kernel.bricks`, whose values can differ from those of `points` in the last place."""
+        """Evaluate the field on bricks of 8 x 8 x 8 grid points.
+
+        Values can differ from those of `points` in the last place.
+
+        Parameters
+        ----------
+        corners
+            Grid index of the first sample of each brick, int32 [n, 3], C-contiguous.
+        origin, voxel
+            Position of grid point (0, 0, 0) and grid spacing, scene units.
+        out
+            Receives the values, [n, 512] of the kernel's dtype, C-contiguous.
+        """
         assert corners.dtype == np.int32 and corners.flags.c_contiguous and out.flags.c_contiguous
         assert out.dtype == self.dtype and out.shape == (len(corners), 512)
         if len(corners):
@@ -124,20 +188,47 @@ class CudaKernel(Kernel):
             filled.copy_to_host(out)
 
     def points_on_device(self, x: Any, y: Any, z: Any, out: Any) -> None:
-        """`points` on arrays of the GPU (Numba's, CuPy's, PyTorch's, ...), 1-D and of the kernel's dtype.
-        Copies nothing and does not wait for the GPU."""
+        """Evaluate the field at points in GPU memory. Copies nothing and does not wait for the GPU.
+
+        Parameters
+        ----------
+        x, y, z
+            Coordinates, scene units: 1-D arrays on the GPU (Numba, CuPy, PyTorch, ...) of the kernel's dtype.
+        out
+            Receives the values; an array of the same kind.
+        """
         launched(self._loops.points, math.prod(out.shape), self._parameters, x, y, z, out)
 
     def bricks_on_device(
         self, corners: Any, origin: tuple[float, float, float], voxel: float, out: Any
     ) -> None:
-        """`bricks` on arrays of the GPU. Copies nothing and does not wait for the GPU."""
+        """Evaluate the field on bricks in GPU memory. Copies nothing and does not wait for the GPU.
+
+        Parameters
+        ----------
+        corners
+            Grid index of the first sample of each brick, int32 [n, 3], on the GPU.
+        origin, voxel
+            Position of grid point (0, 0, 0) and grid spacing, scene units.
+        out
+            Receives the values, [n, 512] of the kernel's dtype, on the GPU.
+        """
         frame = [self.dtype.type(v) for v in (*origin, voxel)]
         launched(self._loops.bricks, math.prod(out.shape), self._parameters, *frame, corners, out)
 
 
 def launched(loop: Any, threads: int, *arguments: Any) -> None:
-    """Starts a loop on at least so many threads, more than 0; does not wait for them."""
+    """Launch a loop without waiting for it.
+
+    Parameters
+    ----------
+    loop
+        Compiled loop.
+    threads
+        Least number of threads, > 0.
+    *arguments
+        Arguments of the loop.
+    """
     with _LAUNCH:
         loop[-(-threads // BLOCK), BLOCK](*arguments)
 
@@ -148,21 +239,75 @@ def _kernel(source: str, values: bytes, precision: Precision) -> CudaKernel:
 
 
 def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
-    """The kernel of a scene tree whose depths are resolved. Raises `KernelError`, also if there is no GPU."""
+    """Compile the kernel of a scene tree for the GPU.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    CudaKernel
+        Compiled field.
+
+    Raises
+    ------
+    KernelError
+        If the scene cannot be linked or compiled, or no GPU can be used.
+    """
     linked = link(root)
     return _kernel(linked.source, linked.parameters.tobytes(), precision)
 
 
 def parameters(linked: Linked, precision: Precision) -> Any:
-    """A linked scene's P, on the GPU. As constants of the launch it is no faster, and launching is slower."""
+    """Copy the parameters P of a linked scene to the GPU.
+
+    Passing them as launch constants is no faster, and makes launching slower.
+
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    DeviceNDArray
+        Parameters on the GPU.
+
+    Raises
+    ------
+    KernelError
+        If no GPU can be used.
+    """
     return require().to_device(linked.parameters.astype(precision))
 
 
 def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> ModuleType:
-    """Loops over a linked scene, as attributes of a module; each is compiled for the types of its first
-    call's arguments.
+    """Load loops over a linked scene. Each is compiled at its first call, for the types of its arguments.
 
-    Raises `KernelError` if there is no GPU.
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    precision
+        "float32" or "float64".
+    loops
+        Loops to load.
+
+    Returns
+    -------
+    module
+        Module with the loops as attributes.
+
+    Raises
+    ------
+    KernelError
+        If no GPU can be used.
     """
     require()
     text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)
@@ -172,14 +317,14 @@ def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> M
 
 @lru_cache(maxsize=1)
 def _toolchain() -> str:
-    """The key of everything beside the module's own text that the machine code depends on."""
+    """Key of everything that the machine code depends on besides the module's own text."""
     words = texts(Path(__file__).parent / "cuda_intrinsics.py")
     versions = (version(name) for name in ("numba-cuda", "numba", "llvmlite"))
     return key(words, *versions, *_numba_settings())
 
 
 def _numba_settings() -> list[str]:
-    """What Numba is told to do otherwise: its variables and its file in the current folder."""
+    """Numba's settings: its environment variables and its file in the current folder."""
     told = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
     with suppress(OSError):
         told.append(repr(Path(".numba_config.yaml").read_bytes()))
@@ -187,8 +332,8 @@ def _numba_settings() -> list[str]:
 
 
 def _imported(name: str, text: str) -> ModuleType:
-    """Numba caches the machine code of a function beside its file, so the text becomes a file that stays; one
-    for this process alone where others could write it.
+    """Import a module from a cached file: Numba caches machine code next to the source file. If other users
+    could write to the cache folder, the file is private to this process.
     """
     path = _kept(cache_folder(), name, text) or _kept(_own_folder(), name, text)
     assert path
@@ -202,14 +347,16 @@ def _imported(name: str, text: str) -> ModuleType:
 
 @lru_cache(maxsize=1)
 def _own_folder() -> Path:
+    """Temporary folder of this process, removed at exit."""
     folder = Path(tempfile.mkdtemp(prefix="fracslice-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
 
 
 def _kept(folder: Path, name: str, text: str) -> Path | None:
-    """The file with this text; None if it cannot be kept. Its date is that of the first who wrote it, which
-    Numba's cache asks for."""
+    """File with this text; None if it cannot be cached. Its modification time is that of the first write,
+    which Numba's cache compares.
+    """
     kept, file, whole = Kept(folder), f"{name}.py", text.encode()
     if kept.get(file, _read) != whole:
         with suppress(OSError):

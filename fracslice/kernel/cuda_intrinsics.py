@@ -1,12 +1,12 @@
-"""The vocabulary of the formulas on one CUDA thread, for the modules that `cuda_source` writes.
+"""Intrinsics of formulas on one CUDA thread, for the modules that `cuda_source` writes.
 
-No fast-math flag is set: they let the compiler assume that there is no NaN and no infinity, and reorder
-sums (a Mandelbulb rendered so loses its normals). Instead each word names its instruction. In float32 most
-are the GPU's own approximations, wrong by about 2 units in the last place (NVIDIA, "PTX ISA": rsqrt, rcp,
-sqrt, lg2, div.full), with denormal arguments taken as zero; NaN and infinity behave. Multiply-add is fused,
-as on the lanes. In float64 they are right to the last place or two.
+No fast-math flag is set: these flags let the compiler assume that there is no NaN and no infinity, and
+reorder sums (a Mandelbulb rendered that way loses its normals). Instead each intrinsic names its instruction.
+In float32 most are the GPU's own approximations, accurate to about 2 units in the last place (NVIDIA, "PTX
+ISA": rsqrt, rcp, sqrt, lg2, div.full), with denormal arguments flushed to zero; NaN and infinity are handled.
+Multiply-add is fused, as on the lanes. In float64 results are accurate to one or two units in the last place.
 
-On Numba's CUDA simulator the words are those of the reference, on single numbers.
+On Numba's CUDA simulator the intrinsics are those of the reference, on scalars.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ import numpy as np
 
 from ..formulas import vocabulary
 
-if not hasattr(np, "row_stack"):  # NumPy 2.5 removed what numba-cuda 0.30 still imports
+if not hasattr(np, "row_stack"):  # NumPy 2.5 removed it, but numba-cuda 0.30 still imports it
     np.row_stack = np.vstack
 
 from llvmlite import ir
 
 cuda: Any = import_module("numba.cuda")
-cuda.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # a few points are few on purpose
+cuda.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # small launches are intended
 SIMULATED = bool(cuda.config.ENABLE_CUDASIM)
 _types: Any = np if SIMULATED else import_module("numba.cuda.types")
 float32, float64, int32 = _types.float32, _types.float64, int if SIMULATED else _types.int32
@@ -37,7 +37,7 @@ kernel = cuda.jit(cache=True)
 
 @device
 def thread():  # type: ignore[no-untyped-def]
-    """The number of this thread, of all that were started."""
+    """Return the global index of this thread."""
     return cuda.grid(1)
 
 
@@ -45,10 +45,10 @@ Instruction = str | Callable[..., Any]
 
 
 def _intrinsic(arity: int, single: Instruction, double: Instruction) -> Any:
-    """A function of reals, in float32 and float64.
+    """Define an intrinsic on reals, in float32 and float64.
 
-    Each is a PTX instruction, a function of NVIDIA's libdevice where the name begins with ``__nv_``, or a
-    Python function.
+    Each implementation is a PTX instruction, a function of NVIDIA's libdevice if the name begins with
+    ``__nv_``, or a Python function.
     """
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -82,7 +82,7 @@ if SIMULATED:
 
     @device
     def together():  # type: ignore[no-untyped-def]
-        """Waits for the other threads of the warp; here each runs alone."""
+        """Synchronise the threads of the warp; in the simulator each runs alone."""
 else:
     intrinsic = import_module("numba.cuda.extending").intrinsic
     LOG_2 = float32(math.log(2))
@@ -97,14 +97,14 @@ else:
         return a * _inverse(b)
 
     def _ratio_in_double(a, b):  # type: ignore[no-untyped-def]
-        """The estimate is right to 20 bits, and a step of the third order to all."""
+        """The reciprocal estimate is accurate to 20 bits; one third-order step makes it accurate to all."""
         y = _inverse(b)
         e = 1.0 - b * y
         return a * (y + y * (e + e * e))
 
     @device
     def _sine(x, quarter_turns):  # type: ignore[no-untyped-def]
-        """As on the lanes (fdlibm's reduction by parts of pi/2): libdevice's own reduces in float64."""
+        """Argument reduction by parts of pi/2 (fdlibm), as on the lanes: libdevice reduces in float64."""
         turns = floor(x * float32(2 / math.pi) + float32(0.5))
         r = x - turns * float32(1.5703125)
         r = r - turns * float32(4.837512969970703125e-4)
@@ -124,7 +124,7 @@ else:
     def _cos(x):  # type: ignore[no-untyped-def]
         return _sine(x, int32(1))
 
-    # Plain min.f32 and max.f32 lose a NaN: a point at infinity would be inside.
+    # Plain min.f32 and max.f32 drop NaN: a point at infinity would be inside.
     def _minimum(a, b):  # type: ignore[no-untyped-def]
         return a if a < b else b
 
@@ -132,7 +132,7 @@ else:
         return a if a > b else b
 
     def _ampere() -> bool:
-        """Whether the GPU is new enough for min.NaN; also where there is none, and code is only looked at."""
+        """True if the GPU supports min.NaN; also without a GPU, where code is only inspected."""
         return not cuda.is_available() or cuda.get_current_device().compute_capability >= (8, 0)
 
     sqrt = _intrinsic(1, "sqrt.approx.ftz.f32", "sqrt.rn.f64")
@@ -151,13 +151,15 @@ else:
 
     @device
     def where(mask, a, b):  # type: ignore[no-untyped-def]
+        """Return a where the mask is set, else b."""
         return a if mask else b
 
     @device
     def any_of(mask):  # type: ignore[no-untyped-def]
+        """Return the mask: a thread has one point."""
         return mask
 
     @device
     def together():  # type: ignore[no-untyped-def]
-        """Waits for the other threads of the warp, so that they go on in step."""
+        """Synchronise the threads of the warp."""
         cuda.syncwarp()

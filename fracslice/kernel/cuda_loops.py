@@ -1,4 +1,4 @@
-"""Loops around a field on CUDA, one thread a point: what `loops` has for the lanes."""
+"""CUDA versions of the loops in `loops`, one thread per point."""
 
 from __future__ import annotations
 
@@ -9,7 +9,17 @@ from .intrinsics import field
 
 @kernel
 def points(P, X, Y, Z, F):
-    """Field values at points; a point with a NaN gives NaN."""
+    """Evaluate the field at points; NaN at a point with a NaN.
+
+    Parameters
+    ----------
+    P
+        Parameters of the scene.
+    X, Y, Z
+        Coordinates, [n] each, scene units.
+    F
+        Receives the values, [n].
+    """
     i = thread()
     if i < F.size:
         x = X[i]
@@ -21,7 +31,19 @@ def points(P, X, Y, Z, F):
 
 @kernel
 def bricks(P, ox, oy, oz, h, corners, F):
-    """512 samples of each brick, at ``(ox, oy, oz) + h * (corner + offset)``."""
+    """Evaluate the 512 samples of each brick, at ``(ox, oy, oz) + h * (corner + offset)``.
+
+    Parameters
+    ----------
+    P
+        Parameters of the scene.
+    ox, oy, oz, h
+        Position of grid point (0, 0, 0), and grid spacing, scene units.
+    corners
+        Grid index of the first sample of each brick, int32 [n, 3].
+    F
+        Receives the values, [n, 512].
+    """
     i = thread()
     b = i >> 9
     s = i & 511

@@ -1,7 +1,8 @@
-"""A linked scene as the text of a CUDA module: one thread a point, every number of the kernel's float width.
+"""Source text of the CUDA module of a linked scene: one thread per point, numbers of the kernel's float
+width.
 
-Numba types a literal as float64 or int64, and arithmetic with float32 then happens in float64, which a GPU
-does up to 64 times slower. So the module that it compiles says ``real(2.0)`` where the formula says ``2.0``.
+Numba types a literal as float64 or int64. Arithmetic with float32 then happens in float64, which is up to 64
+times slower on a GPU. The text therefore has ``real(2.0)`` where the formula has ``2.0``.
 """
 
 from __future__ import annotations
@@ -17,12 +18,30 @@ from .loop_linker import link_loops
 from .loops import Loop
 
 INTRINSICS = "fracslice.kernel.cuda_intrinsics"
+"""Module that the text imports its intrinsics from."""
 
 
 def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
-    """The text of a Python module that Numba compiles for CUDA (and its simulator runs).
+    """Write the text of a Python module that Numba compiles for CUDA and its simulator runs.
 
-    loops: those marked ``@kernel``. In them and in what is marked ``@device`` numbers are typed by hand.
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    bits
+        Width of a float: 32 or 64.
+    loops
+        Loops marked ``@kernel``. In these and in functions marked ``@device`` numbers are typed by hand.
+
+    Returns
+    -------
+    str
+        Source text.
+
+    Raises
+    ------
+    KernelError
+        If a loop or formula is not in the language.
     """
     words = [
         *sorted(NAMES),
@@ -43,17 +62,27 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
 
 
 def typed(source: str) -> str:
-    """Functions in the words of the formulas, as device functions whose every number is ``real`` or
-    ``whole``."""
+    """Rewrite formulas as device functions whose numbers are all ``real`` or ``whole``.
+
+    Parameters
+    ----------
+    source
+        Source text.
+
+    Returns
+    -------
+    str
+        Rewritten text.
+    """
     tree = ast.parse(source)
     return ast.unparse(ast.fix_missing_locations(_Typed(tree).visit(tree))) + "\n"
 
 
 class _Typed(ast.NodeTransformer):
-    """Whole numbers become ``real`` where they meet one; among themselves, and in subscripts, they stay.
+    """Converts integers to ``real`` where they meet a real; among themselves, and in subscripts, they stay.
 
-    Whole are literals without a point, the counters of loops, and all names of a function that shifts bits.
-    Zero times something, by which a formula makes a number as wide as its points, is zero: a thread has one
+    Integers are literals without a point, loop counters, and all names of a function that shifts bits. A
+    product with zero, by which a formula broadcasts a number to its points, becomes zero: a thread has one
     point.
     """
 
@@ -72,6 +101,7 @@ class _Typed(ast.NodeTransformer):
         return node
 
     def whole(self, node: ast.expr) -> bool:
+        """True if an expression is an integer."""
         match node:
             case ast.Constant(value):
                 return isinstance(value, int) and not isinstance(value, bool)
@@ -86,7 +116,7 @@ class _Typed(ast.NodeTransformer):
         return False
 
     def real(self, node: ast.expr) -> Any:
-        """An expression where a real is expected."""
+        """Visit an expression in a place that requires a real."""
         return _call("real", node) if self.whole(node) else self.visit(node)
 
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
@@ -112,7 +142,10 @@ class _Typed(ast.NodeTransformer):
         return node
 
     def visit_For(self, node: ast.For) -> Any:
-        """As a plain loop of 32-bit numbers: Numba's own iterator costs several instructions a round."""
+        """Rewrite as a loop over a 32-bit counter.
+
+        Numba's own iterator costs several instructions per iteration.
+        """
         match node:
             case ast.For(ast.Name(i), ast.Call(ast.Name("range"), [end])):
                 first, after = ast.parse(f"{i} = whole(0)\n{i} = whole({i} + 1)").body
@@ -142,7 +175,7 @@ class _Typed(ast.NodeTransformer):
         return ast.IfExp(self.visit(node.test), self.given(node.body), self.given(node.orelse))
 
     def given(self, node: ast.expr) -> ast.expr:
-        """An expression that becomes the value of a name or a function."""
+        """Visit an expression that becomes the value of a name or a function."""
         if isinstance(node, ast.Tuple):
             return ast.Tuple([self.given(e) for e in node.elts], ast.Load())
         found: ast.expr = self.visit(node) if self.shifts else self.real(node)
@@ -154,7 +187,18 @@ def _listed(found: Any) -> list[ast.stmt]:
 
 
 def after_parameters(arguments: list[ast.expr]) -> list[ast.expr]:
-    """What a call says after P: from where in P on its numbers lie, a whole number."""
+    """Return the arguments of a call after P: integer offsets into P.
+
+    Parameters
+    ----------
+    arguments
+        Arguments of the call.
+
+    Returns
+    -------
+    list
+        The arguments after P; empty if P is none of them or the last.
+    """
     names = [a.id if isinstance(a, ast.Name) else "" for a in arguments]
     return arguments[names.index("P") + 1 :] if "P" in names[:-1] else []
 

@@ -1,6 +1,6 @@
-"""The intrinsics of CUDA loops, as linters see them.
+"""Intrinsics of CUDA loops as linters see them.
 
-`cuda_intrinsics` says what they mean on a GPU, and can be imported only where Numba's CUDA is.
+`cuda_intrinsics` implements them on a GPU, and can be imported only where Numba's CUDA target is available.
 
 One thread does the work of one lane. The numbers of a loop are typed by hand: ``real(0.5)``, ``whole(3)``.
 """
@@ -15,40 +15,62 @@ from .loops import Loop
 
 
 def kernel(function: Callable[..., None]) -> Loop:
-    """Decorates a loop that is started on threads."""
+    """Decorate a loop that threads are launched on.
+
+    Parameters
+    ----------
+    function
+        Function of the loop.
+
+    Returns
+    -------
+    Loop
+        Loop without declared arguments.
+    """
     return Loop(function)
 
 
 def device(function: Function) -> Function:
-    """Decorates a function that loops call, whose numbers are typed by hand."""
+    """Decorate a function that loops call and whose numbers are typed by hand.
+
+    Parameters
+    ----------
+    function
+        Function to decorate.
+
+    Returns
+    -------
+    Callable
+        The function itself.
+    """
     return function
 
 
 @intrinsic
 def real(value: Any) -> Any:
-    """A number as wide as the kernel's floats."""
+    """Return a number of the kernel's float type."""
     return float(value)
 
 
 @intrinsic
 def whole(value: Any) -> Any:
-    """A whole number of 32 bits."""
+    """Return a 32-bit integer."""
     return int(value)
 
 
 @intrinsic
 def thread() -> int:
-    """The number of this thread, of all that were started."""
+    """Return the global index of this thread."""
     raise NotImplementedError
 
 
 @intrinsic
 def together() -> None:
-    """Waits for the other threads of the warp, so that they go on in step."""
+    """Synchronise the threads of the warp."""
     raise NotImplementedError
 
 
 @intrinsic
 def divide(a: Any, b: Any) -> Any:
-    """a / b by the GPU's own division."""
+    """Return a / b by the GPU's own division."""
     raise NotImplementedError

@@ -1,4 +1,4 @@
-"""How deep a fractal is: ``iterations="auto"``, and levels that are too fine for a voxel to be shown."""
+"""Iteration depth of fractals: ``iterations="auto"``, and levels too fine for a voxel size."""
 
 from __future__ import annotations
 
@@ -15,17 +15,32 @@ from .cells import possible_cells
 from .cpu import compile_scene
 
 DEEPEST = 60
+"""Largest automatic depth."""
+
 PROBES = 1 << 12, 1 << 15, 1 << 18
-"""Points that are tried, until `ENOUGH` of them are inside."""
+"""Random points to test, until `ENOUGH` of them are inside."""
 
 ENOUGH = 256
+"""Sufficient number of surface points."""
+
 CELLS = 1 << 13
+"""Largest number of cells searched for the surface."""
+
 BISECTIONS = 24
+"""Bisection steps per surface point."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """A tree, equal to those with its key."""
+    """Scene tree that compares equal to every tree with the same key.
+
+    Attributes
+    ----------
+    node
+        Scene tree.
+    key
+        Its key.
+    """
 
     node: Node = field(compare=False)
     key: str = field(init=False)
@@ -35,10 +50,27 @@ class Known:
 
 
 def resolve_depths(root: Node, detail: float) -> Node:
-    """The scene with every automatic depth replaced by a number, for a size of detail in scene units.
+    """Replace every automatic depth by a number, for a given size of detail.
 
-    For each fractal by itself: the smallest depth at which one more step would move nine tenths of its
-    surface by less than half that size (its own, where a transform scales it).
+    Each fractal is resolved on its own: its depth is the smallest at which one more iteration would move nine
+    tenths of its surface by less than half that size, measured in its own units where a transform scales it.
+
+    Parameters
+    ----------
+    root
+        Scene.
+    detail
+        Size of detail, scene units.
+
+    Returns
+    -------
+    Node
+        Scene with resolved depths.
+
+    Raises
+    ------
+    KernelError
+        If a formula cannot be compiled.
     """
     detail = _within(root, detail)
     children = tuple(resolve_depths(child, detail) for child in root.children)
@@ -48,15 +80,42 @@ def resolve_depths(root: Node, detail: float) -> Node:
 
 
 def depth_notes(root: Node, known: Node) -> tuple[str, ...]:
-    """The automatic depths of a scene by those of the same one with numbers, such as "mandelbulb 5"."""
+    """Describe the automatic depths of a scene, such as "mandelbulb 5".
+
+    Parameters
+    ----------
+    root
+        Scene with automatic depths.
+    known
+        The same scene with resolved depths.
+
+    Returns
+    -------
+    tuple of str
+        One note per automatic depth.
+    """
     pairs = zip(root.walk(), known.walk(), strict=True)
     return tuple(f"{a.formula.name} {b['iterations']}" for a, b in pairs if a.values != b.values)
 
 
 def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
-    """The scene without parts that fall between samples a voxel apart, and what was left out of it, in words.
+    """Drop the parts of a scene that fall between samples one voxel apart.
 
-    What a formula says of itself (`Node.visible`); seams, walls and bends around it are not looked at.
+    Each formula decides for itself (`Node.visible`); seams, walls and bends around it are not considered.
+
+    Parameters
+    ----------
+    root
+        Scene.
+    voxel
+        Voxel size, scene units.
+
+    Returns
+    -------
+    shown : Node
+        Scene without these parts.
+    notes : tuple of str
+        Descriptions of the dropped parts.
     """
     found = root.visible(voxel)
     told = [
@@ -71,14 +130,14 @@ def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
 
 
 def _within(node: Node, voxel: float) -> float:
-    """A voxel in the units of a node's children: the largest, where a transform stretches."""
+    """Voxel size in the units of a node's children; the largest one if a transform stretches."""
     if node.formula.name != "transform":
         return voxel
     return voxel / float(stretches(affine(node)[0])[-1])
 
 
 def _depth(node: Node, detail: float) -> int:
-    """The smallest depth that is deep enough; the deepest at which there is something, if none is."""
+    """Smallest sufficient depth; the deepest non-empty one if none is sufficient."""
     for depth in range(1, DEEPEST):
         step = _step(*(Known(node.changed(iterations=d)) for d in (depth, depth + 1)))
         if step is None:
@@ -90,10 +149,11 @@ def _depth(node: Node, detail: float) -> int:
 
 @lru_cache(maxsize=256)
 def _step(before: Known, after: Known) -> float | None:
-    """How far one more step moves nine tenths of the surface at most, scene units; None if there is none.
+    """Largest displacement of nine tenths of the surface by one more iteration, scene units.
 
-    Outside values tell how far: where a step takes away, of the deeper solid on the surface of the other,
-    where it adds, of the other on the surface of the deeper one.
+    None if the shallower solid is empty. Exterior values measure it: where the iteration removes material,
+    those of the deeper solid on the surface of the other; where it adds material, those of the other solid on
+    the surface of the deeper one.
     """
     surfaces = [_surface_points(solid) for solid in (before, after)]
     if not surfaces[0].shape[1]:
@@ -108,8 +168,9 @@ def _step(before: Known, after: Known) -> float | None:
 
 @lru_cache(maxsize=16)
 def _surface_points(solid: Known) -> np.ndarray:
-    """Points [3, n] on the surface, always the same: bisected between random points inside and outside, of
-    cells that may be inside; none where nothing is found.
+    """Points [3, n] on the surface, the same in every run; n = 0 if nothing is inside.
+
+    They are bisected between random points inside and outside, in cells that may be inside.
     """
     kernel, bounds = compile_scene(solid.node, "float64"), solid.node.bounds
     cells, _, step = possible_cells(lambda p: kernel.points(*p), bounds.lipschitz, bounds.box, CELLS)

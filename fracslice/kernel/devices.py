@@ -1,4 +1,4 @@
-"""What computes a field: the processor or a GPU."""
+"""Compute devices: the CPU or a GPU."""
 
 from __future__ import annotations
 
@@ -7,11 +7,26 @@ from ..formulas.field import Device
 from ..formulas.parameters import Choice, validated
 
 DEVICES = Choice("auto", "what computes", ("cpu", "cuda", "auto"))
+"""Parameter of the device to compute on."""
 
 
 def chosen(device: str) -> Device:
-    """The device to use: "cpu", "cuda", or "auto", which takes the GPU if there is one. Raises `DeviceError`
-    if there is none, or for another word.
+    """Select a compute device.
+
+    Parameters
+    ----------
+    device
+        "cpu", "cuda" or "auto"; "auto" selects the GPU if there is one.
+
+    Returns
+    -------
+    str
+        "cpu" or "cuda".
+
+    Raises
+    ------
+    DeviceError
+        If "cuda" is not available, or for any other text.
     """
     validated("device", device, DEVICES, DeviceError)
     if device == "cpu":

@@ -1,9 +1,9 @@
-"""From the text of a linked scene to LLVM's language, function by function, in one pass over its syntax.
+"""Translation of a linked scene's text to LLVM IR, function by function, in one pass over its syntax tree.
 
-The text is structured: names are assigned, branches and loops end where they began. So every name has one
-value at every place, and what differs where two ways meet becomes a phi there (Braun et al. 2013, "Simple and
-Efficient Construction of Static Single Assignment Form", has the general case). A function is made once for
-each kind of arguments.
+The text is structured: names are assigned, and branches and loops end where they began. Every name therefore
+has one value at every place, and a value that differs where two paths join becomes a phi there (Braun et al.
+2013, "Simple and Efficient Construction of Static Single Assignment Form", has the general case). A function
+is emitted once for each combination of argument kinds.
 """
 
 from __future__ import annotations
@@ -39,8 +39,22 @@ Names = dict[str, Value]
 
 @dataclass
 class Emitter:
-    """A module that is being written. functions: those of the text. called: which are not inlined. files:
-    where the lines of loops and of what they call are.
+    """LLVM module under construction.
+
+    Attributes
+    ----------
+    lanes
+        Layout of the lanes.
+    functions
+        Syntax trees of the text's functions.
+    called
+        Names of the functions that are not inlined.
+    files
+        Files that contain the lines of loops and of the functions they call.
+    module
+        LLVM module.
+    made
+        Functions emitted so far.
     """
 
     lanes: Lanes
@@ -51,7 +65,7 @@ class Emitter:
     made: dict[tuple[str, str], tuple[ir.Function, Kind]] = field(default_factory=dict)
 
     def function(self, name: str, kinds: tuple[Kind, ...]) -> tuple[ir.Function, Kind]:
-        """A function of the text for arguments of these kinds, and what it returns."""
+        """Emit a function of the text for arguments of given kinds; return it and the kind of its result."""
         key = name, repr(kinds)
         if key not in self.made:
             body = Body(self, name)
@@ -62,26 +76,26 @@ class Emitter:
         return self.made[key]
 
     def entry(self, name: str, kinds: tuple[Kind, ...]) -> None:
-        """A function that is called from outside, under its own name."""
+        """Emit an exported function under its own name."""
         Body(self, name).written(kinds, name)
 
 
 @dataclass
 class _Loop:
-    """A loop that is being written: the ways out of it, each a block and the names there."""
+    """Loop under construction: its exits, each a block and the names there."""
 
     left: list[tuple[Any, Names]] = field(default_factory=list)
 
 
 class _WiderError(Exception):
-    """At the end of a loop names turned out to be of other kinds than at its beginning: these."""
+    """Names have wider kinds at the end of a loop than at its beginning."""
 
     def __init__(self, kinds: dict[str, Kind]) -> None:
         self.kinds = kinds
 
 
 class Body(Expressions):
-    """One function for one kind of arguments."""
+    """Body of one function for one combination of argument kinds."""
 
     def __init__(self, emitter: Emitter, name: str) -> None:
         self.emitter, self.lanes = emitter, emitter.lanes
@@ -92,7 +106,7 @@ class Body(Expressions):
         self.blocks: dict[str, Any] = {}
 
     def written(self, kinds: Sequence[Kind], name: str) -> ir.Function:
-        """The function, under a name in the module."""
+        """Emit the function under a name of the module."""
         types = [t for kind in kinds for t in types_of(kind, self.lanes)]
         function = ir.Function(self.emitter.module, ir.FunctionType(ir.VoidType(), types), name)
         function.attributes.add("nounwind")
@@ -109,7 +123,7 @@ class Body(Expressions):
         return function
 
     def finish(self, function: ir.Function, types: list[ir.Type]) -> None:
-        """Writes the returns, now that what they return is known, and types the function after it."""
+        """Emit the return instructions, now that their kind is known, and set the function's type."""
         self.returned = reduce(joined, (kind_of(value) for _, value in self.returns))
         result = ir.LiteralStructType(types_of(self.returned, self.lanes))
         for block, value in self.returns:
@@ -123,13 +137,15 @@ class Body(Expressions):
         function.return_value.type = result
 
     def fail(self, node: ast.AST, message: str) -> KernelError:
+        """Return an error with the place of a node."""
         line, file = ast.unparse(node).splitlines()[0], self.emitter.files.get(self.name)
         name = self.name.removeprefix("f_").removeprefix("l_")
         where = f"{file}:{getattr(node, 'lineno', 1)}: loop" if file else "formula"
         return KernelError(f"{where} {name}: {line!r} cannot be compiled: {message}")
 
-    # --- statements: each says whether what follows it is reached ---
+    # --- statements: each returns True if the next statement is reachable ---
     def statements(self, body: Sequence[ast.stmt]) -> bool:
+        """Emit statements; return True if the next statement is reachable."""
         for statement in body:
             try:
                 reached = self.statement(statement)
@@ -140,6 +156,7 @@ class Body(Expressions):
         return True
 
     def statement(self, node: ast.stmt) -> bool:
+        """Emit a statement; return True if the next one is reachable."""
         match node:
             case ast.Assign([target], value):
                 self.assign(target, self.value(value))
@@ -172,6 +189,7 @@ class Body(Expressions):
         return True
 
     def assign(self, target: ast.expr, value: Value) -> None:
+        """Emit an assignment."""
         match target:
             case ast.Name(name):
                 self.names[name], self.blocks[name] = value, self.builder.block
@@ -187,6 +205,7 @@ class Body(Expressions):
                 raise MismatchError("a name is expected to assign to")
 
     def branch(self, test: Any, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> bool:
+        """Emit an ``if`` statement; return True if the next statement is reachable."""
         names, ends = dict(self.names), []
         blocks = [self.builder.append_basic_block() for _ in range(2)]
         self.builder.cbranch(test, *blocks)
@@ -198,7 +217,7 @@ class Body(Expressions):
         return self.joined(ends)
 
     def joined(self, ends: Sequence[tuple[Any, Names]]) -> bool:
-        """Goes on where several blocks lead, with the names that all of them have."""
+        """Join blocks and continue with the names that all of them have; return False without blocks."""
         if not ends:
             return False
         first, *others = (names for _, names in ends)
@@ -218,7 +237,7 @@ class Body(Expressions):
         return True
 
     def counted(self, node: ast.For, counter: str, limits: Sequence[Any]) -> bool:
-        """A loop over a range, whose step is above zero. When it is through, its counter has no value."""
+        """Emit a loop over a range with a positive step. After the loop its counter has no value."""
         zero, one = ir.Constant(WHOLE, 0), ir.Constant(WHOLE, 1)
         first, end, step = [zero, *limits, one] if len(limits) == 1 else [*limits, one][:3]
         place = f"{counter} of {node.lineno}"
@@ -233,7 +252,7 @@ class Body(Expressions):
         return self.loop(node, (place, counter), test)
 
     def loop(self, node: ast.For | ast.While, own: tuple[str, ...], test: Callable[[], Any]) -> bool:
-        """A loop, written again where names turn out to be of wider kinds than they had when it was begun."""
+        """Emit a loop, again if names turn out to be of wider kinds than at its beginning."""
         function, start = self.builder.function, self.builder.block
         names, blocks, size = dict(self.names), len(function.blocks), len(start.instructions)
         returns, depth = len(self.returns), len(self.loops)
@@ -262,6 +281,7 @@ class Body(Expressions):
         own: tuple[str, ...],
         kinds: dict[str, Kind],
     ) -> bool:
+        """Emit a loop once, with given kinds for some names; raise `_WiderError` if others are needed."""
         for name, kind in kinds.items():
             self.names[name] = as_kind(self.names[name], kind, self.lanes, self.builder)
         start, head = self.builder.block, self.builder.append_basic_block()

@@ -1,6 +1,4 @@
-"""Expressions of a linked scene's text in LLVM's language: what each kind of syntax means on lanes and on
-numbers.
-"""
+"""Translation of expressions to LLVM IR, on lanes and on scalars."""
 
 from __future__ import annotations
 
@@ -54,13 +52,13 @@ _INTRINSICS = {
     for name in names
 }
 _OWN = {"where": 3, "any_of": 1, "int": 1, "min": 2, "max": 2, "load": 2, "store": 3}
-"""The words with a method of their own, and how many values they take."""
+"""Intrinsics with a method of their own, and their numbers of arguments."""
 
 _EXTREMES = {"min": ast.Lt(), "max": ast.Gt()}
 
 
 class Expressions:
-    """What a function's expressions are, written at the place where its builder is."""
+    """Emits the expressions of a function at its builder's position."""
 
     emitter: Emitter
     lanes: Lanes
@@ -69,7 +67,7 @@ class Expressions:
     blocks: dict[str, Any]
 
     def value(self, node: ast.expr) -> Value:
-        """The value of an expression."""
+        """Emit an expression; return its value."""
         match node:
             case ast.Constant(value):
                 return self.constant(value)
@@ -96,6 +94,7 @@ class Expressions:
         raise MismatchError("it is not in the language")
 
     def constant(self, value: object) -> Value:
+        """Emit a constant."""
         if isinstance(value, bool):
             return ir.Constant(BOOL, int(value))
         if isinstance(value, (int, float)):
@@ -103,7 +102,7 @@ class Expressions:
         raise MismatchError("a number is expected")
 
     def named(self, name: str) -> Value:
-        """What a name stands for. A product is fused with what is added to it in the same stretch of code."""
+        """Value of a name. A product is fused with a sum only in the same basic block."""
         if name not in self.names:
             raise MismatchError(f"{name!r} has no value here")
         value = self.names[name]
@@ -112,9 +111,11 @@ class Expressions:
         return value
 
     def condition(self, node: ast.expr) -> Any:
+        """Emit an expression as a scalar condition."""
         return truth(self.builder, self.value(node))
 
     def unary(self, op: ast.unaryop, value: Value) -> Value:
+        """Emit a unary operator."""
         if isinstance(op, ast.Not):
             return self.builder.not_(truth(self.builder, value))
         if isinstance(value, Vec):
@@ -124,16 +125,18 @@ class Expressions:
         return self.builder.fneg(value)
 
     def binary(self, op: ast.operator, a: Value, b: Value) -> Value:
+        """Emit a binary operator."""
         if isinstance(op, (ast.BitAnd, ast.BitOr)) and (is_mask(a) or is_mask(b)):
             a, b = (self.lanes.condition(self.builder, v) for v in (a, b))
             return a.each(self.builder.and_ if isinstance(op, ast.BitAnd) else self.builder.or_, b)
         return self.on_lanes(op, a, b) or operate(self.builder, op, a, b)
 
     def comparison(self, op: ast.cmpop, a: Value, b: Value) -> Value:
+        """Emit a comparison."""
         return self.on_lanes(op, a, b) or compare(self.builder, op, a, b)
 
     def on_lanes(self, op: ast.AST, a: Value, b: Value) -> Vec | None:
-        """An operator where lanes are involved."""
+        """Emit an operator with lanes as operands; None if both are scalars."""
         if not any(isinstance(v, (Vec, tuple)) for v in (a, b)):
             return None
         if type(op) not in _ON_LANES:
@@ -141,7 +144,7 @@ class Expressions:
         return _ON_LANES[type(op)](self.lanes.vec(self.builder, a), self.lanes.vec(self.builder, b))
 
     def short(self, op: ast.boolop, a: Any, node: ast.expr) -> Any:
-        """``and`` and ``or``, which look at the second only if the first leaves it open."""
+        """Emit ``and`` or ``or``; evaluate the second operand only if the first does not decide."""
 
         def second() -> Value:
             return truth(self.builder, self.value(node))
@@ -151,7 +154,7 @@ class Expressions:
         return self.chosen(a, lambda: ir.Constant(BOOL, 1), second)
 
     def chosen(self, test: Any, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
-        """One of two values, of which only that one is computed."""
+        """Emit a choice between two values; only the chosen one is computed."""
         ends = []
         blocks = [self.builder.append_basic_block() for _ in range(2)]
         self.builder.cbranch(test, *blocks)
@@ -162,7 +165,7 @@ class Expressions:
         return self.merged(ends)
 
     def merged(self, ends: Sequence[tuple[Any, Value]], into: Any = None) -> Value:
-        """The value of a place to which several blocks lead, each with its own; the builder goes there."""
+        """Join blocks that each have a value; continue there with the joined value."""
         kind = reduce(joined, (kind_of(value) for _, value in ends))
         into = into or self.builder.append_basic_block()
         rows = []
@@ -174,7 +177,7 @@ class Expressions:
         return self.phis(kind, rows)
 
     def phis(self, kind: Kind, rows: Sequence[tuple[Any, Sequence[Any]]]) -> Value:
-        """A value of a kind that is in each block made of these parts."""
+        """Emit phis for a value of a given kind, from its parts in each block."""
         phis = [self.builder.phi(t) for t in types_of(kind, self.lanes)]
         for block, parts in rows:
             for phi, part in zip(phis, parts, strict=True):
@@ -182,10 +185,11 @@ class Expressions:
         return made_of(kind, phis, self.lanes, self.builder)
 
     def address(self, place: Any, index: Value) -> Any:
+        """Emit the address of an array element."""
         return self.builder.gep(place, [number(self.builder, index, WHOLE)])
 
     def element(self, place: Value, index: Value) -> Value:
-        """An element of an array in memory, or of a tuple."""
+        """Emit an access to an array element in memory or to a tuple element."""
         if not isinstance(place, tuple):
             loaded = self.builder.load(self.address(place, index))
             return widened(self.builder, loaded, WHOLE) if isinstance(loaded.type, ir.IntType) else loaded
@@ -202,6 +206,7 @@ class Expressions:
         return found
 
     def call(self, name: str, given: list[Value]) -> Value:
+        """Emit a call of a function or an intrinsic."""
         if name in self.emitter.functions:
             count = len(self.emitter.functions[name].args.args)
         elif name in _INTRINSICS or name in _OWN:
@@ -218,18 +223,21 @@ class Expressions:
         return found
 
     def called(self, name: str, given: Sequence[Value]) -> Value:
+        """Emit a call of a function of the text."""
         function, kind = self.emitter.function(name, tuple(map(kind_of, given)))
         result = self.builder.call(function, [part for value in given for part in parts_of(value)])
         count = len(types_of(kind, self.lanes))
         parts = [self.builder.extract_value(result, k) for k in range(count)]
         return made_of(kind, parts, self.lanes, self.builder)
 
-    # --- the words that are no function of lanes alone ---
+    # --- intrinsics that are not functions of lanes only ---
     def word_where(self, mask: Value, yes: Value, no: Value) -> Vec:
+        """Emit `where`."""
         yes, no = (self.lanes.vec(self.builder, v) for v in (yes, no))
         return self.lanes.condition(self.builder, mask).choose(yes, no)
 
     def word_any_of(self, mask: Value) -> Any:
+        """Emit `any_of`: one bit test of the joined mask registers."""
         if not isinstance(mask, Vec):
             return truth(self.builder, mask)
         parts = self.lanes.condition(self.builder, mask).parts
@@ -238,15 +246,19 @@ class Expressions:
         return self.builder.icmp_unsigned("!=", bits, word(0))
 
     def word_int(self, value: Value) -> Any:
+        """Emit a conversion to an integer."""
         return number(self.builder, value, WHOLE)
 
     def word_min(self, a: Value, b: Value) -> Any:
+        """Emit the minimum of two scalars."""
         return self.extreme("min", a, b)
 
     def word_max(self, a: Value, b: Value) -> Any:
+        """Emit the maximum of two scalars."""
         return self.extreme("max", a, b)
 
     def extreme(self, which: str, a: Any, b: Any) -> Any:
+        """Emit the minimum or maximum of two scalars."""
         if any(isinstance(v, (Vec, tuple)) for v in (a, b)):
             raise MismatchError("this is for numbers that are the same everywhere")
         kind = common(a.type, b.type)
@@ -254,7 +266,7 @@ class Expressions:
         return self.builder.select(compare(self.builder, _EXTREMES[which], b, a), b, a)
 
     def word_load(self, place: Any, index: Value) -> Vec:
-        """Lanes from memory."""
+        """Load lanes from memory."""
         align = self.lanes.bits // 8
         return Vec(
             self.builder,
@@ -262,13 +274,13 @@ class Expressions:
         )
 
     def word_store(self, place: Any, index: Value, value: Value) -> None:
-        """Lanes to memory."""
+        """Store lanes to memory."""
         parts = self.lanes.vec(self.builder, value).parts
         for address, part in zip(self.registers(place, index), parts, strict=True):
             self.builder.store(part, address, align=self.lanes.bits // 8)
 
     def registers(self, place: Any, index: Value) -> list[Any]:
-        """Where each register of lanes lies, from an element of an array on."""
+        """Addresses of the registers of lanes, starting at an array element."""
         first, kind = self.address(place, index), self.lanes.register
         steps = (ir.Constant(WHOLE, k * kind.count) for k in range(self.lanes.registers))
         return [self.builder.bitcast(self.builder.gep(first, [step]), kind.as_pointer()) for step in steps]

@@ -1,7 +1,7 @@
-"""The intrinsics of loops, beside the vocabulary of formulas: lanes, memory and the scene's field.
+"""Intrinsics of loops, besides those of formulas: lanes, memory and the scene's field.
 
-Here they mean NumPy arrays, so that a loop runs as the Python that it is: lanes are a slice, and P is the
-field itself, a function of ``x, y, z``. The compiler gives the same names their meaning in machine code.
+Here they are implemented on NumPy arrays, so that a loop also runs as plain Python: lanes are a slice, and P
+is the field itself, a function of ``x, y, z``. The compiler implements the same names in machine code.
 """
 
 from __future__ import annotations
@@ -15,35 +15,93 @@ import numpy as np
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 WIDTH = sys.maxsize
-"""Lanes at once; in Python all elements of an array."""
+"""Number of lanes; in Python all elements of an array."""
 
 _INTRINSICS: set[Callable[..., Any]] = set()
 
 
 def intrinsic(function: Function) -> Function:
-    """Decorates a function that the compiler or the linked scene provides under the same name."""
+    """Decorate a function that the compiler or the linked scene provides under the same name.
+
+    Parameters
+    ----------
+    function
+        NumPy implementation.
+
+    Returns
+    -------
+    Callable
+        The function itself.
+    """
     _INTRINSICS.add(function)
     return function
 
 
 def is_intrinsic(value: Any) -> bool:
-    """Whether loops may call a function that is linked from elsewhere."""
+    """Return True if a value is an intrinsic, which loops may call.
+
+    Parameters
+    ----------
+    value
+        Any value.
+
+    Returns
+    -------
+    bool
+        True for an intrinsic.
+    """
     return callable(value) and value in _INTRINSICS
 
 
 @intrinsic
 def load(array: np.ndarray, i: int) -> Any:
-    """The lanes from element i on."""
+    """Load lanes.
+
+    Parameters
+    ----------
+    array
+        Array, [n].
+    i
+        First element.
+
+    Returns
+    -------
+    Any
+        Copy of the elements from i on, at most WIDTH.
+    """
     return array[i : i + WIDTH].copy()
 
 
 @intrinsic
 def store(array: np.ndarray, i: int, lanes: Any) -> None:
-    """Writes lanes from element i on."""
+    """Store lanes.
+
+    Parameters
+    ----------
+    array
+        Array to modify, [n].
+    i
+        First element.
+    lanes
+        Values, WIDTH of them.
+    """
     array[i : i + WIDTH] = lanes
 
 
 @intrinsic
 def field(x: Any, y: Any, z: Any, P: Any) -> Any:
-    """The scene's signed field."""
+    """Evaluate the scene's signed field.
+
+    Parameters
+    ----------
+    x, y, z
+        Coordinates, scene units.
+    P
+        Parameters of the scene; in Python the field itself.
+
+    Returns
+    -------
+    Any
+        Field values.
+    """
     return P(x, y, z)

@@ -1,8 +1,8 @@
 """Elementary functions on LLVM vectors, float32 and float64, without a mathematics library.
 
-Polynomials and argument reductions are those of fdlibm (Sun Microsystems 1993, "Freely Distributable LIBM")
-evaluated without branches, so every machine gives the same bits. Errors are a few units in the last place
-over the range that formulas use; tests hold them to it.
+Polynomials and argument reductions are those of fdlibm (Sun Microsystems 1993, "Freely Distributable LIBM"),
+evaluated without branches, so every machine computes the same bits. Errors are a few units in the last place
+over the range that formulas use, as the tests verify.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .registers import Vec, declare
 
 
 def _polynomial(x: Vec, coefficients: Sequence[float]) -> Vec:
-    """Horner's rule, the highest power first."""
+    """Horner's rule, highest power first."""
     total = x.const(coefficients[0])
     for c in coefficients[1:]:
         total = total * x + c
@@ -26,48 +26,54 @@ def _polynomial(x: Vec, coefficients: Sequence[float]) -> Vec:
 
 
 def _polynomial_in_pairs(x: Vec, coefficients: Sequence[float]) -> Vec:
-    """Horner's rule in x^2 on pairs of an even number of terms: half the latency for one product more."""
+    """Horner's rule in x^2 on pairs of an even number of terms: half the latency for one more product."""
     x2 = x * x
     pairs = [x * a + b for a, b in zip(coefficients[::2], coefficients[1::2], strict=True)]
     return reduce(lambda total, pair: x2 * total + pair, pairs)
 
 
 def sqrt(a: Vec) -> Vec:
+    """Return the square root."""
     return a.call("sqrt")
 
 
 def floor(a: Vec) -> Vec:
+    """Return the largest integer not above a."""
     return a.call("floor")
 
 
 def absolute(a: Vec) -> Vec:
+    """Return the absolute value."""
     return a.call("fabs")
 
 
 def minimum(a: Vec, b: Vec) -> Vec:
-    """a where a < b, else b."""
+    """Return a where a < b, else b."""
     return _extreme(a, b, "min") if _is_avx512(a) else (a < b).choose(a, b)
 
 
 def maximum(a: Vec, b: Vec) -> Vec:
-    """a where a > b, else b."""
+    """Return a where a > b, else b."""
     return _extreme(a, b, "max") if _is_avx512(a) else (a > b).choose(a, b)
 
 
 def _extreme(a: Vec, b: Vec, which: str) -> Vec:
-    """As one instruction, that LLVM can merge with the mask of a `where` around it."""
+    """Minimum or maximum as one instruction that LLVM can merge with the mask of an enclosing `where`."""
     kind, current = a.register, ir.Constant(ir.IntType(32), 4)
     function = _avx512(a, which, [kind, kind, current.type])
     return a.each(lambda x, y: a.builder.call(function, [x, y, current]), b)
 
 
 def ratio(a: Vec, b: Vec) -> Vec:
-    """a/b. The divider has little else to do, while an estimate and Newton steps take multiplications."""
+    """Return a/b by division.
+
+    The divider is mostly idle, while an estimate with Newton steps takes multiplications.
+    """
     return a / b
 
 
 def rsqrt(a: Vec) -> Vec:
-    """1/sqrt(a): the hardware's 14-bit estimate and Newton steps where there is one, else a division."""
+    """Return 1/sqrt(a): the hardware's 14-bit estimate and Newton steps on AVX-512, else a division."""
     if not _is_avx512(a):
         return a.const(1.0) / sqrt(a)
     kind, mask = a.register, ir.IntType(a.register.count)
@@ -81,7 +87,7 @@ def rsqrt(a: Vec) -> Vec:
 
 
 HOST_FEATURES: frozenset[str] = frozenset()
-"""CPU features that code may use; set by the back end before it compiles."""
+"""CPU features that code may use; the back end sets them before it compiles."""
 
 
 def _is_avx512(a: Vec) -> bool:
@@ -108,11 +114,11 @@ _LOG = {
         0.66666666666587495,
     ],
 }
-"""Of fdlibm's series with a term less; minimax for the relative error, 8e-10 and 2e-16."""
+"""Coefficients of fdlibm's series with one term less; minimax in the relative error, 8e-10 and 2e-16."""
 
 
 def log(x: Vec) -> Vec:
-    """Natural logarithm of a positive, normal number; anything for another."""
+    """Return the natural logarithm of a positive, normal number; undefined for others."""
     mantissa, root_half = (23, 0x3F3504F3) if x.bits == 32 else (52, 0x3FE6A09E << 32)
     above = x.as_whole().plus(-root_half)
     exponent = above.right(mantissa).to_real()
@@ -124,7 +130,7 @@ def log(x: Vec) -> Vec:
 
 
 def exp(x: Vec) -> Vec:
-    """e^x, saturating at the ends of the range of normal numbers."""
+    """Return e^x, saturated at the ends of the range of normal numbers."""
     mantissa, bias, top, terms = (23, 127, 87.0, 7) if x.bits == 32 else (52, 1023, 708.0, 13)
     x = minimum(maximum(x, x.const(-top)), x.const(top))
     n = floor(x * (1 / math.log(2)) + 0.5)
@@ -170,10 +176,12 @@ def _sine(x: Vec, quarter_turns: int) -> Vec:
 
 
 def sin(x: Vec) -> Vec:
+    """Return the sine for |x| up to about 10^4."""
     return _sine(x, 0)
 
 
 def cos(x: Vec) -> Vec:
+    """Return the cosine for |x| up to about 10^4."""
     return _sine(x, 1)
 
 
@@ -193,7 +201,7 @@ _ATAN = [
 
 
 def atan2(y: Vec, x: Vec) -> Vec:
-    """The angle of (x, y), in (-pi, pi]; 0 at the origin."""
+    """Return the angle of (x, y), in (-pi, pi]; 0 at the origin."""
     ax, ay = absolute(x), absolute(y)
     steep = ay > ax
     low, high = steep.choose(ax, ay), steep.choose(ay, ax)

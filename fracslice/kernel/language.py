@@ -1,9 +1,9 @@
-"""The language of formulas: which Python it is, and the text of a function in the words of the vocabulary.
+"""Language of formulas: a subset of Python, and the text of a function in that subset.
 
-A formula is plain Python over points: arithmetic, comparisons, the words of `formulas.vocabulary`, ``for``
-over a range and ``if not any_of(...): break``. What else Python's own functions mean the same (abs, min, max,
-pow, ``math.sqrt``, ``np.sqrt``) is written as the word it is. All the rest is refused here, by file and line,
-before anything is compiled.
+A formula is plain Python over points: arithmetic, comparisons, the intrinsics of `formulas.vocabulary`,
+``for`` over a range and ``if not any_of(...): break``. Functions of Python and NumPy with the same meaning
+(abs, min, max, pow, ``math.sqrt``, ``np.sqrt``) are rewritten as intrinsics. Everything else is rejected
+here, by file and line, before anything is compiled.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _OF_THE_KERNEL = re.compile(r"[NT]\d+|P0?")
 _PLAIN = ("range", "int")
 _PYTHON = {"abs": "absolute", "min": "minimum", "max": "maximum", "fabs": "absolute", "pow": "pow"}
 _HIGHEST = 16
-"""The largest exponent that is written as products."""
+"""Largest exponent expanded to products."""
 
 _STATEMENTS = (ast.Assign, ast.AugAssign, ast.Return, ast.For, ast.If, ast.Break, ast.Expr, ast.Pass)
 _EXPRESSIONS = (
@@ -56,20 +56,47 @@ _ON_NUMBERS_ALONE = {
 
 
 def parameters(function: Callable[..., Any]) -> list[str]:
-    """The names of a function's arguments."""
+    """Return the names of a function's parameters."""
     code = function.__code__
     return list(code.co_varnames[: code.co_argcount])
 
 
 def scope(function: Callable[..., Any]) -> dict[str, Any]:
-    """All that a function sees from outside: Python's own names, its module's, those around it."""
+    """Return the names visible to a function from outside: builtins, its module's globals and its closure.
+
+    Parameters
+    ----------
+    function
+        Python function.
+
+    Returns
+    -------
+    dict
+        Values by name.
+    """
     assert isinstance(function, FunctionType)
     cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
     return {**vars(builtins), **function.__globals__, **{name: cell.cell_contents for name, cell in cells}}
 
 
 def text(function: Callable[..., Any]) -> str:
-    """A function in the words of the vocabulary. Raises `KernelError` for what is not in the language."""
+    """Return a function rewritten in the language of formulas.
+
+    Parameters
+    ----------
+    function
+        Formula, defined in a file or a notebook.
+
+    Returns
+    -------
+    str
+        Source text.
+
+    Raises
+    ------
+    KernelError
+        If the function is not in the language or its source cannot be read.
+    """
     return _text(function, seen(function))
 
 
@@ -90,12 +117,12 @@ def _text(function: Callable[..., Any], _: object) -> str:
 
 
 def word(value: Any) -> str | None:
-    """The word that something means, if it is one: ``np.sqrt`` is ``sqrt``."""
+    """Return the name of the intrinsic that a value stands for, or None: ``np.sqrt`` is ``sqrt``."""
     return _INTRINSICS.get(id(value))
 
 
 INTRINSICS = frozenset({*vocabulary.NAMES, *_PLAIN})
-"""All names that a text in the language has without saying what they are."""
+"""Names that a text in the language may use without a definition."""
 
 _INTRINSICS = {id(getattr(vocabulary, name)): name for name in (*vocabulary.NAMES, "orbit")} | {
     id(getattr(module, name)): _PYTHON.get(name, name)
@@ -106,7 +133,7 @@ _INTRINSICS = {id(getattr(vocabulary, name)): name for name in (*vocabulary.NAME
 
 
 class _Language(ast.NodeTransformer):
-    """Checks a function statement by statement, and writes what it uses from elsewhere as what it is."""
+    """Checks a function statement by statement, and replaces outside names by intrinsics or constants."""
 
     def __init__(self, function: Callable[..., Any], tree: ast.FunctionDef, place: str, first: int) -> None:
         self.scope, self.place, self.first = scope(function), place, first
@@ -187,7 +214,7 @@ class _Language(ast.NodeTransformer):
         return self.of_numbers(node, node.op)
 
     def of_numbers(self, node: ast.expr, op: ast.AST) -> ast.AST:
-        """What is only for numbers that are the same for all points."""
+        """Reject operators that require scalars if their operands are points."""
         if type(op) in _ON_NUMBERS_ALONE and self.on_points(node):
             self.refuse(node, _ON_NUMBERS_ALONE[type(op)])
         return self.generic_visit(node)
@@ -225,7 +252,7 @@ class _Language(ast.NodeTransformer):
         return node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        """``np.sqrt`` and ``math.pi``."""
+        """Resolve ``np.sqrt`` and ``math.pi``."""
         module = self.scope.get(node.value.id) if isinstance(node.value, ast.Name) else None
         value = getattr(module, node.attr, None) if isinstance(module, ModuleType) else None
         return self.known(node, value, node.attr)
@@ -252,7 +279,7 @@ class _Language(ast.NodeTransformer):
 
 
 def is_number(value: Any) -> bool:
-    """True of a number, or a tuple of them, that a function takes from outside."""
+    """Return True for a number, or a tuple of numbers, that a function takes from outside."""
     if isinstance(value, tuple):
         return all(map(is_number, value))
     return isinstance(value, (int, float))

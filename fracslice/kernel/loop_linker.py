@@ -1,9 +1,8 @@
-"""Loops and the functions that they call as trees that the compilers take, each line where it stands in its
-file.
+"""Linking of loops and the functions that they call to syntax trees that keep their files' line numbers.
 
-Numbers that a function takes from elsewhere (of its module, of an enumeration, of a fixed record) become
-constants, and branches on constants the one that is taken. A function that is called with fixed arguments is
-a copy of its own. Intrinsics and the words of the formulas keep their names.
+Numbers from outside a function (of its module, of an enumeration, of a fixed record) become constants, and
+branches on constants are resolved. A function called with fixed arguments is copied for them. Intrinsics keep
+their names.
 """
 
 from __future__ import annotations
@@ -24,14 +23,22 @@ from .intrinsics import is_intrinsic
 from .loops import Loop
 
 OF_LOOPS = "l_"
-"""What the names of functions that loops call begin with, so that they are no formula's and no unit's."""
+"""Prefix of the names of functions that loops call, distinct from those of formulas and units."""
 
 Fixed = tuple[tuple[str, Any], ...]
 
 
 @dataclass(frozen=True)
 class LinkedFunction:
-    """A function that calls linked functions and intrinsics only. file: where its lines are."""
+    """Function that calls only linked functions and intrinsics.
+
+    Attributes
+    ----------
+    tree
+        Syntax tree.
+    file
+        File of its lines.
+    """
 
     tree: ast.FunctionDef
     file: str
@@ -39,7 +46,23 @@ class LinkedFunction:
 
 @lru_cache(maxsize=32)
 def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
-    """Loops and the functions that they call, by name. Raises `KernelError`."""
+    """Link loops and the functions that they call.
+
+    Parameters
+    ----------
+    loops
+        Loops to link.
+
+    Returns
+    -------
+    dict
+        Linked functions by name.
+
+    Raises
+    ------
+    KernelError
+        If a loop is not in the language.
+    """
     linker = _LoopLinker()
     for loop in loops:
         linker.linked(loop.function, loop.fixed, loop.name)
@@ -47,7 +70,23 @@ def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
 
 
 def loop_source(loops: Sequence[Loop]) -> str:
-    """The text of loops and of the functions that they call."""
+    """Return the text of loops and of the functions that they call.
+
+    Parameters
+    ----------
+    loops
+        Loops to link.
+
+    Returns
+    -------
+    str
+        Source text.
+
+    Raises
+    ------
+    KernelError
+        If a loop is not in the language.
+    """
     return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
 
 
@@ -57,8 +96,7 @@ class _LoopLinker:
     names: dict[tuple[Callable[..., Any], Fixed], str] = field(default_factory=dict)
 
     def linked(self, function: Callable[..., Any], fixed: Fixed, name: str) -> str:
-        """Links a function once for the same fixed arguments; returns its name: a longer one if that is
-        taken."""
+        """Link a function once per set of fixed arguments; return its name, extended if that is in use."""
         if (function, fixed) not in self.names:
             while name in self.names.values():
                 name += "_"
@@ -72,7 +110,7 @@ _UNKNOWN = object()
 
 
 class _Resolver(ast.NodeTransformer):
-    """Gives a function's names from elsewhere their values."""
+    """Substitutes the values of outside names in a function."""
 
     def __init__(self, linker: _LoopLinker, function: Callable[..., Any], fixed: dict[str, Any]) -> None:
         self.linker, self.function, self.fixed = linker, function, fixed
@@ -80,7 +118,7 @@ class _Resolver(ast.NodeTransformer):
         self.local = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - fixed.keys()
 
     def tree(self, name: str) -> ast.FunctionDef:
-        """The function under another name, without its fixed arguments."""
+        """Function under another name, without its fixed arguments."""
         tree = _parsed(self.function)
         arguments = [a.arg for a in tree.args.args if a.arg not in self.fixed]
         tree.name, tree.returns = name, None
@@ -95,7 +133,7 @@ class _Resolver(ast.NodeTransformer):
         raise KernelError(f"{code.co_filename}:{line}: loop {self.function.__name__}: {message}")
 
     def known(self, node: ast.expr) -> Any:
-        """The value of what is the same whenever the loop runs."""
+        """Value of an expression that is constant for the loop."""
         match node:
             case ast.Name(name) if name in self.fixed:
                 return self.fixed[name]
@@ -114,7 +152,7 @@ class _Resolver(ast.NodeTransformer):
         return self.generic_visit(node) if local else self.resolved(node)
 
     def is_local(self, node: ast.Name) -> bool:
-        return node.id in self.local and node.id not in self.fixed  # the counter of a tuple is, for a while
+        return node.id in self.local and node.id not in self.fixed  # fixed while a tuple is unrolled
 
     def resolved(self, node: ast.Name | ast.Attribute) -> ast.AST:
         value = self.known(node)
@@ -157,7 +195,7 @@ class _Resolver(ast.NodeTransformer):
         return ast.copy_location(ast.Call(ast.Name(name, ast.Load()), passed, []), node)
 
     def unrolled(self, node: ast.Call, element: ast.expr, generator: ast.comprehension) -> ast.AST:
-        """A tuple of as many elements as are known."""
+        """Unroll a tuple of known length."""
         match generator:
             case ast.comprehension(ast.Name(counter), ast.Call(ast.Name("range"), [limit]), []):
                 match self.visit(limit):
@@ -199,7 +237,7 @@ class _Resolver(ast.NodeTransformer):
 
 
 def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
-    """A function's own tree, with the lines of its file."""
+    """Syntax tree of a function with the line numbers of its file."""
     code = function.__code__
     lines, first = linecache.getlines(code.co_filename), code.co_firstlineno
     last = _functions("".join(lines)).get(first)
@@ -212,7 +250,7 @@ def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
 
 @lru_cache(maxsize=32)
 def _functions(text: str) -> dict[int, int]:
-    """The first and the last line of each function of a file, decorators included."""
+    """First and last line of each function of a file, decorators included."""
     found = {}
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef):

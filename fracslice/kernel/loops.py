@@ -1,7 +1,7 @@
-"""Loops around a field: what a compiled kernel does with it.
+"""Loops around a field, the entry points of a compiled kernel.
 
-A loop is a Python function in the words of the formulas and in `intrinsics`, which may also use ``while``,
-elements of arrays, and the numbers and functions that its module sees. It becomes a C function.
+A loop is a Python function that uses the intrinsics of formulas and of `intrinsics`, ``while``, array
+elements, and the numbers and functions of its module. It becomes a C function.
 """
 
 from __future__ import annotations
@@ -16,11 +16,17 @@ from .intrinsics import WIDTH, field, load, store
 
 @dataclass(frozen=True)
 class Loop:
-    """A C function over a field.
+    """C function over a field.
 
-    arguments: one letter each: "r" a pointer to the kernel's float type, "i" to int32, "n" a whole number.
-    The first argument is P by convention. fixed: arguments beside these, by name, that are known when it is
-    compiled: functions, and records of numbers.
+    Attributes
+    ----------
+    function
+        Python function of the loop.
+    arguments
+        One letter per argument: "r" a pointer to the kernel's float type, "i" to int32, "n" an integer. The
+        first argument is P by convention.
+    fixed
+        Further arguments by name, constant at compile time: functions, and records of numbers.
     """
 
     function: Callable[..., None]
@@ -29,21 +35,45 @@ class Loop:
 
     @property
     def name(self) -> str:
+        """Name of the function."""
         return self.function.__name__
 
     def fix(self, **fixed: Any) -> Loop:
-        """The loop with arguments that are known when it is compiled."""
+        """Return the loop with arguments that are constant at compile time."""
         return replace(self, fixed=tuple(fixed.items()))
 
 
 def loop(arguments: str) -> Callable[[Callable[..., None]], Loop]:
-    """Decorates a function that is a `Loop` with these arguments."""
+    """Return a decorator that makes a function a `Loop`.
+
+    Parameters
+    ----------
+    arguments
+        Arguments of the loop, one letter each.
+
+    Returns
+    -------
+    Callable
+        Decorator.
+    """
     return lambda function: Loop(function, arguments)
 
 
 @loop("rrrrrn")
 def points(P, X, Y, Z, F, n):
-    """Field values at n points, n a multiple of WIDTH; a point with a NaN gives NaN."""
+    """Evaluate the field at points; NaN at a point with a NaN.
+
+    Parameters
+    ----------
+    P
+        Parameters of the scene.
+    X, Y, Z
+        Coordinates, [n] each, scene units.
+    F
+        Receives the values, [n].
+    n
+        Number of points, a multiple of WIDTH.
+    """
     for i in range(0, n, WIDTH):
         x = load(X, i)
         y = load(Y, i)
@@ -55,7 +85,23 @@ def points(P, X, Y, Z, F, n):
 
 @loop("rrrrrirn")
 def bricks(P, FRAME, IX, IY, IZ, corners, F, n):
-    """512 samples of each of n bricks, at ``FRAME[:3] + FRAME[3] * (corner + (IX, IY, IZ))``."""
+    """Evaluate the 512 samples of bricks, at ``FRAME[:3] + FRAME[3] * (corner + (IX, IY, IZ))``.
+
+    Parameters
+    ----------
+    P
+        Parameters of the scene.
+    FRAME
+        Position of grid point (0, 0, 0), then grid spacing, [4], scene units.
+    IX, IY, IZ
+        Offsets of the samples from the corner, [512] each.
+    corners
+        Grid index of the first sample of each brick, int32 [n, 3].
+    F
+        Receives the values, [n, 512].
+    n
+        Number of bricks.
+    """
     h = FRAME[3]
     for b in range(n):
         x0 = corners[3 * b]

@@ -1,7 +1,7 @@
 """Machine code as functions of NumPy arrays.
 
-Nowhere else does an array become an address. Code and arrays are held by the call, or by the native object
-that is given both (`fracslice/native/machine.h`), so neither can be freed while it is in use.
+This is the only place where an array becomes an address. Code and arrays are kept alive by the call, or by
+the native object that holds both (`fracslice/native/machine.h`), so neither can be freed while in use.
 """
 
 from __future__ import annotations
@@ -16,12 +16,17 @@ from .loops import Loop
 
 
 class Function:
-    """A compiled loop, called with arrays and whole numbers. Safe to call from many threads at once.
+    """Compiled loop, called with arrays and integers. Thread-safe; releases the GIL.
 
-    Other threads of the interpreter run meanwhile. Arrays are C-contiguous; their dtype is the kernel's where
-    the loop says "r", int32 where it says "i"; a `ctypes.ArgumentError` otherwise.
+    Arrays must be C-contiguous, of the kernel's dtype where the loop has "r" and int32 where it has "i";
+    otherwise a call raises `ctypes.ArgumentError`.
 
-    arguments: the loop's. address: the code's, valid as long as this object lives.
+    Attributes
+    ----------
+    arguments
+        Arguments of the loop, one letter each.
+    address
+        Address of the code, valid while this object exists.
     """
 
     def __init__(self, engine: Any, loop: Loop, dtype: np.dtype) -> None:
@@ -36,7 +41,9 @@ class Function:
 
 
 class _Pointer:
-    """An argument type of ctypes, which calls `from_param` and keeps the array until the function returns."""
+    """Argument type for ctypes, which calls `from_param` and keeps the array alive until the function
+    returns.
+    """
 
     def __init__(self, dtype: np.dtype) -> None:
         self.dtype = dtype
@@ -46,13 +53,28 @@ class _Pointer:
             order = "C-contiguous" if array.flags.c_contiguous else "not C-contiguous"
             raise TypeError(f"an array of {array.dtype}, {order}: expected {self.dtype}, C-contiguous")
         if array.flags.writeable and array.size:
-            # A third of the time of the other way, which read-only and empty arrays need.
+            # Three times as fast as the code below, which read-only and empty arrays need.
             return ctypes.byref(ctypes.c_char.from_buffer(array.data))
         return ctypes.c_void_p(array.ctypes.data)
 
 
 def loaded(code: bytes, loops: Sequence[Loop], dtype: np.dtype) -> dict[str, Function]:
-    """The functions of an object file, by name."""
+    """Load the functions of an object file.
+
+    Parameters
+    ----------
+    code
+        Object file.
+    loops
+        Loops that it contains.
+    dtype
+        Floating-point type of the kernel.
+
+    Returns
+    -------
+    dict
+        Functions by name.
+    """
     import llvmlite.binding as llvm
 
     machine = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(jit=True)
@@ -63,7 +85,20 @@ def loaded(code: bytes, loops: Sequence[Loop], dtype: np.dtype) -> dict[str, Fun
 
 
 def constant(values: np.ndarray, dtype: np.dtype | str) -> np.ndarray:
-    """A copy that nobody can change, C-contiguous: what several threads may read."""
+    """Return a read-only, C-contiguous copy, which threads may share.
+
+    Parameters
+    ----------
+    values
+        Array to copy.
+    dtype
+        Type of the copy.
+
+    Returns
+    -------
+    ndarray
+        Read-only array.
+    """
     kept = np.array(values, dtype, order="C")
     kept.setflags(write=False)
     return kept

@@ -1,4 +1,4 @@
-"""Machine code of linked scenes: object files in a folder, named by the hash of everything that made them."""
+"""Cache of machine code: object files named by the hash of everything that they depend on."""
 
 from __future__ import annotations
 
@@ -20,12 +20,34 @@ from .loop_linker import loop_source
 from .loops import Loop
 
 DIGEST = hashlib.sha256().digest_size
+"""Length of a digest, bytes."""
 
 
 def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> bytes:
-    """The object file of loops over a linked scene: the one kept, or compiled now and kept.
+    """Return the object file of loops over a linked scene: cached, or compiled and cached.
 
-    One that others could have written is not used. Raises `KernelError`.
+    A file that other users could have written is not used.
+
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    bits
+        Width of a float: 32 or 64.
+    width
+        Lanes.
+    loops
+        Loops to compile.
+
+    Returns
+    -------
+    bytes
+        Object file.
+
+    Raises
+    ------
+    KernelError
+        If the scene or a loop cannot be compiled.
     """
     texts_of_all = linked.source, loop_source(loops), [loop.arguments for loop in loops]
     kept, name = Kept(cache_folder()), f"{key(*texts_of_all, bits, width, toolchain())}.o"
@@ -41,14 +63,14 @@ def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) ->
 
 
 def cache_folder() -> Path:
-    """Where kernels are kept: $FRACSLICE_CACHE, else a folder in the user's cache folder."""
+    """Return the cache folder of kernels: $FRACSLICE_CACHE, else one in the user's cache folder."""
     given = os.environ.get("FRACSLICE_CACHE")
     return Path(given).expanduser() if given else users_folder("XDG_CACHE_HOME", "~/.cache") / "kernels"
 
 
 @lru_cache(maxsize=1)
 def toolchain() -> str:
-    """The key of everything beside the linked text that machine code depends on."""
+    """Return the key of everything that machine code depends on besides the linked text."""
     from llvmlite.binding import llvm_version_info
 
     own = texts(*sorted(Path(__file__).parent.glob("*.py")), Path(vocabulary.__file__))
@@ -56,6 +78,6 @@ def toolchain() -> str:
 
 
 def _read(file: BinaryIO) -> bytes | None:
-    """The code in a file; None where it is not whole: what loads it would end the process."""
+    """Code in a file; None if it is incomplete, since loading it would crash the process."""
     digest, code = file.read(DIGEST), file.read()
     return code if hashlib.sha256(code).digest() == digest else None

@@ -1,4 +1,4 @@
-"""The reference back end: the linked scene on NumPy float64 arrays. Slow, the oracle of every other one."""
+"""Reference back end: the linked scene on NumPy float64 arrays. Slow; the oracle of all other back ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,23 @@ from .linker import CALLED, FIELD, link
 
 
 def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:
-    """``f(x, y, z)`` of float64 arrays of one shape, the signed field of a scene tree."""
+    """Return the signed field of a scene tree.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+
+    Returns
+    -------
+    Callable
+        ``f(x, y, z)`` of float64 arrays of one shape, scene units.
+
+    Raises
+    ------
+    KernelError
+        If the scene cannot be linked.
+    """
     linked = link(root)
     scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
     scope[CALLED] = lambda function: function

@@ -1,7 +1,7 @@
-"""LLVM vectors with Python's operators, the registers under the lanes.
+"""LLVM vectors with Python's operators: the registers that hold lanes.
 
-A product to which something is added in the same expression is fused with it here, not by LLVM, which may
-choose another one of two products in another place: a value does not depend on the code around it.
+A product is fused with a sum in the same expression here, not by LLVM, which may fuse the other of two
+products elsewhere: a value does not depend on the code around it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from llvmlite import ir
 
 
 def splat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
-    """A scalar in every element of a register."""
+    """Broadcast a scalar to every element of a register."""
     undefined = ir.Constant(vector, ir.Undefined)
     first = builder.insert_element(undefined, scalar, ir.Constant(ir.IntType(32), 0))
     return builder.shuffle_vector(
@@ -25,10 +25,19 @@ def splat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Vec:
-    """LLVM vectors of floats (or integers of the same width, or booleans), each one register, with Python's
-    operators: done on one register after the other, so that several are in flight.
+    """LLVM vectors of floats, of integers of the same width, or of booleans, with Python's operators.
 
-    factors: of which it is the product. Adding to it or subtracting is one instruction and one rounding.
+    Each vector is one register. An operator acts on one register after the other, so that several are in
+    flight.
+
+    Attributes
+    ----------
+    builder
+        LLVM IR builder.
+    parts
+        One LLVM value per register.
+    factors
+        Factors of a product, or None. Adding to it or subtracting is one instruction with one rounding.
     """
 
     builder: Any
@@ -37,10 +46,12 @@ class Vec:
 
     @property
     def register(self) -> ir.VectorType:
+        """LLVM type of a register."""
         return self.parts[0].type
 
     @property
     def bits(self) -> int:
+        """Width of an element: 1, 32 or 64."""
         element = self.register.element
         return (
             element.width
@@ -52,24 +63,27 @@ class Vec:
 
     @property
     def whole(self) -> ir.VectorType:
+        """LLVM type of a register of integers of the same width."""
         return ir.VectorType(ir.IntType(self.bits), self.register.count)
 
     @property
     def real(self) -> ir.VectorType:
+        """LLVM type of a register of floats of the same width."""
         return ir.VectorType(ir.FloatType() if self.bits == 32 else ir.DoubleType(), self.register.count)
 
     def const(self, number: float) -> Vec:
+        """Return a constant of this type."""
         constant = ir.Constant(self.register, [number] * self.register.count)
         return Vec(self.builder, (constant,) * len(self.parts))
 
     def each(self, emit: Callable[..., Any], *others: Vec | float) -> Vec:
-        """An instruction on each register of self and the others."""
+        """Emit an instruction on each register of self and the others."""
         rows = [o.parts if isinstance(o, Vec) else self.const(o).parts for o in others]
         return Vec(self.builder, tuple(emit(*p) for p in zip(self.parts, *rows, strict=True)))
 
     def __add__(self, other: Vec | float) -> Vec:
         theirs = other.factors if isinstance(other, Vec) else None
-        if theirs is self.factors:  # neither is a product, or it is added to itself, which needs no fusing
+        if theirs is self.factors:  # no products, or a product added to itself, which needs no fusing
             return self.each(self.builder.fadd, other)
         if self.factors:
             return self._fused(1, other)
@@ -121,54 +135,60 @@ class Vec:
         return self._compare("==", other)  # type: ignore[arg-type]
 
     def choose(self, yes: Vec | float, no: Vec | float) -> Vec:
-        """With self a mask: yes where it holds, else no; at least one of them a vector."""
+        """Select `yes` where the mask self is set, else `no`; at least one of them is a vector."""
         like = yes if isinstance(yes, Vec) else no
         assert isinstance(like, Vec)
         yes, no = (v if isinstance(v, Vec) else like.const(v) for v in (yes, no))
         return self.each(self.builder.select, yes, no)
 
     def call(self, name: str, *others: Vec | float) -> Vec:
-        """An LLVM intrinsic on vectors of this type."""
+        """Call an LLVM intrinsic on vectors of this type."""
         kind = self.register
         function = ir.FunctionType(kind, [kind] * (1 + len(others)))
         declared = declare(self.builder.module, function, f"llvm.{name}.v{kind.count}f{self.bits}")
         return self.each(lambda *registers: self.builder.call(declared, registers), *others)
 
     def as_whole(self) -> Vec:
-        """The same bits as integers."""
+        """Reinterpret the bits as integers."""
         return self._to(self.builder.bitcast, self.whole)
 
     def as_real(self) -> Vec:
-        """The same bits as floats."""
+        """Reinterpret the bits as floats."""
         return self._to(self.builder.bitcast, self.real)
 
     def to_real(self) -> Vec:
-        """Integers as floats."""
+        """Convert integers to floats."""
         return self._to(self.builder.sitofp, self.real)
 
     def to_whole(self) -> Vec:
-        """Floats, already whole, as integers."""
+        """Convert floats with integer values to integers."""
         return self._to(self.builder.fptosi, self.whole)
 
     def _to(self, conversion: Callable[[Any, ir.VectorType], Any], kind: ir.VectorType) -> Vec:
         return self.each(lambda register: conversion(register, kind))
 
     def plus(self, n: int | Vec) -> Vec:
+        """Add integers."""
         return self.each(self.builder.add, n)
 
     def masked(self, n: int) -> Vec:
+        """Bitwise and of integers."""
         return self.each(self.builder.and_, n)
 
     def left(self, n: int) -> Vec:
+        """Shift integers left."""
         return self.each(self.builder.shl, n)
 
     def right(self, n: int) -> Vec:
+        """Shift integers right, arithmetically."""
         return self.each(self.builder.ashr, n)
 
     def is_set(self) -> Vec:
+        """Return a mask of the non-zero integers."""
         return self.each(partial(self.builder.icmp_signed, "!="), 0)
 
 
 def declare(module: Any, function: ir.FunctionType, name: str) -> Any:
+    """Return the declaration of an external function in a module; add it if missing."""
     known = module.globals.get(name)
     return known if known is not None else ir.Function(module, function, name)

@@ -1,4 +1,4 @@
-"""What a function's text follows from: in a notebook, all of it may change while the function stays."""
+"""Fingerprints of functions: in a notebook, the values that a function's text depends on may change."""
 
 from __future__ import annotations
 
@@ -9,7 +9,18 @@ from typing import Any
 
 
 def seen(function: Callable[..., Any]) -> Hashable:
-    """Equal as long as a function's code, and all that it takes from elsewhere, is the same."""
+    """Return a fingerprint, equal while a function's code and all values it uses from outside are the same.
+
+    Parameters
+    ----------
+    function
+        Python function.
+
+    Returns
+    -------
+    Hashable
+        Fingerprint.
+    """
     assert isinstance(function, FunctionType)
     code, names = function.__code__, _names(function.__code__)
     cells = zip(code.co_freevars, function.__closure__ or (), strict=True)
@@ -19,13 +30,13 @@ def seen(function: Callable[..., Any]) -> Hashable:
 
 @lru_cache(maxsize=4096)
 def _names(code: CodeType) -> tuple[str, ...]:
-    """All names that a function takes from elsewhere, and attributes of these."""
+    """Names that a function uses from outside, and their attributes."""
     inner = (_names(c) for c in code.co_consts if isinstance(c, CodeType))
     return tuple(sorted({*code.co_names, *code.co_freevars, *(n for names in inner for n in names)}))
 
 
 def _mark(value: Any, attributes: tuple[str, ...] = ()) -> Hashable:
-    """What is to be known of a value: functions by identity, numbers by type and every digit."""
+    """Fingerprint of a value: functions by identity, numbers by type and every digit."""
     if isinstance(value, FunctionType):
         return value
     if isinstance(value, ModuleType):

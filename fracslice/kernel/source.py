@@ -1,6 +1,4 @@
-"""Copies of formulas as text: fixed arguments filled in, dead branches dropped, the names they take from
-elsewhere told.
-"""
+"""Copies of formulas as text: fixed arguments substituted, dead branches dropped, outside names resolved."""
 
 from __future__ import annotations
 
@@ -19,14 +17,24 @@ from .syntax import stored_names
 
 @dataclass(frozen=True)
 class Copy:
-    """A function's text under its own name, and the functions it calls, by the names it calls them by."""
+    """Text of a function.
+
+    Attributes
+    ----------
+    name
+        Name of the function in the text.
+    text
+        Source text.
+    calls
+        Functions that it calls, by the names used in the text.
+    """
 
     name: str
     text: str
     calls: Mapping[str, Callable[..., Any]]
 
     def renamed(self, names: Mapping[str, str]) -> str:
-        """The text with other names for itself and for what it calls."""
+        """Return the text with other names for the function and for those it calls."""
         changed = {old: new for old, new in names.items() if old != new}
         if not changed:
             return self.text
@@ -34,8 +42,26 @@ class Copy:
 
 
 def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.FunctionDef:
-    """A function's tree without decorators, docstring and hints, its fixed arguments replaced by their
-    values.
+    """Return a function's tree with its fixed arguments substituted.
+
+    Decorators, docstring and annotations are removed.
+
+    Parameters
+    ----------
+    function
+        Formula.
+    fixed
+        Values of the fixed arguments.
+
+    Returns
+    -------
+    ast.FunctionDef
+        Specialised tree.
+
+    Raises
+    ------
+    KernelError
+        If the function is not in the language.
     """
     tree = ast.parse(language.text(function)).body[0]
     assert isinstance(tree, ast.FunctionDef)
@@ -45,7 +71,22 @@ def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.F
 
 
 def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset[str] = frozenset()) -> Copy:
-    """A function's specialised tree as text, the numbers that it takes from outside filled in."""
+    """Return a specialised tree as text, with numbers from outside the function substituted.
+
+    Parameters
+    ----------
+    tree
+        Specialised tree.
+    function
+        Formula that the tree comes from.
+    given
+        Names that the text gets from elsewhere.
+
+    Returns
+    -------
+    Copy
+        Text and called functions.
+    """
     tree = _Forget().visit(tree)
     scope = language.scope(function)
     names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
@@ -58,7 +99,29 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
 
 
 def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str]) -> Copy:
-    """A function's copy. A scene is linked anew for every camera, and this is nine tenths of the time."""
+    """Return the cached copy of a function.
+
+    Scenes are linked anew for every camera; copying is nine tenths of the time.
+
+    Parameters
+    ----------
+    function
+        Formula.
+    fixed
+        Names and values of the fixed arguments.
+    given
+        Names that the text gets from elsewhere.
+
+    Returns
+    -------
+    Copy
+        Text and called functions.
+
+    Raises
+    ------
+    KernelError
+        If the function is not in the language.
+    """
     return _shared(function, fixed, given, (seen(function), repr(fixed)))
 
 
@@ -66,19 +129,21 @@ def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], giv
 def _shared(
     function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str], _: object
 ) -> Copy:
-    """The last argument tells what is equal and not the same apart: 1 and 1.0, a function and its next."""
+    """Cached copy. The last argument distinguishes values that are equal but not the same: 1 and 1.0, a
+    function and its redefinition.
+    """
     return copied(specialised(function, dict(fixed)), function, given)
 
 
 def _plain(value: Any) -> Any:
-    """A number as Python's own, whatever library it is of."""
+    """Convert a number of any library to Python's own."""
     if isinstance(value, tuple):
         return tuple(map(_plain, value))
     return int(value) if isinstance(value, int) else float(value)
 
 
 class _Substitute(ast.NodeTransformer):
-    """Names replaced by constants; loops over a constant tuple unrolled."""
+    """Replaces names by constants; unrolls loops over a constant tuple."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self.values = values
@@ -102,7 +167,7 @@ class _Substitute(ast.NodeTransformer):
 
 
 class _Prune(ast.NodeTransformer):
-    """Branches and choices on a constant reduced to the one that is taken."""
+    """Replaces branches and choices on a constant by the one taken."""
 
     def visit_If(self, node: ast.If) -> Any:
         self.generic_visit(node)
@@ -118,13 +183,13 @@ class _Prune(ast.NodeTransformer):
 
 
 class _Forget(ast.NodeTransformer):
-    """Marks of orbits left out: a field does not look at them."""
+    """Removes orbit marks, which a field does not use."""
 
     def visit_Expr(self, node: ast.Expr) -> Any:
         return None if is_mark(node) else node
 
 
 def is_mark(node: ast.AST) -> bool:
-    """True of the statement ``orbit(...)``."""
+    """Return True for the statement ``orbit(...)``."""
     call = node.value if isinstance(node, ast.Expr) else None
     return isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "orbit"

@@ -1,4 +1,4 @@
-"""From a tree to functions: one for all parts that have the same structure, and differ in numbers only."""
+"""Functions of a tree: one for all parts that have the same structure and differ in numbers only."""
 
 from __future__ import annotations
 
@@ -15,19 +15,26 @@ if TYPE_CHECKING:
     from .linker import Linker
 
 INLINED = 12
-"""How many parts' code may lie inside that of one function; the others are called. Kernels of small scenes
-are one piece, and the time to compile a large one grows with the number of its parts.
+"""Parts whose code may be inlined in one function; others are called. Kernels of small scenes are one
+function, and the compile time of a large one grows with the number of its parts.
 """
 
 UNROLLED = 3
-"""How many elements of one structure are written out; more are a loop."""
+"""Elements of one structure that are unrolled; more become a loop."""
 
 
 @dataclass(frozen=True)
 class Subroutine:
-    """The function ``name(x, y, z, P, P0)`` of all trees of one structure.
+    """Function ``name(x, y, z, P, P0)`` of all trees of one structure.
 
-    size: how many numbers of P it reads, from P0 on. weight: how many parts' code it holds.
+    Attributes
+    ----------
+    name
+        Name of the function.
+    size
+        Number of entries of P that it reads, from P0 on.
+    weight
+        Number of parts whose code it contains.
     """
 
     name: str
@@ -37,8 +44,16 @@ class Subroutine:
 
 @dataclass(frozen=True)
 class Run:
-    """Elements side by side that one function computes. start: where the first one's numbers begin, from P0
-    on.
+    """Consecutive elements computed by one function.
+
+    Attributes
+    ----------
+    part
+        Function of the elements.
+    count
+        Number of elements.
+    start
+        Offset of the first element's numbers from P0.
     """
 
     part: Subroutine
@@ -46,23 +61,44 @@ class Run:
     start: int
 
     def call(self, k: str = "", points: str = "x, y, z") -> str:
-        """The call of its first element, or of the one k after that."""
+        """Return the call of one element.
+
+        Parameters
+        ----------
+        k
+            Expression of the element's index; default: the first element.
+        points
+            Expressions of the coordinates.
+
+        Returns
+        -------
+        str
+            Expression.
+        """
         place = f"P0 + {self.start}" + (f" + {self.part.size} * {k}" if k else "")
         return f"{self.part.name}({points}, P, {place})"
 
     @property
     def calls(self) -> list[str]:
-        """The calls of all of them."""
+        """Calls of all elements."""
         step = self.part.size
         return [Run(self.part, 1, self.start + k * step).call() for k in range(self.count)]
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """A node's function and what it is called with.
+    """Function of a node and its arguments.
 
-    fixed: written into a copy of the function. passed: for the others, in the function's own order, the
-    expression that reads each from P. numbers: those that lie there.
+    Attributes
+    ----------
+    function
+        Function of the formula.
+    fixed
+        Arguments substituted in a copy of the function.
+    passed
+        Expressions that read the other arguments from P, in the function's order.
+    numbers
+        Numbers in P.
     """
 
     function: Callable[..., Any]
@@ -72,25 +108,90 @@ class Arguments:
 
 
 class Dialect(Protocol):
-    """How the functions of a tree are written. prefix: of their names."""
+    """Style of the functions of a tree.
+
+    Attributes
+    ----------
+    prefix
+        Prefix of their names.
+    """
 
     prefix: str
 
     def kept(self, node: Node) -> Node:
-        """The node that stands for this one: the first below it that does something."""
+        """Return the node that represents this one.
+
+        Parameters
+        ----------
+        node
+            Node of a scene.
+
+        Returns
+        -------
+        Node
+            The first node at or below it that is no identity.
+        """
 
     def arguments(self, node: Node) -> Arguments: ...
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
-        """The order in which the children may be evaluated."""
+        """Return an order in which the children may be evaluated.
+
+        Parameters
+        ----------
+        node
+            Node of a scene.
+        parts
+            Functions of its children.
+
+        Returns
+        -------
+        sequence of int
+            Indices of the children.
+        """
 
     def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
-        """The text of a node's function."""
+        """Return the text of a node's function.
+
+        Parameters
+        ----------
+        name
+            Name of the function.
+        node
+            Node of a scene.
+        given
+            Function of its formula and arguments.
+        runs
+            Its children.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
 
 
 def link_tree(linker: Linker, root: Node, dialect: Dialect) -> str:
-    """Writes the functions of a tree and appends its numbers to P; returns the call of its field at ``x, y,
-    z``.
+    """Write the functions of a tree and append its numbers to P.
+
+    Parameters
+    ----------
+    linker
+        Receives functions and numbers.
+    root
+        Scene.
+    dialect
+        Style of the functions.
+
+    Returns
+    -------
+    str
+        Call of the tree's field at ``x, y, z``.
+
+    Raises
+    ------
+    KernelError
+        If a formula is not in the language.
     """
     tree = _Tree(linker, dialect)
     start = len(linker.parameters)
@@ -123,7 +224,7 @@ class _Tree:
         return self.parts[id(root)]
 
     def part(self, node: Node) -> Subroutine:
-        """The function of a node whose children have theirs."""
+        """Function of a node whose children are linked."""
         given = self.given[id(node)] = self.dialect.arguments(node)
         children = self.inside[id(node)]
         places = self.dialect.order(node, [self.parts[id(child)] for child in children])
@@ -141,7 +242,9 @@ class _Tree:
         return self.linker.part(self.dialect.prefix, key, written)
 
     def weight(self, runs: Sequence[Run]) -> int:
-        """What a function holds that calls these; where that is too much, the heaviest are called."""
+        """Weight of a function with these calls. If it is too large, the heaviest parts are called, not
+        inlined.
+        """
         held = {run.part.name: 0 for run in runs}
         for run in runs:
             sites = run.count if run.count <= UNROLLED else 2
@@ -156,10 +259,24 @@ class _Tree:
 
 
 def arguments(node: Node, leading: int) -> Arguments:
-    """What a node's function is called with, by name. leading: how many of its arguments are points or
-    values.
+    """Return the function of a node and its arguments.
 
-    Raises `KernelError` if the formula gives other arguments than its function has.
+    Parameters
+    ----------
+    node
+        Node of a scene.
+    leading
+        Number of the function's arguments that are points, values or a child.
+
+    Returns
+    -------
+    Arguments
+        Function and arguments.
+
+    Raises
+    ------
+    KernelError
+        If the arguments of the formula and of its function differ.
     """
     function, values = node.function, node.arguments
     names = language.parameters(function)[leading:]
@@ -177,8 +294,21 @@ def arguments(node: Node, leading: int) -> Arguments:
 
 
 def read(value: Any, numbers: list[float], origin: str = "") -> str:
-    """Appends a number or a tuple of numbers; returns the expression that reads it back from P, from an
-    origin on.
+    """Append a number or a tuple of numbers to a list.
+
+    Parameters
+    ----------
+    value
+        Number or nested tuple of numbers.
+    numbers
+        List to append to.
+    origin
+        Expression of the list's offset in P; default: 0.
+
+    Returns
+    -------
+    str
+        Expression that reads the value back from P.
     """
     if isinstance(value, tuple):
         return f"({', '.join(read(v, numbers, origin) for v in value)},)"

@@ -1,4 +1,4 @@
-"""The names in a function: those that it assigns, and those whose values differ from point to point."""
+"""Names in a function: assigned ones, and those whose values differ from point to point."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import ast
 from collections.abc import Iterator, Sequence
 
 CHILD = "child"
-"""What a warp calls its element."""
+"""Name of a domain operator's child function."""
 
 
 def stored_names(*trees: ast.AST) -> set[str]:
-    """The names that are given values."""
+    """Return the names that trees assign."""
     return {n.id for tree in trees for n in _names(tree) if isinstance(n.ctx, ast.Store)}
 
 
 def assigned_names(body: Sequence[ast.stmt]) -> set[str]:
-    """The names that statements give values to, the places of loops' counters included."""
+    """Return the names that statements assign, and the hidden counters of loops."""
     loops = [n for statement in body for n in ast.walk(statement) if isinstance(n, ast.For)]
     return stored_names(*body) | {f"{ast.unparse(loop.target)} of {loop.lineno}" for loop in loops}
 
@@ -25,7 +25,20 @@ def _names(tree: ast.AST) -> Iterator[ast.Name]:
 
 
 def point_names(tree: ast.FunctionDef, first: set[str]) -> set[str]:
-    """The names of what differs from point to point: these, and what follows from them."""
+    """Return the names whose values differ from point to point.
+
+    Parameters
+    ----------
+    tree
+        Function.
+    first
+        Names of points.
+
+    Returns
+    -------
+    set of str
+        These names, and those computed from them.
+    """
     found = set(first)
     while True:
         more = {
@@ -41,7 +54,7 @@ def point_names(tree: ast.FunctionDef, first: set[str]) -> set[str]:
 
 
 def _assigned_points(target: ast.expr, value: ast.expr, points: set[str]) -> Iterator[ast.Name]:
-    """The names of a target that are given points: of ``a, b = x, 1.0`` the first."""
+    """Names of a target that are assigned points: of ``a, b = x, 1.0`` the first."""
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
         for part, given in zip(target.elts, value.elts, strict=True):
             if depends_on_points(given, points):
@@ -51,7 +64,20 @@ def _assigned_points(target: ast.expr, value: ast.expr, points: set[str]) -> Ite
 
 
 def depends_on_points(node: ast.expr, points: set[str]) -> bool:
-    """Whether a value may differ from point to point; ``any_of`` and what a tuple is do not."""
+    """Return True if a value may differ from point to point; ``any_of`` does not, ``child`` does.
+
+    Parameters
+    ----------
+    node
+        Expression.
+    points
+        Names whose values differ from point to point.
+
+    Returns
+    -------
+    bool
+        True if the value may differ.
+    """
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("any_of", CHILD):
         return node.func.id == CHILD
     if isinstance(node, ast.Name):

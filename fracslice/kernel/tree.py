@@ -1,4 +1,4 @@
-"""What a scene's tree needs to be a `formulas.field.Field`; `Node` calls it."""
+"""Implementation of `formulas.field.Field` for scene trees; `Node` calls it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,27 @@ from .loops import Loop
 
 
 def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
-    """The kernel of a tree whose depths are resolved. Raises `KernelError`."""
+    """Compile the kernel of a tree.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+    device
+        "cpu" or "cuda".
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    Kernel
+        Compiled field.
+
+    Raises
+    ------
+    KernelError
+        If the scene cannot be compiled or the device is not available.
+    """
     if device == "cpu":
         return cpu.compile_scene(root, precision)
     from . import cuda
@@ -22,13 +42,49 @@ def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
 
 
 def loops(root: Node, loops: Sequence[Loop], precision: Precision) -> Loops:
-    """Compiled loops over a tree whose depths are resolved. Raises `KernelError`."""
+    """Compile loops over a tree for the CPU.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+    loops
+        Loops to compile.
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    Loops
+        Compiled loops by name.
+
+    Raises
+    ------
+    KernelError
+        If the scene or a loop cannot be compiled.
+    """
     linked = link(root)
     return cpu.compile_loops(linked.source, linked.parameters.tobytes(), tuple(loops), precision)
 
 
 def key(root: Node) -> str:
-    """The hash of the linked text, the parameters and the facts, of the tree and of its guard."""
+    """Hash the linked text, parameters and bounds of a tree and of its conservative field.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+
+    Returns
+    -------
+    str
+        Key.
+
+    Raises
+    ------
+    KernelError
+        If the scene cannot be linked.
+    """
     parts: list[object] = []
     for node in (root, root.conservative()):
         linked = link(node)

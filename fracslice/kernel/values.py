@@ -1,10 +1,10 @@
-"""What the names of a formula stand for while it is compiled: lanes, masks, numbers, places in memory, and
-tuples.
+"""Values of a formula's names during compilation: lanes, masks, scalars, memory addresses and tuples.
 
-Lanes and masks are `Vec`, a few registers; a number is one LLVM value, the same for all lanes: a boolean, a
-whole number of 64 bits, a float of 32 or 64. Numbers mix as NumPy's scalars do: what meets a float literal is
+Lanes and masks are `Vec`, a few registers. A scalar is one LLVM value, the same for all lanes: a boolean, a
+64-bit integer, a float of 32 or 64 bits. Scalars mix as NumPy's do: an operation with a float literal is
 computed in 64 bits, and rounded once where it meets lanes. There is no fast-math: results do not depend on
-what surrounds an operation (`registers` says how products are fused), and NaN and infinity behave.
+the code around an operation (`registers` describes how products are fused), and NaN and infinity are
+handled.
 """
 
 from __future__ import annotations
@@ -21,16 +21,26 @@ from .registers import Vec, splat
 BOOL, WHOLE, FLOAT, DOUBLE = ir.IntType(1), ir.IntType(64), ir.FloatType(), ir.DoubleType()
 
 Value = Any
-"""A `Vec`, an LLVM value, or a tuple of these."""
+"""`Vec`, LLVM value, or tuple of these."""
 
 
 class MismatchError(Exception):
-    """Two things that cannot be brought together; the message says which."""
+    """Incompatible values; the message names them."""
 
 
 @dataclass(frozen=True)
 class Lanes:
-    """So many floats of 32 or 64 bits, in so many registers."""
+    """Layout of lanes.
+
+    Attributes
+    ----------
+    bits
+        Width of a float: 32 or 64.
+    width
+        Number of lanes.
+    registers
+        Number of registers that hold them.
+    """
 
     bits: int
     width: int
@@ -38,18 +48,39 @@ class Lanes:
 
     @property
     def scalar(self) -> ir.Type:
+        """LLVM type of a float."""
         return FLOAT if self.bits == 32 else DOUBLE
 
     @property
     def register(self) -> ir.VectorType:
+        """LLVM type of a register of floats."""
         return ir.VectorType(self.scalar, self.width // self.registers)
 
     @property
     def mask(self) -> ir.VectorType:
+        """LLVM type of a register of booleans."""
         return ir.VectorType(BOOL, self.width // self.registers)
 
     def vec(self, builder: ir.IRBuilder, value: Value) -> Vec:
-        """Lanes as they are; a number in all of them."""
+        """Return lanes unchanged; broadcast a scalar.
+
+        Parameters
+        ----------
+        builder
+            LLVM IR builder.
+        value
+            Lanes or scalar.
+
+        Returns
+        -------
+        Vec
+            Lanes.
+
+        Raises
+        ------
+        MismatchError
+            For a mask or a tuple.
+        """
         if isinstance(value, Vec):
             if is_mask(value):
                 raise MismatchError(
@@ -62,7 +93,25 @@ class Lanes:
         return Vec(builder, (one,) * self.registers)
 
     def condition(self, builder: ir.IRBuilder, value: Value) -> Vec:
-        """A mask as it is; a boolean in all lanes."""
+        """Return a mask unchanged; broadcast a boolean.
+
+        Parameters
+        ----------
+        builder
+            LLVM IR builder.
+        value
+            Mask or scalar.
+
+        Returns
+        -------
+        Vec
+            Mask.
+
+        Raises
+        ------
+        MismatchError
+            For lanes of numbers or a tuple.
+        """
         if isinstance(value, Vec):
             if not is_mask(value):
                 raise MismatchError("a number where a condition is expected")
@@ -71,11 +120,32 @@ class Lanes:
 
 
 def is_mask(value: Value) -> bool:
+    """Return True for a mask."""
     return isinstance(value, Vec) and value.register.element == BOOL
 
 
 def number(builder: ir.IRBuilder, value: Value, kind: ir.Type) -> Any:
-    """A number as another kind of number."""
+    """Convert a scalar to another type.
+
+    Parameters
+    ----------
+    builder
+        LLVM IR builder.
+    value
+        Scalar.
+    kind
+        LLVM type.
+
+    Returns
+    -------
+    Any
+        LLVM value of that type.
+
+    Raises
+    ------
+    MismatchError
+        If the value is no scalar.
+    """
     if not isinstance(getattr(value, "type", None), (ir.IntType, ir.FloatType, ir.DoubleType)):
         raise MismatchError("a number is expected")
     given = value.type
@@ -91,18 +161,48 @@ def number(builder: ir.IRBuilder, value: Value, kind: ir.Type) -> Any:
 
 
 def widened(builder: ir.IRBuilder, value: Any, kind: ir.IntType) -> Any:
+    """Extend an integer to a wider type; booleans become 0 or 1."""
     return builder.zext(value, kind) if value.type == BOOL else builder.sext(value, kind)
 
 
 def common(a: ir.Type, b: ir.Type) -> ir.Type:
-    """The kind that two kinds of number are computed in."""
+    """Return the type in which two scalar types are computed.
+
+    Parameters
+    ----------
+    a, b
+        LLVM types.
+
+    Returns
+    -------
+    ir.Type
+        The type itself if both are equal and not boolean, else a 64-bit integer or float.
+    """
     if a == b and a != BOOL:
         return a
     return WHOLE if isinstance(a, ir.IntType) and isinstance(b, ir.IntType) else DOUBLE
 
 
 def truth(builder: ir.IRBuilder, value: Value) -> Any:
-    """A number as a condition: whether it is not zero."""
+    """Convert a scalar to a condition: True if it is not zero.
+
+    Parameters
+    ----------
+    builder
+        LLVM IR builder.
+    value
+        Scalar.
+
+    Returns
+    -------
+    Any
+        LLVM boolean.
+
+    Raises
+    ------
+    MismatchError
+        For lanes, a mask or a tuple.
+    """
     if isinstance(value, (Vec, tuple)):
         raise MismatchError("it may differ from point to point; expected where(...), or if any_of(...)")
     if value.type == BOOL:
@@ -122,7 +222,27 @@ _REAL = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
 
 
 def operate(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
-    """Arithmetic on two numbers."""
+    """Emit arithmetic on two scalars.
+
+    Parameters
+    ----------
+    builder
+        LLVM IR builder.
+    op
+        Operator.
+    a, b
+        Scalars.
+
+    Returns
+    -------
+    Any
+        LLVM value.
+
+    Raises
+    ------
+    MismatchError
+        For an integer operator on floats.
+    """
     if isinstance(op, (ast.BitAnd, ast.BitOr, ast.BitXor)) and a.type == b.type == BOOL:
         return getattr(builder, _WHOLE[type(op)])(a, b)
     kind = common(a.type, b.type)
@@ -138,7 +258,7 @@ def operate(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
 
 
 def _floored(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
-    """Python's quotient and remainder, which has the sign of b."""
+    """Python's floored quotient, or remainder with the sign of b."""
     rest = builder.srem(a, b)
     zero = ir.Constant(WHOLE, 0)
     other = builder.icmp_signed("<", builder.xor(rest, b), zero)
@@ -149,7 +269,22 @@ def _floored(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
 
 
 def compare(builder: ir.IRBuilder, op: ast.cmpop, a: Any, b: Any) -> Any:
-    """A comparison of two numbers."""
+    """Emit a comparison of two scalars.
+
+    Parameters
+    ----------
+    builder
+        LLVM IR builder.
+    op
+        Operator.
+    a, b
+        Scalars.
+
+    Returns
+    -------
+    Any
+        LLVM boolean.
+    """
     kind = common(a.type, b.type)
     a, b = number(builder, a, kind), number(builder, b, kind)
     how = _COMPARISONS[type(op)]
@@ -158,19 +293,20 @@ def compare(builder: ir.IRBuilder, op: ast.cmpop, a: Any, b: Any) -> Any:
     return (builder.fcmp_unordered if how == "!=" else builder.fcmp_ordered)(how, a, b)
 
 
-# --- as LLVM values, between functions and where ways meet ---
+# --- as LLVM values, between functions and where paths join ---
 Kind = Any
-"""What a value is: an LLVM type, "lanes", "mask", or a tuple of kinds."""
+"""Kind of a value: an LLVM type, "lanes", "mask", or a tuple of kinds."""
 
 
 def kind_of(value: Value) -> Kind:
+    """Return the kind of a value."""
     if isinstance(value, tuple):
         return tuple(map(kind_of, value))
     return ("mask" if is_mask(value) else "lanes") if isinstance(value, Vec) else value.type
 
 
 def types_of(kind: Kind, lanes: Lanes) -> list[ir.Type]:
-    """The LLVM types of which a value of this kind is made."""
+    """Return the LLVM types of the parts of a value of this kind."""
     if isinstance(kind, tuple):
         return [t for part in kind for t in types_of(part, lanes)]
     if kind == "lanes":
@@ -179,14 +315,14 @@ def types_of(kind: Kind, lanes: Lanes) -> list[ir.Type]:
 
 
 def parts_of(value: Value) -> list[Any]:
-    """The LLVM values of which a value is made."""
+    """Return the LLVM values that a value consists of."""
     if isinstance(value, tuple):
         return [p for part in value for p in parts_of(part)]
     return list(value.parts) if isinstance(value, Vec) else [value]
 
 
 def made_of(kind: Kind, parts: Sequence[Any], lanes: Lanes, builder: ir.IRBuilder) -> Value:
-    """The value of a kind that is made of these LLVM values."""
+    """Assemble a value of a kind from LLVM values."""
     left = list(parts)
 
     def taken(kind: Kind) -> Value:
@@ -201,7 +337,23 @@ def made_of(kind: Kind, parts: Sequence[Any], lanes: Lanes, builder: ir.IRBuilde
 
 
 def joined(a: Kind, b: Kind) -> Kind:
-    """The kind that values of two kinds both can be."""
+    """Return the common kind of two kinds.
+
+    Parameters
+    ----------
+    a, b
+        Kinds.
+
+    Returns
+    -------
+    Kind
+        Kind that values of both can be converted to.
+
+    Raises
+    ------
+    MismatchError
+        If there is none.
+    """
     if a == b:
         return a
     if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
@@ -219,7 +371,29 @@ def joined(a: Kind, b: Kind) -> Kind:
 
 
 def as_kind(value: Value, kind: Kind, lanes: Lanes, builder: ir.IRBuilder) -> Value:
-    """A value as another kind that it can be."""
+    """Convert a value to another kind.
+
+    Parameters
+    ----------
+    value
+        Value.
+    kind
+        Kind that the value can be converted to.
+    lanes
+        Layout of the lanes.
+    builder
+        LLVM IR builder.
+
+    Returns
+    -------
+    Value
+        Value of that kind.
+
+    Raises
+    ------
+    MismatchError
+        If the value cannot be converted.
+    """
     if isinstance(kind, tuple):
         return tuple(as_kind(v, k, lanes, builder) for v, k in zip(value, kind, strict=True))
     if kind == "lanes":

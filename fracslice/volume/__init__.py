@@ -1,4 +1,4 @@
-"""From a field to sparse samples around its surface, and to OpenVDB."""
+"""Sparse sampling of a field around its surface, and export to OpenVDB."""
 
 from __future__ import annotations
 
@@ -41,18 +41,37 @@ __all__ = [
 AnyBricks = TypeVar("AnyBricks", Bricks, SignBricks)
 
 DETAIL = 256
-"""The finest detail of automatic depths, along the object's longest side: a mesh shows it if nothing else is
-asked for. The next step would move most of the surface by less than half of it."""
+"""Finest detail that automatic depths resolve: voxels along the longest side. A mesh of default resolution
+shows it. One more iteration would move most of the surface by less than half of it.
+"""
 
 COARSE = 64
-"""Voxels along the longest side that its length is known to a quarter of, for depths to follow from it."""
+"""Voxels along the longest side for the first estimate of the size, accurate to a quarter of a voxel, from
+which depths follow.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What is about to be sampled: the scene with all depths known, the object's box, a box that surely
-    encloses it, its outermost points [3, 6], and the voxel, all in scene units. notes: what the voxel is too
-    large for, in words. depths: those that were automatic, such as "mandelbulb 5"."""
+    """Scene with resolved depths, its bounds and its voxel size.
+
+    Attributes
+    ----------
+    root
+        Scene to sample.
+    box
+        Bounds of the object, scene units.
+    outer
+        Conservative bounds of the object, scene units.
+    tips
+        Outermost points of the object, float64 [3, 6], scene units.
+    voxel
+        Voxel size, scene units.
+    notes
+        Details that the voxel is too large to resolve, as text.
+    depths
+        Automatic depths, such as "mandelbulb 5".
+    """
 
     root: Field
     box: Box
@@ -64,14 +83,33 @@ class Plan:
 
     @property
     def lattice(self) -> Lattice:
-        """The grid that it is sampled on."""
+        """Sampling grid of the plan."""
         return Lattice.around(self.outer, self.voxel, self.box)
 
 
 def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
-    """Finds the object's size and depths, and leaves out what a resolution cannot show.
+    """Measure the object, resolve automatic depths and drop detail below the resolution.
 
-    resolution: voxels along the object's longest side (need not be whole). Raises `VolumeError`.
+    Parameters
+    ----------
+    root
+        Scene.
+    resolution
+        Voxels along the object's longest side; need not be an integer.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    Plan
+        Scene, bounds and voxel size.
+
+    Raises
+    ------
+    VolumeError
+        If the scene is empty or unbounded.
+    Cancelled
+        If the job was cancelled.
     """
     known = with_depths(root, work)
     found = extent(known, resolution, work)
@@ -81,16 +119,33 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
 
 
 def with_depths(root: Node, work: Work | None = None) -> Node:
-    """The scene with every automatic depth replaced by a number.
+    """Replace every automatic depth by a number.
 
-    The depths follow from the object alone, whatever it is sampled for: a mesh, layers and what checks them
-    are of the same solid. Raises `VolumeError`.
+    Depths depend on the object only, not on the use of the samples: meshes, layers and checks describe the
+    same solid.
+
+    Parameters
+    ----------
+    root
+        Scene.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    Node
+        Scene with resolved depths; `root` itself if it is unbounded.
+
+    Raises
+    ------
+    VolumeError
+        If the extent of the object cannot be determined.
     """
     if not root.bounds.box.finite:
         return root
     size = max(root.bounds.box.size)
     known = resolve_depths(root, size / DETAIL)
-    # A deeper solid is smaller, so that finer detail counts, until no depth changes any more.
+    # A deeper solid is smaller and needs finer detail; iterate until the depths are stable.
     while known is not root:
         size = min(size, max(extent(known, COARSE, work).box.size))
         deeper = resolve_depths(root, size / DETAIL)
@@ -101,22 +156,63 @@ def with_depths(root: Node, work: Work | None = None) -> Node:
 
 
 def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
-    """Samples of a planned scene around its surface, taken now or kept in the store.
+    """Sample a planned scene around its surface, or read the samples from the cache.
 
-    Raises `VolumeError`, `Cancelled`.
+    Parameters
+    ----------
+    planned
+        Scene, bounds and voxel size.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    Bricks
+        Samples around the surface.
+
+    Raises
+    ------
+    VolumeError
+        If there is no surface or it leaves the lattice.
+    Cancelled
+        If the job was cancelled.
     """
     return _sampled(planned, work or Work(), sample, Bricks, "values")
 
 
 def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
-    """As `sample_scene`; of each sample only its sign, which is all that the exact surface takes."""
+    """Sample a planned scene as `sample_scene` does, but keep only the signs.
+
+    Signs suffice to extract the exact surface.
+
+    Parameters
+    ----------
+    planned
+        Scene, bounds and voxel size.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    SignBricks
+        Signs of the samples around the surface.
+
+    Raises
+    ------
+    VolumeError
+        If there is no surface or it leaves the lattice.
+    Cancelled
+        If the job was cancelled.
+    """
     return _sampled(planned, work or Work(), sample_signs, SignBricks, "signs")
 
 
 def _sampled(
     planned: Plan, work: Work, take: Callable[..., AnyBricks], kind: type[AnyBricks], held: str
 ) -> AnyBricks:
-    """held: the name of the arrays that the bricks hold besides their places."""
+    """Sample a planned scene or read it from the cache. `held` names the array that the bricks hold besides
+    positions and index.
+    """
     lattice, fresh = planned.lattice, list[AnyBricks]()
 
     def made() -> Arrays:
@@ -130,7 +226,7 @@ def _sampled(
 
 
 def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:
-    """What is sampled, the bounds of what is pruned by, and what is pruned by: mostly the same."""
+    """Kernel to sample, and bounds and kernel to prune by; mostly the same field."""
     root = planned.root
     conservative = root.conservative()
     return root.kernel(work.device), conservative.bounds, conservative.kernel(work.device)

@@ -1,4 +1,4 @@
-"""How far a mesh is from the surface it stands for."""
+"""Distance of a mesh from the exact surface."""
 
 from __future__ import annotations
 
@@ -12,26 +12,51 @@ from ..kernel import Field
 from ..work import Work, chunks
 
 REACH = 1e-4
-"""The step of the differences, in voxels."""
+"""Step of the finite differences, in voxels."""
 
 FLAT = 1e-5
-"""Voxels: what seems to be farther off is looked at along diagonals too."""
+"""Estimated distance in voxels above which differences along diagonals are taken too."""
 
 DIAGONALS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if np.count_nonzero(way) > 1])
+"""Diagonal directions of a cube, [20, 3]."""
 
 
 STARTS, STEPS = 1024, 24
-"""Random points from which the surface is looked for, and how often each is moved towards it."""
+"""Random starting points of the search for the surface, and Newton steps per point."""
 
 NEAR = 1e-3
-"""Voxels: a point that is moved no farther is on the surface."""
+"""Length of the last step, in voxels, below which a point is on the surface."""
 
 
 def surface_points(root: Field, box: Box, voxel: float, count: int, work: Work | None = None) -> np.ndarray:
-    """Points on the zero set, found without samples or a mesh: float64 [n, 3], scene units, at most `count`.
+    """Find points on the zero set without samples or a mesh.
 
-    Newton's method from random points of a box, always the same. Where a field is no distance inside, they
-    come from outside. A part of the surface is found as often as it is the nearest one: a thin wire, too.
+    Newton's method from random points of a box, with a fixed seed. If the field is no distance inside, the
+    starting points are outside. A part of the surface is reached from the starting points closest to it, so
+    thin wires are found too.
+
+    Parameters
+    ----------
+    root
+        Field.
+    box
+        Box of the starting points, scene units.
+    voxel
+        Voxel size, scene units.
+    count
+        Largest number of points.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    ndarray
+        Points, float64 [n, 3], scene units; n <= `count`.
+
+    Raises
+    ------
+    Cancelled
+        If the job was cancelled.
     """
     kernel, work = root.kernel("cpu", "float64"), work or Work()
     rng = np.random.default_rng(0)
@@ -52,12 +77,33 @@ def surface_points(root: Field, box: Box, voxel: float, count: int, work: Work |
 
 
 def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | None = None) -> np.ndarray:
-    """Distances of points from the zero set to first order, ``|f| / |grad f|``.
+    """Estimate distances from the zero set to first order, ``|f| / |grad f|``.
 
-    points: float [n, 3], scene units; voxel: scene units. Returns float64 [n], scene units, at most a voxel
-    each (where the gradient vanishes it says nothing more). By the float64 kernel; along each axis the
-    steeper of the two one-sided differences, because at an edge or a corner they cancel. Where two solids
-    touch in an edge the axes lie in the surface: where they are flat, the steepest of all ways counts.
+    The float64 kernel is used. Along each axis the steeper of the two one-sided differences counts, because
+    they cancel at an edge or corner. Where two solids touch in an edge the axes lie in the surface: where
+    they are flat, the steepest of all directions counts, diagonals included.
+
+    Parameters
+    ----------
+    root
+        Field.
+    points
+        Points, float [n, 3], scene units.
+    voxel
+        Voxel size, scene units.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    ndarray
+        Distances, float64 [n], scene units, limited to one voxel; where the gradient vanishes the estimate
+        says no more.
+
+    Raises
+    ------
+    Cancelled
+        If the job was cancelled.
     """
     kernel, h = root.kernel("cpu", "float64"), REACH * voxel
     error = np.empty(len(points))

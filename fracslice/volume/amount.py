@@ -1,4 +1,4 @@
-"""How much of an object there is, by its field alone, and how fine samples have to be to show it."""
+"""Volume of an object estimated from its field, and the sample spacing that resolves it."""
 
 from __future__ import annotations
 
@@ -16,28 +16,44 @@ from ..work import Work
 from .values import values_at
 
 POINTS = 1 << 18
+"""Random points in all boxes."""
+
 CELLS = 1 << 16
+"""Largest number of cells in all boxes."""
+
 MOST_EACH = 64
-"""Points in a cell."""
+"""Largest number of random points per cell."""
 
 TOLERANCE = 0.01
-"""The share of an object's volume that samples may lack, or add."""
+"""Tolerated volume error of the samples, as a fraction of the object's volume."""
 
 SURE = 3.0
-"""Standard errors that a difference must have."""
+"""Standard errors by which a difference is significant."""
 
 SEEN = 1 << 11
-"""Inside points that are looked at for how fine samples must be."""
+"""Interior points tested to choose a sample spacing."""
 
 FINER = 2, 4, 8, 16, 32
+"""Refinement factors to choose from."""
+
 MARGIN = 1.5
-"""How much thicker than the spacing a wall should be: before, a slanted one has a sample here and there."""
+"""Required ratio of wall thickness to sample spacing: below it, a slanted wall is sampled only here and
+there.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class VolumeEstimate:
-    """An object's volume and its standard error, scene units^3. inside: the points [3, n] that were inside of
-    it, in cells that are not wholly.
+    """Monte Carlo estimate of an object's volume.
+
+    Attributes
+    ----------
+    volume
+        Volume, scene units^3.
+    error
+        Standard error of the volume, scene units^3.
+    inside
+        Random points inside the object, float64 [3, n], scene units, in cells that are not proven full.
     """
 
     volume: float
@@ -45,19 +61,47 @@ class VolumeEstimate:
     inside: np.ndarray
 
     def off(self, made: float) -> float:
-        """The share of the volume that what was made of it has more, or, negative, lacks; 0 where that is
-        within the tolerance, or not sure.
+        """Return the relative error of a reproduced volume.
+
+        Parameters
+        ----------
+        made
+            Volume of the mesh or layers, scene units^3.
+
+        Returns
+        -------
+        float
+            Excess as a fraction of the volume, negative if volume is missing; 0 if within the tolerance or
+            not significant.
         """
         sure = abs(made - self.volume) > max(SURE * self.error, TOLERANCE * self.volume)
         return made / self.volume - 1 if sure and self.volume else 0.0
 
 
 def amount(root: Field, boxes: list[Box], work: Work | None = None) -> VolumeEstimate:
-    """The volume of what is inside boxes that do not overlap: stratified random points, always the same.
+    """Estimate the volume inside disjoint boxes by stratified random points with a fixed seed.
 
-    Of each box the cells that are proven empty are left out, and where the field bounds distances inside,
-    too, those that are proven full are counted (Cochran 1977, "Sampling Techniques", chapter 5). Raises
-    `Cancelled`.
+    Cells that are proven empty are skipped. Cells that are proven full are counted whole, where the field
+    bounds distances inside too (Cochran 1977, "Sampling Techniques", chapter 5).
+
+    Parameters
+    ----------
+    root
+        Field.
+    boxes
+        Disjoint boxes, scene units.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    VolumeEstimate
+        Volume, standard error and interior points.
+
+    Raises
+    ------
+    Cancelled
+        If the job was cancelled.
     """
     work, conservative = work or Work(), root.conservative()
     kernel, bound = root.kernel(), conservative.kernel()
@@ -72,7 +116,7 @@ def amount(root: Field, boxes: list[Box], work: Work | None = None) -> VolumeEst
 def _part(
     kernel: Kernel, conservative: Kernel, bounds: Bounds, box: Box, boxes: int, work: Work
 ) -> VolumeEstimate:
-    """One box' share."""
+    """Estimate the volume inside one of `boxes` boxes."""
     cells, values, step = possible_cells(
         lambda p: values_at(conservative, p, work), bounds.lipschitz, box, CELLS // boxes
     )
@@ -95,12 +139,29 @@ def finer(
     spacing: tuple[float, float, float],
     work: Work | None = None,
 ) -> int | None:
-    """How many times nearer samples should be, for them to lack less than the tolerance; None if more often
-    than they can be.
+    """Return the refinement factor of the samples that brings the volume error below the tolerance.
 
-    off: the share of the volume that is wrong. origin, spacing: of the samples, scene units. What is lost is
-    in proportion to the inside points between eight outside samples; if there are hardly any, it is by
-    facets, as the square of the spacing.
+    The missing volume is proportional to the fraction of interior points whose eight surrounding samples are
+    all outside. If that fraction is small, the error comes from faceting and is proportional to the square of
+    the spacing.
+
+    Parameters
+    ----------
+    root
+        Field.
+    found
+        Volume estimate of the object.
+    off
+        Relative volume error of the samples.
+    origin, spacing
+        First grid point of the samples and their spacing along each axis, scene units.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    int
+        Factor from `FINER`; None if none suffices.
     """
     kernel, rng = root.kernel(), np.random.default_rng(1)
     points = found.inside[:, rng.integers(found.inside.shape[1], size=SEEN)]

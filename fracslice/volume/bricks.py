@@ -1,4 +1,4 @@
-"""The record that the sampler hands to the mesher and to OpenVDB: bricks of samples around a surface."""
+"""Bricks of samples around a surface: the output of the sampler, the input of the mesher and of OpenVDB."""
 
 from __future__ import annotations
 
@@ -13,17 +13,28 @@ OUTSIDE, INSIDE = -1, -2
 class Bricks:
     """Samples of a signed field on the grid points near its zero set.
 
-    origin: position of grid point (0, 0, 0), scene units. voxel: spacing, scene units.
-    ijk: int32 [n, 3], C-contiguous: grid index of each brick's first sample, multiples of 8, in lexicographic
-    order. values: float32 [n, 512], offset x*64 + y*8 + z; negative inside, never NaN.
-    index: int32 [bx, by, bz]: the row of each brick, or `OUTSIDE` or `INSIDE` where no sample is needed.
+    No sign change crosses a face between a brick with samples and one without, or between two without;
+    everything beyond `index` is outside. The surface is therefore closed and lies within the samples.
 
-    No sign change crosses a face between a brick with samples and one without, or between two without; all
-    beyond `index` is outside. So the surface is closed and wholly within the samples.
-
-    evaluations: how many times the field was evaluated, probing included. audited: points that were looked at
-    outside the samples, to test the bounds that pruning relies on. repaired: bricks that a violated bound
-    would have lost, found by the audit or the closure rule, and sampled.
+    Attributes
+    ----------
+    origin
+        Position of grid point (0, 0, 0), scene units.
+    voxel
+        Grid spacing, scene units.
+    ijk
+        Grid index of each brick's first sample, int32 [n, 3], C-contiguous: multiples of 8, in lexicographic
+        order.
+    values
+        Samples, float32 [n, 512], at offset x*64 + y*8 + z; negative inside, never NaN.
+    index
+        Row of each brick, int32 [bx, by, bz]; `OUTSIDE` or `INSIDE` where no samples are needed.
+    evaluations
+        Field evaluations, probing included.
+    repaired
+        Bricks that a violated bound would have lost, detected by the audit or the closure rule, and sampled.
+    audited
+        Points tested outside the samples to verify the bounds that pruning relies on.
     """
 
     origin: tuple[float, float, float]
@@ -40,7 +51,7 @@ class Bricks:
 
     @property
     def signs(self) -> SignBricks:
-        """What is left of these samples where only their signs are needed."""
+        """Signs of the samples."""
         from .._native import signs
 
         return SignBricks(
@@ -57,10 +68,14 @@ class Bricks:
 
 @dataclass(frozen=True, eq=False)
 class SignBricks:
-    """Bricks whose samples are kept as a bit each: enough to find a known field's surface, in a 32nd of the
-    memory.
+    """Bricks with one bit per sample: enough to extract a known field's surface, in 1/32 of the memory.
 
-    signs: uint8 [n, 8, 8], bit z of byte (x, y) set where inside. All else as in `Bricks`.
+    Attributes
+    ----------
+    signs
+        Sign bits, uint8 [n, 8, 8]: bit z of byte (x, y) is set inside.
+    origin, voxel, ijk, index, evaluations, repaired, audited
+        As in `Bricks`.
     """
 
     origin: tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""The farthest points of a solid in some directions, found by steps that stay in it."""
+"""Extreme points of a solid in given directions, by pattern search."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 STEPS = 256
+"""Largest number of steps."""
 
 SLANTS = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), 0.1 ** np.arange(0, 3.5, 0.5))).reshape(3, -1)
-"""Steps straight along the last axis or aslant, [3, w]."""
+"""Steps straight along the last axis or slanted, [3, w]."""
 
 
 def climb(
@@ -19,11 +20,26 @@ def climb(
     first: float,
     exact: float,
 ) -> np.ndarray:
-    """Where inside points get to that go outwards as far as they can.
+    """Move interior points outwards as far as possible.
 
-    starts: float64 [3, n, k]: for each of n directions some points. ways: `SLANTS` turned to each direction,
-    [3, n, w]. inside: of points [3, m]. Steps are taken as long as they end inside, `first` long at first,
-    then shorter ones down to `exact` (pattern search: Hooke and Jeeves 1961). All points at once.
+    Pattern search (Hooke and Jeeves 1961): a step is taken if it ends inside; if none does, the step length
+    is halved. All points move at once.
+
+    Parameters
+    ----------
+    inside
+        Predicate of points [3, m], returns bool [m].
+    starts
+        Interior points for each of n directions, float64 [3, n, k].
+    ways
+        `SLANTS` rotated to each direction, [3, n, w].
+    first, exact
+        First and last step length.
+
+    Returns
+    -------
+    ndarray
+        Final points, float64 [3, n, k].
     """
     found, going = starts.copy(), np.arange(starts.shape[1])
     step = np.full(len(going), first)

@@ -1,7 +1,7 @@
-"""Where exactly the surface crosses the grid's edges, and its normals there.
+"""Exact intersections of the surface with the grid's edges, and normals there.
 
-A vertex moves along its own grid edge only, strictly between the edge's ends, so refining cannot fold or
-pierce a mesh whose triangles stay in their cells.
+A vertex moves only along its own grid edge, strictly between the edge's ends. Refinement therefore cannot
+fold a mesh or make it self-intersect if its triangles stay in their cells.
 """
 
 from __future__ import annotations
@@ -16,14 +16,23 @@ from ..work import Work
 from .roots import MOST, QUICK, Roots
 
 SURE = 1e-4
-"""A root is exact where Newton's last step was shorter, as a share of a voxel: the error is of the order of
-its square."""
+"""Length of Newton's last step, as a fraction of a voxel, below which a root is exact: the error is of the
+order of its square.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """first: the number of the first one. t: float64 [n], where along each grid edge the surface crosses it.
-    normals: float32 [3, n], outward, unit.
+    """Intersections of the surface with consecutive grid edges.
+
+    Attributes
+    ----------
+    first
+        Number of the first intersection.
+    t
+        Position along each grid edge, float64 [n].
+    normals
+        Outward unit normals, float32 [3, n].
     """
 
     first: int
@@ -32,11 +41,22 @@ class Crossings:
 
 
 class Refiner:
-    """Finds the exact crossings of grid edges whose ends have opposite signs, in the float64 field.
+    """Root finder on grid edges whose ends have opposite signs, for the float64 field.
 
-    origin, voxel: of the grid, scene units. Roots are looked for by the float32 kernel and made exact by the
-    float64 one, from its own signs where that one's misled. Where the float64 field does not change its sign
-    (it is smaller than float32 can tell at one end) t is that end.
+    The float32 kernel brackets each root and the float64 kernel refines it; the float64 kernel starts from
+    its own signs where the float32 kernel was wrong. If the float64 field has no sign change (at one end it
+    is smaller than float32 resolves) t is that end.
+
+    Parameters
+    ----------
+    root
+        Field.
+    cells
+        Grid cells with sign changes.
+    origin, voxel
+        First grid point and spacing, scene units.
+    work
+        Execution settings.
     """
 
     def __init__(
@@ -54,11 +74,29 @@ class Refiner:
         self._placement = origin, voxel
         self._cells, self._work = cells, work or Work()
         self._memory: tuple[np.ndarray, np.ndarray] = np.empty(0), np.empty((3, 0), np.float32)
-        self._first, self._end = 0, 0  # what is known: where this memory starts, and behind the last one
+        self._first, self._end = 0, 0  # computed intersections: first in memory, one past the last
 
     def between(self, begin: int, end: int) -> Crossings:
-        """The crossings from `begin`, which only goes up, to `end` - 1 or what is known already, of whole
-        bricks; the next call writes over them. Raises `Cancelled`.
+        """Return the intersections from number `begin` to at least `end` - 1.
+
+        Both numbers lie between bricks. Intersections beyond `end` are included if already computed.
+
+        Parameters
+        ----------
+        begin
+            First intersection; must not decrease from call to call.
+        end
+            One past the last intersection.
+
+        Returns
+        -------
+        Crossings
+            Views that the next call overwrites.
+
+        Raises
+        ------
+        Cancelled
+            If the job was cancelled.
         """
         self._work.check()
         known, end = max(self._end - begin, 0), max(self._end, end)
@@ -70,8 +108,9 @@ class Refiner:
         return Crossings(begin, t, normals)
 
     def _room(self, begin: int, size: int, known: int) -> tuple[np.ndarray, np.ndarray]:
-        """Memory for so many crossings, the first of which are known: these move only where there is no room
-        behind them."""
+        """Memory for `size` intersections, the first `known` of which are computed. They are moved only if no
+        space is left behind them.
+        """
         memory, here = self._memory, begin - self._first
         if here + size > len(memory[0]):
             if 2 * size > len(memory[0]):

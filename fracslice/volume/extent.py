@@ -1,4 +1,4 @@
-"""How large the object itself is: what is proved of its six sides, and how near it comes to that."""
+"""Bounds of an object: six proven sides, and the outermost points found."""
 
 from __future__ import annotations
 
@@ -14,40 +14,52 @@ from .climbing import SLANTS, climb
 from .sides import UNKNOWN, FreeSpace, Side
 
 TURNS = 8
-"""How often what is searched is made larger, for the object goes on there, or smaller."""
+"""Attempts to enlarge the searched box because the object leaves it, or to shrink it."""
 
 MARGIN = 1 / 14
-"""Of the longest side: how far beyond the box that formulas promise is searched."""
+"""Margin searched beyond the box that the formulas state, as a fraction of the longest side."""
 
 FIRST = 16
-"""Points along each axis that are looked at first."""
+"""Points along each axis tested first."""
 
 SHIFT = np.array([[0.5497], [0.2451], [0.4302]])
-"""Of a step: where they lie, which is in no plane of symmetry."""
+"""Position of these points within a step; it lies in no plane of symmetry."""
 
 BOLD = 0.15, 0.4
-"""Of the bound of an escape-time fractal, by which its values are a fifth of the distance: shares by
-which its tips are looked for before anything is proved.
+"""Fractions of the Lipschitz bound of an escape-time fractal, whose values are a fifth of the distance, for
+the search for tips before anything is proven.
 """
 
 SHARE = 0.25
-"""Of a voxel: how near sides are proved, if `MOST` columns do; and `FINER` times finer while `LITTLE` do."""
+"""Accuracy of the proven sides in voxels, if `MOST` columns suffice; refined by `FINER` while `LITTLE`
+suffice.
+"""
 
 FINER = 16
 LITTLE, MOST = 1 << 14, 1 << 17
 
 EXACT = 2.5e-7
-"""Of the longest side: the last step that tips are taken outwards."""
+"""Last step of the outward search for tips, as a fraction of the longest side."""
 
 OUTWARDS = np.array([[-1], [1]])
+"""Signs of the lower and upper sides."""
+
 BENEATH = np.array([0.0, 1e-3, 0.01, 0.1, 0.5])
-"""Voxels beneath a vertex: the first of them that is inside is where its body is entered."""
+"""Depths beneath a vertex in voxels, tested for an interior point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Extent:
-    """The object's box, as near as it was found; one with the same middle that surely encloses it; and the
-    points of the object that are farthest out along -x, -y, -z, x, y and z: float64 [3, 6].
+    """Bounds of an object.
+
+    Attributes
+    ----------
+    box
+        Approximate bounds, scene units.
+    outer
+        Conservative bounds with the same centre, scene units.
+    tips
+        Outermost points of the object along -x, -y, -z, x, y and z, float64 [3, 6], scene units.
     """
 
     box: Box
@@ -56,14 +68,34 @@ class Extent:
 
 
 def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
-    """The box of the points where a scene's field is negative.
+    """Compute the bounds of the points where a field is negative.
 
-    resolution: voxels along the longest side. Nothing is farther than a quarter of a voxel outside the box,
-    as the scene's bound proves; where that takes too much (a bound that is far too large, something as thin
-    as paper) the outer box is larger. Smooth faces, edges and tips are found to 1e-6 of the longest side. The
-    box that the formulas promise is doubled as long as the object goes on beyond it (an offset or smooth
-    union of a field that underestimates distances can). Raises `VolumeError` if nothing is inside, or the
-    object has no end.
+    The Lipschitz bound of the field proves that nothing is farther than a quarter of a voxel outside the box.
+    Where that proof is too expensive (the bound is far too large, the feature is as thin as paper) the outer
+    box is larger. Smooth faces, edges and tips are located to 1e-6 of the longest side. The box that the
+    formulas state is doubled while the object leaves it: an offset or smooth union of a field that
+    underestimates distances can.
+
+    Parameters
+    ----------
+    root
+        Field.
+    resolution
+        Voxels along the longest side.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    Extent
+        Bounds and outermost points.
+
+    Raises
+    ------
+    VolumeError
+        If nothing is inside or the object is unbounded.
+    Cancelled
+        If the job was cancelled.
     """
     box, found = root.bounds.box, None
     if box.empty:
@@ -85,10 +117,26 @@ def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
 
 
 def reached(root: Field, points: np.ndarray, voxel: float, work: Work | None = None) -> Box:
-    """The box of what is connected with points on or near an object's surface, as near as it was found.
+    """Compute the approximate bounds of the components that contain some points on or near the surface.
 
-    points: float64 [3, n], scene units. From those that are inside, or from half a voxel beneath those that
-    are not, steps of less than a voxel go outwards.
+    The search steps outwards by less than a voxel, from the points inside or, where a point is outside, from
+    at most half a voxel beneath it.
+
+    Parameters
+    ----------
+    root
+        Field.
+    points
+        Points on or near the surface, float64 [3, n], scene units.
+    voxel
+        Voxel size, scene units.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    Box
+        Bounds, scene units.
     """
     field = _free_space(root, work or Work())
     found = _box(np.stack([points.min(1), points.max(1)]))
@@ -111,12 +159,12 @@ def _free_space(root: Field, work: Work) -> FreeSpace:
 
 
 def _sides(field: FreeSpace, region: Box) -> list[Side]:
-    """In the order of an extent's tips."""
+    """Six sides in the order of the tips of an extent."""
     return [Side(field, region, axis, sign, UNKNOWN) for sign in (-1, 1) for axis in range(3)]
 
 
 def _search(field: FreeSpace, box: Box, resolution: float) -> Extent | None:
-    """The object's extent, if it is in `box`; None if it goes on beyond it."""
+    """Extent of the object if `box` contains it, else None."""
     longest = max(box.size) or 1.0
     sides = _sides(field, box.grown(MARGIN * longest))
     cells = (np.indices((FIRST,) * 3).reshape(3, -1) + SHIFT) / FIRST
@@ -154,7 +202,7 @@ def _learn(sides: list[Side], points: np.ndarray) -> None:
 
 
 def _climb(field: FreeSpace, sides: list[Side], first: float, exact: float) -> None:
-    """Takes all sides' tips outwards as far as they go."""
+    """Move the tips of all sides outwards."""
     ways = np.stack([side.sign * np.roll(SLANTS, side.axis - 2, 0) for side in sides], 1)
     here = climb(field.inside, np.stack([side.best for side in sides], 1), ways, first, exact)
     for side, points in zip(sides, here.swapaxes(0, 1), strict=True):

@@ -1,4 +1,4 @@
-"""Bricks as OpenVDB grids: sparse level sets that other programs read."""
+"""Conversion of bricks to and from OpenVDB grids, sparse level sets that other programs read."""
 
 from __future__ import annotations
 
@@ -15,13 +15,28 @@ if TYPE_CHECKING:
     from .._native import Grid
 
 NAME = "surface"
-"""The name of the grid in a file: what OpenVDB calls a level set of a solid."""
+"""Grid name in a file: OpenVDB's name for the level set of a solid."""
 
 
 def to_grid(bricks: Bricks) -> Grid:
-    """The bricks as an OpenVDB level set: active where sampled, the inside filled with tiles.
+    """Convert bricks to an OpenVDB level set: sampled voxels are active, the interior is filled with tiles.
 
-    Its background is the largest sample. Raises `VolumeError` if the arrays contradict each other.
+    The background value is the largest sample.
+
+    Parameters
+    ----------
+    bricks
+        Samples around a surface.
+
+    Returns
+    -------
+    Grid
+        OpenVDB grid named `NAME`.
+
+    Raises
+    ------
+    VolumeError
+        If the arrays contradict each other.
     """
     from .._native import Grid
 
@@ -35,9 +50,22 @@ def to_grid(bricks: Bricks) -> Grid:
 
 
 def from_grid(grid: Grid) -> Bricks:
-    """The bricks of an OpenVDB grid, one for each of its leaf nodes.
+    """Convert an OpenVDB grid to bricks, one per leaf node.
 
-    Raises `VolumeError` if its voxels are not cubes along the axes, or a sample is not a number.
+    Parameters
+    ----------
+    grid
+        OpenVDB grid of floats.
+
+    Returns
+    -------
+    Bricks
+        Samples around the surface.
+
+    Raises
+    ------
+    VolumeError
+        If the voxels are not axis-aligned cubes, or a sample is NaN.
     """
     try:
         origin, voxel, ijk, values, index = grid.to_bricks()
@@ -52,8 +80,21 @@ def from_grid(grid: Grid) -> Bricks:
 def write_vdb(
     bricks: Bricks, path: str | os.PathLike[str], metadata: Mapping[str, str] | None = None
 ) -> None:
-    """Writes a .vdb file with one grid, `NAME`, and text beside it. Raises `VolumeError` if not all could be
-    written.
+    """Write bricks to a .vdb file with one grid named `NAME`.
+
+    Parameters
+    ----------
+    bricks
+        Samples around a surface.
+    path
+        File to write.
+    metadata
+        Text stored in the file.
+
+    Raises
+    ------
+    VolumeError
+        If the file could not be written completely.
     """
     grid = to_grid(bricks)
     try:
@@ -63,7 +104,25 @@ def write_vdb(
 
 
 def read_vdb(path: str | os.PathLike[str], name: str = "") -> Bricks:
-    """The bricks of the float grid `name` in a .vdb file, or of the first one. Raises `VolumeError`."""
+    """Read bricks from a .vdb file.
+
+    Parameters
+    ----------
+    path
+        File to read.
+    name
+        Name of a float grid; default: the first one.
+
+    Returns
+    -------
+    Bricks
+        Samples around the surface.
+
+    Raises
+    ------
+    VolumeError
+        If the file or the grid cannot be read.
+    """
     from .._native import Grid
 
     try:

@@ -1,4 +1,4 @@
-"""The grid a scene is sampled on."""
+"""Sampling grid of a scene."""
 
 from __future__ import annotations
 
@@ -9,18 +9,33 @@ from ..errors import VolumeError
 from ..formulas.box import Box, Triple
 
 BRICK = 8
+"""Grid points along the side of a brick."""
+
 PADDING = 2.5
-"""Voxels between the object's box and the first grid point: the outermost layer of samples is outside."""
+"""Voxels between the object's box and the first grid point, so that the outermost layer of samples is
+outside.
+"""
 
 BESIDE = 0.1
-"""Voxels."""
+"""Distance in voxels at which a face counts as next to a plane of grid points."""
 
 MOST_BRICKS = 512**3
+"""Largest number of bricks in a lattice."""
 
 
 @dataclass(frozen=True)
 class Lattice:
-    """Grid points at ``origin + voxel * (i, j, k)``, in `bricks` bricks of 8 along each axis."""
+    """Grid points at ``origin + voxel * (i, j, k)``.
+
+    Attributes
+    ----------
+    origin
+        Position of grid point (0, 0, 0), scene units.
+    voxel
+        Grid spacing, scene units.
+    bricks
+        Number of bricks of 8 grid points along each axis.
+    """
 
     origin: Triple
     voxel: float
@@ -28,10 +43,27 @@ class Lattice:
 
     @classmethod
     def around(cls, box: Box, voxel: float, solid: Box | None = None) -> Lattice:
-        """The lattice around the box' middle; solid: of what is to be sampled, whose faces shall not be
-        beside planes of grid points.
+        """Centre a lattice on a box.
 
-        Raises `VolumeError` if it would have too many points.
+        Parameters
+        ----------
+        box
+            Box to cover, scene units.
+        voxel
+            Grid spacing, scene units.
+        solid
+            Bounds of the sampled solid, scene units. The grid is shifted so that its faces do not lie next to
+            planes of grid points.
+
+        Returns
+        -------
+        Lattice
+            Lattice that covers the box and its padding.
+
+        Raises
+        ------
+        VolumeError
+            If `voxel` is no positive length, or the lattice would have too many points.
         """
         if not (math.isfinite(voxel) and voxel > 0):
             raise VolumeError(f"voxel size {voxel!r}: expected a length > 0")
@@ -50,9 +82,11 @@ class Lattice:
 
 
 def _aside(half: float) -> float:
-    """How far the middle of a solid is from the middle between two grid points, in voxels, if its faces are
-    so many from it: half a voxel where these would be beside planes of grid points. Just inside of one, a
-    face is known from samples a voxel away, and what ends at its edges is cut off."""
+    """Shift in voxels of a solid's centre from the middle between two grid points, given the distance of its
+    faces from it: half a voxel where a face would lie next to a plane of grid points, else 0. A face just
+    inside such a plane is known only from samples a voxel away, and features that end at its edges are cut
+    off.
+    """
     return 0.5 if abs(half - 0.5 - round(half - 0.5)) < BESIDE else 0.0
 
 

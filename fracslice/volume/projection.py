@@ -1,4 +1,4 @@
-"""Vertices that lie on no grid edge are brought to the surface, each within a box of its own."""
+"""Projection of vertices that lie on no grid edge to the surface, each within its own trust region."""
 
 from __future__ import annotations
 
@@ -12,15 +12,23 @@ from ..work import Work, chunks
 from .roots import Roots
 
 NEAR, FOUND = 1e-9, 1e-8
-"""A point with |f| below this share of a voxel is where it should be, for a corner has no gradient to follow;
-one that is brought there shall have |f| below the other."""
+"""Values of |f| in voxels: below `NEAR` a point needs no projection (a corner has no gradient to follow); a
+projected point should be below `FOUND`.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class TrustRegions:
-    """Where some points may go: low, high: corners of boxes, float64 [3, n], scene units; a box may be flat.
-    other: points in the boxes or on their borders where the field has the other sign, or None. middle:
-    points in the boxes amid the surface there, as far as it is known, or None.
+    """Boxes that points must not leave.
+
+    Attributes
+    ----------
+    low, high
+        Corners of the boxes, float64 [3, n], scene units; a box may be flat.
+    other
+        Points in the boxes or on their boundaries where the field has the opposite sign, [3, n], or None.
+    middle
+        Points in the boxes in the middle of the known part of the surface there, [3, n], or None.
     """
 
     low: np.ndarray
@@ -36,15 +44,37 @@ def project(
     voxel: float,
     work: Work | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Brings points to the zero set, never out of their boxes.
+    """Project points to the zero set within their trust regions.
 
-    points: float64 [n, 3], scene units. trust_regions: those of points by number; the
-    second argument says which are inside. A point moves along the gradient if the field changes its sign
-    there within
-    four of Newton's steps and the box, else straight towards its room's point of the other sign. Where the
-    field is smooth close up it moves straight towards the middle if the surface lies between. One that
-    comes no nearer stays, and so does what lies on the surface already, such as an exact corner. Returns the
-    numbers of those that did not, int64 [k], and where they are now, float64 [k, 3].
+    A point moves along the gradient if the field changes its sign there within four Newton steps and the box,
+    else straight towards the point of opposite sign of its trust region. Where the field is smooth nearby, it
+    moves straight towards the middle if the surface lies between. A point that would come no nearer stays, as
+    does a point already on the surface, such as an exact corner.
+
+    Parameters
+    ----------
+    root
+        Field.
+    points
+        Points, float64 [n, 3], scene units.
+    trust_regions
+        Function of point numbers and of a mask of the interior ones, returns their trust regions.
+    voxel
+        Voxel size, scene units.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    numbers : ndarray
+        Numbers of the points that were off the surface, int64 [k].
+    places : ndarray
+        Their new positions, float64 [k, 3], scene units.
+
+    Raises
+    ------
+    Cancelled
+        If the job was cancelled.
     """
     kernel, work = root.kernel("cpu", "float64"), work or Work()
     guess, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
@@ -77,12 +107,27 @@ def project(
 
 
 def anywhere(which: np.ndarray, inside: np.ndarray) -> TrustRegions:
-    """Rooms without borders."""
+    """Return unbounded trust regions.
+
+    Parameters
+    ----------
+    which
+        Point numbers, [n].
+    inside
+        Mask of the interior points, [n]; not used.
+
+    Returns
+    -------
+    TrustRegions
+        Infinite boxes.
+    """
     return TrustRegions(np.full((3, len(which)), -np.inf), np.full((3, len(which)), np.inf))
 
 
 def _relative(p: np.ndarray, region: TrustRegions) -> np.ndarray:
-    """What `Roots.lead` takes: float32 holds distances better than places."""
+    """Argument of `Roots.lead`: positions relative to the points, since float32 resolves distances better
+    than positions.
+    """
     rows = np.empty((15, p.shape[1]), np.float32)
     rows[:3], rows[3:6], rows[6:9] = p, p - region.low, region.high - p
     rows[9:12] = np.nan if region.other is None else region.other - p

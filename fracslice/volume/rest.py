@@ -1,4 +1,4 @@
-"""How large what stays of an object is, where some of its bodies are taken away from its mesh."""
+"""Bounds of an object after some components are removed from its mesh."""
 
 from __future__ import annotations
 
@@ -15,10 +15,24 @@ from .extent import reached
 def box_of_the_rest(
     planned: Plan, whole: np.ndarray, rest: np.ndarray, tips: Callable[[], np.ndarray], work: Work
 ) -> Box:
-    """The box of the bodies that stay, scene units: the field's, for a mesh does not have all of its tips.
+    """Return the bounds of the remaining components, from the field: a mesh does not contain all tips.
 
-    whole, rest: bounds of the mesh [2, 3] with all bodies, and with those. tips: the outermost vertices that
-    stay, [n, 3], scene units, from which a side is looked for where bodies that were removed reach farther.
+    Parameters
+    ----------
+    planned
+        Scene, bounds and voxel size.
+    whole, rest
+        Bounds of the mesh with all components and with the remaining ones, [2, 3], scene units.
+    tips
+        Returns the outermost remaining vertices, [n, 3], scene units. The search for a side starts there if a
+        removed component reached farther.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    Box
+        Bounds, scene units.
     """
     if (rest == whole).all():
         return planned.box
@@ -29,6 +43,17 @@ def box_of_the_rest(
 
 
 def outermost(vertices: np.ndarray) -> np.ndarray:
-    """Those of [n, 3] that are farthest out along each axis, [6, 3]."""
+    """Return the outermost points along each axis.
+
+    Parameters
+    ----------
+    vertices
+        Points, [n, 3].
+
+    Returns
+    -------
+    ndarray
+        Lowest points along x, y and z, then highest, [6, 3].
+    """
     found: np.ndarray = vertices[[*vertices.argmin(0), *vertices.argmax(0)]]
     return found

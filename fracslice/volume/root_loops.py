@@ -1,8 +1,9 @@
-"""The loops over a compiled field that find its roots on segments.
+"""Loops over a compiled field that find roots on segments.
 
-FRAME, in all of them: one over a voxel; when a root is found, |f| in voxels and what is left of the segment;
-the differences' step and what room is none, scene units; how short a step is the last, as a share of the
-segment.
+Entries of FRAME, in all loops: 0: reciprocal of the voxel size. 1: |f| in voxels at which a root is accepted.
+2: remaining bracket, as a fraction of the segment, at which a root is accepted. 3: step of the finite
+differences, scene units. 4: distance that counts as no clearance, scene units. 5: length of the last step, as
+a fraction of the segment.
 """
 
 from __future__ import annotations
@@ -14,12 +15,25 @@ from ..kernel.loops import loop
 
 @loop("rrrrrrrrrnn")
 def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
-    """The root T on each of n segments, from X, Y, Z to as much further as DX, DY, DZ say, as a share of it;
-    where the ends have one sign, the end nearer to zero; 2 more where that takes more than so many steps.
+    """Find one root on each of n segments.
 
     Fields are steep on one side of their surface and flat on the other, so the secant goes through the last
-    two points on one side. Where it leaves the bracket that is halved, and every other time when many steps
-    are done.
+    two points on one side. If it leaves the bracket, the bracket is halved; after many steps every other step
+    halves it too.
+
+    Parameters
+    ----------
+    P, FRAME
+        Parameters of the scene, and of the loop.
+    X, Y, Z, DX, DY, DZ
+        Starts of the segments and vectors to their ends, [n] each, scene units.
+    T
+        Receives the roots as fractions of the segments, [n]. If both ends have the same sign, the end nearer
+        to zero; 2 is added to a root that needs more than `steps` steps.
+    steps
+        Largest number of steps.
+    n
+        Number of segments, a multiple of WIDTH.
     """
     over, small, near, close = FRAME[0], FRAME[1], FRAME[2], FRAME[5]
     for i in range(0, n, WIDTH):
@@ -62,8 +76,23 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
 
 @loop("rrrrrrrrrrrrrn")
 def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
-    """One of Newton's steps along the segment from T, and how far it was; the unit normal where it
-    started."""
+    """Take one Newton step along each of n segments.
+
+    Parameters
+    ----------
+    P, FRAME
+        Parameters of the scene, and of the loop.
+    X, Y, Z, DX, DY, DZ
+        Starts of the segments and vectors to their ends, [n] each, scene units.
+    T
+        Roots as fractions of the segments, [n]; modified in place.
+    NX, NY, NZ
+        Receive the unit normals where the steps started, [n] each.
+    MISS
+        Receives the lengths of the steps as fractions of the segments, [n].
+    n
+        Number of segments, a multiple of WIDTH.
+    """
     e = FRAME[3]
     for i in range(0, n, WIDTH):
         dx, dy, dz, t = load(DX, i), load(DY, i), load(DZ, i), load(T, i)
@@ -89,8 +118,21 @@ def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
 
 @loop("rrrrrrrrrrn")
 def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
-    """One of Newton's steps along the segment from T, if it comes nearer to zero; and |f| where it ended, in
-    voxels."""
+    """Take one Newton step along each of n segments if it comes nearer to zero.
+
+    Parameters
+    ----------
+    P, FRAME
+        Parameters of the scene, and of the loop.
+    X, Y, Z, DX, DY, DZ
+        Starts of the segments and vectors to their ends, [n] each, scene units.
+    T
+        Roots as fractions of the segments, [n]; modified in place.
+    MISS
+        Receives |f| at the new roots in voxels, [n].
+    n
+        Number of segments, a multiple of WIDTH.
+    """
     over = FRAME[0]
     for i in range(0, n, WIDTH):
         x, y, z = load(X, i), load(Y, i), load(Z, i)
@@ -112,17 +154,34 @@ def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
 
 @loop("rrrrrrrrrrrrrrrrrrrrn")
 def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, DY, DZ, n):
-    """Where to look for the surface from n points: the way to go, D.
+    """Compute the vector from each of n points towards the surface.
 
-    Along the gradient, by central differences so that at an edge neither side is preferred, four of Newton's
-    steps or as far as L and H, the room below and above each point, allow; where that does not lead to the
-    surface (within rounding) or beyond it, O, if that is no NaN. A coordinate without room is kept; slopes
-    below 0.1 are taken for it, so that no step is longer than ten times |f|.
+    The vector follows the gradient, by central differences so that neither side is preferred at an edge. Its
+    length is four Newton steps, limited by the point's trust region. If it does not reach the surface (within
+    rounding), the vector O replaces it, unless that is NaN. A coordinate without clearance is kept. Slopes
+    below 0.1 count as 0.1, so that no step is longer than ten times |f|.
 
-    Where the slopes on both sides of a point differ little (by less than 25 degrees: their difference is then
-    2 tan(12.5 deg) of their mean, its square 0.05 of theirs) the field is smooth there, and no edge is near:
-    the planes that met in the point are of a bend that is rounder, or folded finer, than they say. The way is
-    then M, to the middle of what is known of the surface, if it leads through it.
+    If the slopes on both sides of a point differ little (by less than 25 degrees: their difference is then 2
+    tan(12.5 deg) of their mean, its square 0.05 of theirs) the field is smooth there and no edge is near. The
+    planes that met in the point then belong to a bend that is rounder, or folded finer, than they indicate.
+    The vector is then M, if the surface lies between.
+
+    Parameters
+    ----------
+    P, FRAME
+        Parameters of the scene, and of the loop.
+    X, Y, Z
+        Points, [n] each, scene units.
+    LX, LY, LZ, HX, HY, HZ
+        Distances to the lower and upper sides of the trust regions, [n] each, scene units.
+    OX, OY, OZ
+        Vectors to points of opposite sign, [n] each, scene units, or NaN.
+    MX, MY, MZ
+        Vectors to the middle of the known part of the surface, [n] each, scene units, or NaN.
+    DX, DY, DZ
+        Receive the vectors, [n] each, scene units.
+    n
+        Number of points, a multiple of WIDTH.
     """
     e, tight = FRAME[3], FRAME[4]
     for i in range(0, n, WIDTH):

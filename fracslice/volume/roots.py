@@ -1,7 +1,7 @@
-"""Where a field is zero on many segments at once: the loops that its compiled kernel runs, and their rounds.
+"""Roots of a field on many segments at once: the compiled loops and their rounds.
 
-A segment is six rows: where it starts, and from there to its end; a root is a share t of it. Every lane is
-for itself: what it finds does not depend on its neighbours, nor on how the segments are dealt out.
+A segment is six rows: its start, and the vector to its end; a root is a fraction t of it. Each lane is
+independent: its result does not depend on its neighbours or on the order of the segments.
 """
 
 from __future__ import annotations
@@ -16,19 +16,37 @@ from ..kernel.machine import constant
 from .root_loops import aim, find, lead, polish
 
 FRAMES = {"float32": (1e-6, 1e-5, 5e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-5, 1e-6, 1e-7)}
-"""FRAME but for its first number, the lengths in voxels."""
+"""Entries of FRAME after the first, lengths in voxels."""
 
 QUICK, MOST = 8, 48
-"""Steps towards a root that all segments are given, and those that then are left."""
+"""Steps for all segments, and further steps for those not finished."""
 
 LOOPS = {"float32": (find, lead), "float64": (find, polish, aim)}
+"""Loops compiled for each precision."""
 
 
 class Roots:
-    """The loops over one scene's field. Safe to call from many threads at once.
+    """Root-finding loops of one scene's field. Thread-safe.
 
-    precision: "float32" or "float64". voxel: scene units. Segments are float [6, n] of that precision, n a
-    multiple of `width`. batch: segments worth a call.
+    Segments are float [6, n] of that precision; n is a multiple of `width`.
+
+    Parameters
+    ----------
+    root
+        Field.
+    precision
+        "float32" or "float64".
+    voxel
+        Voxel size, scene units.
+
+    Attributes
+    ----------
+    dtype
+        Floating-point type.
+    width
+        Lanes.
+    batch
+        Segments per call that amortise its overhead.
     """
 
     def __init__(self, root: Field, precision: Precision, voxel: float) -> None:
@@ -40,11 +58,34 @@ class Roots:
         self.width, self.batch, self._runs = loops.width, loops.batch, loops.runs
 
     def padded(self, index: np.ndarray) -> np.ndarray:
-        """The numbers of some segments, the last one repeated until they fill their lanes."""
+        """Pad segment numbers to a multiple of the lanes by repeating the last one.
+
+        Parameters
+        ----------
+        index
+            Segment numbers, int [n], n > 0.
+
+        Returns
+        -------
+        ndarray
+            Segment numbers, int [m], m a multiple of `width`.
+        """
         return np.concatenate([index, np.repeat(index[-1:], -len(index) % self.width)])
 
     def found(self, segments: np.ndarray) -> np.ndarray:
-        """The roots, [n], as shares of the segments; where the ends have one sign, the end nearer to zero."""
+        """Find the roots on segments.
+
+        Parameters
+        ----------
+        segments
+            Starts and vectors, [6, n].
+
+        Returns
+        -------
+        ndarray
+            Roots as fractions of the segments, [n]; where both ends have the same sign, the end nearer to
+            zero.
+        """
         roots = self._stepped(segments, QUICK)
         slow = np.flatnonzero(roots > 1)
         if len(slow):
@@ -54,25 +95,63 @@ class Roots:
         return roots
 
     def _stepped(self, segments: np.ndarray, steps: int) -> np.ndarray:
+        """Run `find` with a limit of steps."""
         roots = np.empty((1, segments.shape[1]), self.dtype)
         self._runs["find"](self._frame, segments, roots, steps)
         found: np.ndarray = roots[0]
         return found
 
     def native(self, name: str) -> tuple[Any, ...] | Callable[..., None]:
-        """One of the loops for native code."""
+        """Return a loop for native code.
+
+        Parameters
+        ----------
+        name
+            Name of the loop.
+
+        Returns
+        -------
+        tuple or Callable
+            Machine code and its constant arguments, or a Python function.
+        """
         return self._runs[name].native(self._frame)
 
     def aimed(self, segments: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Roots brought nearer, [n], and |f| in voxels, [n]."""
+        """Refine roots by one step.
+
+        Parameters
+        ----------
+        segments
+            Starts and vectors, [6, n].
+        roots
+            Roots as fractions of the segments, [n].
+
+        Returns
+        -------
+        roots : ndarray
+            Refined roots, [n].
+        miss : ndarray
+            Values of |f| there in voxels, [n].
+        """
         out = np.empty((2, len(roots)), self.dtype)
         out[0] = roots
         self._runs["aim"](self._frame, segments, out)
         return out[0], out[1]
 
     def lead(self, trust_regions: np.ndarray) -> np.ndarray:
-        """The ways, [3, n], from points to the surface. trust_regions: [15, n]: the points, the space
-        below and above them, the ways to somewhere of the other sign and to the middle, or NaN."""
+        """Compute directions from points to the surface.
+
+        Parameters
+        ----------
+        trust_regions
+            Rows [15, n]: the points, the distances to the lower and upper sides of their trust regions, and
+            the vectors to a point of opposite sign and to the middle of the surface, or NaN.
+
+        Returns
+        -------
+        ndarray
+            Directions, [3, n].
+        """
         ways = np.empty((3, trust_regions.shape[1]), self.dtype)
         self._runs["lead"](self._frame, trust_regions, ways)
         return ways

@@ -1,15 +1,16 @@
-"""Sparse sampling: from a distance field to bricks that hold its whole surface and little else.
+"""Sparse sampling of a distance field: bricks that contain its whole surface and little else.
 
-Top down, a cell is dropped when the field at its centre says that no sign change is in it or within a voxel
-of it: ``|f| > L * (half diagonal + voxel)``. What remains at brick size are candidates. They are sampled from
-the outside in: a candidate next to empty space, or whose centre is outside, is sampled; then every neighbour
-that a sampled brick shows an outside sample to, until none is left. The inside of an escape-time fractal,
-which costs every iteration and cannot be recognised from afar, is so never entered beyond its first layer.
+Top down, a cell is discarded if the field at its centre proves that no sign change is in it or within a voxel
+of it: ``|f| > L * (half diagonal + voxel)``. The remaining bricks are candidates. They are sampled from the
+outside in: first each candidate next to empty space or with its centre outside, then every neighbour across a
+face on which a sampled brick has an exterior sample, until none is left. The interior of an escape-time
+fractal, which costs every iteration and cannot be recognised from afar, is thus never entered beyond its
+first layer.
 
-The same rule is a safety net: where a sign change would leave the samples, the neighbour is sampled too,
-whatever the bound said. A second one is the audit: grid points at random in what was not sampled, one in
-every brick beside the samples and many of the rest; where the sign is not the one assumed, sampling goes on
-from there. All results depend on the field only, not on threads or order.
+The same rule guards against violated bounds: where a sign change would leave the samples, the neighbour is
+sampled too, whatever the bound claims. The audit is a second check: random grid points in unsampled bricks,
+one in every brick next to the samples and many in the others. Where the sign is not the assumed one, sampling
+continues from there. Results depend on the field only, not on threads or order.
 """
 
 from __future__ import annotations
@@ -35,7 +36,10 @@ COARSEST = 16
 """Bricks along a cell of the first level: 128 voxels, as in OpenVDB's tree."""
 
 AUDITS = 8
+"""Largest number of audits."""
+
 FAR_AUDITS = 1 << 15
+"""Random bricks tested by an audit, besides those next to the samples; in a smaller lattice, all bricks."""
 
 
 def sample(
@@ -45,11 +49,32 @@ def sample(
     work: Work | None = None,
     conservative: Kernel | None = None,
 ) -> Bricks:
-    """Samples a scene's field around its surface.
+    """Sample a scene's field around its surface.
 
-    kernel: the scene's float32 kernel. bounds: the scene's, whose Lipschitz bound prunes. conservative: the
-    kernel to prune by, where it is another; then bounds are its own (`Node.conservative`). Raises
-    `VolumeError` if there is no surface, or if it leaves the lattice; `Cancelled`.
+    Parameters
+    ----------
+    kernel
+        Float32 kernel of the scene.
+    bounds
+        Bounds of the field to prune by; cells are pruned by its Lipschitz bound.
+    lattice
+        Sampling grid.
+    work
+        Execution settings.
+    conservative
+        Kernel to prune by, if not `kernel`; `bounds` are then its own (`Node.conservative`).
+
+    Returns
+    -------
+    Bricks
+        Samples around the surface.
+
+    Raises
+    ------
+    VolumeError
+        If there is no surface or it leaves the lattice.
+    Cancelled
+        If the job was cancelled.
     """
     values: list[np.ndarray] = []
 
@@ -77,13 +102,41 @@ def sample_signs(
     work: Work | None = None,
     conservative: Kernel | None = None,
 ) -> SignBricks:
-    """The same bricks, in a 32nd of the memory: of each sample only its sign is kept."""
+    """Sample the same bricks but keep only signs, in 1/32 of the memory.
+
+    Parameters
+    ----------
+    kernel
+        Float32 kernel of the scene.
+    bounds
+        Bounds of the field to prune by.
+    lattice
+        Sampling grid.
+    work
+        Execution settings.
+    conservative
+        Kernel to prune by, if not `kernel`.
+
+    Returns
+    -------
+    SignBricks
+        Signs of the samples around the surface.
+
+    Raises
+    ------
+    VolumeError
+        If there is no surface or it leaves the lattice.
+    Cancelled
+        If the job was cancelled.
+    """
     signs, _ = _Run(kernel, conservative or kernel, bounds, lattice, work or Work(), None).signs()
     return signs
 
 
 @dataclass
 class _Run:
+    """State of one sampling."""
+
     kernel: Kernel
     conservative: Kernel
     bounds: Bounds
@@ -97,7 +150,7 @@ class _Run:
     bits: list[np.ndarray] = field(default_factory=list)
 
     def signs(self) -> tuple[SignBricks, np.ndarray]:
-        """The sampled bricks that the surface needs, and which rows of all sampled ones these are."""
+        """Sampled bricks that the surface needs, and their rows among all sampled bricks."""
         states, outside = self.probe()
         front = self.seeds(states, outside)
         for turn in range(AUDITS):
@@ -110,7 +163,7 @@ class _Run:
 
     # --- top down -------------------------------------------------------------------------------------------
     def probe(self) -> tuple[States, np.ndarray]:
-        """The state of every brick, and of the candidates in order whether their centre is outside."""
+        """State of every brick, and for each candidate, in order, whether its centre is outside."""
         size = COARSEST
         grid = np.full([-(-n // size) for n in self.lattice.bricks], CANDIDATE, np.uint8)
         while True:
@@ -131,11 +184,11 @@ class _Run:
         return States.within(grid), ~(own < 0)
 
     def centres(self, cells: tuple[np.ndarray, ...], size: int, kernel: Kernel) -> np.ndarray:
-        """A field at the centres of cells of `size` bricks."""
+        """Field at the centres of cells of `size` bricks."""
         return self.values_at([size * BRICK * c + (size * BRICK - 1) / 2 for c in cells], kernel)
 
     def values_at(self, indices: Sequence[np.ndarray], kernel: Kernel) -> np.ndarray:
-        """A field at positions given in grid indices, three arrays [n]."""
+        """Field at positions in grid indices, three arrays [n]."""
         points = np.empty((3, len(indices[0])))
         for row, start, along in zip(points, self.lattice.origin, indices, strict=True):
             np.add(start, self.lattice.voxel * along, out=row)
@@ -143,23 +196,20 @@ class _Run:
         return values_at(kernel, points, self.work)
 
     def seeds(self, states: States, outside: np.ndarray) -> np.ndarray:
-        """The candidates to start from.
-
-        Where the inside is as recognisable as the outside, these are all of them.
-        """
+        """Candidates to start from: all of them if the field bounds distances inside too."""
         flat = states.flat
         candidates = np.flatnonzero(flat == CANDIDATE)
         edge = states.beside((flat == EMPTY) | (flat == BORDER))
         if self.bounds.exterior_only:
             candidates = candidates[edge[candidates] | outside]
-        # Said to be full next to what is said to be empty: the bound is wrong there.
+        # A full brick next to an empty one: the bound is wrong there.
         wrong = np.flatnonzero((flat == FULL) & edge)
         self.repaired += len(wrong)
         return np.concatenate([candidates, wrong])
 
     # --- outside in -----------------------------------------------------------------------------------------
     def explore(self, states: States, front: np.ndarray) -> None:
-        """Samples the front, then what it shows a sign change to, until the samples are closed."""
+        """Sample the front, then each neighbour that must be sampled too, until the samples are closed."""
         flat = states.flat
         while len(front):
             empty = self.emptied(states.places(front)) & (flat[front] == CANDIDATE)
@@ -175,7 +225,7 @@ class _Run:
             front = states.distinct(np.concatenate([found, near[flat[near] == CANDIDATE]]))
 
     def emptied(self, places: np.ndarray) -> np.ndarray:
-        """Which bricks are empty after all, looked at in eight cells: 8 evaluations to save 512."""
+        """Mask of the bricks proven empty by their eight subcells: 8 evaluations to save 512."""
         size = BRICK // 2
         middle = np.indices((2, 2, 2)).reshape(3, 8, 1) * size + (size - 1) / 2
         f = self.values_at((places[:, None] * BRICK + middle).reshape(3, -1), self.conservative)
@@ -183,13 +233,13 @@ class _Run:
         return empty
 
     def reach(self, size: int) -> float:
-        """The least |f| at the centre of a cell of `size` samples that leaves no sign change within a voxel
-        of it.
+        """Least |f| at the centre of a cell of `size` samples that excludes a sign change within a voxel of
+        it.
         """
         return self.bounds.lipschitz * float(np.sqrt(3)) * self.lattice.voxel * (size + 1) / 2
 
     def sampled(self, places: np.ndarray) -> np.ndarray:
-        """Samples bricks; returns their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set where inside."""
+        """Sample bricks; return their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set inside."""
         corners = np.ascontiguousarray(places.T * BRICK, np.int32)
         values = np.empty((len(corners) if self.keep else 0, BRICK**3), np.float32)
         signs = np.empty((len(corners), 64), np.uint8)
@@ -208,7 +258,7 @@ class _Run:
         return signs.reshape(-1, 8, 8)
 
     def neighbours(self, states: States, bricks: np.ndarray, signs: np.ndarray) -> np.ndarray:
-        """The bricks that must be sampled because of what these show on their faces."""
+        """Bricks that must be sampled because of the signs on the faces of these bricks."""
         found, faces = [], SignFaces(signs)
         for axis, step in FACES:
             inside, outside = faces.shown(axis, step)
@@ -222,7 +272,9 @@ class _Run:
         return np.concatenate(found)
 
     def audit(self, states: States, turn: int) -> np.ndarray:
-        """Bricks without samples, with a sample of the other sign than assumed; always the same points."""
+        """Unsampled bricks where a random grid point has not the assumed sign; the points are the same in
+        every run.
+        """
         rng, flat = np.random.default_rng(turn), states.flat
         bare = flat < QUEUED
         near = np.flatnonzero(bare & states.beside(flat == QUEUED))
@@ -233,13 +285,13 @@ class _Run:
         inside, assumed = self.values_at(points, self.kernel) < 0, flat[bricks]
         wrong = inside != (assumed != EMPTY)
         self.audited += len(bricks)
-        # A candidate is in doubt: what is outside in it is a pocket that nothing led to, and no bound denied.
+        # A wrong candidate violates no bound: it contains an exterior pocket that was not reached.
         self.repaired += int(np.count_nonzero(wrong & (assumed != CANDIDATE)))
         return states.distinct(bricks[wrong])
 
     # --- the result -----------------------------------------------------------------------------------------
     def finished(self, states: States) -> tuple[SignBricks, np.ndarray]:
-        """The bricks that a crossing edge touches, in order, and their rows."""
+        """Bricks touched by an edge with a sign change, in order, and their rows."""
         numbers = np.concatenate([np.empty(0, np.intp), *self.numbers])
         signs = np.concatenate([np.empty((0, 8, 8), np.uint8), *self.bits])
         index = np.where(states.flat == EMPTY, OUTSIDE, INSIDE).astype(np.int32)
@@ -267,8 +319,8 @@ class _Run:
     def crossed(
         self, states: States, numbers: np.ndarray, signs: np.ndarray, index: np.ndarray
     ) -> np.ndarray:
-        """Which sampled bricks have a sign change in them or to a neighbour; the others' sign is written to
-        `index`.
+        """Mask of the sampled bricks with a sign change in them or to a neighbour. Writes the sign of the
+        others to `index`.
         """
         faces = SignFaces(signs)
         any_in, any_out = faces.anywhere
@@ -285,7 +337,7 @@ class _Run:
 
 
 def _gathered(waves: list[np.ndarray], order: np.ndarray, work: Work) -> np.ndarray:
-    """The samples of the bricks in `order`; each wave is let go as soon as it is copied."""
+    """Samples of the bricks in `order`. Each batch is released as soon as it is copied."""
     out, start = np.empty((len(order), BRICK**3), np.float32), 0
     while waves:
         wave = waves.pop(0)

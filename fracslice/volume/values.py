@@ -1,4 +1,4 @@
-"""A field at many points, on all threads."""
+"""Parallel evaluation of a field."""
 
 from __future__ import annotations
 
@@ -9,7 +9,27 @@ from ..work import Work, chunks
 
 
 def values_at(kernel: Kernel, points: np.ndarray, work: Work) -> np.ndarray:
-    """Field values [n] in the kernel's dtype at points [3, n], scene units. Raises `Cancelled`."""
+    """Evaluate a field at many points on all threads.
+
+    Parameters
+    ----------
+    kernel
+        Kernel of the field.
+    points
+        Points, [3, n], scene units.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    ndarray
+        Field values, [n], of the kernel's dtype.
+
+    Raises
+    ------
+    Cancelled
+        If the job was cancelled.
+    """
     f = np.empty(points.shape[1], kernel.dtype)
 
     def task(part: slice) -> None:
