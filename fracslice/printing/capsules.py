@@ -55,7 +55,7 @@ def _lines(start: np.ndarray, along: np.ndarray) -> np.ndarray:
 
 
 def _along(lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points on the axes, at most a voxel apart, float64 [m, 3], and their axes, int32 [m]."""
+    """Points on the axes, at most a voxel apart, float64 [m, 3], and axis numbers, int32 [m]."""
     pieces = np.ceil(np.linalg.norm(lines[:, 3:6], axis=1)).astype(np.int64)
     of = np.repeat(np.arange(len(lines), dtype=np.int32), pieces + 1)
     first = np.repeat(np.cumsum(pieces + 1) - pieces - 1, pieces + 1)

@@ -163,7 +163,7 @@ def check_object(
     Raises
     ------
     VolumeError
-        If the field has no surface.
+        If the field cannot be sampled.
     Cancelled
         When the work is cancelled.
     """
