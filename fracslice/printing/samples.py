@@ -23,7 +23,7 @@ NEAR = 1.5
 """Minimum distance of unsampled points from the surface, voxels."""
 
 LIPSCHITZ = 1.8
-"""Lipschitz bound of interpolated distances: each of the three slopes is at most 1, but never all at once."""
+"""Lipschitz bound of interpolated distances: each of the three slopes is at most 1, never all at once."""
 
 
 SIDE = 11

@@ -170,8 +170,8 @@ class Slicer:
     def map(self, make: Callable[[Layer], T], layers: Sequence[int] | None = None) -> Iterator[T]:
         """Yield ``make(layer)`` for every layer, or for chosen ones.
 
-        At most a few slabs are in memory at a time. Results do not depend on the number of
-        threads. Exceptions of `make` propagate.
+        At most a few slabs are in memory at a time. Results do not depend on the number of threads.
+        Exceptions of `make` propagate.
 
         Parameters
         ----------
