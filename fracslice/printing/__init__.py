@@ -1,4 +1,4 @@
-"""Making an object printable, in the field, and measuring whether it is."""
+"""Field edits that make an object printable, and printability checks of solids."""
 
 from .make import printable
 

@@ -1,4 +1,4 @@
-"""Where parts end and others begin, of those that touch as of those that are far apart."""
+"""Borders midway between connected components, touching or far apart."""
 
 from __future__ import annotations
 
@@ -13,15 +13,31 @@ from .components import Connected
 from .samples import Samples
 
 FAR = 255
-"""Steps: more are not counted."""
+"""Number of grid steps at which the search stops; unreached samples keep this value."""
 
 REACH = 8
-"""Voxels: samples farther from a border may have bricks without samples between, where it is not known."""
+"""Largest distance from a border, voxels. Farther off, unsampled bricks may lie between, which the search
+cannot cross.
+"""
 
 
 def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
-    """Negative where fewer samples are on the way to these parts than to the others: half the difference. So
-    the border lies midway between them, and the surfaces of both stay as they are.
+    """A field that is negative nearer to some components than to others.
+
+    The value is half the difference of the grid steps to either, so the border lies midway between them. The
+    surfaces of both stay unchanged.
+
+    Parameters
+    ----------
+    found : Connected
+        Samples of a solid and its components.
+    these, others : int64 [k]
+        Numbers of the components on the negative and on the positive side.
+
+    Returns
+    -------
+    Samples
+        The field in scene units, at most `REACH` voxels in magnitude, on bricks in and around `these`.
     """
     solid, components = found.solid, found.components
     rows, _ = components.samples(these)
@@ -34,8 +50,9 @@ def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
 
 
 def _around(solid: Bricks, rows: np.ndarray, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The rows of the bricks in and around some rows and some bricks without samples, and their index: these
-    bricks are inside, all others outside.
+    """Rows of the bricks in and around `rows` and the unsampled bricks `tiles`, and an index of them.
+
+    In the index, `tiles` are inside and all other unsampled bricks are outside.
     """
     from scipy.ndimage import binary_dilation
 
@@ -50,7 +67,7 @@ def _around(solid: Bricks, rows: np.ndarray, tiles: np.ndarray) -> tuple[np.ndar
 
 @compiled
 def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
-    """From each sample to the nearest seed along edges of the grid, at most `FAR`: breadth first."""
+    """Grid steps from each sample to the nearest seed, at most `FAR`, by breadth-first search."""
     steps = np.full(seeds.shape, FAR, np.uint8)
     queue = np.empty(seeds.size, np.int32)
     first, last = 0, 0
@@ -79,7 +96,20 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
 
 @compiled
 def beside(index, ijk, row, axis, way):  # type: ignore[no-untyped-def]
-    """The row of the next brick along an axis, negative for none."""
+    """Row of the adjacent brick along an axis.
+
+    Parameters
+    ----------
+    index, ijk : int32 [bx, by, bz], int32 [n, 3]
+        As of `Bricks`.
+    row, axis, way : int
+        Row of the brick, axis 0 to 2, and direction, -1 or 1.
+
+    Returns
+    -------
+    int
+        Negative if the adjacent brick has no samples or does not exist.
+    """
     x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
     x, y, z = x + way * (axis == 0), y + way * (axis == 1), z + way * (axis == 2)
     nx, ny, nz = index.shape

@@ -1,4 +1,4 @@
-"""The shortest struts that join loose bodies."""
+"""Struts of minimum total length that join disconnected bodies."""
 
 from __future__ import annotations
 
@@ -9,20 +9,35 @@ from .components import Components
 from .samples import positions
 
 NONE = -1
+"""Marks samples in no body and cells without an entry."""
 
 ACROSS = 192
-"""Cells along the longest side, at most; where samples are finer, bodies are in cells of several."""
+"""Maximum number of cells along the longest side; on finer grids, a cell spans several samples."""
 
 CHUNK = 2048
+"""Bricks processed at a time."""
 
 
 def struts(solid: Bricks, components: Components, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The ends of struts, float64 [n - 1, 3] each, scene units, that join n bodies, together as short as can
-    be.
+    """Struts that join n bodies with minimum total length.
 
-    Every cell of the space between belongs to its nearest body (exact Euclidean distances: Maurer, Qi and
-    Raghavan 2003); where two such regions meet, their bodies may be joined. The minimum spanning tree of the
+    Each cell of the empty space belongs to its nearest body, by exact Euclidean distances (Maurer, Qi and
+    Raghavan 2003). Bodies whose regions are adjacent are candidate pairs. The minimum spanning tree of the
     bodies is among these pairs, as the one of points is in their Delaunay triangulation.
+
+    Parameters
+    ----------
+    solid : Bricks
+        Samples of the solid.
+    components : Components
+        Its connected components.
+    bodies : int64 [n]
+        Numbers of the components to join.
+
+    Returns
+    -------
+    start, end : float64 [n - 1, 3]
+        Ends of the struts, scene units.
     """
     from scipy.ndimage import distance_transform_edt
     from scipy.sparse import coo_array
@@ -46,8 +61,10 @@ def struts(solid: Bricks, components: Components, bodies: np.ndarray) -> tuple[n
 
 
 def _nearest(pairs: np.ndarray, ends: np.ndarray, slack: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Each pair once, with the ends that are nearest to each other, and their distance. Where faces lie side
-    by side many are, but for some samples: then the ones nearest to the middle of them.
+    """Unique pairs of bodies, their nearest end points, and the distance between these.
+
+    Between parallel faces many end points are nearest within `slack` samples: the one closest to their mean
+    is returned.
     """
     swapped = pairs[:, 0] > pairs[:, 1]
     pairs, ends = pairs.copy(), ends.copy()
@@ -69,9 +86,10 @@ def _nearest(pairs: np.ndarray, ends: np.ndarray, slack: int) -> tuple[np.ndarra
 def _cells(
     solid: Bricks, components: Components, bodies: np.ndarray, times: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The cells of `times` samples along each side that bodies are in, one after the other: flat index,
-    number of the body, and a sample of it there, int64 [n], [n] and [n, 3]. A cell comes once for each body
-    in it.
+    """Cells of `times` samples along each side that contain bodies, once for each body in a cell.
+
+    Returns the flat index of the cell, the position of the body in `bodies`, and the grid index of one of its
+    samples in the cell: int64 [n], [n] and [n, 3].
     """
     number = np.full(len(components.inside), NONE)
     number[bodies] = np.arange(len(bodies))
@@ -90,13 +108,13 @@ def _cells(
 
 
 def _sharing(cell: np.ndarray) -> np.ndarray:
-    """Those that follow each other in one cell, int64 [n, 2]."""
+    """Pairs of consecutive entries in the same cell, int64 [n, 2]."""
     first = np.flatnonzero(cell[:-1] == cell[1:])
     return np.column_stack([first, first + 1])
 
 
 def _meetings(owner: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """The nearest ones of either side, int64 [n, 2], where regions of different bodies meet."""
+    """Pairs of nearest entries on either side where regions of different bodies meet, int64 [n, 2]."""
     pairs = [np.empty((0, 2), np.int64)]
     for axis in range(3):
         own = np.moveaxis(owner, axis, 0)

@@ -1,4 +1,4 @@
-"""The distance to many balls and struts, on bricks around them: of each the samples within reach."""
+"""Distance to many capsules (balls and round-ended struts), sampled on bricks around them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,25 @@ from ..volume.bricks import OUTSIDE
 from .samples import Samples
 
 BAND = 2.0
-"""Voxels around the capsules that are sampled."""
+"""Width of the sampled band around the capsules, voxels."""
 
 
 def capsules(start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Samples:
-    """The field of capsules, round-ended struts from start to end, float64 [n, 3], scene units; balls where
-    these are the same. Sampled on the grid of `like`, in bricks of its own.
+    """Sample the distance to capsules on the grid of given bricks.
+
+    Parameters
+    ----------
+    start, end : float64 [n, 3]
+        Ends of the axes, scene units; equal ends make a ball.
+    radius : float
+        Scene units.
+    like : Bricks
+        Samples whose grid is used.
+
+    Returns
+    -------
+    Samples
+        The union of the capsules, in bricks of its own.
     """
     voxel, reach = like.voxel, radius / like.voxel + BAND
     low = np.floor(((np.minimum(start, end).min(0) - like.origin) / voxel - reach) / 8).astype(int) - 1
@@ -36,13 +49,13 @@ def capsules(start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) ->
 
 
 def _lines(start: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Where strokes begin, how they go on, and the inverse square of their length: float64 [n, 7]."""
+    """Start, direction vector and inverse squared length of each axis, float64 [n, 7]; 0 for balls."""
     square = (along**2).sum(1, keepdims=True)
     return np.hstack([start, along, np.divide(1, square, np.zeros_like(square), where=square > 1e-12)])
 
 
 def _along(lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points on strokes, a voxel apart at most, float64 [m, 3], and whose they are, int32 [m]."""
+    """Points on the axes, at most a voxel apart, float64 [m, 3], and axis numbers, int32 [m]."""
     pieces = np.ceil(np.linalg.norm(lines[:, 3:6], axis=1)).astype(np.int64)
     of = np.repeat(np.arange(len(lines), dtype=np.int32), pieces + 1)
     first = np.repeat(np.cumsum(pieces + 1) - pieces - 1, pieces + 1)
@@ -52,6 +65,7 @@ def _along(lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @compiled
 def _mark(points, reach, index):  # type: ignore[no-untyped-def]
+    """Mark the bricks within `reach` voxels of the points."""
     for n in range(len(points)):
         x, y, z = points[n]
         for i in range(int(x - reach) >> 3, (int(x + reach) >> 3) + 1):
@@ -62,8 +76,9 @@ def _mark(points, reach, index):  # type: ignore[no-untyped-def]
 
 @compiled
 def _shorten(lines, points, of, reach, index, squares):  # type: ignore[no-untyped-def]
-    """The squares of the distances from samples, wherever a capsule is nearer than those before it. All that
-    is in reach of a capsule is within half a voxel more of one of its points.
+    """Lower the squared distances of samples to those of nearer capsules.
+
+    Every sample within reach of a capsule is within reach plus half a voxel of one of its axis points.
     """
     far = reach + 0.5
     for m in range(len(points)):

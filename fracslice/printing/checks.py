@@ -1,4 +1,4 @@
-"""Would it print? What the samples tell of the solid as a whole, in time linear in its surface."""
+"""Printability checks on a sampled solid, in time linear in its surface."""
 
 from __future__ import annotations
 
@@ -24,27 +24,43 @@ from .walls import Walls, walls
 from .widths import BINS, Widths, widths_of
 
 COARSE, FINE = 96, 192
-"""Samples along the longest side, at least and at most."""
+"""Minimum and maximum number of samples along the longest side."""
 
 SPECK = 27
-"""Samples: less is not told from noise."""
+"""Volume in samples; smaller components are indistinguishable from noise."""
 
 ACROSS = 4
-"""Samples across the thinnest wall that may be, if `FINE` allows."""
+"""Samples across the thinnest allowed wall, as far as `FINE` permits."""
 
 UP = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What counts. Lengths are numbers of mm, or text such as "0.4mm".
+    """Limits of the checks. Lengths are numbers of mm, or text such as "0.4mm".
 
-    speck: parts with less area (mm^2) in every layer, or less volume (mm^3), are dust that is counted but no
-    reason to stop. cup: the least area of a suction cup or a resin trap, mm^2. deep: the least height of a
-    suction cup, mm: any hole in the first layers is a shallow one. wall: the thinnest wall, mm; in a layer it
-    is judged by the thinnest hundredth. floor: the thinnest floor or roof, mm, measured upwards. thin: walls
-    and floors count from so much thin surface on, mm^2. density: of the resin, g/cm^3. Raises `SceneError`
-    for a value that cannot be.
+    Attributes
+    ----------
+    speck : float
+        Components with less area in every layer (mm^2), or less volume (mm^3), are counted as specks but are
+        not a problem.
+    cup : float
+        Minimum area of a suction cup or a resin trap, mm^2.
+    deep : float
+        Minimum height of a suction cup, mm; every hole in the first layers is a shallow one.
+    wall : float
+        Thinnest allowed wall, mm; layers are judged by their thinnest hundredth.
+    floor : float
+        Thinnest allowed floor or roof along z, mm.
+    thin : float
+        Minimum area of thin walls, or thin floors, that is a problem, mm^2.
+    density : float
+        Density of the resin, g/cm^3.
+
+    Raises
+    ------
+    SceneError
+        For an invalid value.
     """
 
     speck: float = 0.02
@@ -69,10 +85,22 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class SolidReport:
-    """What the samples told, and the field of what is thinner. voxel: mm between samples: lengths are right
-    within one. bodies, cavities: their volumes in mm^3, the largest first, without specks. walls, gaps,
-    floors: thicknesses up to 2 mm. thin_walls, thin_floors: how much surface is under the limits, mm^2.
-    unseen: what walls a mesh or layers may lose, in words.
+    """Report on a solid, measured on samples and, for thin features, on the field.
+
+    Attributes
+    ----------
+    voxel : float
+        Sample spacing, mm; lengths are accurate to one voxel.
+    bodies, cavities : list of float
+        Volumes without specks, mm^3, the largest first.
+    walls, gaps, floors : Widths or None
+        Thicknesses up to 2 mm, or up to the larger limit if that is more.
+    thin_walls, thin_floors : float
+        Surface below the limits, mm^2.
+    unseen : str
+        Walls that a mesh or layers may lose; empty if there are none.
+    problems : list of str
+        One line for each problem.
     """
 
     voxel: float
@@ -88,11 +116,17 @@ class SolidReport:
 
     @property
     def thin(self) -> list[str]:
-        """The problems that neither a mesh nor layers tell of."""
+        """Problems that neither a mesh nor layers reveal: thin walls and floors."""
         return self.problems[int(len(self.bodies) > 1) + int(bool(self.cavities)) :]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON."""
+        """The report as plain JSON types.
+
+        Returns
+        -------
+        dict
+            Keyed by attribute name.
+        """
         return asdict(self)
 
 
@@ -104,8 +138,34 @@ def check_object(
     work: Work | None = None,
     finest: float | None = None,
 ) -> SolidReport:
-    """Checks an object, all depths of its tree known, within the box `outer`. scale: mm per scene unit. The
-    rest, and what it raises, is that of `check_solid`.
+    """Check an object given by its field.
+
+    Parameters
+    ----------
+    root : Field
+        The object, all depths of its tree known.
+    outer : Box
+        Conservative bounds of the object, scene units.
+    scale : float
+        mm per scene unit.
+    limits : Limits, optional
+        Limits of the checks.
+    work : Work, optional
+        Threads, progress and cancellation.
+    finest : float, optional
+        Width in mm below which a mesh or layers may lose walls; the sample spacing if not given.
+
+    Returns
+    -------
+    SolidReport
+        The report.
+
+    Raises
+    ------
+    VolumeError
+        If the field cannot be sampled.
+    Cancelled
+        When the work is cancelled.
     """
     limits, work = limits or Limits(), work or Work()
     longest = max(outer.size)
@@ -123,11 +183,34 @@ def check_solid(
     work: Work | None = None,
     finest: float | None = None,
 ) -> SolidReport:
-    """Checks a sampled solid: loose bodies, sealed cavities, thin walls and floors. root: what the bricks are
-    samples of. scale: mm per scene unit. finest: mm, what is thinner a mesh or layers may lose; if not given,
-    a voxel.
+    """Check a sampled solid: bodies, sealed cavities, thin walls and thin floors.
 
-    Raises `VolumeError`, `Cancelled`.
+    Parameters
+    ----------
+    root : Field
+        The sampled field.
+    bricks : Bricks
+        Its samples.
+    scale : float
+        mm per scene unit.
+    limits : Limits, optional
+        Limits of the checks.
+    work : Work, optional
+        Threads, progress and cancellation.
+    finest : float, optional
+        Width in mm below which a mesh or layers may lose walls; the sample spacing if not given.
+
+    Returns
+    -------
+    SolidReport
+        The report.
+
+    Raises
+    ------
+    VolumeError
+        If the field cannot be sampled.
+    Cancelled
+        When the work is cancelled.
     """
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
@@ -169,7 +252,10 @@ def check_solid(
 
 
 def _unseen(found: Walls, finest: float, least: float, scale: float) -> str:
-    """Walls thinner than `finest` mm, if there are `least` mm2 of them: how thin, and where in the scene."""
+    """Describe the walls thinner than `finest` mm: area, least thickness and its place in the scene.
+
+    Empty if their area is below `least` mm2.
+    """
     lost = found.chosen(found.width * scale < finest)
     area = float(lost.area.sum()) * scale**2
     if area < least:
@@ -183,12 +269,25 @@ def _unseen(found: Walls, finest: float, least: float, scale: float) -> str:
 
 
 def counted(things: Sequence[object], one: str, more: str = "") -> str:
-    """How many there are, and what: "1 suction cup", "2 suction cups"."""
+    """Count with its noun: "1 suction cup", "2 suction cups".
+
+    Parameters
+    ----------
+    things : sequence
+        Things to count.
+    one, more : str
+        Singular and plural; the plural is the singular and an s if not given.
+
+    Returns
+    -------
+    str
+        The number and the noun.
+    """
     return f"{len(things)} {one if len(things) == 1 else more or one + 's'}"
 
 
 def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
-    """Of all bodies, and of all cavities, of at least `speck`, the largest first."""
+    """Volumes of bodies and of cavities of at least `speck`, the largest first, cubed scene units."""
     components = components_of(bricks)
     sizes = [
         bricks.voxel**3 * components.count[numbers] for numbers in (components.bodies, components.cavities)
@@ -198,5 +297,5 @@ def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
 
 
 def _under(found: Walls, limit: float, scale: float) -> float:
-    """How much surface is thinner than a limit, mm^2, by more than a hundredth of it."""
+    """Surface thinner than `limit` mm by more than a hundredth of it, mm^2."""
     return float(np.sum(found.area[found.width * scale < 0.99 * limit]) * scale**2)

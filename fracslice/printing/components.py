@@ -1,4 +1,4 @@
-"""The connected parts of a sampled solid and of the space around it."""
+"""Connected components of a sampled solid and of the space around it."""
 
 from __future__ import annotations
 
@@ -16,10 +16,18 @@ from .samples import positions
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """Parts numbered from 0; number 0 is the space that reaches beyond the samples.
+    """Connected components, numbered from 0. Number 0 is the space that extends beyond the samples.
 
-    labels: int32 [n, 512], the part of each sample. tiles: int32 [bx, by, bz], that of each brick without
-    samples, -1 for the others. inside: bool [m], whether a part is solid. count: int64 [m], in samples.
+    Attributes
+    ----------
+    labels : int32 [n, 512]
+        Component of each sample.
+    tiles : int32 [bx, by, bz]
+        Component of each unsampled brick, -1 for sampled ones.
+    inside : bool [m]
+        True if the component is solid.
+    count : int64 [m]
+        Size of the component, samples.
     """
 
     labels: np.ndarray
@@ -29,12 +37,12 @@ class Components:
 
     @cached_property
     def bodies(self) -> np.ndarray:
-        """The numbers of the solid parts, the largest first."""
+        """Numbers of the solid components, int64 [k], the largest first."""
         return self._by_size(self.inside)
 
     @cached_property
     def cavities(self) -> np.ndarray:
-        """The numbers of the spaces that nothing reaches, the largest first."""
+        """Numbers of the enclosed empty components, int64 [k], the largest first."""
         return np.asarray([number for number in self._by_size(~self.inside) if number], np.int64)
 
     def _by_size(self, chosen: np.ndarray) -> np.ndarray:
@@ -42,7 +50,18 @@ class Components:
         return np.asarray(numbers[np.argsort(-self.count[numbers], kind="stable")])
 
     def samples(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The rows and the offsets of the samples of these components, int64 [n] each."""
+        """Samples of some components.
+
+        Parameters
+        ----------
+        numbers : int64 [k]
+            Numbers of the components.
+
+        Returns
+        -------
+        rows, offsets : int64 [n]
+            Row of each sample's brick, and offset in the brick.
+        """
         chosen = np.zeros(len(self.inside), np.bool_)
         chosen[numbers] = True
         flat = np.empty(self.count[numbers].sum(), np.int64)
@@ -50,7 +69,18 @@ class Components:
         return found >> 9, found & 511
 
     def masks(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where these parts are: bool like labels, and like tiles."""
+        """Masks of some components.
+
+        Parameters
+        ----------
+        numbers : int64 [k]
+            Numbers of the components.
+
+        Returns
+        -------
+        samples, tiles : bool [n, 512], bool [bx, by, bz]
+            True in the components, shaped like `labels` and `tiles`.
+        """
         chosen = np.zeros(len(self.inside) + 1, bool)
         chosen[numbers] = True
         return np.asarray(chosen[self.labels]), np.asarray(chosen[self.tiles])
@@ -58,18 +88,48 @@ class Components:
 
 @dataclass(frozen=True, eq=False)
 class Connected:
-    """Samples of a solid, and its parts."""
+    """A sampled solid and its connected components.
+
+    Attributes
+    ----------
+    solid : Bricks
+        The samples.
+    components : Components
+        Their components.
+    """
 
     solid: Bricks
     components: Components
 
     @classmethod
     def of(cls, solid: Bricks) -> Connected:
-        """What is connected in a sampled solid."""
+        """Label the components of a sampled solid.
+
+        Parameters
+        ----------
+        solid : Bricks
+            The samples.
+
+        Returns
+        -------
+        Connected
+            The samples and their components.
+        """
         return cls(solid, components_of(solid))
 
     def filled(self, cavities: np.ndarray) -> Connected:
-        """As they are once these cavities are solid: what floats in one is of the body around it."""
+        """Fill cavities. A body that floats in a cavity joins the body around it.
+
+        Parameters
+        ----------
+        cavities : int64 [k]
+            Numbers of the cavities.
+
+        Returns
+        -------
+        Connected
+            The filled solid, its components renumbered.
+        """
         place = self._places(cavities)
         beside = [self._at(place + step) for step in np.vstack([np.eye(3, dtype=int), -np.eye(3, dtype=int)])]
         parent = np.arange(len(self.components.inside))
@@ -87,7 +147,18 @@ class Connected:
         return Connected(self._turned(cavities, -1.0, INSIDE), merged)
 
     def sealed(self, before: Connected) -> np.ndarray:
-        """The numbers of the cavities that were none before, of a solid that may be sampled otherwise."""
+        """Cavities that were not cavities before.
+
+        Parameters
+        ----------
+        before : Connected
+            The solid before, which may be sampled on another grid.
+
+        Returns
+        -------
+        int64 [k]
+            Numbers of the new cavities.
+        """
         cavities = self.components.cavities
         place = self._places(cavities)
         points = np.array(self.solid.origin) + self.solid.voxel * place
@@ -96,11 +167,11 @@ class Connected:
         return np.setdiff1d(cavities, self._at(place)[known])
 
     def _places(self, numbers: np.ndarray) -> np.ndarray:
-        """The grid indices of the samples of some components, int64 [n, 3]."""
+        """Grid indices of the samples of some components, int64 [n, 3]."""
         return positions(self.solid, *self.components.samples(numbers))
 
     def _at(self, place: np.ndarray) -> np.ndarray:
-        """The components at grid indices [n, 3], int64 [n]."""
+        """Components at grid indices [n, 3], int64 [n]; 0 beyond the bricks."""
         brick = place >> 3
         within = np.all((brick >= 0) & (brick < self.solid.index.shape), axis=1)
         at = tuple(np.where(within[:, None], brick, 0).T)
@@ -111,21 +182,42 @@ class Connected:
         return np.where(within, label, 0).astype(np.int64)
 
     def without(self, bodies: np.ndarray) -> Bricks:
-        """The samples of the solid without some bodies."""
+        """The solid without some bodies.
+
+        Parameters
+        ----------
+        bodies : int64 [k]
+            Numbers of the bodies.
+
+        Returns
+        -------
+        Bricks
+            The samples.
+        """
         return self._turned(bodies, 1.0, OUTSIDE)
 
     def _turned(self, numbers: np.ndarray, sign: float, side: int) -> Bricks:
-        """With parts on the other side, a voxel from the surface."""
+        """Move components to one side: samples to `sign` voxels from the surface, tiles to `side`."""
         samples, tiles = self.components.masks(numbers)
         values = np.where(samples, np.float32(sign * self.solid.voxel), self.solid.values)
         return replace(self.solid, values=values, index=np.where(tiles, np.int32(side), self.solid.index))
 
 
 def components_of(bricks: Bricks) -> Components:
-    """The parts of a sampled solid, in time linear in the samples.
+    """Label the connected components of a sampled solid, in time linear in the samples.
 
-    Samples are connected along the grid's edges: what touches only along a line is not joined. Each brick is
-    labelled alone, then its faces are united with its neighbours' (union and find, Tarjan 1975).
+    Samples are connected along edges of the grid: solids that touch only along a line are not connected. Each
+    brick is labelled alone, then united with its neighbours across faces (union-find, Tarjan 1975).
+
+    Parameters
+    ----------
+    bricks : Bricks
+        The samples.
+
+    Returns
+    -------
+    Components
+        The components.
     """
     labels = np.empty(bricks.values.shape, np.int32)
     first = np.zeros(len(bricks) + 1, np.int64)
@@ -149,6 +241,7 @@ def components_of(bricks: Bricks) -> Components:
 
 @compiled
 def _samples(labels, chosen, flat):  # type: ignore[no-untyped-def]
+    """Write the flat indices of the samples of chosen components; return their number."""
     n = 0
     for row in range(len(labels)):
         for s in range(512):
@@ -160,7 +253,7 @@ def _samples(labels, chosen, flat):  # type: ignore[no-untyped-def]
 
 @compiled
 def _tally(values, labels, first, count, inside):  # type: ignore[no-untyped-def]
-    """Numbers the components of all bricks, from 1 on; of each, its samples and whether it is solid."""
+    """Number the components of all bricks from 1; record the samples and the side of each."""
     for row in range(len(labels)):
         for s in range(512):
             label = labels[row, s] + first[row] + 1
@@ -171,6 +264,7 @@ def _tally(values, labels, first, count, inside):  # type: ignore[no-untyped-def
 
 @compiled
 def _renumber(labels, number):  # type: ignore[no-untyped-def]
+    """Replace labels by component numbers."""
     for row in range(len(labels)):
         for s in range(512):
             labels[row, s] = number[labels[row, s]]
@@ -178,7 +272,7 @@ def _renumber(labels, number):  # type: ignore[no-untyped-def]
 
 @compiled
 def _label(values, labels, first):  # type: ignore[no-untyped-def]
-    """The components of each brick alone, numbered from 0, and how many there are before each brick."""
+    """Label the components of each brick alone, from 0, and count the components before each brick."""
     parent = np.empty(512, np.int32)
     for row in range(len(values)):
         f = values[row]
@@ -210,6 +304,7 @@ def _label(values, labels, first):  # type: ignore[no-untyped-def]
 
 @compiled
 def _unite_faces(index, labels, tiles, inside, parent):  # type: ignore[no-untyped-def]
+    """Unite components across brick faces, and the empty ones at the rim with number 0."""
     nx, ny, nz = index.shape
     for x in range(nx):
         for y in range(ny):
@@ -233,7 +328,7 @@ def _unite_faces(index, labels, tiles, inside, parent):  # type: ignore[no-untyp
 
 @compiled
 def _unite_face(axis, here, there, own, other, labels, inside, parent):  # type: ignore[no-untyped-def]
-    """The last layer of one brick along an axis with the first layer of the next; either may be a tile."""
+    """Unite the last layer of a brick along an axis with the first of the next; either may be unsampled."""
     step, p, q = ((64, 8, 1), (8, 64, 1), (1, 64, 8))[axis]
     for i in range(8):
         for j in range(8):

@@ -1,4 +1,4 @@
-"""Samples that tell what is connected, however thin the walls and the gaps."""
+"""Samples fine enough to resolve connectivity, however thin the walls and gaps."""
 
 from __future__ import annotations
 
@@ -15,18 +15,42 @@ from .thin_features import thin_features
 from .walls import Walls
 
 FINEST = 768
-"""Samples along the longest side where fewer show nothing at all."""
+"""Maximum number of samples along the longest side in the search for a surface."""
 
 MOST = 150_000
-"""Bricks of samples to tell what is connected, about."""
+"""Approximate maximum number of bricks in samples that resolve connectivity."""
 
 AGAIN = 3.0
-"""How many times finer fractals are looked at that seem to be in pieces."""
+"""Refinement factor for fractals that appear disconnected."""
 
 
 def shown(root: Field, outer: Box, longest: float, samples: float, work: Work) -> Bricks:
-    """Samples of an object within the box `outer`, so many along `longest`, or more if those show nothing: a
-    plate may lie between all of them. Raises `VolumeError`, `Cancelled`.
+    """Sample an object, finer until a surface appears: a plate may lie between all samples.
+
+    Parameters
+    ----------
+    root : Field
+        The object.
+    outer : Box
+        Conservative bounds, scene units.
+    longest : float
+        Longest side, scene units.
+    samples : float
+        Samples along `longest`, doubled while no surface appears.
+    work : Work
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    Bricks
+        The samples.
+
+    Raises
+    ------
+    VolumeError
+        If no surface appears in up to `FINEST` samples.
+    Cancelled
+        When the work is cancelled.
     """
     while True:
         try:
@@ -40,13 +64,38 @@ def shown(root: Field, outer: Box, longest: float, samples: float, work: Work) -
 def resolved(
     root: Field, bricks: Bricks, least: float, loose: bool, work: Work, thin: Walls | None = None
 ) -> Bricks:
-    """These samples of an object, or finer ones if it has walls or gaps that they may miss: two across the
-    thinnest. A plate thicker than sqrt 3 samples is not pierced, whatever its tilt (Andres, Acharya and
-    Sibata 1997, "Discrete analytical hyperplanes").
+    """Resample an object finer if its samples may miss walls or gaps: two samples across the thinnest.
 
-    least: the area from which such walls and gaps count, scene units. thin: those, if they are known. A
-    fractal has them at every scale; it is looked at again only if it seems to be in pieces, `loose`. Raises
-    `VolumeError`, `Cancelled`.
+    A plate thicker than sqrt 3 samples is not pierced, whatever its tilt (Andres, Acharya and Sibata 1997,
+    "Discrete analytical hyperplanes"). A fractal has walls of every thickness; it is resampled only if it
+    appears disconnected.
+
+    Parameters
+    ----------
+    root : Field
+        The object.
+    bricks : Bricks
+        Its samples.
+    least : float
+        Area of thin walls and gaps from which finer samples are taken, squared scene units.
+    loose : bool
+        True if the samples appear disconnected.
+    work : Work
+        Threads, progress and cancellation.
+    thin : Walls, optional
+        Thin walls and gaps of the object, if known.
+
+    Returns
+    -------
+    Bricks
+        Finer samples, or `bricks`.
+
+    Raises
+    ------
+    VolumeError
+        If the field cannot be sampled.
+    Cancelled
+        When the work is cancelled.
     """
     times = AGAIN if loose else 1.0
     if not root.bounds.exterior_only:
@@ -61,7 +110,7 @@ def resolved(
 
 
 def _times(bricks: Bricks, thin: Walls, least: float) -> float:
-    """How many times finer to look."""
+    """Refinement factor for these walls and gaps, limited by `MOST`; 1 if fewer than `least` are thin."""
     voxel = bricks.voxel
     if thin.chosen(thin.width < 2 * voxel).area.sum() < least:
         return 1.0
@@ -70,7 +119,7 @@ def _times(bricks: Bricks, thin: Walls, least: float) -> float:
 
 
 def _thinnest(found: Walls) -> float:
-    """The width that a hundredth of the surface is under."""
+    """Width of the thinnest hundredth, by area."""
     order = np.argsort(found.width, kind="stable")
     upto = np.cumsum(found.area[order])
     return float(found.width[order][np.searchsorted(upto, 0.01 * upto[-1])])

@@ -1,4 +1,4 @@
-"""A field that another one changes: its own values stay what they are, exact."""
+"""Field edits: one field changed by another, its own values kept exact."""
 
 from __future__ import annotations
 
@@ -20,9 +20,16 @@ _FOLDED = {"cut": difference, "add": union, "keep": intersection}
 
 @dataclass(frozen=True, eq=False)
 class EditedField(ArrayField):
-    """A field that another one changes.
+    """A field changed by another field.
 
-    does: "cut" takes the other one's inside away, "add" adds it, "keep" leaves only what is in it.
+    Attributes
+    ----------
+    root : Field
+        The field to change.
+    does : {"cut", "add", "keep"}
+        Subtract the other field's inside, add it, or intersect with it.
+    shape : Field
+        The other field.
     """
 
     root: Field
@@ -31,7 +38,7 @@ class EditedField(ArrayField):
 
     @cached_property
     def bounds(self) -> Bounds:
-        """Of both together; the box encloses what is added."""
+        """Bounds of both fields together; the box encloses an added shape."""
         own, other = self.root.bounds, self.shape.bounds
         return Bounds(
             own.box | other.box if self.does == "add" else own.box,
@@ -47,7 +54,7 @@ class EditedField(ArrayField):
         return key(self.root.key, self.does, self.shape.key)
 
     def conservative(self) -> EditedField:
-        """`Field.conservative`. What is cut away has none: less of it is more of all."""
+        """`Field.conservative`. A cut shape stays exact: a conservative one would cut too much."""
         shape = self.shape if self.does == "cut" else self.shape.conservative()
         return EditedField(self.root.conservative(), self.does, shape)
 
@@ -57,7 +64,7 @@ class EditedField(ArrayField):
 
 
 class _Composite(Kernel):
-    """The kernel of an altered field."""
+    """Kernel of an edited field."""
 
     def __init__(self, root: Kernel, does: Does, shape: Kernel) -> None:
         self.dtype = root.dtype
@@ -72,7 +79,22 @@ class _Composite(Kernel):
 
 
 def edited(thing: Field, does: Does, shape: Field) -> Field:
-    """A field with one more change. A formula becomes part of a tree of formulas."""
+    """Apply an edit to a field.
+
+    Parameters
+    ----------
+    thing : Field
+        The field to change.
+    does : {"cut", "add", "keep"}
+        As of `EditedField`.
+    shape : Field
+        The field that changes it.
+
+    Returns
+    -------
+    Field
+        A formula tree if both are formula trees, an `EditedField` otherwise.
+    """
     if thing.tree and shape.tree:
         return _FOLDED[does](thing.tree, shape.tree)
     return EditedField(thing, does, shape)

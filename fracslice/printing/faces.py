@@ -1,4 +1,4 @@
-"""The two faces of walls and gaps, by the field itself: samples tell only about where they are."""
+"""Projection of the faces of walls and gaps to the surface, where samples place them only roughly."""
 
 from __future__ import annotations
 
@@ -10,14 +10,36 @@ from ..work import Work
 from .walls import OPPOSITE, Walls
 
 STEP = 0.05
-"""Voxels between points whose values tell a slope."""
+"""Step of central differences, voxels."""
 
 AWAY = 0.5
-"""Voxels that a face is moved at most."""
+"""Maximum displacement of a face, voxels."""
 
 
 def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple[np.ndarray, np.ndarray]:
-    """How steep a field is at points [3, n], by central differences, [n], and its unit normals, [3, n]."""
+    """Gradient of a field by central differences.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Kernel of the field.
+    points : float64 [3, n]
+        Points, scene units.
+    step : float
+        Distance from a point to either side, scene units.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    length, normals : [n], [3, n]
+        Magnitude of the gradient, and unit normals.
+
+    Raises
+    ------
+    Cancelled
+        When the work is cancelled.
+    """
     shifts = step * np.eye(3)[:, :, None]
     slope = np.stack(
         [values_at(kernel, points + s, work) - values_at(kernel, points - s, work) for s in shifts]
@@ -27,9 +49,32 @@ def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple
 
 
 def projected(root: Field, found: Walls, voxel: float, work: Work) -> Walls:
-    """Walls or gaps that samples a voxel apart told of, their ends moved along them to where the field itself
-    is zero; without those whose faces do not look away from each other there: crumbs that samples made of
-    what is thinner than a voxel. Of escape-time fractals samples tell more than values: all stay as they are.
+    """Project the faces of walls or gaps to the surface, along the wall.
+
+    Walls whose faces do not look away from each other there are dropped: they are artefacts of features
+    thinner than a voxel. Walls of escape-time fractals are returned unchanged: samples are more accurate than
+    values.
+
+    Parameters
+    ----------
+    root : Field
+        The object.
+    found : Walls
+        Walls or gaps measured on samples.
+    voxel : float
+        Spacing of those samples, scene units.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    Walls
+        The projected walls or gaps.
+
+    Raises
+    ------
+    Cancelled
+        When the work is cancelled.
     """
     if root.bounds.exterior_only or not len(found.width):
         return found

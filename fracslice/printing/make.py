@@ -1,7 +1,7 @@
-"""From an object to one that prints: each change is measured on samples of what the ones before it left.
+"""Make an object printable by field edits, each measured on samples of the previous result.
 
-Distances come from the field where it tells them, else from its samples by fast sweeping (Zhao 2004), so a
-millimetre is a millimetre for any formula.
+Distances come from the field where its values are distances, else from its samples by fast sweeping (Zhao
+2004): a millimetre is a millimetre for any formula.
 """
 
 from __future__ import annotations
@@ -21,33 +21,56 @@ from ..volume.grid import from_grid, to_grid
 from ..work import Work
 from .edits import edited
 
-# What measures needs Numba and SciPy, which take as long to load as a small mesh: only where it is used.
+# Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
 if TYPE_CHECKING:
     from .components import Components, Connected
     from .samples import Samples
 
 COARSE, FINE = 128, 640
-"""Samples along the longest side that distances are measured on, at least and at most."""
+"""Minimum and maximum number of samples along the longest side for measuring lengths."""
 
 SHARP = 6
-"""Samples across what is to be thickened, closed or left standing, if the finest grid has as many."""
+"""Samples across a length to thicken, close or keep, as far as `FINE` permits."""
 
 DUST = 1e-5
-"""The share of the whole below which a body is dust: no strut is built to it, it is dropped."""
+"""Fraction of the solid's volume below which a body is dust: it is dropped, not joined by a strut."""
 
 POCKET = 0.1
-"""The share of the largest part of a hollow below which another one is not worth two holes."""
+"""Fraction of the largest hollow's volume below which another hollow stays solid instead of being drained."""
 
 THIN = 1.0
-"""mm2 of walls or gaps that samples may miss, from which finer ones are taken."""
+"""Area of walls or gaps that samples may miss, from which finer samples are taken, mm^2."""
 
 
 def printable(planned: Plan, size: float, how: Print, work: Work | None = None) -> tuple[Plan, float]:
-    """A planned scene made printable, and its scale in mm per scene unit.
+    """Make a planned scene printable.
 
-    size: mm, the longest side of what stays, by its field. Samples with the voxel of `planned` are at the
-    same points before and after. Raises `VolumeError` where nothing would be left, or a length is too small
-    to be measured or larger than the object, `Cancelled`.
+    Samples with the voxel of `planned` lie at the same points before and after.
+
+    Parameters
+    ----------
+    planned : Plan
+        The scene.
+    size : float
+        Longest side of the bodies that stay, mm, measured on the field before anything is cut off or added.
+    how : Print
+        Changes to make.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    plan : Plan
+        The printable scene.
+    scale : float
+        mm per scene unit.
+
+    Raises
+    ------
+    VolumeError
+        If nothing would be left, or a length is too small to measure or larger than the object.
+    Cancelled
+        When the work is cancelled.
     """
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
         if (length := getattr(how, name)) > size and (name != "drain" or how.hollow):
@@ -63,37 +86,38 @@ def printable(planned: Plan, size: float, how: Print, work: Work | None = None) 
 
 @dataclass
 class _Run:
-    """The object as it is so far."""
+    """The object during its edits."""
 
     planned: Plan
     size: float
     how: Print
     work: Work
     scale: float = 1.0
-    """mm per scene unit, known when it is known which bodies stay."""
+    """mm per scene unit, set once the bodies that stay are known."""
     known: Connected | None = None
-    """What is connected, once it was looked at."""
+    """Samples and components, once computed."""
 
     @property
     def thing(self) -> Field:
+        """The current field."""
         return self.planned.root
 
     def put(self, thing: Field) -> None:
-        """The object is this now."""
+        """Replace the current field."""
         self.planned = replace(self.planned, root=thing)
 
     def bound(self) -> None:
-        """Finds how large the object is now."""
+        """Recompute the extent of the object."""
         found = extent(self.thing, max(self.planned.box.size) / self.planned.voxel, self.work)
         self.planned = replace(self.planned, box=found.box, outer=found.outer, tips=found.tips)
 
     @property
     def grown(self) -> bool:
-        """Whether something is added to its outside."""
+        """True if an edit adds to the outside."""
         return bool(self.how.bridge or self.how.thickness)
 
     def changes(self) -> Iterator[tuple[str, Callable[[], Field]]]:
-        """What is asked for, in order."""
+        """The requested edits in order: name of the stage, and function that returns the edited field."""
         how = self.how
         if how.cavities == "fill":
             yield "filling cavities", self.filled
@@ -119,7 +143,7 @@ class _Run:
             yield "hollowing", self.hollowed
 
     def sampled(self, length: float = np.inf) -> Bricks:
-        """Samples of the object as it is, fine enough for a length in mm."""
+        """Samples of the current object, fine enough for a length in mm."""
         samples = min(max(COARSE, SHARP * self.size / length), FINE)
         if length < 2 * self.size / samples:
             least = 2 * self.size / samples
@@ -129,7 +153,7 @@ class _Run:
         return shown(self.thing, self.planned.outer, max(self.planned.box.size), samples, self.work)
 
     def connected(self) -> Connected:
-        """Samples that tell what is connected, and what is: taken once, for cavities, bodies and bridges."""
+        """Samples that resolve connectivity, and their components; shared by cavities, bodies and bridges."""
         from .components import Connected, components_of
         from .connectivity import resolved
 
@@ -142,17 +166,17 @@ class _Run:
         return self.known
 
     def seen(self, length: float) -> Samples:
-        """The same, as a field between the samples."""
+        """The samples of `sampled` as an interpolated field."""
         from .samples import Samples
 
         return Samples(self.sampled(length))
 
     def filled(self) -> Field:
-        """The space that nothing reaches becomes solid."""
+        """Fill enclosed cavities."""
         return self.without(self.connected().components.cavities)
 
     def without(self, cavities: np.ndarray) -> Field:
-        """These become solid."""
+        """Fill the given cavities."""
         from .border import nearer
 
         if not len(cavities):
@@ -162,7 +186,7 @@ class _Run:
         return edited(self.thing, "add", nearer(found, cavities, np.array([0])))
 
     def largest(self) -> Field:
-        """Only the largest body stays."""
+        """Keep only the largest body."""
         from .border import nearer
 
         found = self.connected()
@@ -170,7 +194,7 @@ class _Run:
         return edited(self.thing, "keep", nearer(found, first, others)) if len(others) else self.thing
 
     def bridged(self) -> Field:
-        """Struts between bodies, as few and as short as can be, and no dust."""
+        """Join bodies by struts of minimum total length, and drop dust."""
         from .border import nearer
         from .bridges import struts
         from .capsules import capsules
@@ -187,14 +211,14 @@ class _Run:
         return self.with_capsules(capsules(start, end, width / 2, found.solid), width)
 
     def unsealed(self) -> Field:
-        """What only samples as far apart as a mesh's seal becomes solid."""
+        """Fill cavities that are sealed only at the sample spacing of the mesh."""
         from .components import Connected
 
         fine, self.known = self.known, Connected.of(sample_scene(self.planned, self.work))
         return self.without(self.known.sealed(fine)) if fine else self.thing
 
     def closed(self) -> Field:
-        """Gaps are filled from face to face."""
+        """Fill gaps from face to face."""
         from .capsules import capsules
         from .thin_features import all_walls
 
@@ -208,9 +232,10 @@ class _Run:
         return self.with_capsules(made, 2 * radius)
 
     def thickened(self) -> Field:
-        """Balls as wide as the least thickness along the middle of all walls that are thinner: what opening
-        with such a ball would take away (Serra 1982), along the part of the medial axis between opposite
-        faces. Pores that they seal are filled.
+        """Add balls as wide as the minimum thickness along the medial axis of thinner walls.
+
+        They restore what opening with such a ball would remove (Serra 1982), along the part of the medial
+        axis between opposite faces. Pores that they seal are filled.
         """
         from .capsules import capsules
         from .components import Connected
@@ -229,14 +254,15 @@ class _Run:
         return self.without(self.known.sealed(before))
 
     def with_capsules(self, made: Samples, width: float) -> Field:
-        """With capsules so wide, which may join what was apart."""
+        """Add capsules of a width in scene units. They may connect components, which are forgotten."""
         self.known = None
         self.planned = replace(self.planned, outer=self.planned.outer.grown(width))
         return edited(self.thing, "add", made)
 
     def hollowed(self) -> Field:
-        """Everything farther inside than the walls are thick is taken away, and two holes made into each part
-        of that. With holes, parts under `POCKET` of the largest stay solid.
+        """Remove everything deeper than the wall thickness, and drill two drain holes into each hollow.
+
+        With drain holes, hollows under `POCKET` of the largest stay solid.
         """
         from .components import Connected, components_of
         from .samples import Samples, positions
@@ -258,9 +284,11 @@ class _Run:
         return edited(thing, "cut", union(*holes))
 
     def drains(self, hollow: np.ndarray, depth: np.ndarray) -> Iterator[Node]:
-        """From the hollow's lowest point to the nearer side along x: one downwards would be shut by the
-        plate. And from its highest point upwards, which hangs lowest on the printer. hollow: points in it,
-        next to its wall, [n, 3]; depth: how far they are from it.
+        """Drain holes of one hollow: one sideways, one upwards.
+
+        The first leads from the lowest point to the nearer side along x, as the plate would close a hole
+        downwards. The second leads upwards from the highest point, which hangs lowest on the printer. hollow:
+        points in the hollow next to its wall, [n, 3]. depth: their distances from the wall, [n].
         """
         radius, outer = self.how.drain / self.scale / 2, self.planned.outer
         lowest, highest = (hollow[:, 2] - depth).argmin(), (hollow[:, 2] + depth).argmax()
@@ -275,7 +303,7 @@ class _Run:
 
 
 def _apart(points: np.ndarray, voxel: float) -> np.ndarray:
-    """Numbers of points of which no two are in the same quarter of a voxel, along x, then y, then z."""
+    """Numbers of points, one in each occupied cell of a quarter voxel, ordered along x, then y, then z."""
     if not len(points):
         return np.empty(0, np.int64)
     cells = np.round(4 * points / voxel).astype(np.int64)
@@ -285,15 +313,15 @@ def _apart(points: np.ndarray, voxel: float) -> np.ndarray:
 
 
 def _large(components: Components) -> np.ndarray:
-    """The numbers of the bodies that are no dust."""
+    """Numbers of the bodies that are not dust."""
     bodies = components.bodies
     return np.asarray(bodies[components.count[bodies] > DUST * components.count[components.inside].sum()])
 
 
 def _standing(made: Plan, how: Print, scale: float) -> Plan:
-    """With its bottom cut off and a raft under it.
+    """Cut off the base and add the raft.
 
-    The raft reaches a tenth of the longest side beyond the object, and half its height into it.
+    The raft extends a tenth of the longest side beyond the object, and half its height into it.
     """
     thing, found, outer = made.root, made.box, made.outer
     (x0, y0, z0), (x1, y1, z1) = found.lo, found.hi

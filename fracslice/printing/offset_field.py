@@ -1,4 +1,4 @@
-"""A field whose inside reaches farther, or less far."""
+"""Offset field: a field whose surface is moved outwards or inwards."""
 
 from __future__ import annotations
 
@@ -16,16 +16,22 @@ from ..keys import key
 
 @dataclass(frozen=True, eq=False)
 class OffsetField(ArrayField):
-    """A field less a constant."""
+    """A field less a constant.
+
+    Attributes
+    ----------
+    root : Field
+        The field to offset.
+    by : float
+        Constant to subtract, scene units; positive values grow the inside.
+    """
 
     root: Field
     by: float
 
     @cached_property
     def bounds(self) -> Bounds:
-        """Those of the formula `offset`. The flatter the field is, the farther its inside can reach from the
-        box.
-        """
+        """Bounds as of the formula `offset`. A flatter field's inside can extend farther from its box."""
         own = self.root.bounds
         return replace(own, box=own.box.grown(self.by), lipschitz=moved_slope(own, self.by))
 
@@ -35,7 +41,7 @@ class OffsetField(ArrayField):
         return key(self.root.key, "offset", self.by)
 
     def conservative(self) -> OffsetField:
-        """`Field.conservative`. A shrunk escape-time fractal stays as it is: its inside bounds nothing."""
+        """`Field.conservative`. An escape-time fractal is not shrunk: its interior values bound nothing."""
         by = max(self.by, 0.0) if self.root.bounds.exterior_only else self.by
         return OffsetField(self.root.conservative(), by)
 
@@ -45,7 +51,7 @@ class OffsetField(ArrayField):
 
 
 class _Shifted(Kernel):
-    """The kernel of an offset field."""
+    """Kernel of an offset field."""
 
     def __init__(self, root: Kernel, by: float) -> None:
         self.dtype, self.batch = root.dtype, root.batch

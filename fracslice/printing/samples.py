@@ -1,4 +1,4 @@
-"""A sampled field between its samples."""
+"""A sampled field, interpolated between its samples."""
 
 from __future__ import annotations
 
@@ -17,23 +17,29 @@ from ..volume.bricks import INSIDE, OUTSIDE
 from ..volume.lattice import BRICK
 
 STRIDE = 0.5
-"""Voxels from point to point along a ray."""
+"""Step along a ray, voxels."""
 
 NEAR = 1.5
-"""Voxels from the surface: the least that a point without samples is away from it."""
+"""Minimum distance of unsampled points from the surface, voxels."""
 
 LIPSCHITZ = 1.8
-"""Of samples of a distance, interpolated: each of the three slopes is at most 1, and they are never all so.
-"""
+"""Lipschitz bound of interpolated distances: each of the three slopes is at most 1, never all at once."""
 
 
 SIDE = 11
-"""Samples along each axis of a brick with the layer before it and the two after it."""
+"""Samples along each axis of a brick with one layer before it and two after it."""
 
 
 class Samples(ArrayField):
-    """Bricks of samples as a field over all space: trilinear between samples, elsewhere a lower bound of the
-    distance, with its sign, from how many bricks away the nearest samples are. May be used from many threads.
+    """Bricks of samples as a field over all space.
+
+    Values are trilinear between samples. Elsewhere they are signed lower bounds of the distance to the
+    surface, from the number of bricks to the nearest samples. Safe to use from many threads.
+
+    Parameters
+    ----------
+    bricks : Bricks
+        The samples.
     """
 
     def __init__(self, bricks: Bricks) -> None:
@@ -59,15 +65,26 @@ class Samples(ArrayField):
 
     @cached_property
     def beside(self) -> np.ndarray:
-        """Which samples have one on the other side of the surface among the 26 around them, bool [n, 512]."""
+        """True for samples with the opposite sign among the 26 samples around them, bool [n, 512]."""
         b = self.bricks
         found = np.empty(b.values.shape, np.bool_)
         _beside(b.ijk, b.index, self.brick_bounds, b.values, found)
         return found
 
     def free(self, start: np.ndarray, ways: np.ndarray, far: np.ndarray) -> np.ndarray:
-        """How far it is from points along unit vectors, [n, 3], to the first cell of the grid with the
-        surface in it, or `far`, [n], where that is nearer.
+        """Distance along rays to the first grid cell that contains the surface.
+
+        Parameters
+        ----------
+        start, ways : float64 [n, 3]
+            Origins and unit directions, scene units.
+        far : float64 [n]
+            Maximum distances, scene units.
+
+        Returns
+        -------
+        float64 [n]
+            Distances, at most `far`.
         """
         b, out = self.bricks, np.empty(len(far))
         grid = b.index, self.brick_bounds, b.values, self.beside
@@ -75,7 +92,18 @@ class Samples(ArrayField):
         return out
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Values at points, float64 of their shape."""
+        """Values at points.
+
+        Parameters
+        ----------
+        x, y, z : array_like
+            Coordinates, scene units.
+
+        Returns
+        -------
+        float64
+            Values, in the shape of `x`.
+        """
         b, out = self.bricks, np.empty(np.shape(x))
         u, v, w = (np.ascontiguousarray(a, np.float64).ravel() for a in (x, y, z))
         _interpolate(u, v, w, *b.origin, b.voxel, b.index, self.brick_bounds, b.values, out.ravel())
@@ -83,7 +111,7 @@ class Samples(ArrayField):
 
 
 class _Interpolated(Kernel):
-    """The kernel of samples."""
+    """Kernel of a sampled field."""
 
     def __init__(self, samples: Samples, dtype: np.dtype) -> None:
         self._samples, self.dtype = samples, dtype
@@ -94,7 +122,18 @@ class _Interpolated(Kernel):
 
 
 def together(solid: Bricks, added: Bricks) -> Bricks:
-    """The samples of the union of two fields that are sampled on one grid, maybe in other bricks."""
+    """Unite two fields sampled on the same grid, possibly in different bricks.
+
+    Parameters
+    ----------
+    solid, added : Bricks
+        The samples.
+
+    Returns
+    -------
+    Bricks
+        Samples of the union.
+    """
     shift = np.round((np.array(added.origin) - solid.origin) / (8 * solid.voxel)).astype(int)
     low = np.minimum(shift, 0)
     shape = np.maximum(shift + added.index.shape, solid.index.shape) - low
@@ -113,7 +152,7 @@ def together(solid: Bricks, added: Bricks) -> Bricks:
 
 @compiled
 def _least(some, rows, more, others, out):  # type: ignore[no-untyped-def]
-    """Of each row of two fields the lesser samples, or those of the one field that has it."""
+    """Minimum of two fields, brick by brick; copies a brick that only one of them has."""
     for n in range(len(out)):
         if rows[n] < 0:
             out[n] = more[others[n]]
@@ -124,7 +163,7 @@ def _least(some, rows, more, others, out):  # type: ignore[no-untyped-def]
 
 
 def _brick_bounds(bricks: Bricks) -> np.ndarray:
-    """For each brick without samples, how far its points are from the surface at least, signed, float32."""
+    """Signed lower bound of the distance to the surface in each unsampled brick, float32 [bx, by, bz]."""
     from scipy.ndimage import distance_transform_cdt
 
     away = distance_transform_cdt(bricks.index < 0, metric="chessboard") if len(bricks) else bricks.index * 0
@@ -134,20 +173,51 @@ def _brick_bounds(bricks: Bricks) -> np.ndarray:
 
 @compiled
 def _interpolate(xs, ys, zs, x0, y0, z0, voxel, index, brick_bounds, values, out):  # type: ignore[no-untyped-def]
+    """Write the values at points."""
     for n in range(len(xs)):
         out[n] = interpolated(xs[n], ys[n], zs[n], x0, y0, z0, voxel, index, brick_bounds, values)
 
 
 @compiled
 def interpolated(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
-    """The value at one point, scene units."""
+    """Value at a point in scene units.
+
+    Parameters
+    ----------
+    x, y, z : float
+        The point.
+    x0, y0, z0, voxel : float
+        Origin and spacing of the grid, scene units.
+    index, brick_bounds, values : ndarray
+        As of `Bricks` and `Samples`.
+
+    Returns
+    -------
+    float
+        The interpolated value, or a bound.
+    """
     u, v, w = (x - x0) / voxel, (y - y0) / voxel, (z - z0) / voxel
     return between(u, v, w, voxel, index, brick_bounds, values)
 
 
 @compiled
 def between(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
-    """The value at one point, given in voxels from the origin of the grid."""
+    """Value at a point in voxels from the origin of the grid.
+
+    Parameters
+    ----------
+    u, v, w : float
+        The point, voxels.
+    voxel : float
+        Spacing of the grid, scene units.
+    index, brick_bounds, values : ndarray
+        As of `Bricks` and `Samples`.
+
+    Returns
+    -------
+    float
+        The interpolated value, or a bound, scene units.
+    """
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
     u, v, w = u - i, v - j, w - k
     p, q, r = i & 7, j & 7, k & 7
@@ -172,7 +242,22 @@ def between(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-unt
 
 @compiled
 def sample_at(index, brick_bounds, values, voxel, i, j, k):  # type: ignore[no-untyped-def]
-    """The sample of a grid point, or a bound; beyond the bricks, from how far beyond it is."""
+    """Sample at a grid point, or a bound if it has none.
+
+    Parameters
+    ----------
+    index, brick_bounds, values : ndarray
+        As of `Bricks` and `Samples`.
+    voxel : float
+        Spacing of the grid, scene units.
+    i, j, k : int
+        Grid index, which may lie beyond the bricks.
+
+    Returns
+    -------
+    float
+        The sample; beyond the bricks, a bound from the distance to them.
+    """
     bi, bj, bk = i >> 3, j >> 3, k >> 3
     nx, ny, nz = index.shape
     if min(bi, bj, bk) < 0 or bi >= nx or bj >= ny or bk >= nz:
@@ -186,7 +271,17 @@ def sample_at(index, brick_bounds, values, voxel, i, j, k):  # type: ignore[no-u
 
 @compiled
 def gather(ijk, index, brick_bounds, values, row, f):  # type: ignore[no-untyped-def]
-    """A brick's samples with one layer before them and two after them along each axis, [SIDE^3]."""
+    """Copy a brick's samples with one layer before them and two after them along each axis.
+
+    Parameters
+    ----------
+    ijk, index, brick_bounds, values : ndarray
+        As of `Bricks` and `Samples`.
+    row : int
+        Row of the brick.
+    f : float32 [SIDE**3]
+        Written: the samples.
+    """
     x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
     nx, ny, nz = index.shape
     for a in range(3):
@@ -206,6 +301,7 @@ def gather(ijk, index, brick_bounds, values, row, f):  # type: ignore[no-untyped
 
 @compiled
 def _beside(ijk, index, brick_bounds, values, found):  # type: ignore[no-untyped-def]
+    """Write `Samples.beside`."""
     f = np.empty(SIDE**3, np.float32)
     one, two = np.empty(SIDE**3, np.uint8), np.empty(SIDE**3, np.uint8)
     for row in range(len(ijk)):
@@ -223,6 +319,7 @@ def _beside(ijk, index, brick_bounds, values, found):  # type: ignore[no-untyped
 
 @compiled
 def _free(start, ways, far, x0, y0, z0, voxel, index, brick_bounds, values, beside, out):  # type: ignore[no-untyped-def]
+    """Write `Samples.free`."""
     for n in range(len(far)):
         x, y, z = (start[n, 0] - x0) / voxel, (start[n, 1] - y0) / voxel, (start[n, 2] - z0) / voxel
         s = 0.0
@@ -236,7 +333,7 @@ def _free(start, ways, far, x0, y0, z0, voxel, index, brick_bounds, values, besi
 
 @compiled
 def _is_mixed(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
-    """Whether the corners of the cell around a point, in voxels from the origin, are on both sides."""
+    """True if the cell around a point, in voxels from the origin, has corners on both sides."""
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
     inside = 0
     for corner in range(8):
@@ -247,7 +344,20 @@ def _is_mixed(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-u
 
 @compiled
 def is_beside(u, v, w, index, beside):  # type: ignore[no-untyped-def]
-    """Whether the nearest sample is `Samples.beside`, of a point in voxels from the origin of the grid."""
+    """True if the nearest sample of a point is `Samples.beside`.
+
+    Parameters
+    ----------
+    u, v, w : float
+        The point, voxels from the origin of the grid.
+    index, beside : ndarray
+        As of `Bricks` and `Samples`.
+
+    Returns
+    -------
+    bool
+        False if the point has no sample.
+    """
     i, j, k = int(np.floor(u + 0.5)), int(np.floor(v + 0.5)), int(np.floor(w + 0.5))
     nx, ny, nz = index.shape
     x, y, z = i >> 3, j >> 3, k >> 3
@@ -256,7 +366,20 @@ def is_beside(u, v, w, index, beside):  # type: ignore[no-untyped-def]
 
 
 def positions(bricks: Bricks, rows: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Grid indices of samples, int64 [n, 3], from their rows and their offsets in the bricks."""
+    """Grid indices of samples.
+
+    Parameters
+    ----------
+    bricks : Bricks
+        The samples.
+    rows, offsets : int64 [n]
+        Row of each sample's brick, and offset in the brick.
+
+    Returns
+    -------
+    int64 [n, 3]
+        Grid indices.
+    """
     inner = np.stack([offsets >> 6, offsets >> 3 & 7, offsets & 7], -1)
     place: np.ndarray = bricks.ijk[rows].astype(np.int64) + inner
     return place

@@ -1,8 +1,8 @@
-"""Walls and gaps too thin for samples: they pass between them, or show in some only.
+"""Walls and gaps that are too thin for samples, which miss them or show only some of them.
 
-The field is sampled once more, less `NEAR` voxels, so that each wall is as much thicker on both sides and no
-longer fits between samples. From there rays follow the normal inwards, now on the field itself: to where the
-object begins, and on to where it ends. For gaps all is the other way round.
+An offset field, the field less `NEAR` voxels, is sampled: each wall is thicker by that on both sides and no
+longer fits between samples. From its surface, rays follow the normal inwards on the field itself: to where
+the object begins, and on to where it ends. For gaps all signs are reversed.
 """
 
 from __future__ import annotations
@@ -26,49 +26,90 @@ from .samples import Samples
 from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, walls
 
 NEAR = 0.9
-"""Voxels: more than from any point to the nearest sample, half the diagonal."""
+"""Offset in voxels: more than the distance from any point to the nearest sample, half the diagonal."""
 
 BEFORE = 0.8
-"""Voxels from where a ray begins in which it enters nothing."""
+"""Length at the start of a ray in which it enters nothing, voxels."""
 
 THIN = 3.0
-"""Voxels: what is thicker is measured by samples, too."""
+"""Voxels; thicker features are measured on samples, too."""
 
 STEP = 0.05
-"""Voxels: the least step along a ray; a wall or gap as thin as that may still be missed."""
+"""Minimum step along a ray, voxels; walls and gaps as thin as that may still be missed."""
 
 SLACK = 0.25
-"""Voxels before a thick wall or gap in which nothing else is looked for."""
+"""Voxels before a thick wall or gap in which nothing else is searched for."""
 
 ROUNDS = 400
+"""Maximum number of steps along a ray."""
 
 RAYS = 1 << 13
-"""At a time, by one thread."""
+"""Rays traced at a time by one thread."""
 
 
 @dataclass(frozen=True, eq=False)
 class ThinFeatures:
-    """Walls, or gaps, that are thin, right within a hundredth of a voxel. replaces: below which width (scene
-    units) they stand for what the samples tell; 0 where the samples are right, and these are what they miss.
+    """Thin walls, or thin gaps, accurate to a hundredth of a voxel.
+
+    Attributes
+    ----------
+    walls : Walls
+        The walls or gaps.
+    replaces : float
+        Width, scene units, below which they replace those measured on samples. 0 if the samples are accurate,
+        and `walls` has only those that the samples miss.
     """
 
     walls: Walls
     replaces: float
 
     def beside(self, sampled: Walls, limit: float, direction: Direction | None = None) -> Walls:
-        """All walls up to `limit` scene units: these, measured along a direction if there is one, and sampled
-        ones.
+        """Combine with walls measured on samples.
+
+        Parameters
+        ----------
+        sampled : Walls
+            Walls or gaps measured on samples.
+        limit : float
+            Maximum width, scene units.
+        direction : three floats, optional
+            Measure the thin ones along it.
+
+        Returns
+        -------
+        Walls
+            Thin and sampled walls or gaps.
         """
         mine = self.walls if direction is None else self.walls.along(direction)
         return sampled.chosen(sampled.width >= self.replaces) + mine.chosen(mine.width < limit)
 
 
 def thin_features(root: Field, seen: Samples, work: Work) -> tuple[ThinFeatures, ThinFeatures]:
-    """The thin walls and gaps of an object, also those that its samples miss.
+    """Find the thin walls and gaps of an object, including those that its samples miss.
 
-    root: all depths known. seen: samples of it. The values of escape-time fractals
-    are far from distances: there the samples are better, and only what they miss is looked for. A gap between
-    walls that are themselves thin is found behind them.
+    The values of escape-time fractals are far from distances: their samples are more accurate, and only
+    features that the samples miss are searched for. A gap between thin walls is found behind them.
+
+    Parameters
+    ----------
+    root : Field
+        The object, all depths known.
+    seen : Samples
+        Its samples.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    walls, gaps : ThinFeatures
+        Thin walls and thin gaps.
+
+    Raises
+    ------
+    VolumeError
+        If the field cannot be sampled.
+    Cancelled
+        When the work is cancelled.
     """
     look = _Look(root, seen, THIN * seen.bricks.voxel, work)
     return look.told(look.walls()), look.told(look.gaps())
@@ -76,8 +117,10 @@ def thin_features(root: Field, seen: Samples, work: Work) -> tuple[ThinFeatures,
 
 @dataclass(frozen=True, eq=False)
 class _Rays(Rows):
-    """From beside a surface through it. start, ways: float64 [n, 3]; area: [n], of the surface that each
-    stands for; enter, leave: [n], how far along the thin wall or gap begins and ends.
+    """Rays that start next to a surface and pass through it.
+
+    start, ways: float64 [n, 3]. area: [n], surface that each represents. enter, leave: [n], distances along
+    the ray to the beginning and the end of the thin wall or gap.
     """
 
     start: np.ndarray
@@ -87,13 +130,13 @@ class _Rays(Rows):
     leave: np.ndarray
 
     def points(self, s: np.ndarray) -> np.ndarray:
-        """So far along each, [3, n]."""
+        """Points at distances `s` along the rays, [3, n]."""
         return np.asarray(self.start.T + s * self.ways.T)
 
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What is looked at, what its samples tell, and how thick walls and gaps are at most, scene units."""
+    """A search for the thin features of a field: its samples, and the maximum width in scene units."""
 
     root: Field
     seen: Samples
@@ -109,12 +152,12 @@ class _Look:
         return self.seen.bricks.voxel
 
     def told(self, found: Walls) -> ThinFeatures:
-        """Walls or gaps that were found, and what they are better than."""
+        """Walls or gaps with the width below which they replace sampled ones."""
         return ThinFeatures(found, 0.0 if self.root.bounds.exterior_only else self.most)
 
     @cached_property
     def inwards(self) -> _Rays:
-        """Through all thin walls."""
+        """Rays through all thin walls."""
         return self.rays(1.0)
 
     def walls(self) -> Walls:
@@ -122,8 +165,10 @@ class _Look:
         return self.facing(self.inwards)
 
     def gaps(self) -> Walls:
-        """Thin gaps: what is seen of them from within thick walls; and behind thin ones, also behind those
-        that follow, where they are so near each other that no ray starts between them.
+        """Thin gaps, found from within thick walls and behind thin ones.
+
+        Behind a thin wall the search goes on through the next gap and wall while the gaps are too narrow for
+        a ray to start in them.
         """
         found, rays = self.from_within(), self.inwards
         while len(rays.start):
@@ -136,7 +181,7 @@ class _Look:
         return found
 
     def from_within(self) -> Walls:
-        """Thin gaps seen from thick walls."""
+        """Thin gaps found from within thick walls."""
         try:
             rays = self.rays(-1.0)
         except VolumeError:  # all walls are thin
@@ -146,15 +191,16 @@ class _Look:
         return self.facing(rays.chosen(rays.enter + back > limit))
 
     def stretch(self, rays: _Rays, begin: np.ndarray, sign: float) -> _Rays:
-        """The rays on which the field times `sign`, which is positive from `begin` on, is negative within
-        `most`; entered at the one, left at the other.
+        """Rays along which the field times `sign`, positive from `begin` on, turns negative within `most`.
+
+        They enter at `begin` and leave at the change of sign.
         """
         end = begin + self.most
         leave = self.first(rays, begin, end, sign)
         return replace(rays, enter=begin, leave=leave).chosen(leave < end)
 
     def rays(self, sign: float) -> _Rays:
-        """Through all thin walls (sign 1), or from within all others through thin gaps (-1)."""
+        """Rays through all thin walls (sign 1), or from within thick walls through thin gaps (sign -1)."""
         reach = NEAR * self.voxel * self.root.bounds.lipschitz
         offset_field = self.offset_field(sign * reach)
 
@@ -169,10 +215,11 @@ class _Look:
         return gathered(look, len(offset_field.bricks), AT_ONCE, self.work)
 
     def limited(self, rays: _Rays, sign: float) -> _Rays:
-        """Those that may enter something thin, up to where they leave. Of a field whose values tell distances
-        these are all that may leave within `most` what they enter, `NEAR` voxels from where they begin at
-        least: most others are as far from any surface halfway. Of a fractal they end where the samples know
-        of a surface.
+        """Rays that may enter something thin, with the distance up to which they are traced.
+
+        If the field's values are distances, these are all rays that may leave within `most` what they enter
+        at least `NEAR` voxels from their start: most others are as far from any surface halfway. Rays of a
+        fractal end where its samples contain a surface.
         """
         if self.root.bounds.exterior_only:
             end = self.seen.free(rays.start, rays.ways, rays.leave)
@@ -183,14 +230,14 @@ class _Look:
         return rays.chosen(~(f <= -half * self.root.bounds.lipschitz))
 
     def missed(self, rays: _Rays, s: np.ndarray) -> _Rays:
-        """Those that are to be looked at so far along: of a fractal, at what its samples miss."""
+        """Rays to continue at distance `s`; of a fractal, only where its samples miss the surface."""
         if not self.root.bounds.exterior_only:
             return rays
         begin = rays.points(s).T
         return rays.chosen(self.seen.free(begin, rays.ways, np.full(len(begin), self.voxel)) > 0)
 
     def offset_field(self, by: float) -> Samples:
-        """Samples of the field less `by`: the flatter it is, the farther its inside reaches from the box."""
+        """Samples of the field less `by`. The box grows: a flatter field's inside extends farther from it."""
         for times in (2, 8, 32):
             try:
                 box = (self.root.bounds.box | self.seen.bounds.box).grown(times * abs(by))
@@ -201,8 +248,9 @@ class _Look:
         raise failure
 
     def first(self, rays: _Rays, begin: np.ndarray, end: np.ndarray, sign: float) -> np.ndarray:
-        """How far along each ray the field times `sign` is first below zero from `begin` on; beyond `end`
-        where it never is.
+        """Distance along each ray at which the field times `sign` first turns negative after `begin`.
+
+        Beyond `end` if it does not.
         """
 
         def field(which: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -211,11 +259,11 @@ class _Look:
         return _first(field, begin, end, self.root.bounds.lipschitz, STEP * self.voxel)
 
     def field(self, points: np.ndarray) -> np.ndarray:
-        """At points [3, n]."""
+        """Field values at points [3, n]."""
         return values_at(self.kernel, points, self.work)
 
     def facing(self, rays: _Rays) -> Walls:
-        """Those whose two faces are turned away from each other."""
+        """Rays whose two faces look away from each other, as walls."""
 
         def look(part: slice) -> Walls:
             some = rays.chosen(part)
@@ -227,12 +275,38 @@ class _Look:
         return gathered(look, len(rays.start), RAYS, self.work)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Unit normals of the field itself at points [3, n], [3, n]."""
+        """Unit normals of the field at points [3, n], [3, n]."""
         return slopes(self.kernel, points, STEP * self.voxel, self.work)[1]
 
 
 def all_walls(root: Field, seen: Samples, limit: float, work: Work, *, gaps: bool = False) -> Walls:
-    """The walls or gaps up to `limit` scene units, whether the samples tell of them or the field alone."""
+    """Find all walls or gaps, on the samples and on the field.
+
+    Parameters
+    ----------
+    root : Field
+        The object.
+    seen : Samples
+        Its samples.
+    limit : float
+        Maximum width, scene units.
+    work : Work
+        Threads and cancellation.
+    gaps : bool
+        Find gaps instead of walls.
+
+    Returns
+    -------
+    Walls
+        Walls or gaps thinner than `limit`.
+
+    Raises
+    ------
+    VolumeError
+        If the field cannot be sampled.
+    Cancelled
+        When the work is cancelled.
+    """
     exterior_only, most = root.bounds.exterior_only, THIN * seen.bricks.voxel
     look = _Look(root, seen, most if exterior_only else max(most, limit), work)
     found = look.gaps() if gaps else look.walls()
@@ -243,7 +317,7 @@ def all_walls(root: Field, seen: Samples, limit: float, work: Work, *, gaps: boo
 
 @compiled
 def _points(start, ways, which, s):  # type: ignore[no-untyped-def]
-    """So far along some rays, [3, n]."""
+    """Points at distances `s` along some rays, [3, n]."""
     points = np.empty((3, len(s)))
     for i in range(len(s)):
         for axis in range(3):
@@ -258,9 +332,10 @@ def _first(
     bound: float,
     least: float,
 ) -> np.ndarray:
-    """Where a field on rays, of their numbers and of how far along, is first below zero after `begin`: in
-    steps of the distance (sphere tracing, Hart 1996), the last one of `least`, in which it is taken for
-    straight. Beyond `end` where it never is.
+    """Distance along each ray at which a field first turns negative after `begin`; beyond `end` if never.
+
+    field: values from numbers of rays and distances along them. bound: its Lipschitz bound. Steps follow the
+    distance (sphere tracing, Hart 1996). Over the last step, of length `least`, the field is taken as linear.
     """
     s, before, todo = begin + least, begin.copy(), np.arange(len(begin))
     high, low = np.full((2, len(begin)), least * bound / 2)

@@ -1,10 +1,10 @@
-"""How thick a sampled solid is, and how wide its gaps: straight through, from surface to surface.
+"""Thickness of a sampled solid and width of its gaps, measured from surface to surface.
 
-From each crossing of a grid edge a ray follows the normal until it comes out again, in steps of the distance
-to the surface (sphere tracing, Hart 1996); its length is the wall's thickness there if the two faces are
-turned away from each other. So the edge of a cube is no thin wall, as it would be to inscribed spheres
-(Hildebrand and Rüegsegger 1997), and a plate is as thick at its rim as in its middle. It is the shape
-diameter function (Shapira, Shamir and Cohen-Or 2008) with one ray.
+From each crossing of a grid edge a ray follows the normal to the opposite surface, in steps of the distance
+(sphere tracing, Hart 1996). Its length is the thickness of the wall there if the two faces look away from
+each other. So the edge of a cube is not a thin wall, as it would be for inscribed spheres (Hildebrand and
+Rüegsegger 1997), and a plate is as thick at its rim as in its middle. This is the shape diameter function
+(Shapira, Shamir and Cohen-Or 2008) with one ray.
 """
 
 from __future__ import annotations
@@ -21,20 +21,19 @@ from ..work import Work, chunks
 from .samples import SIDE, STRIDE, Samples, between, gather, interpolated, is_beside
 
 OPPOSITE = -0.5
-"""The cosine between the normals of two faces of a wall is at most this: wedges up to 60 degrees are walls.
-"""
+"""Maximum cosine between the normals of the two faces of a wall: wedges up to 60 degrees count."""
 
 AT_ONCE = 512
-"""Bricks whose surface is looked at by one thread at a time."""
+"""Bricks processed at a time by one thread."""
 
 ROOM = 8
-"""Samples for each crossing that room is made for at first."""
+"""Samples per crossing in the first allocation."""
 
 ALONG = 0.999
-"""The share of a normal's largest component that is taken for as large."""
+"""Fraction of a normal's largest component above which another component ties with it."""
 
 FIRST = 0.1
-"""Voxels along a ray to the first point that is looked at, off the surface that it begins on."""
+"""First step along a ray, voxels, away from the surface that it starts on."""
 
 Direction = tuple[float, float, float]
 R = TypeVar("R", bound=Rows)
@@ -42,8 +41,16 @@ R = TypeVar("R", bound=Rows)
 
 @dataclass(frozen=True, eq=False)
 class Walls(Rows):
-    """Walls or gaps that are thinner than a limit. start, end: float64 [n, 3], on the two faces; width:
-    float64 [n]; area: float64 [n], the part of the surface that each stands for. Scene units.
+    """Walls or gaps thinner than a limit. Lengths in scene units.
+
+    Attributes
+    ----------
+    start, end : float64 [n, 3]
+        Points on the two faces.
+    width : float64 [n]
+        Distance between them.
+    area : float64 [n]
+        Surface that each represents.
     """
 
     start: np.ndarray
@@ -53,16 +60,33 @@ class Walls(Rows):
 
     @property
     def middle(self) -> np.ndarray:
-        """Halfway between the faces, float64 [n, 3]."""
+        """Midpoints between the faces, float64 [n, 3]."""
         return np.asarray((self.start + self.end) / 2)
 
     @classmethod
     def none(cls) -> Walls:
-        """No walls at all."""
+        """An empty record.
+
+        Returns
+        -------
+        Walls
+            No walls.
+        """
         return cls(*np.empty((2, 0, 3)), *np.empty((2, 0)))
 
     def along(self, direction: Direction) -> Walls:
-        """Those whose faces look along a direction or against it, measured along it."""
+        """Walls whose faces look along a direction or against it, measured along it.
+
+        Parameters
+        ----------
+        direction : three floats
+            A unit vector.
+
+        Returns
+        -------
+        Walls
+            The walls, with new ends and widths.
+        """
         way = self.end - self.start
         share = (way * direction).sum(1) / np.linalg.norm(way, axis=1)
         width = self.width / np.maximum(np.abs(share), 1e-9)
@@ -78,10 +102,33 @@ def walls(
     gaps: bool = False,
     direction: Direction | None = None,
 ) -> Walls:
-    """Walls, or gaps, up to `limit` scene units thick.
+    """Measure walls, or gaps, on samples.
 
-    direction: measure along it instead of the normal, through faces that look along it or against it. Right
-    within a voxel; what is thinner than one shows only where a sample lies in it, see `thin_features`.
+    Widths are accurate to one voxel. Features thinner than a voxel appear only where they contain a sample,
+    see `thin_features`.
+
+    Parameters
+    ----------
+    solid : Samples
+        The samples.
+    limit : float
+        Maximum width, scene units.
+    work : Work
+        Threads and cancellation.
+    gaps : bool
+        Measure gaps instead of walls.
+    direction : three floats, optional
+        Measure along this unit vector instead of the normal, through faces that look along it or against it.
+
+    Returns
+    -------
+    Walls
+        Walls or gaps thinner than `limit`.
+
+    Raises
+    ------
+    Cancelled
+        When the work is cancelled.
     """
     b, towards = solid.bricks, -1.0 if gaps else 1.0
 
@@ -113,15 +160,49 @@ def walls(
 
 
 def gathered(look: Callable[[slice], R], count: int, size: int, work: Work) -> R:
-    """What is found by looking at `count` rows, `size` of them at a time, on all threads; in order."""
+    """Process rows in blocks on all threads and join the results in order.
+
+    Parameters
+    ----------
+    look : callable
+        Returns a record for a slice of rows.
+    count, size : int
+        Number of rows, and rows in a block.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    Rows
+        The joined records.
+
+    Raises
+    ------
+    Cancelled
+        When the work is cancelled.
+    """
     found = work.collect(look, chunks(count, size) or [slice(0, 0)])
     return type(found[0]).joined(found)
 
 
 def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the surface crosses the edges of the grid that begin in some bricks, float64 [n, 3], its unit
-    normals there, [n, 3], and how much of it each crossing stands for, [n], scene units.
-    Of a smooth surface, one for each line of the grid along the axis that is nearest to its normal.
+    """Crossings of the surface with grid edges that begin in some bricks.
+
+    A smooth surface has one crossing for each grid line along the axis nearest to its normal.
+
+    Parameters
+    ----------
+    solid : Samples
+        The samples.
+    rows : slice
+        Rows of the bricks.
+
+    Returns
+    -------
+    points, normals : float64 [n, 3]
+        Crossings, scene units, and unit normals.
+    area : float64 [n]
+        Surface that each crossing represents, squared scene units.
     """
     b = solid.bricks
     begin, end, _ = rows.indices(len(b))
@@ -147,7 +228,20 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
 
 
 def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
-    """Unit normals by central differences over a voxel, [n, 3]."""
+    """Unit normals by central differences over a voxel.
+
+    Parameters
+    ----------
+    solid : Samples
+        The samples.
+    points : float64 [n, 3]
+        Points, scene units.
+
+    Returns
+    -------
+    float64 [n, 3]
+        Unit normals.
+    """
     b, normals = solid.bricks, np.empty(points.shape)
     _normals(points, *b.origin, b.voxel, b.index, solid.brick_bounds, b.values, normals)
     return normals
@@ -155,7 +249,7 @@ def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
 
 @compiled
 def _cross(begin, end, x0, y0, z0, voxel, ijk, index, brick_bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
-    """Writes what `crossed` returns, as much as there is room for, and returns how much there is."""
+    """Write the results of `crossed` as far as the arrays reach; return the number of crossings."""
     n, f = 0, np.empty(SIDE**3, np.float32)
     for row in range(begin, end):
         gather(ijk, index, brick_bounds, values, row, f)
@@ -183,7 +277,7 @@ def _cross(begin, end, x0, y0, z0, voxel, ijk, index, brick_bounds, values, poin
 
 @compiled
 def _across(f, at, axis, share, normal):  # type: ignore[no-untyped-def]
-    """The unit normal so far along an edge, by central differences over a voxel of what is interpolated."""
+    """Write the unit normal at `share` along an edge, by interpolated central differences over a voxel."""
     along = (SIDE * SIDE, SIDE, 1)[axis]
     total = 0.0
     for k in range(3):
@@ -204,6 +298,7 @@ def _across(f, at, axis, share, normal):  # type: ignore[no-untyped-def]
 
 @compiled
 def _normals(points, x0, y0, z0, voxel, index, brick_bounds, values, normals):  # type: ignore[no-untyped-def]
+    """Write the unit normals at points."""
     for n in range(len(points)):
         x, y, z = points[n]
         normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
@@ -211,6 +306,7 @@ def _normals(points, x0, y0, z0, voxel, index, brick_bounds, values, normals):  
 
 @compiled
 def _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
+    """Unit normal at a point, by central differences over a voxel."""
     h = voxel / 2
     u = interpolated(x + h, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
     u -= interpolated(x - h, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
@@ -224,7 +320,7 @@ def _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: i
 
 @compiled
 def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, brick_bounds, values, beside, width):  # type: ignore[no-untyped-def]
-    """How far it is to the other side; twice the limit where that is farther."""
+    """Write the distance along each ray to the opposite surface; twice the limit if it is farther."""
     for n in range(len(points)):
         x, y, z = (points[n, 0] - x0) / voxel, (points[n, 1] - y0) / voxel, (points[n, 2] - z0) / voxel
         s, before = FIRST, 0.0

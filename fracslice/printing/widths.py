@@ -1,4 +1,4 @@
-"""Thicknesses as numbers and as a histogram."""
+"""Thickness statistics: percentiles and a histogram."""
 
 from __future__ import annotations
 
@@ -7,13 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 
 BINS = 0.05 * np.arange(41)
-"""Edges of the histogram's bins, mm; what is thicker is in the last one."""
+"""Bin edges of the histogram, mm; the last bin includes everything thicker."""
 
 
 @dataclass(frozen=True)
 class Widths:
-    """Of walls or gaps in mm: the smallest, the thinnest hundredth, the median; and how much is in each bin,
-    whose edges `edges` are: pixels of middle lines in layers, mm^2 of surface in space.
+    """Statistics of the widths of walls or gaps, mm.
+
+    Attributes
+    ----------
+    smallest, thinnest_hundredth, median : float
+        Minimum, first percentile and median.
+    counts : tuple of float
+        Weight in each bin: pixels of medial axes in layers, mm^2 of surface in solids.
+    edges : tuple of float
+        Edges of the bins.
     """
 
     smallest: float
@@ -24,7 +32,20 @@ class Widths:
 
 
 def widths_of(values: np.ndarray, weights: np.ndarray | None = None) -> Widths | None:
-    """The summary of widths in mm, float64 [n], each with a weight; None if there are none."""
+    """Summarise widths.
+
+    Parameters
+    ----------
+    values : float64 [n]
+        Widths, mm.
+    weights : float64 [n], optional
+        Weights; equal if not given.
+
+    Returns
+    -------
+    Widths or None
+        None if there are no widths.
+    """
     if not len(values):
         return None
     weight = np.ones(len(values)) if weights is None else weights

@@ -1,4 +1,4 @@
-"""From a field to a printer's layers, with no mesh between."""
+"""Slicing: from a field to the layers of a printer, without a mesh."""
 
 from .adaptive import adapted
 from .contours import Contours

@@ -1,4 +1,4 @@
-"""Layers as high as the slope of the surface allows."""
+"""Adaptive layer heights, limited by the slope of the surface."""
 
 from __future__ import annotations
 
@@ -14,20 +14,39 @@ from .layers import Layer, Slicer
 from .stack import Stack
 
 ACROSS = 128
-"""Pixels along the longer side, of the layers that slopes are measured on."""
+"""Pixels along the longer side of the coarse layers on which slopes are measured."""
 
 SHARE = 0.9
-"""Of a layer's outline that is not steeper than its slope; the rest of a rough outline is left out."""
+"""Quantile of the slope along an outline that limits the layer; the rest of a rough outline is ignored."""
 
 
 def adapted(stack: Stack, most: float, work: Work | None = None) -> Stack:
-    """The stack with layers put together, up to `most` high (mm, or such as "0.2mm"), where the surface is
-    steep.
+    """Merge planned layers where the surface is steep.
 
-    Dolenc and Maekelae 1994, "Slicing procedures for layered manufacturing techniques": a layer of height t
-    leaves steps whose cusps stand t |n| from the surface, n the vertical part of its unit normal. Layers grow
-    while that is at most the height of one planned layer. The same for any number of threads. Raises
-    `SliceError` if `most` is below the planned height.
+    A layer of height t leaves cusps of height t |n|, n the vertical component of the surface's unit normal
+    (Dolenc and Maekelae 1994, "Slicing procedures for layered manufacturing techniques"). Layers grow while
+    that is at most the height of one planned layer. The result does not depend on the number of threads.
+
+    Parameters
+    ----------
+    stack : Stack
+        Layers of one height.
+    most : float or str
+        Maximum height of a layer, mm, or text such as "0.2mm".
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    Stack
+        The stack with merged layers.
+
+    Raises
+    ------
+    SliceError
+        For an invalid `most`, or one below the planned height.
+    Cancelled
+        When the work is cancelled.
     """
     least, most = float(stack.heights[0]), validated("layer", most, Length(None, ""), SliceError)
     if most < least:
@@ -43,7 +62,7 @@ def adapted(stack: Stack, most: float, work: Work | None = None) -> Stack:
 
 
 def _ends(slopes: np.ndarray, most: int) -> list[int]:
-    """The last planned layer of each, at most `most` of them together."""
+    """Last planned layer of each merged layer; at most `most` planned layers are merged into one."""
     ends, count, steepest = [], 0, 0.0
     for index, slope in enumerate(slopes.tolist()):
         if count and (count == most or (count + 1) * max(steepest, slope) > 1):
@@ -62,7 +81,7 @@ def _coarse(stack: Stack) -> Stack:
 
 
 def _slope(layer: Layer) -> float:
-    """The vertical part of the normal along a layer's outline, 0 to 1, measured over the layer's height."""
+    """Vertical component of the normal along an outline, 0 to 1, by differences over the layer's height."""
     edges, ends = layer.slab.crossings(layer.place)
     if not len(edges):
         return 0.0

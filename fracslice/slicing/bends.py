@@ -1,4 +1,4 @@
-"""Bends of contours: points of the outline where it leaves the straight side between two crossings."""
+"""Bends of contours: vertices where the outline leaves the straight side between two crossings."""
 
 from __future__ import annotations
 
@@ -10,25 +10,28 @@ from ..rows import Rows
 from .section import CrossSection, Vertices, alone, free
 
 SAGITTA = 2e-3
-"""Pixels that an outline may be away from the middle of a side."""
+"""Maximum distance of the outline from the midpoint of a side, pixels."""
 
 STEEPEST = 1 / 8
-"""Of a side's length, that its outline may be away from its middle: what is farther is no bend."""
+"""Maximum distance of a bend from the midpoint of a side, as a fraction of the side's length."""
 
 SHORT = 0.1
-"""Pixels: a shorter side tells no direction."""
+"""Pixels; a shorter side has no reliable direction."""
 
 LEVELS = 3
-"""Times that a side is halved, at most."""
+"""Maximum number of times that a side is halved."""
 
 ROUNDS = 8
+"""Maximum number of steps of the secant method."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Sides(Rows):
-    """begin, end: float64 [n, 2]. after, share: of their middles, as of `Vertices`. height: float64 [n], how
-    far to the left of its middle the outline is, pixels. low, high: int64 [n, 2], corners of the pixels that
-    it may be in.
+    """Sides of contours, in pixels.
+
+    begin, end: float64 [n, 2]. after, share: of the midpoints, as of `Vertices`. height: float64 [n],
+    distance of the outline to the left of the midpoint. low, high: int64 [n, 2], corners of the pixels that
+    the outline may be in.
     """
 
     begin: np.ndarray
@@ -41,27 +44,29 @@ class _Sides(Rows):
 
     @property
     def way(self) -> np.ndarray:
+        """Vectors from `begin` to `end`."""
         return np.asarray(self.end - self.begin)
 
     @property
     def middles(self) -> np.ndarray:
+        """Midpoints of the sides."""
         return np.asarray((self.begin + self.end) / 2)
 
     @property
     def tops(self) -> np.ndarray:
-        """Where the outline is beside their middles."""
+        """Points of the outline next to the midpoints."""
         x, y = self.way.T
         left = np.column_stack([-y, x]) / np.hypot(x, y)[:, None]
         return np.asarray(self.middles + self.height[:, None] * left)
 
     def halved(self, share: float) -> _Sides:
-        """From their ends to their tops. share: half of the way along a new one."""
+        """Sides from both ends to the tops. share: half of a new side's share."""
         first = replace(self, end=self.tops, share=self.share - share, height=self.height / 4)
         return first + replace(first, begin=self.tops, end=self.end, share=self.share + share)
 
     @property
     def bent(self) -> _Sides:
-        """Those that a bend is beside."""
+        """Sides with a bend next to them."""
         away = np.abs(self.height)
         return self.chosen((away > SAGITTA) & (away < STEEPEST * np.hypot(*self.way.T)))
 
@@ -69,15 +74,31 @@ class _Sides(Rows):
 def bends(
     points: np.ndarray, following: np.ndarray, pixels: np.ndarray, sharp: Vertices, section: CrossSection
 ) -> Vertices:
-    """What is to be put between crossings so that no contour is farther than `SAGITTA` from its outline where
-    that is smooth.
+    """Vertices to add between crossings, so that smooth contours are within `SAGITTA` of their outlines.
 
-    points: of the crossings, lattice units, float64 [n, 2]; following: the next ones, int64 [n]; pixels: that
-    each contour goes through from there, int64 [n, 2]; sharp: the corners. How far the outline leaves a side
-    is guessed from the circles through three crossings, then found on the field; sides that it leaves are
-    halved, again and again. A side that has no corner, alone in its pixel, is left for a point of that pixel,
-    or of one beside it where no contour or corner is, within `STEEPEST` of its length: the angles of the
-    sides there are too flat to meet again. So no contour crosses itself or another one.
+    The distance of the outline from a side is estimated from circles through three crossings, then solved for
+    on the field. Sides that the outline leaves are halved, up to `LEVELS` times. A side is bent only if it
+    has no corner and is alone in its pixel. The vertex is in that pixel, or in an adjacent one without
+    contours and corners, and within `STEEPEST` of the side's length: the angles between sides are too flat
+    for them to meet again. So contours have no intersections.
+
+    Parameters
+    ----------
+    points : float64 [n, 2]
+        Crossings, lattice units.
+    following : int64 [n]
+        The next crossing of each one's contour.
+    pixels : int64 [n, 2]
+        The pixel that the contour goes through from there.
+    sharp : Vertices
+        Corners.
+    section : CrossSection
+        The field in the plane of the layer.
+
+    Returns
+    -------
+    Vertices
+        The bends.
     """
     sides = _guessed(points, following, pixels).bent
     if not len(sides.after):
@@ -101,8 +122,10 @@ def bends(
 
 
 def _guessed(points: np.ndarray, following: np.ndarray, pixels: np.ndarray) -> _Sides:
-    """All sides. The outline is as curved as the less curved of its ends: beside a corner, and where it is
-    rough, the other one tells of something else.
+    """All sides, with estimated heights.
+
+    The smaller curvature of the two ends counts: next to a corner, and on a rough outline, the larger one
+    belongs to another part of the outline.
     """
     before = np.empty_like(following)
     before[following] = np.arange(len(following))
@@ -115,13 +138,13 @@ def _guessed(points: np.ndarray, following: np.ndarray, pixels: np.ndarray) -> _
 
 
 def _far(points: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """The crossing beside each, or the one beyond if that is so near that it tells no direction."""
+    """The adjacent crossing, or the one beyond it if the adjacent one is too near for a direction."""
     near = _square(points[beside] - points) < SHORT**2
     return np.where(near, beside[beside], beside)
 
 
 def _curvature(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Of the circles through three points, [n, 2] each; positive where it turns to the left."""
+    """Curvature of the circles through three points, [n, 2] each; positive if it turns left."""
     u, v = b - a, c - b
     product = np.sqrt(_square(u) * _square(v) * _square(c - a))
     twice: np.ndarray = 2 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
@@ -129,11 +152,12 @@ def _curvature(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
 
 
 def _square(way: np.ndarray) -> np.ndarray:
+    """Squared lengths of vectors [n, 2]."""
     return np.asarray(way[:, 0] ** 2 + way[:, 1] ** 2)
 
 
 def _settled(sides: _Sides, section: CrossSection) -> _Sides:
-    """Sides with the heights that the field says, by the secant method; without those where it finds none."""
+    """Sides with their heights on the field, by the secant method; those without a solution are dropped."""
     height, before, last = sides.height.copy(), np.zeros(len(sides.height)), section(sides.middles)
     found, todo = np.zeros(len(height), bool), np.arange(len(height))
     for _ in range(ROUNDS):

@@ -1,5 +1,5 @@
-"""Would it print? Islands, overhangs, cups, traps, cavities, loose bodies, thin walls and gaps, fit, volume
-and weight.
+"""Printability checks of layers: islands, overhangs, cups, traps, cavities, bodies, thin walls and gaps, fit,
+volume and weight.
 """
 
 from __future__ import annotations
@@ -23,17 +23,44 @@ from .stack import Stack
 from .thickness import widths
 
 THICKNESS_LAYERS = 24
-"""Layers that walls and gaps are measured in, spread over the height."""
+"""Layers, evenly spaced over the height, in which walls and gaps are measured."""
 
 WORST = 6
+"""Maximum number of layers in `PrintReport.worst`."""
 
 
 @dataclass(frozen=True)
 class PrintReport:
-    """What the layers told. Lengths in mm, areas in mm^2, volumes in mm^3; lists have the largest first.
+    """Report on all layers. Lengths in mm, areas in mm^2, volumes in mm^3; lists have the largest first.
 
-    specks: islands and bodies below the limit. solid: what was measured in space, not in layers. worst:
-    layers with most overhang or the largest islands.
+    Attributes
+    ----------
+    layers : int
+        Number of layers.
+    pixels : tuple of int
+        Pixels along x and y.
+    size : tuple of float
+        Size of the object.
+    fits : bool or None
+        True if the object fits the printer; None without a printer.
+    volume, weight_g : float
+        Volume of the solid, and weight in grams.
+    bodies, islands : list of Found
+        Connected components, and components with nothing below them, without specks.
+    specks : int
+        Number of islands and bodies below the limit.
+    overhang_area, largest_overhang : float
+        Total over all layers, and maximum in a layer.
+    cups, traps, cavities : list of Found
+        Suction cups, resin traps and sealed cavities.
+    walls, gaps : Widths or None
+        Widths in layers.
+    worst : list of int
+        Layers with the most overhang or the largest islands.
+    solid : SolidReport
+        Report on the solid, measured in space instead of in layers.
+    problems : list of str
+        One line for each problem.
     """
 
     layers: int
@@ -57,13 +84,19 @@ class PrintReport:
     problems: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON."""
+        """The report as plain JSON types.
+
+        Returns
+        -------
+        dict
+            Keyed by attribute name.
+        """
         return asdict(self)
 
 
 @dataclass(frozen=True, eq=False)
 class _LayerFindings:
-    """What a worker tells of one layer."""
+    """Results of one layer."""
 
     solid: LayerComponents
     empty: LayerComponents
@@ -75,8 +108,32 @@ class _LayerFindings:
 def check_layers(
     stack: Stack, limits: Limits | None = None, printer: Printer | None = None, work: Work | None = None
 ) -> PrintReport:
-    """Checks a planned stack, layer by layer; memory grows with the number of parts only. Raises
-    `SliceError`, `Cancelled`.
+    """Check a planned stack, layer by layer, in memory that grows with the number of components only.
+
+    Parameters
+    ----------
+    stack : Stack
+        The planned layers.
+    limits : Limits, optional
+        Limits of the checks.
+    printer : Printer, optional
+        Printer that the object is to fit.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    PrintReport
+        The report.
+
+    Raises
+    ------
+    SliceError
+        If a layer cannot be sampled.
+    VolumeError
+        If the solid cannot be sampled.
+    Cancelled
+        When the work is cancelled.
     """
     chosen = set(np.linspace(0, len(stack.z) - 1, THICKNESS_LAYERS).astype(int).tolist())
 
@@ -92,12 +149,15 @@ def check_layers(
 
 @dataclass(eq=False)
 class _Collector:
+    """Combines the results of all layers into a report."""
+
     stack: Stack
     limits: Limits
     printer: Printer | None
     solid: SolidReport
 
     def report(self, findings: Iterator[_LayerFindings]) -> PrintReport:
+        """The report of findings in the order of the layers."""
         stack, solid, empty = self.stack, Graph(), Graph()
         square = stack.pixel[0] * stack.pixel[1]
         volume, overhangs, walls, gaps = 0.0, [], [np.empty((0, 2))], [np.empty((0, 2))]
@@ -145,23 +205,38 @@ class _Collector:
         return report
 
     def found(self, nodes: Nodes, chosen: np.ndarray) -> list[Found]:
+        """Chosen nodes as connected groups."""
         return nodes.grouped(chosen, self.stack.heights, self.stack.pixel, self.stack.shape)
 
     def shut(self, hollows: Nodes, backwards: bool) -> list[Found]:
-        """What is shut and large, see `Nodes.shut`."""
+        """Large groups of shut nodes, see `Nodes.shut`."""
         return [p for p in self.found(hollows, hollows.shut(backwards)) if p.area >= self.limits.cup]
 
     def height(self, part: Found) -> float:
-        """mm."""
+        """Height of a group, mm."""
         first, last = part.layers
         return float(self.stack.heights[first : last + 1].sum())
 
     def bodies(self, nodes: Nodes) -> list[Found]:
+        """All nodes as connected groups."""
         return self.found(nodes, np.ones(len(nodes.layer), bool))
 
 
 def misfit(stack: Stack, printer: Printer) -> str:
-    """Why a planned stack does not fit a printer, in words, or nothing: known before any layer is."""
+    """Explain why a planned stack does not fit a printer, before any layer is sampled.
+
+    Parameters
+    ----------
+    stack : Stack
+        The planned layers.
+    printer : Printer
+        The printer.
+
+    Returns
+    -------
+    str
+        Empty if the stack fits.
+    """
     try:
         check_fits(stack, printer)
     except SliceError:
@@ -171,14 +246,14 @@ def misfit(stack: Stack, printer: Printer) -> str:
 
 
 def _worst(overhang: np.ndarray, islands: list[Found]) -> list[int]:
-    """The layers to look at: where the largest islands begin, then those with most overhang."""
+    """Layers in which the largest islands begin, then those with the most overhang."""
     first = [i.layers[0] for i in sorted(islands, key=lambda i: -i.area)[: WORST // 2]]
     most = [int(k) for k in np.argsort(-overhang, kind="stable")[:WORST] if overhang[k] > 0]
     return sorted(list(dict.fromkeys([*first, *most]))[:WORST])
 
 
 def _problems(r: PrintReport, limits: Limits) -> list[str]:
-    """Why it would not print, one line each."""
+    """Problems of a report, one line each."""
     found = []
     if len(r.bodies) > 1:
         found.append(f"{len(r.bodies)} loose bodies")

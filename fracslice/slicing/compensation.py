@@ -1,4 +1,4 @@
-"""Outlines moved outwards or inwards. It needs Numba, whose import takes as long as a small job."""
+"""Compensation: outlines moved outwards or inwards. Importing Numba for it takes as long as a small job."""
 
 from __future__ import annotations
 
@@ -10,10 +10,24 @@ from ..compiled import compiled
 
 
 def compensated(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.ndarray:
-    """Coverage with its outlines moved outwards by `by` mm, uint8.
+    """Move the outlines of a coverage image outwards.
 
-    A pixel's coverage is taken as its distance to the outline, in pixels, and grows as the distance does:
-    grey dilation with a cone. Exact for outlines along an axis; within a fifth of a pixel for all others.
+    A pixel's coverage is taken as its distance to the outline, in pixels, and grows with that distance: grey
+    dilation with a cone. Exact for outlines along an axis, within a fifth of a pixel for all others.
+
+    Parameters
+    ----------
+    image : uint8 [ny, nx]
+        Coverage, 255 for full.
+    by : float
+        Distance, mm; negative moves inwards.
+    pixel : tuple of float
+        Width and height of a pixel, mm.
+
+    Returns
+    -------
+    uint8 [ny, nx]
+        Compensated coverage.
     """
     unit = math.sqrt(pixel[0] * pixel[1])
     amount, reach = abs(by) / unit, math.ceil(abs(by) / min(pixel)) + 1
@@ -26,6 +40,7 @@ def compensated(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.
 
 @compiled
 def _dilate(image, cone, out):  # type: ignore[no-untyped-def]
+    """Dilate an image with a cone."""
     ny, nx = image.shape
     reach = cone.shape[0] // 2
     out[:] = image

@@ -1,4 +1,4 @@
-"""The contours of a layer as polygons in mm, exact to the zero set, nested and oriented."""
+"""Contours of a layer as nested, oriented polygons in mm, projected to the zero set."""
 
 from __future__ import annotations
 
@@ -14,18 +14,26 @@ from .section import CrossSection, Vertices
 from .stack import Stack
 
 ROUNDS = 20
+"""Maximum number of steps of false position."""
+
 PRECISE = 1e-3
-"""Pixels between a crossing and the zero set, at most."""
+"""Maximum distance between a crossing and the zero set, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contours:
-    """Closed polygons, outer ones counter-clockwise, holes clockwise; no two meet. Their points are the
-    crossings of the pixel lattice, and between those sharp corners, or points where the outline bends.
+    """Closed polygons without intersections, outer ones counter-clockwise, holes clockwise.
 
-    points: float64 [n, 2], mm from the middle of the object's box, x to the right and y to the back.
-    starts: int32 [m + 1]: polygon i has the points ``starts[i]:starts[i + 1]``, the first not repeated.
-    parent: int32 [m], the polygon just around it, -1 for none; a parent comes before its children.
+    Their points are crossings of the pixel lattice and, between these, sharp corners or bends of the outline.
+
+    Attributes
+    ----------
+    points : float64 [n, 2]
+        mm from the middle of the object's box, x to the right and y to the back.
+    starts : int32 [m + 1]
+        Polygon i has the points ``starts[i]:starts[i + 1]``; the first is not repeated.
+    parent : int32 [m]
+        The innermost polygon around each, -1 for none. A parent comes before its children.
     """
 
     points: np.ndarray
@@ -50,20 +58,36 @@ class Contours:
 
     @property
     def area(self) -> float:
-        """The inside area in mm^2."""
+        """Total inside area, mm^2."""
         return float(self.areas.sum())
 
 
 def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Contours:
-    """The contours of layer `k` of a slab, at height `z` (scene units).
+    """Extract the contours of a layer.
 
-    exact: the float64 kernel that the crossings are refined with.
+    Parameters
+    ----------
+    slab : Slab
+        Sampled layers.
+    k : int
+        Layer in the slab.
+    z : float
+        Its height, scene units.
+    stack : Stack
+        The planned layers.
+    exact : Kernel
+        float64 kernel that refines the crossings.
+
+    Returns
+    -------
+    Contours
+        The polygons.
     """
     edges, ends = slab.crossings(k)
     following, section = edges[:, 3], CrossSection(exact, z, stack.frame)
     order, starts = _cycles(following)
     along = refined(section, edges, ends)
-    # Never quite at an end: there several contours, or the parts of one, would meet.
+    # Never at an end of the edge: several contours, or branches of one, would meet there.
     along = np.clip(along, PRECISE, 1 - PRECISE)
     points = edges[:, :2] + along[:, None] * np.eye(2)[edges[:, 2]]
     vertices = Vertices(points, np.arange(len(points)), np.zeros(len(points)))
@@ -82,7 +106,7 @@ def _turns(points: np.ndarray, edges: np.ndarray, section: CrossSection) -> Vert
 
 
 def _cycles(following: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The cycles of a permutation, each from its lowest number on: order [n], starts [m + 1]."""
+    """Cycles of a permutation, each from its lowest number on: order [n], starts [m + 1]."""
     steps, seen, order, starts = following.tolist(), bytearray(len(following)), [], [0]
     for first in range(len(steps)):
         at = first
@@ -96,8 +120,24 @@ def _cycles(following: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def refined(section: CrossSection, edges: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Where on its edge each crossing lies, 0 to 1, to `PRECISE`: false position with the Illinois rule
-    (Dowell and Jarratt 1971), all edges at once; those that are done are left out.
+    """Refine the crossings of edges to `PRECISE`.
+
+    False position with the Illinois rule (Dowell and Jarratt 1971), on all edges at once; converged ones are
+    left out.
+
+    Parameters
+    ----------
+    section : CrossSection
+        The field in the plane of the layer.
+    edges : int32 [n, 4]
+        Column, row, direction and next edge, as of `Slab.crossings`.
+    ends : float64 [n, 2]
+        Values at both ends.
+
+    Returns
+    -------
+    float64 [n]
+        Position on the edge, 0 to 1.
     """
     base, step = edges[:, :2].astype(float), np.eye(2)[edges[:, 2]]
     lo, hi = np.zeros(len(edges)), np.ones(len(edges))
@@ -126,7 +166,7 @@ def _nested(
 ) -> Contours:
     """Contours in the order of their lowest, leftmost crossing of a row of samples, each with its parent.
 
-    The crossing left of that one in its row tells: it is on the parent, or on a sibling, by whether the
+    The crossing to the left of that one in its row is on the parent or on a sibling, depending on whether the
     solid begins or ends there (as in Suzuki and Abe 1985, "Topological structural analysis of digitized
     binary images").
     """

@@ -1,4 +1,4 @@
-"""Sharp corners of contours: where the outline turns within a pixel, the point where its two sides meet."""
+"""Sharp corners of contours: where the outline turns within a pixel, the intersection of its two sides."""
 
 from __future__ import annotations
 
@@ -7,23 +7,32 @@ import numpy as np
 from .section import CrossSection, Vertices, alone, free
 
 STEP = 1e-4
-"""Pixels between the points of a slope."""
+"""Step of finite differences, pixels."""
 
 SINE = 0.17
-"""Of the angle between two sides, at least: 10 degrees."""
+"""Minimum sine of the angle between two sides: 10 degrees."""
 
 NEAR = 0.01
-"""Pixels between a corner and the zero set, at most."""
+"""Maximum distance between a corner and the zero set, pixels."""
 
 
 def corners(points: np.ndarray, following: np.ndarray, pixels: np.ndarray, section: CrossSection) -> Vertices:
     """Corners between crossings.
 
-    points, following, pixels: as of `bends`. A corner is where the tangents of two crossings of one pixel
-    meet, as in dual contouring (Ju, Losasso, Schaefer and Warren 2002, "Dual contouring of Hermite data"), if
-    the field is zero there; between them an arc is half as far from its chord. It lies in that pixel, and no
-    other contour does; or beside it in one that has no contour and no other corner. So no two contours can
-    meet.
+    A corner is the point where the tangents at two crossings of a pixel meet, as in dual contouring (Ju,
+    Losasso, Schaefer and Warren 2002, "Dual contouring of Hermite data"), if the field is zero there; an arc
+    between the crossings would be half as far from its chord. It lies in that pixel, which has no other
+    contour, or in an adjacent one without contours and other corners. So contours have no intersections.
+
+    Parameters
+    ----------
+    points, following, pixels, section
+        As of `bends`.
+
+    Returns
+    -------
+    Vertices
+        The corners.
     """
     f, slope = _tangents(points, section)
     a, b = slope, slope[following]
@@ -46,7 +55,7 @@ def corners(points: np.ndarray, following: np.ndarray, pixels: np.ndarray, secti
 
 
 def _tangents(points: np.ndarray, section: CrossSection) -> tuple[np.ndarray, np.ndarray]:
-    """The field at points, and its slope per pixel, float64 [n] and [n, 2]."""
+    """Field at points, [n], and its gradient per pixel, [n, 2], float64."""
     f = section(points)
     along = [section(points + STEP * step) - f for step in np.eye(2)]
     return f, np.column_stack(along) / STEP

@@ -1,10 +1,9 @@
-"""The parts of all layers and what lies over what: islands, bodies, cups, traps and cavities, by union and
-find.
+"""Islands, bodies, cups, traps and cavities: components of all layers and their overlaps, by union-find.
 
 On a masked printer the object hangs from the plate, its first layer uppermost, and grows downwards into the
-resin. So a hollow that has no way out through the layers printed so far is a cup that sucks at the film;
-one that has none through the layers that follow keeps its resin when it is lifted; one that has none at all
-is a cavity.
+resin. A hollow without a way out through the layers printed so far is a suction cup, which sucks at the film.
+One without a way out through the layers that follow is a resin trap, which keeps its resin when it is lifted.
+One without any way out is a cavity.
 """
 
 from __future__ import annotations
@@ -20,8 +19,18 @@ from .runs import LayerComponents, overlaps
 
 @dataclass(frozen=True)
 class Found:
-    """Something that a check found. layers: the first and last it is in. area: its largest in a layer,
-    mm^2. volume: mm^3. at: the middle of its first layer's part, mm from the middle of the object.
+    """A feature found by a check.
+
+    Attributes
+    ----------
+    layers : tuple of int
+        First and last layer.
+    area : float
+        Maximum area in a layer, mm^2.
+    volume : float
+        Volume, mm^3.
+    at : tuple of float
+        Centroid in its first layer, mm from the middle of the object.
     """
 
     layers: tuple[int, int]
@@ -32,7 +41,17 @@ class Found:
 
 @dataclass(eq=False)
 class Graph:
-    """Parts as nodes, in the order of their layers. Fed one layer at a time."""
+    """Components of layers as nodes, overlaps as edges. Layers are added in order.
+
+    Attributes
+    ----------
+    layer, area, middle, open, edges : list of ndarray
+        Arrays of `Nodes`, layer by layer.
+    last : LayerComponents or None
+        Components of the last layer.
+    count : int
+        Number of nodes.
+    """
 
     layer: list[np.ndarray] = field(default_factory=list)
     area: list[np.ndarray] = field(default_factory=list)
@@ -43,7 +62,13 @@ class Graph:
     count: int = 0
 
     def add(self, components: LayerComponents) -> None:
-        """The parts of the next layer."""
+        """Add the components of the next layer.
+
+        Parameters
+        ----------
+        components : LayerComponents
+            Solid or empty components.
+        """
         if self.last is not None:
             pairs = overlaps(self.last, components).astype(np.int64)
             self.edges.append(pairs + np.array([self.count - len(self.last), self.count]))
@@ -55,7 +80,13 @@ class Graph:
         self.count += len(components)
 
     def nodes(self) -> Nodes:
-        """All that was fed, as arrays."""
+        """Combine all layers.
+
+        Returns
+        -------
+        Nodes
+            Nodes and edges as arrays.
+        """
         edges = np.concatenate([np.empty((0, 2), np.int64), *self.edges])
         layer, area, middle, free = (
             np.concatenate(a) for a in (self.layer, self.area, self.middle, self.open)
@@ -65,8 +96,20 @@ class Graph:
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """layer int32 [n], area int64 [n] and middle float64 [n, 2] in pixels, open bool [n]; edges int64 [e,
-    2], by layers.
+    """Nodes and edges of a `Graph`.
+
+    Attributes
+    ----------
+    layer : int32 [n]
+        Layer of each node.
+    area : int64 [n]
+        Area, pixels.
+    middle : float64 [n, 2]
+        Centroid (x, y), pixels.
+    open : bool [n]
+        True if it reaches the border of the window.
+    edges : int64 [e, 2]
+        Pairs of overlapping nodes (below, above), sorted by layer.
     """
 
     layer: np.ndarray
@@ -76,20 +119,41 @@ class Nodes:
     edges: np.ndarray
 
     def bodies(self) -> np.ndarray:
-        """The body of each node, numbered by first node, int64 [n]."""
+        """Connected component of each node.
+
+        Returns
+        -------
+        int64 [n]
+            Its first node.
+        """
         return _united(self.edges, len(self.layer))
 
     def islands(self) -> np.ndarray:
-        """Which nodes have nothing below them, bool [n]; the first layer lies on the plate."""
+        """Nodes with nothing below them. The first layer lies on the plate.
+
+        Returns
+        -------
+        bool [n]
+            True for islands.
+        """
         held = self.layer == 0
         held[self.edges[:, 1]] = True
         return np.asarray(~held)
 
     def shut(self, backwards: bool) -> np.ndarray:
-        """Which empty nodes have no way out through the layers up to their own (or, backwards, from their
-        own on).
+        """Empty nodes without a way out through the layers up to their own.
 
-        The plate shuts the first layer; what reaches the last one is open.
+        The plate closes the first layer. Looking backwards, nodes that reach the last layer are open.
+
+        Parameters
+        ----------
+        backwards : bool
+            Look at the layers from the node's own on instead.
+
+        Returns
+        -------
+        bool [n]
+            True for shut nodes.
         """
         order = -1 if backwards else 1
         free = self.open | (backwards & (self.layer == self.layer.max(initial=0)))
@@ -100,7 +164,13 @@ class Nodes:
         return np.asarray(_shut(edges, np.sort(later), order * self.layer, free))
 
     def sealed(self) -> np.ndarray:
-        """Which empty nodes have no way out at all, not even to the plate's side."""
+        """Empty nodes without any way out, not even to the plate.
+
+        Returns
+        -------
+        bool [n]
+            True for sealed nodes.
+        """
         body = self.bodies()
         free = np.zeros(len(body), bool)
         free[body[self.open | (self.layer == 0) | (self.layer == self.layer.max(initial=0))]] = True
@@ -109,7 +179,24 @@ class Nodes:
     def grouped(
         self, chosen: np.ndarray, heights: np.ndarray, pixel: tuple[float, float], shape: tuple[int, int]
     ) -> list[Found]:
-        """The chosen nodes as connected groups, the largest volume first. heights: of the layers, mm."""
+        """Group chosen nodes into connected components.
+
+        Parameters
+        ----------
+        chosen : bool [n]
+            Nodes.
+        heights : float64 [l]
+            Heights of the layers, mm.
+        pixel : tuple of float
+            Width and height of a pixel, mm.
+        shape : tuple of int
+            Rows and columns of a layer.
+
+        Returns
+        -------
+        list of Found
+            The groups, by descending volume.
+        """
         inner = self.edges[chosen[self.edges].all(1)]
         root = _united(inner, len(self.layer))
         nodes = np.flatnonzero(chosen)
@@ -134,7 +221,7 @@ class Nodes:
 
 
 def _united(edges: np.ndarray, count: int) -> np.ndarray:
-    """The root of each node."""
+    """Root of each node."""
     parent = np.arange(count)
     _unite_all(parent, edges)
     return parent
@@ -142,6 +229,7 @@ def _united(edges: np.ndarray, count: int) -> np.ndarray:
 
 @compiled
 def _unite_all(parent, edges):  # type: ignore[no-untyped-def]
+    """Unite the nodes of all edges and flatten the tree."""
     for a, b in edges:
         unite(parent, a, b)
     for i in range(len(parent)):
@@ -150,7 +238,7 @@ def _unite_all(parent, edges):  # type: ignore[no-untyped-def]
 
 @compiled
 def _shut(edges, later, layer, free):  # type: ignore[no-untyped-def]
-    """Adds the edges layer by layer; a node is judged when its layer is complete."""
+    """True for nodes that are not connected to an open one once the edges up to their layer are added."""
     count = len(layer)
     root = np.arange(count + 1)
     order = np.argsort(layer, kind="mergesort")

@@ -1,4 +1,4 @@
-"""Layers one after the other: computed in parallel, slab by slab, handed out in order, and let go."""
+"""Layers in order, computed in parallel, slab by slab, and released once read."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .runs import Runs
 
 SLAB = 8
-"""Layers that are computed together."""
+"""Number of layers computed together."""
 
 
 T = TypeVar("T")
@@ -33,9 +33,18 @@ T = TypeVar("T")
 class ScreenView:
     """How a screen shows a layer, its back up.
 
-    shape: rows and columns of the picture. transposed: its rows run along the layer's y; backwards: its
-    columns from right to left. at: row and column of the layer's first pixel on the screen as seen from
-    above, the first row in front. levels: of the screen by coverage, 256 bytes, the first 0, the last 255.
+    Attributes
+    ----------
+    shape : tuple of int
+        Rows and columns of the picture.
+    transposed : bool
+        Rows of the picture run along y of the layer.
+    backwards : bool
+        Columns run from right to left.
+    at : tuple of int
+        Row and column of the layer's first pixel on the screen, seen from above, the first row in front.
+    levels : bytes
+        Grey level for each coverage, 256 bytes, the first 0, the last 255.
     """
 
     shape: tuple[int, int]
@@ -47,9 +56,22 @@ class ScreenView:
 
 @dataclass(eq=False)
 class Layer:
-    """One layer of a stack, before it is given a form: to be read before the next one is sampled.
+    """One layer of a stack, to be read before the next one is sampled.
 
-    evaluations: of the field for this layer, about.
+    Attributes
+    ----------
+    stack : Stack
+        Its stack.
+    index : int
+        Its number in the stack.
+    evaluations : float
+        Approximate number of field evaluations for it.
+    slab : Slab
+        Samples.
+    place : int
+        Its number in the slab.
+    exact : Kernel
+        float64 kernel of the field.
     """
 
     stack: Stack
@@ -61,17 +83,26 @@ class Layer:
 
     @property
     def top(self) -> float:
-        """The layer's upper face, mm above the object's lowest point."""
+        """Upper face, mm above the object's lowest point."""
         return float(self.stack.tops[self.index])
 
     @property
     def height(self) -> float:
-        """mm."""
+        """Layer height, mm."""
         return float(self.stack.heights[self.index])
 
     def deflated(self, view: ScreenView) -> bytes:
-        """What a PNG file holds of the layer as a screen shows it: rows, each after a byte 0, as a zlib
-        stream.
+        """Image data of a PNG file with the layer as a screen shows it.
+
+        Parameters
+        ----------
+        view : ScreenView
+            The screen.
+
+        Returns
+        -------
+        bytes
+            A zlib stream of rows, each after a byte 0.
         """
         data, area, cut = self.slab.picture(
             self.place, view.shape, view.transposed, view.backwards, view.at, self.stack.shape, view.levels
@@ -81,10 +112,10 @@ class Layer:
 
     @cached_property
     def coverage(self) -> np.ndarray:
-        """How much of each pixel is inside, uint8 [ny, nx], 255 for wholly; row 0 is the front (lowest y).
+        """Coverage of each pixel, uint8 [ny, nx], 255 for full; row 0 is the front (lowest y).
 
-        The area that the outline cuts from it: straight between where it crosses the pixel's sides, with a
-        corner where it turns.
+        It is the area cut off by the outline, which is straight between its crossings of the pixel's sides,
+        with a corner where it turns.
         """
         image = np.zeros(self.stack.shape, np.uint8)
         self._painted = self.slab.paint(self.place, image)
@@ -92,8 +123,8 @@ class Layer:
 
     @cached_property
     def runs(self) -> Runs:
-        """Its solid pixels: those of which at least half is inside."""
-        from .runs import Runs  # it needs Numba, and a job does not
+        """Solid pixels, at least half covered."""
+        from .runs import Runs  # needs Numba, which a job does without
 
         rows, runs, area, cut = self.slab.runs(self.place, self.stack.shape)
         self._painted = area, cut
@@ -102,16 +133,17 @@ class Layer:
 
     @cached_property
     def _painted(self) -> tuple[float, int]:
+        """Inside area in pixels, and number of pixels that the contour cuts."""
         return self.slab.paint(self.place, np.zeros(self.stack.shape, np.uint8))
 
     @property
     def area(self) -> float:
-        """mm^2, of the coverage before it is rounded."""
+        """Area in mm^2, from the coverage before rounding."""
         return self._painted[0] * self.stack.pixel[0] * self.stack.pixel[1]
 
     @property
     def boundary(self) -> int:
-        """The number of pixels that the contour cuts."""
+        """Number of pixels that the contour cuts."""
         return self._painted[1]
 
     @cached_property
@@ -122,17 +154,43 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class Slicer:
-    """Cuts a planned stack."""
+    """Slices a planned stack.
+
+    Attributes
+    ----------
+    stack : Stack
+        The planned layers.
+    work : Work
+        Threads, progress and cancellation.
+    """
 
     stack: Stack
     work: Work = field(default_factory=Work)
 
     def map(self, make: Callable[[Layer], T], layers: Sequence[int] | None = None) -> Iterator[T]:
-        """``make(layer)`` of every layer, or of the chosen ones, which ascend.
+        """Yield ``make(layer)`` for every layer, or for chosen ones.
 
-        `make` runs in worker threads, and reads a layer while it is there; results do not depend on their
-        number. At most a few slabs are held at a time. Raises `SliceError`, `Cancelled`, or what `make`
-        raises.
+        At most a few slabs are in memory at a time. Results do not depend on the number of threads.
+        Exceptions of `make` propagate.
+
+        Parameters
+        ----------
+        make : callable
+            Runs in worker threads, and reads the layer before it returns.
+        layers : sequence of int, optional
+            Numbers of the layers, ascending; all if not given.
+
+        Returns
+        -------
+        iterator
+            Results in the order of the layers.
+
+        Raises
+        ------
+        SliceError
+            If the solid reaches the rim of the lattice.
+        Cancelled
+            When the work is cancelled.
         """
         root, shape = self.stack.root, self.stack.shape
         exact = root.kernel("cpu", "float64")
@@ -156,6 +214,7 @@ class Slicer:
         return self._in_order(slab, groups)
 
     def _in_order(self, slab: Callable[[list[int]], list[T]], groups: list[list[int]]) -> Iterator[T]:
+        """Results of slabs in order, computed a few slabs ahead."""
         ahead: deque[Future[list[T]]] = deque()
         waiting = iter(groups)
         with ThreadPoolExecutor(self.work.threads) as pool:

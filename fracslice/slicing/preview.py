@@ -1,4 +1,4 @@
-"""Layers to look at: a contact sheet, an animation, and the layers that a check found worst."""
+"""Previews of layers: a contact sheet, an animation, and the worst layers of a check."""
 
 from __future__ import annotations
 
@@ -21,7 +21,18 @@ ALARM = (214, 60, 60)
 
 
 def thumbnail(image: np.ndarray) -> Image:
-    """A layer's coverage, at most `CELL` pixels a side, each the mean of what it covers."""
+    """Shrink a layer's coverage by box averaging, in colour.
+
+    Parameters
+    ----------
+    image : uint8 [ny, nx]
+        Coverage.
+
+    Returns
+    -------
+    PIL.Image.Image
+        At most `CELL` pixels along a side.
+    """
     from PIL import Image
 
     small = Image.fromarray(np.ascontiguousarray(image[::-1]))
@@ -31,7 +42,7 @@ def thumbnail(image: np.ndarray) -> Image:
 
 
 def _spread(stack: Stack, count: int) -> list[int]:
-    """So many layers, evenly over the height, from the middle of the first part to that of the last."""
+    """Numbers of `count` layers, evenly spaced over the height, each in the middle of its interval."""
     total = len(stack.z)
     return sorted({int((i + 0.5) * total / min(count, total)) for i in range(min(count, total))})
 
@@ -39,14 +50,33 @@ def _spread(stack: Stack, count: int) -> list[int]:
 def contact_sheet(
     stack: Stack, file: BinaryIO, work: Work | None = None, layers: Sequence[int] | None = None
 ) -> None:
-    """A PNG with chosen layers, or 24 over the height, each with its height above the bed."""
+    """Write a PNG with layers, each with its height above the bed.
+
+    Parameters
+    ----------
+    stack : Stack
+        The planned layers.
+    file : binary file
+        Where to write.
+    work : Work, optional
+        Threads, progress and cancellation.
+    layers : sequence of int, optional
+        Numbers of the layers, ascending; 24, evenly spaced, if not given.
+
+    Raises
+    ------
+    SliceError
+        If a layer cannot be sampled.
+    Cancelled
+        When the work is cancelled.
+    """
     chosen = list(layers) if layers is not None else _spread(stack, CELLS)
     images = list(Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), chosen))
     _sheet(stack, chosen, images, math.ceil(math.sqrt(1.5 * max(len(images), 1)))).save(file, "PNG")
 
 
 def _sheet(stack: Stack, layers: Sequence[int], images: Sequence[Image], across: int) -> Image:
-    """Images of layers in rows, each with what it shows."""
+    """Thumbnails in rows, each with its caption."""
     from PIL import Image, ImageDraw
 
     width = max([CAPTION, *(i.width for i in images)]) + 8
@@ -61,7 +91,24 @@ def _sheet(stack: Stack, layers: Sequence[int], images: Sequence[Image], across:
 
 
 def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
-    """An endless animated WebP that climbs through the object in up to 60 layers, three seconds long."""
+    """Write an endless animated WebP that climbs through up to 60 layers in three seconds.
+
+    Parameters
+    ----------
+    stack : Stack
+        The planned layers.
+    file : binary file
+        Where to write.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Raises
+    ------
+    SliceError
+        If a layer cannot be sampled.
+    Cancelled
+        When the work is cancelled.
+    """
     frames = list(
         Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), _spread(stack, FRAMES))
     )
@@ -69,7 +116,26 @@ def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
 
 
 def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work | None = None) -> None:
-    """A PNG of layers, pixel by pixel, what has nothing below it in red; without any, of the lowest one."""
+    """Write a PNG of layers at full resolution, pixels with nothing below them in red.
+
+    Parameters
+    ----------
+    stack : Stack
+        The planned layers.
+    layers : sequence of int
+        Numbers of the layers; the lowest one if empty.
+    file : binary file
+        Where to write.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Raises
+    ------
+    SliceError
+        If a layer cannot be sampled.
+    Cancelled
+        When the work is cancelled.
+    """
     from PIL import Image
 
     layers = layers or [0]
@@ -84,4 +150,5 @@ def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work
 
 
 def _solid(layer: Layer) -> np.ndarray:
+    """Pixels of a layer that are at least half covered."""
     return layer.coverage >= 128

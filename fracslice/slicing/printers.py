@@ -1,4 +1,4 @@
-"""Resin printers: their screens, as published. docs/reference/printers.md says where each figure is from."""
+"""Resin printers and their screens, as published. Sources of the figures: docs/reference/printers.md."""
 
 from __future__ import annotations
 
@@ -12,8 +12,20 @@ from ..errors import SliceError
 class Printer:
     """A masked resin printer.
 
-    pixels: of the screen along the bed's x and y. screen: its size in mm. height: the highest print in mm.
-    mirror: the picture is mirrored along x. portrait: the picture's rows run along the bed's x.
+    Attributes
+    ----------
+    name, title : str
+        Name in commands, and name in messages.
+    pixels : tuple of int
+        Pixels of the screen along x and y of the bed.
+    screen : tuple of float
+        Size of the screen, mm.
+    height : float
+        Maximum height of a print, mm.
+    mirror : bool
+        The picture is mirrored along x.
+    portrait : bool
+        Rows of the picture run along x of the bed.
     """
 
     name: str
@@ -26,12 +38,12 @@ class Printer:
 
     @property
     def pixel(self) -> tuple[float, float]:
-        """Width and height of a pixel in mm."""
+        """Width and height of a pixel, mm."""
         return self.screen[0] / self.pixels[0], self.screen[1] / self.pixels[1]
 
     @property
     def room(self) -> tuple[float, float, float]:
-        """The largest print in mm."""
+        """Build volume (x, y, z), mm."""
         return *self.screen, self.height
 
 
@@ -53,7 +65,23 @@ PRINTERS = {
 
 
 def printer(name: str) -> Printer:
-    """The printer called `name`. Raises `SliceError` with the nearest right name."""
+    """Look up a printer.
+
+    Parameters
+    ----------
+    name : str
+        A key of `PRINTERS`.
+
+    Returns
+    -------
+    Printer
+        The printer.
+
+    Raises
+    ------
+    SliceError
+        For an unknown name; the message has the nearest known one.
+    """
     if name in PRINTERS:
         return PRINTERS[name]
     near = difflib.get_close_matches(name.lower().replace(" ", "-"), PRINTERS, 1, 0.4)

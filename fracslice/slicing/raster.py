@@ -1,4 +1,4 @@
-"""From coverage to the picture on a printer's screen: compensation, gamma, place, mirror."""
+"""From coverage to the picture on a printer's screen: compensation, gamma, position, mirroring."""
 
 from __future__ import annotations
 
@@ -18,12 +18,26 @@ from .stack import Stack
 
 @dataclass(frozen=True, eq=False)
 class Screen:
-    """How layers become pictures.
+    """Turns layers into pictures.
 
-    printer: whose screen; None shows the object alone. compensation: a length, in mm or such as "50um", by
-    which every outline moves outwards (negative: inwards), for resin that cures beyond its pixels or shrinks.
-    gamma: of the grey levels. mirror: overrides the printer's. Raises `SliceError` for a value that cannot be
-    or an object that the printer has no room for.
+    Attributes
+    ----------
+    stack : Stack
+        The planned layers.
+    printer : Printer or None
+        Its screen is shown; None shows the object alone.
+    compensation : float or str
+        Distance by which outlines move outwards (negative: inwards), for resin that cures beyond its pixels
+        or shrinks; mm, or text such as "50um".
+    gamma : float
+        Exponent of the grey levels.
+    mirror : bool or None
+        Overrides the printer's.
+
+    Raises
+    ------
+    SliceError
+        For an invalid value, or an object larger than the printer's build volume.
     """
 
     stack: Stack
@@ -48,7 +62,18 @@ class Screen:
         return (across, along) if self.printer.portrait else (along, across)
 
     def picture(self, layer: Layer) -> np.ndarray:
-        """uint8 [rows, columns], as the file wants it: the first row at the top."""
+        """Picture of a layer.
+
+        Parameters
+        ----------
+        layer : Layer
+            A layer of the stack.
+
+        Returns
+        -------
+        uint8 [rows, columns]
+            Grey levels, the first row at the top.
+        """
         image = np.zeros(self.shape, np.uint8)
         bed, mine = self._bed(image), self._place
         if self.compensation:
@@ -61,15 +86,26 @@ class Screen:
         return image
 
     def deflated(self, layer: Layer) -> bytes:
-        """The picture as a PNG file holds it: each row after a byte 0 for no filter, as a zlib stream.
+        """Image data of a PNG file with the picture of a layer.
 
-        Written from the layer's tiles as runs of equal pixels, without laying out the picture, unless there
-        is compensation.
+        Without compensation it is encoded from the layer's tiles, as runs of equal pixels, and the picture is
+        never allocated.
+
+        Parameters
+        ----------
+        layer : Layer
+            A layer of the stack.
+
+        Returns
+        -------
+        bytes
+            A zlib stream of rows, each after a byte 0 for no filter.
         """
         return deflated(self.picture(layer)) if self.compensation else layer.deflated(self._view)
 
     @cached_property
     def _view(self) -> ScreenView:
+        """The screen for native code."""
         mine = self._place
         at = [on.start - of.start for on, of in zip(mine.on_bed, mine.of_layer, strict=True)]
         backwards = self._mirrored != self._portrait
@@ -77,11 +113,12 @@ class Screen:
 
     @cached_property
     def _levels(self) -> np.ndarray:
+        """Grey level for each coverage, uint8 [256]."""
         return np.rint(255 * (np.arange(256) / 255) ** self.gamma).astype(np.uint8)
 
     @cached_property
     def _place(self) -> _Window:
-        """The object in the middle of the bed; the window may be a few empty pixels larger than the bed."""
+        """The layer centred on the bed; it may be a few empty pixels larger than the bed."""
         bed = self.printer.pixels[::-1] if self.printer else self.stack.shape
         on_bed, of_layer = [], []
         for mine, room in zip(self.stack.shape, bed, strict=True):
@@ -92,14 +129,16 @@ class Screen:
 
     @property
     def _portrait(self) -> bool:
+        """True if rows of the picture run along x of the bed."""
         return bool(self.printer and self.printer.portrait)
 
     @property
     def _mirrored(self) -> bool:
+        """True if the picture is mirrored along x."""
         return self.mirror if self.mirror is not None else bool(self.printer and self.printer.mirror)
 
     def _bed(self, image: np.ndarray) -> np.ndarray:
-        """A picture as seen from above, row 0 at the front: a view."""
+        """View of a picture as seen from above, row 0 at the front."""
         if self._portrait:
             return image[::-1].T if self._mirrored else image[::-1, ::-1].T
         return image[::-1, ::-1] if self._mirrored else image[::-1]
@@ -113,14 +152,27 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class _Window:
-    """Where a layer lies on the bed: rows and columns of the bed, and which of the layer's they show."""
+    """Where a layer lies on the bed: rows and columns of the bed, and those of the layer that they show."""
 
     on_bed: tuple[slice, slice]
     of_layer: tuple[slice, slice]
 
 
 def check_fits(stack: Stack, printer: Printer) -> None:
-    """Raises `SliceError` if the object is larger than the printer's room."""
+    """Check that the object fits a printer.
+
+    Parameters
+    ----------
+    stack : Stack
+        The planned layers.
+    printer : Printer
+        The printer.
+
+    Raises
+    ------
+    SliceError
+        If the object is larger than the build volume.
+    """
     for axis, mine, room in zip("xyz", stack.size, printer.room, strict=True):
         if mine > room * (1 + 1e-6):
             raise SliceError(

@@ -1,4 +1,4 @@
-"""Layers as runs of solid or empty pixels: parts, and what lies over what, in time linear in the outline."""
+"""Layers as runs of pixels: connected components and overlaps, in time linear in the outline."""
 
 from __future__ import annotations
 
@@ -12,8 +12,16 @@ from ..disjoint import find, unite
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """The solid pixels of a layer. rows: int32 [ny + 1], row y has the runs ``rows[y]:rows[y + 1]``. begin,
-    end: int32 [r], the pixels of each, end excluded. width: pixels of a row.
+    """Solid pixels of a layer.
+
+    Attributes
+    ----------
+    rows : int32 [ny + 1]
+        Row y has the runs ``rows[y]:rows[y + 1]``.
+    begin, end : int32 [r]
+        Pixels of each run, end excluded.
+    width : int
+        Pixels in a row.
     """
 
     rows: np.ndarray
@@ -23,12 +31,12 @@ class Runs:
 
     @property
     def height(self) -> int:
-        """Rows."""
+        """Number of rows."""
         return len(self.rows) - 1
 
     @property
     def gaps(self) -> Runs:
-        """The other pixels."""
+        """Runs of the empty pixels."""
         rows = np.zeros(len(self.rows), np.int32)
         begin, end = (np.empty(len(self.begin) + self.height, np.int32) for _ in range(2))
         count = _gaps(self.rows, self.begin, self.end, self.width, rows, begin, end)
@@ -37,11 +45,22 @@ class Runs:
 
 @dataclass(frozen=True, eq=False)
 class LayerComponents:
-    """The connected parts of one layer, solid ones or empty ones.
+    """Connected components of one layer, solid or empty.
 
-    rows: int32 [ny + 1], the runs of row y are ``rows[y]:rows[y + 1]``. begin, end: int32 [r], the pixels
-    of each run, end excluded. part: int32 [r], the part of each run. area: int64 [m] in pixels. middle:
-    float64 [m, 2], (x, y) in pixels. open: bool [m], whether the part reaches the border of the window.
+    Attributes
+    ----------
+    rows : int32 [ny + 1]
+        Row y has the runs ``rows[y]:rows[y + 1]``.
+    begin, end : int32 [r]
+        Pixels of each run, end excluded.
+    part : int32 [r]
+        Component of each run.
+    area : int64 [m]
+        Area, pixels.
+    middle : float64 [m, 2]
+        Centroid (x, y), pixels.
+    open : bool [m]
+        True if the component reaches the border of the window.
     """
 
     rows: np.ndarray
@@ -57,11 +76,23 @@ class LayerComponents:
 
 
 def components_of(solid: Runs) -> tuple[LayerComponents, LayerComponents]:
-    """The solid parts, pixels that touch at a corner connected, and the empty ones, by sides only."""
+    """Label the components of a layer: solid ones 8-connected, empty ones 4-connected.
+
+    Parameters
+    ----------
+    solid : Runs
+        The solid pixels.
+
+    Returns
+    -------
+    solid, empty : LayerComponents
+        The components.
+    """
     return _labelled(solid, 1), _labelled(solid.gaps, 0)
 
 
 def _labelled(runs: Runs, reach: int) -> LayerComponents:
+    """Label runs that overlap, or at `reach` 1 touch at a corner."""
     rows, begin, end = runs.rows, runs.begin, runs.end
     part = np.empty(len(begin), np.int32)
     count = _label(rows, begin, end, reach, part)
@@ -79,6 +110,7 @@ def _labelled(runs: Runs, reach: int) -> LayerComponents:
 
 @compiled
 def _gaps(rows, begin, end, nx, gaps, gap_begin, gap_end):  # type: ignore[no-untyped-def]
+    """Write the runs between runs; return their number."""
     n = 0
     for y in range(len(rows) - 1):
         x = 0
@@ -96,6 +128,7 @@ def _gaps(rows, begin, end, nx, gaps, gap_begin, gap_end):  # type: ignore[no-un
 
 @compiled
 def _label(rows, begin, end, reach, part):  # type: ignore[no-untyped-def]
+    """Write the component of each run; return the number of components."""
     parent = np.arange(len(begin))
     for y in range(1, len(rows) - 1):
         a, b = rows[y - 1], rows[y]
@@ -117,18 +150,30 @@ def _label(rows, begin, end, reach, part):  # type: ignore[no-untyped-def]
 
 
 def overlaps(below: LayerComponents, above: LayerComponents) -> np.ndarray:
-    """Pairs of parts of two layers that share a pixel, int32 [n, 2] (below, above), in order, each once."""
+    """Pairs of components of two layers that share a pixel.
+
+    Parameters
+    ----------
+    below, above : LayerComponents
+        Components of the layers.
+
+    Returns
+    -------
+    int32 [n, 2]
+        Unique pairs (below, above), sorted.
+    """
     pairs = np.empty((len(below.begin) + len(above.begin), 2), np.int32)
     count = _overlaps(
         below.rows, below.begin, below.end, below.part, above.rows, above.begin, above.end, above.part, pairs
     )
-    # Numbers are sorted several times faster than rows.
+    # Sorting numbers is several times faster than sorting rows.
     numbers = np.unique(pairs[:count, 0].astype(np.int64) * len(above) + pairs[:count, 1])
     return np.column_stack(np.divmod(numbers, max(len(above), 1))).astype(np.int32)
 
 
 @compiled
 def _overlaps(rows_a, begin_a, end_a, part_a, rows_b, begin_b, end_b, part_b, pairs):  # type: ignore[no-untyped-def]
+    """Write the components of overlapping runs; return their number."""
     n = 0
     for y in range(len(rows_a) - 1):
         a, b = rows_a[y], rows_b[y]
@@ -144,7 +189,22 @@ def _overlaps(rows_a, begin_a, end_a, part_a, rows_b, begin_b, end_b, part_b, pa
 
 
 def unsupported(below: LayerComponents, above: LayerComponents, reach: float, width: int) -> int:
-    """Solid pixels of a layer that are farther than `reach` pixels from all solid ones of the layer below."""
+    """Count the overhanging pixels of a layer.
+
+    Parameters
+    ----------
+    below, above : LayerComponents
+        Solid components of the layers.
+    reach : float
+        Pixels within this distance of a solid pixel of the layer below are supported, pixels.
+    width : int
+        Pixels in a row.
+
+    Returns
+    -------
+    int
+        Number of unsupported pixels.
+    """
     return int(
         _unsupported(below.rows, below.begin, below.end, above.rows, above.begin, above.end, reach, width)
     )
@@ -152,6 +212,7 @@ def unsupported(below: LayerComponents, above: LayerComponents, reach: float, wi
 
 @compiled
 def _unsupported(rows_a, begin_a, end_a, rows_b, begin_b, end_b, reach, width):  # type: ignore[no-untyped-def]
+    """Count the pixels of runs farther than `reach` from all runs of the layer below."""
     held = np.zeros(width + 1, np.int32)
     total, far = 0, int(np.floor(reach))
     for y in range(len(rows_b) - 1):
@@ -177,7 +238,7 @@ def _unsupported(rows_a, begin_a, end_a, rows_b, begin_b, end_b, reach, width): 
 
 @compiled
 def _lies_on(rows_a, begin_a, end_a, rows_b, begin_b, end_b, y):  # type: ignore[no-untyped-def]
-    """Whether every run of a row lies on one of the row below."""
+    """True if every run of a row lies on a run of the row below."""
     a = rows_a[y]
     for b in range(rows_b[y], rows_b[y + 1]):
         while a < rows_a[y + 1] and end_a[a] < end_b[b]:

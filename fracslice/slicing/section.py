@@ -1,4 +1,4 @@
-"""The plane of a layer: the field in it, and points of outlines."""
+"""The field in the plane of a layer, and vertices of contours."""
 
 from __future__ import annotations
 
@@ -12,22 +12,51 @@ from ..rows import Rows
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """kernel: of the field. z: of the layer. frame: (x0, y0, dx, dy) of the lattice. Scene units."""
+    """The field in the plane of a layer.
+
+    Attributes
+    ----------
+    kernel : Kernel
+        Kernel of the field.
+    z : float
+        Height of the plane, scene units.
+    frame : float64 [4]
+        (x0, y0, dx, dy) of the lattice, scene units.
+    """
 
     kernel: Kernel
     z: float
     frame: np.ndarray
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """The field at points of the lattice, float64 [n, 2]."""
+        """Field at points of the lattice.
+
+        Parameters
+        ----------
+        points : float64 [n, 2]
+            Points, lattice units.
+
+        Returns
+        -------
+        [n]
+            Values, in the kernel's dtype.
+        """
         x, y = self.frame[:2, None] + self.frame[2:, None] * points.T
         return self.kernel.points(x, y, np.full(len(points), self.z))
 
 
 @dataclass(frozen=True, eq=False)
 class Vertices(Rows):
-    """Points of contours, lattice units, float64 [n, 2]; the crossing that each is or comes after, int64 [n];
-    and how far it is on the way to the next one, float64 [n], 0 to 1.
+    """Vertices of contours.
+
+    Attributes
+    ----------
+    points : float64 [n, 2]
+        Positions, lattice units.
+    after : int64 [n]
+        The crossing that each vertex is or follows.
+    share : float64 [n]
+        Fraction of the way to the next crossing, 0 to 1.
     """
 
     points: np.ndarray
@@ -36,25 +65,67 @@ class Vertices(Rows):
 
     @classmethod
     def none(cls) -> Vertices:
-        """No points at all."""
+        """An empty record.
+
+        Returns
+        -------
+        Vertices
+            No vertices.
+        """
         return cls(np.empty((0, 2)), np.empty(0, np.int64), np.empty(0))
 
 
 def keys(pixels: np.ndarray) -> np.ndarray:
-    """A number for each pixel, int64 [n, 2]."""
+    """Unique number of each pixel.
+
+    Parameters
+    ----------
+    pixels : int64 [n, 2]
+        Columns and rows.
+
+    Returns
+    -------
+    int64 [n]
+        The numbers.
+    """
     found: np.ndarray = (pixels[:, 0] << 32) + pixels[:, 1]
     return found
 
 
 def alone(pixels: np.ndarray) -> np.ndarray:
-    """Whether each pixel, int64 [n, 2], is there only once."""
+    """Find pixels that occur once.
+
+    Parameters
+    ----------
+    pixels : int64 [n, 2]
+        Columns and rows.
+
+    Returns
+    -------
+    bool [n]
+        True if no other row is the same pixel.
+    """
     _, which, count = np.unique(keys(pixels), return_inverse=True, return_counts=True)
     return np.asarray(count[which] == 1)
 
 
 def free(pixels: np.ndarray, beside: np.ndarray, taken: np.ndarray) -> np.ndarray:
-    """Whether something of each pixel may be in another one, int64 [n, 2] both: if it is the same, or a next
-    one that nothing else reaches and that is none of those taken.
+    """Find vertices that may leave their pixel, or stay in it.
+
+    Parameters
+    ----------
+    pixels : int64 [n, 2]
+        The pixel of each vertex.
+    beside : int64 [n, 2]
+        The pixel that it is to be in.
+    taken : int64 [m, 2]
+        Pixels with contours or corners.
+
+    Returns
+    -------
+    bool [n]
+        True if both pixels are the same, or adjacent and the other is neither taken nor wanted by another
+        vertex.
     """
     away = np.abs(beside - pixels).sum(1)
     found: np.ndarray = (away == 0) | ((away == 1) & alone(beside) & ~np.isin(keys(beside), keys(taken)))

@@ -1,21 +1,21 @@
-"""A few neighbouring layers, from the field to the samples around their contours.
+"""A slab: a few adjacent layers, sampled around their contours.
 
-The work is `fracslice._slices`; here is what it must know of a field. Top down, blocks of 64, 32 and 16
-pixels over all layers of the slab, of 8 over a few of them and of 4 over one or two are dropped where
-``|f| > bound * reach`` at their middle says that no sample in them has the other sign. In what is left of
-each layer one sample of each block of 2 pixels and then the others are evaluated, as long as no value
-reaches them. Then follows closure: where two neighbours differ in sign and one of them is only implied by
-another, it is evaluated. Nothing within a layer is evaluated twice.
+`fracslice._slices` does the work; this module provides the bounds that it needs of a field. Blocks are
+subdivided top down: of 64, 32 and 16 pixels over all layers of the slab, of 8 over a few of them, of 4 over
+one or two. A block is dropped where ``|f| > bound * reach`` at its centre shows that no sample in it has the
+other sign. In the remaining blocks of each layer, one sample of each block of 2 pixels is evaluated, then the
+others, unless the bound of a value covers them. Closure follows: where two neighbours differ in sign and one
+sign is only implied, that sample is evaluated. Nothing within a layer is evaluated twice.
 
-For more than 16 pixels the bound is the formula's own, which is proven or measured with a margin. It is
-far from what escape-time fractals do: their values are a fifth of the distance outside and a fiftieth
-inside (means on Mandelbulbs and Julia sets), and going down to single pixels by it would cost more than
-the contours. In a scene of nothing else blocks of 16 are dropped by half of it outside and by a tenth
-inside, smaller ones by how steep the field is there, but not below `LIKELY`; and single samples where two
-blocks around theirs all have one sign, for inside, values tell less of how near the surface is than the
-signs around them do. What is lost, specks of a pixel or two, is below 0.1 % of the area
-(tests/slicing/test_layers.py). Where a scene mixes them with other shapes, probing ends at blocks of `STOP`
-pixels instead, and parts smaller than that which touch no probe are not found.
+Above 16 pixels the bound is the formula's own, which is proven or measured with a margin. Escape-time
+fractals are far from it: their values are a fifth of the distance outside and a fiftieth inside (means on
+Mandelbulbs and Julia sets), and subdivision to single pixels by that bound would cost more than the contours.
+In a scene of escape-time fractals only, blocks of 16 are dropped by half of the bound outside and by a tenth
+inside. Smaller blocks are dropped by the steepness of the field there, but not below `LIKELY`. Single samples
+are dropped where two blocks around theirs all have one sign: inside, the signs around a sample are better
+evidence of the distance to the surface than its value. Specks of a pixel or two are lost, below 0.1 % of the
+area (tests/slicing/test_layers.py). Where a scene mixes fractals with other shapes, subdivision ends at
+blocks of `STOP` pixels instead, and smaller features that touch no probe are missed.
 """
 
 from __future__ import annotations
@@ -28,17 +28,27 @@ from ..formulas.field import Bounds
 from ..kernel import Field, Kernel
 
 LIKELY = 0.06, 0.015
-"""The least bounds for small blocks of a fractal, outside and inside, as shares of its own."""
+"""Minimum bounds for small blocks of a fractal, outside and inside, as fractions of its own bound."""
 
 STOP = 2, 4
 """Pixels, outside and inside."""
 
 
 class Sampler:
-    """Samples slabs of a stack; may be used from many threads.
+    """Samples slabs of a stack. Safe to use from many threads.
 
-    kernel: of `root`, float32. frame: (x0, y0, dx, dy) of the lattice, scene units.
-    shape: lattice points (ny, nx).
+    Parameters
+    ----------
+    kernel : Kernel
+        float32 kernel of `root`.
+    root : Field
+        The field.
+    bounds : Bounds
+        Its bounds.
+    frame : float64 [4]
+        (x0, y0, dx, dy) of the lattice, scene units.
+    shape : tuple of int
+        Lattice points (ny, nx).
     """
 
     def __init__(
@@ -54,12 +64,36 @@ class Sampler:
         self._entry = kernel.entry
 
     def slab(self, z: np.ndarray) -> Slab:
-        """Neighbouring layers at heights `z` (scene units), none of them sampled."""
+        """Create a slab without samples.
+
+        Parameters
+        ----------
+        z : float64 [n]
+            Heights of adjacent layers, scene units.
+
+        Returns
+        -------
+        Slab
+            The slab.
+        """
         x0, y0, dx, dy = self.frame.tolist()
         return Slab(self._memory, self._entry, self._probe_bounds, (x0, y0, dx, dy), z.tolist(), *self.shape)
 
     def sample(self, slab: Slab, layer: int) -> None:
-        """Samples a layer of a slab. Raises `SliceError` where the solid reaches the rim of the lattice."""
+        """Sample a layer of a slab.
+
+        Parameters
+        ----------
+        slab : Slab
+            The slab.
+        layer : int
+            Number of the layer in the slab.
+
+        Raises
+        ------
+        SliceError
+            If the solid reaches the rim of the lattice.
+        """
         try:
             slab.sample(layer)
         except BorderError as error:
@@ -67,6 +101,7 @@ class Sampler:
 
 
 def _probe_bounds(root: Field, bounds: Bounds) -> ProbeBounds:
+    """Bounds by which blocks are dropped."""
     bound, exterior_only = bounds.lipschitz, bounds.exterior_only
     if exterior_only and root.escape_time_only:
         return ProbeBounds(bound, bound * LIKELY[0], bound * LIKELY[1], 1, 1, True)

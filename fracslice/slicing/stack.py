@@ -1,4 +1,4 @@
-"""What is to be cut: the job, and the stack of layers that is planned for it."""
+"""Slicing jobs, and the planned stack of layers."""
 
 from __future__ import annotations
 
@@ -26,12 +26,27 @@ MOST_PIXELS = 65_536
 
 @dataclass(frozen=True)
 class SliceJob:
-    """What to cut. Lengths are numbers of mm, or text such as "0.05mm"; the fields hold mm.
+    """Parameters of a job. Lengths are numbers of mm, or text such as "0.05mm"; the attributes hold mm.
 
-    size: the object's longest side, before anything is cut off or added. layer: layer height. pixel: width
-    and height of a pixel, or one length for both. up: the direction of the scene that is up in the print.
-    printing: what makes it printable. Raises `SceneError` for a value that cannot be, `SliceError` for layers
-    or pixels as large as the object.
+    Attributes
+    ----------
+    size : float
+        Longest side of the object, before anything is cut off or added.
+    layer : float
+        Layer height.
+    pixel : tuple of float
+        Width and height of a pixel, or one length for both.
+    up : tuple of float
+        Direction of the scene that is up in the print.
+    printing : Print
+        Changes that make the object printable.
+
+    Raises
+    ------
+    SceneError
+        For an invalid value.
+    SliceError
+        For layers or pixels as large as the object.
     """
 
     size: float
@@ -58,14 +73,30 @@ _KINDS = {
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """A planned job: the field, and where its layers and pixels lie.
+    """A planned job: the field, its layers and its pixels.
 
-    root: the scene with all depths known, turned so that z is up. scale: mm per scene unit. corner:
-    position of the lattice point (0, 0) in scene units. pixel: mm (x, y). shape: pixels (ny, nx); there is
-    one more lattice point along each. z: float64 [n], the heights at which the layers are cut, scene units.
-    tops: float64 [n], the layers' upper faces in mm above the object's lowest point. size: the object's
-    size in mm. outer: a box that surely encloses it, scene units. notes: what a pixel is too large for, in
-    words.
+    Attributes
+    ----------
+    root : Field
+        The scene with all depths known, rotated so that z is up.
+    scale : float
+        mm per scene unit.
+    corner : tuple of float
+        Lattice point (0, 0), scene units.
+    pixel : tuple of float
+        Width and height of a pixel, mm.
+    shape : tuple of int
+        Pixels (ny, nx); the lattice has one more point along each axis.
+    z : float64 [n]
+        Heights at which the layers are cut, scene units.
+    tops : float64 [n]
+        Upper faces of the layers, mm above the object's lowest point.
+    size : tuple of float
+        Size of the object, mm.
+    outer : Box
+        Conservative bounds of the object, scene units.
+    notes : tuple of str
+        What a pixel or a layer is too large for.
     """
 
     root: Field
@@ -81,19 +112,40 @@ class Stack:
 
     @property
     def heights(self) -> np.ndarray:
-        """Each layer's height in mm, float64 [n]."""
+        """Layer heights in mm, float64 [n]."""
         return np.diff(self.tops, prepend=0.0)
 
     @property
     def frame(self) -> np.ndarray:
-        """(x0, y0, dx, dy) in scene units, float64 [4]."""
+        """(x0, y0, dx, dy) of the lattice in scene units, float64 [4]."""
         return np.array([*self.corner, self.pixel[0] / self.scale, self.pixel[1] / self.scale])
 
 
 def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
-    """Finds the object's size and depths and lays its layers and pixels.
+    """Find the object's size and depths, make it printable, and place layers and pixels.
 
-    Raises `SliceError` if there would be too many, `VolumeError` for a scene without a solid.
+    Parameters
+    ----------
+    root : Node
+        The scene.
+    job : SliceJob
+        The job.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    Stack
+        The planned layers.
+
+    Raises
+    ------
+    SliceError
+        For too many layers or pixels.
+    VolumeError
+        For a scene without a solid, or if it cannot be made printable.
+    Cancelled
+        When the work is cancelled.
     """
     turned = _turned(root, job.up, work)
     planned = plan(turned, job.size / min(job.pixel), work)
@@ -115,7 +167,7 @@ def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
 
 
 def _tops(height: float, layer: float) -> np.ndarray:
-    """As many whole layers as come nearest to the height, at least one."""
+    """Upper faces of the whole number of layers, at least one, that is nearest to the height."""
     count = max(round(height / layer), 1)
     if count > MOST_LAYERS:
         raise SliceError(f"{count} layers: at most {MOST_LAYERS}")
@@ -123,14 +175,14 @@ def _tops(height: float, layer: float) -> np.ndarray:
 
 
 def _rounded(height: float, made: float) -> tuple[str, ...]:
-    """A line if whole layers make the object lower or higher by more than a hundredth, mm."""
+    """A note if whole layers change the height in mm by more than a hundredth."""
     if abs(made - height) <= height / 100:
         return ()
     return (f"whole layers are {made:.4g} mm high, the object {height:.4g} mm; expected lower layers",)
 
 
 def _turned(root: Node, up: tuple[float, float, float], work: Work | None) -> Node:
-    """The scene turned so that `up` points along z, by the shortest way; as deep as it is unturned."""
+    """The scene rotated by the shortest way so that `up` is along z, with the depths of the unrotated one."""
     direction = np.asarray(up, float) / length(np.asarray(up, float))
     axis = np.cross(direction, (0.0, 0.0, 1.0))
     angle = math.degrees(math.atan2(length(axis), float(direction[2])))

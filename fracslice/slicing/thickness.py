@@ -1,4 +1,4 @@
-"""How thick walls are, and how wide gaps, in a layer."""
+"""Thickness of walls and width of gaps in a layer."""
 
 from __future__ import annotations
 
@@ -11,30 +11,41 @@ from ..printing.widths import BINS
 from .runs import Runs
 
 WIDE = float(BINS[-1])
-"""mm: what is at least so wide is measured in coarser pixels where a layer has many."""
+"""mm; in layers with many pixels, greater widths are measured on coarser pixels."""
 
 COARSE, LAYER = 4, 512
-"""Coarse pixels across `WIDE`, and along the layer, at least."""
+"""Minimum numbers of coarse pixels across `WIDE`, and along the layer."""
 
 WINDOW = 1024
-"""Pixels along the side of what is measured at a time, about, what is around it aside."""
+"""Approximate size of the windows that are measured at a time, without their halo, pixels."""
 
 AROUND = 3
-"""Pixels, besides half of `WIDE`: more than the slope of a distance looks at."""
+"""Halo in pixels, besides half of `WIDE`: wider than the stencil of a distance's slope."""
 
 Pair = tuple[float, float]
 Window = tuple[slice, slice]
 
 
 def widths(solid: Runs, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
-    """Walls and gaps along their middle lines, float64 [n, 2]: widths in mm, and how many pixels of those
-    lines have them.
+    """Measure walls and gaps on their medial axes.
 
-    Twice the distance to the outline, where the distance has no slope (Blum 1967, "A transformation for
-    extracting new descriptors of shape"): along the lines that run into right corners it has one of 0.7,
-    and in a corner's last pixel it is lower than beside. The outline lies at half coverage, so a width is
-    right within a pixel. In large layers what is wider than `WIDE` is right within a coarse pixel: so time
-    and memory follow the outline, not the area.
+    A width is twice the distance to the outline where that distance has no slope (Blum 1967, "A
+    transformation for extracting new descriptors of shape"). Axes into right-angled corners are excluded:
+    their slope is 0.7, and in the last pixel of a corner the distance is lower than beside it. The outline
+    lies at half coverage, so widths are accurate to one pixel. In large layers, widths above `WIDE` are
+    accurate to one coarse pixel: time and memory follow the outline, not the area.
+
+    Parameters
+    ----------
+    solid : Runs
+        Solid pixels of a layer.
+    pixel : tuple of float
+        Width and height of a pixel, mm.
+
+    Returns
+    -------
+    walls, gaps : float64 [n, 2]
+        Widths in mm, and the number of pixels of the medial axis at each.
     """
     if not len(solid.begin):
         return np.empty((0, 2)), np.empty((0, 2))
@@ -45,10 +56,10 @@ def widths(solid: Runs, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _measured(solid: Runs, count: np.ndarray, times: int, pixel: Pair, gaps: bool) -> np.ndarray:
-    """Of walls or gaps. count: how many pixels of each coarse one, `times` across, are solid."""
+    """Widths of walls or gaps. count: solid pixels in each coarse one, which is `times` pixels across."""
     coarse, narrow = (pixel[0] * times, pixel[1] * times), np.zeros(count.shape, np.bool_)
     if times > 1:
-        # Through a wall of any tilt either a row or a column is not longer.
+        # Whatever the tilt of a wall, a row or a column through it is at most this long.
         longest = np.ceil(2**0.5 * WIDE / np.array(pixel)).astype(np.int64)
         _narrow(solid.rows, solid.begin, solid.end, solid.width, gaps, times, longest, narrow)
     width, middle = _across((2 * np.pad(count, 2) >= times**2) != gaps, coarse)
@@ -67,7 +78,7 @@ def _measured(solid: Runs, count: np.ndarray, times: int, pixel: Pair, gaps: boo
 
 
 def _windows(chosen: np.ndarray, side: int) -> Iterator[Window]:
-    """Parts of an image, at most so large, that hold all that is chosen."""
+    """Windows of an image, at most `side` pixels along a side, that contain all chosen pixels."""
     for y in range(0, chosen.shape[0], side):
         for x in range(0, chosen.shape[1], side):
             rows, columns = np.nonzero(chosen[y : y + side, x : x + side])
@@ -77,23 +88,23 @@ def _windows(chosen: np.ndarray, side: int) -> Iterator[Window]:
 
 
 def _across(region: np.ndarray, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
-    """How wide a region is at each pixel, if that lies on a middle line, and which ones do."""
+    """Width of a region at each pixel of its medial axis, and a mask of these pixels."""
     from scipy.ndimage import distance_transform_edt, maximum_filter
 
     if region.all():
         return np.zeros(region.shape), np.zeros(region.shape, bool)
     unit = min(pixel)
-    # The nearest pixel's middle is half a pixel beyond the outline.
+    # The centre of the nearest pixel is half a pixel beyond the outline.
     distance = np.maximum(distance_transform_edt(region, sampling=pixel[::-1]) - unit / 2, 0)
     slope = np.hypot(*np.gradient(distance, *pixel[::-1]))
     middle = (slope < 0.6) & region & (distance > maximum_filter(distance, 3) - 0.4 * unit)
-    # Where two pixels are in the middle, the middle lies between them.
+    # Where two pixels are next to the axis, the axis lies between them.
     return 2 * distance + unit * (slope > 0.25), middle
 
 
 @compiled
 def _count(rows, begin, end, times, count):  # type: ignore[no-untyped-def]
-    """How many pixels of each coarse one are in runs."""
+    """Count the pixels of runs in each coarse pixel."""
     for y in range(len(rows) - 1):
         line = count[y // times]
         for r in range(rows[y], rows[y + 1]):
@@ -105,15 +116,15 @@ def _count(rows, begin, end, times, count):  # type: ignore[no-untyped-def]
 
 @compiled
 def _narrow(rows, begin, end, width, gaps, times, longest, narrow):  # type: ignore[no-untyped-def]
-    """Marks coarse pixels in which a row or a column is solid, or is not, for at most `longest` pixels."""
-    since = np.full(width, -longest[1] - 1)  # from which row on a column is as it is
+    """Mark coarse pixels with a row or a column that is solid, or empty, for at most `longest` pixels."""
+    since = np.full(width, -longest[1] - 1)  # row of the last change in each column
     for y in range(len(rows) - 1):
         first, last = rows[y], rows[y + 1]
         for r in range(first, last - gaps):
             low, high = (end[r], begin[r + 1]) if gaps else (begin[r], end[r])
             if high - low <= longest[0]:
                 narrow[y // times, low // times : (high - 1) // times + 1] = True
-        # Where solid begins or ends between the row below and this one: columns from turn to turn.
+        # Columns that change between the row below and this one, by the ends of the runs of both.
         a, b, x, changed = rows[y - 1] if y else first, first, 0, False
         at_a, at_b = False, False
         while True:
@@ -136,7 +147,7 @@ def _narrow(rows, begin, end, width, gaps, times, longest, narrow):  # type: ign
 
 @compiled
 def _paint(rows, begin, end, top, left, image):  # type: ignore[no-untyped-def]
-    """The part of a layer that an image shows, from row `top` and column `left` on."""
+    """Paint the runs of a layer that an image shows, from row `top` and column `left` on."""
     for y in range(max(-top, 0), min(image.shape[0], len(rows) - 1 - top)):
         for r in range(rows[top + y], rows[top + y + 1]):
             image[y, max(begin[r] - left, 0) : max(end[r] - left, 0)] = True
