@@ -25,7 +25,7 @@ TRUSTED = 8
 COARSE = 4
 """Default grid spacing of the first pass, pixels."""
 NEARLY = 0.999
-"""Factor on a mean that rounding cannot lift above the largest of the values."""
+"""Safety factor: a mean times this does not exceed the largest value, despite rounding."""
 
 BAND = 32
 """Rows of a picture per task."""

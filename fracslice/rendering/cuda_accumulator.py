@@ -122,7 +122,7 @@ class CudaAccumulator:
         return self._pixels, int(self._summed(self._loops.choose, *chosen)[0])
 
     def receive(self, pixels: Any, add: Callable[[Any], None]) -> None:
-        """Run a pass and count it; the sums are not restored if it raises."""
+        """Run a pass and add its samples; see `Accumulator.receive`."""
         add(self.sums)
         self.passes += 1
 
