@@ -58,15 +58,14 @@ class Accumulator(Protocol):
         """Select the pixels of the next pass.
 
         The first pass takes a grid, the second the other pixels. Later passes take all pixels with fewer than
-        TRUSTED
-        samples. A pixel with 2^k samples then gets as many again, up to `most`, if two conditions hold:
+        TRUSTED samples. A pixel with 2^k samples then gets as many again, up to `most`, if two conditions
+        hold:
 
         - its error or a neighbour's is above the tolerance;
         - the samples reduce the error of the picture by at least the mean over all unfinished pixels.
 
         Samples thus go where the gain is largest (after Mitchell 1987, "Generating Antialiased Images at Low
-        Sampling
-        Densities"). A net of samples that was begun is completed.
+        Sampling Densities"). A net of samples that was begun is completed.
 
         Parameters
         ----------

@@ -38,8 +38,8 @@ def develop(image: np.ndarray, film: Film, mode: str = "light") -> np.ndarray:
 def bloomed(light: np.ndarray, part: float) -> np.ndarray:
     """Add bloom to an image.
 
-    Light above `BRIGHT` is spread by four Gaussians, from 1/256 to 1/32 of the picture's height wide
-    (Spencer et al. 1995, "Physically-Based Glare Effects for Digital Images", as a sum of Gaussians).
+    Light above `BRIGHT` is spread by four Gaussians of standard deviation 1/256 to 1/32 of the picture's
+    height (Spencer et al. 1995, "Physically-Based Glare Effects for Digital Images", as a sum of Gaussians).
 
     Parameters
     ----------

@@ -1,8 +1,7 @@
 """Kernel generation: scene and view to one kernel that calls only the units in use.
 
 The generated text is straight-line code. Every calculation is in a unit of `fracslice.rendering.units`, bound
-to
-its parameters under a name. Effects that a scene does not use generate no code.
+to its parameters under a name. Effects that a scene does not use generate no code.
 """
 
 from __future__ import annotations

@@ -110,8 +110,7 @@ class Live:
     """Live picture of a scene file, which is read again whenever it is saved.
 
     If a later version of the file is invalid, the picture stays and the message is in `shown.trouble`. Call
-    `close`
-    at the end.
+    `close` at the end.
 
     Parameters
     ----------

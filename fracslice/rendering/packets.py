@@ -3,13 +3,11 @@
 Conventions:
 
 - P holds the scene's parameters, Q the points of the sample sequence, S the distance at which the rays of
-  each
-  block of pixels start, A the sums of the picture.
+  each block of pixels start, A the sums of the picture.
 - W is the workspace of a tile: one row per quantity in `Row`, m numbers each. The t of ray i is
   ``W[Row.t * m + i]``.
 - L holds the packet under way: one row per quantity in `Lane`, WIDTH numbers each. `rays` holds the ray of
-  each
-  lane, -1 for none.
+  each lane, -1 for none.
 
 Packets are refilled: a lane whose ray is done takes the next ray at once, so no lane idles while rays are
 left.

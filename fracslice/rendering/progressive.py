@@ -188,8 +188,7 @@ class Renderer:
         """Restart the picture from another camera; depths and precision are kept.
 
         Suitable for moves that leave the level of detail unchanged; otherwise create a new renderer, which
-        chooses
-        depths and precision again. The eye must be outside the solid.
+        chooses depths and precision again. The eye must be outside the solid.
 
         Parameters
         ----------
@@ -197,8 +196,7 @@ class Renderer:
             The new camera.
         within : float, optional
             Time budget of the first pass, seconds. Its grid is the finest that fits, judged by the rate of
-            earlier
-            passes.
+            earlier passes.
         """
         what = self.setup
         seen = optics(camera, (self.width, self.height), what.roots[-1], what.optics.least)
@@ -242,8 +240,8 @@ class Renderer:
         """Yield the picture after every pass until all pixels have converged.
 
         A pixel is finished when it has `samples` samples or its error is within `tolerance`. The first pass
-        samples
-        one pixel in 16, the second all others; `Accumulator.wanted` chooses the pixels of later passes.
+        samples one pixel in 16, the second all others; `Accumulator.wanted` chooses the pixels of later
+        passes.
 
         Parameters
         ----------

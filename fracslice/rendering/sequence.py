@@ -1,16 +1,13 @@
 """Low-discrepancy samples in sixteen dimensions, Owen-scrambled per pixel and dimension.
 
 A digital (0, 16)-sequence in base 16 (Faure 1982, Niederreiter 1987): dimension d multiplies the digits of
-the index by the powers of Pascal's matrix that belong to an element of GF(16). Each digit is read out as
-bits in an order specific to its dimension. The orders make each pair of dimensions 2k and 2k + 1, which
-places a
+the index by the powers of Pascal's matrix that belong to an element of GF(16). Each digit is read out as bits
+in an order specific to its dimension. The orders make each pair of dimensions 2k and 2k + 1, which places a
 sample on a pixel, a lens or a light, a (0, 2)-sequence in base 2 as well: every 2^m samples are stratified in
-all
-elementary intervals (the idea is that of Ahmed, Pharr, Ostromoukhov and Huang's SZ sequences, 2025). Sobol's
-sequence has this property in its first pair only; its fifth and sixth dimensions have twice the error at 256
-samples. Among the orders with this property, a greedy search chose those for which four dimensions, a pair
-and
-an earlier one, form the best nets of 8 to 512 samples in base 2.
+all elementary intervals (the idea is that of Ahmed, Pharr, Ostromoukhov and Huang's SZ sequences, 2025).
+Sobol's sequence has this property in its first pair only; its fifth and sixth dimensions have twice the error
+at 256 samples. Among the orders with this property, a greedy search chose those for which four dimensions, a
+pair and an earlier one, form the best nets of 8 to 512 samples in base 2.
 
 The hash-based scrambling is that of Laine and Karras 2011, "Stratified Sampling for Stochastic Transparency",
 with the constants of Vegdahl 2021, "Owen Scrambling Based on Dithered Blue Noise Sampling". Burley 2020,
@@ -30,8 +27,7 @@ _DIMENSIONS = (
     (2, (3, 5, 9, 1)), (3, (1, 14, 4, 2)), (4, (7, 9, 2, 1)), (5, (13, 6, 2, 1)),
 )  # fmt: skip
 """Element of GF(16) of each dimension, and its bit masks: output bit k of a digit is the parity of the input
-bits in
-mask k.
+bits in mask k.
 """
 DIMENSIONS = len(_DIMENSIONS)
 

@@ -2,8 +2,7 @@
 
 The field's tree is compiled a second time, with every function returning (f, paint, tone). `paint` is the
 material's number, 0 for none. `tone` is the smallest abs(w) of the orbit (Pickover's and Carlson's orbit
-traps;
-Carlson 1999). The result is evaluated once per hit.
+traps; Carlson 1999). The result is evaluated once per hit.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Camera rays.
 
 px, py: film position in pixels. lens_u, lens_v: random numbers of the lens. corner: direction to the film's
-upper
-left corner. across, down: change of direction per pixel. Results: origin and unit direction.
+upper left corner. across, down: change of direction per pixel. Results: origin and unit direction.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Lights as seen from a point.
 
 x, y, z: the point. u, v: random numbers in [0, 1). A light returns a unit direction, a distance and the
-fraction of
-its strength that arrives.
+fraction of its strength that arrives.
 """
 
 from __future__ import annotations
@@ -33,8 +32,7 @@ def disc(u, v):
     """Map the unit square to the unit disc, uniformly by area.
 
     Neighbours in the square stay neighbours, so fewer samples suffice than with radius and angle (Shirley and
-    Chiu
-    1997, "A Low Distortion Map Between Disk and Square").
+    Chiu 1997, "A Low Distortion Map Between Disk and Square").
 
     Returns
     -------

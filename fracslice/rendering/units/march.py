@@ -40,16 +40,12 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     """Take one step of safe, over-relaxed sphere tracing.
 
     Sphere tracing: Hart 1996, "Sphere Tracing". Over-relaxation: Keinert et al. 2014, "Enhanced Sphere
-    Tracing".
-    ``|f| / L`` is the radius of an empty ball. A step of `relax` radii is kept if the next ball touches the
-    previous
-    one; otherwise the ray returns to the end of the previous ball. A hit is a point nearer to the surface
-    than half a
-    pixel's width.
+    Tracing". ``|f| / L`` is the radius of an empty ball. A step of `relax` radii is kept if the next ball
+    touches the previous one; otherwise the ray returns to the end of the previous ball. A hit is a point
+    nearer to the surface than half a pixel's width.
 
     Inside the solid (side -1), the field of a fractal is no useful bound: a hit is a change of sign, and
-    steps are at
-    least two pixels.
+    steps are at least two pixels.
 
     Parameters
     ----------

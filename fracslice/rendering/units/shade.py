@@ -152,8 +152,7 @@ def goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, chance):
     """Return the continuation of a ray at a transparent or mirroring surface.
 
     A random number chooses between reflection and refraction with Fresnel weights. The normal points to the
-    side of
-    the incoming ray.
+    side of the incoming ray.
 
     Parameters
     ----------
