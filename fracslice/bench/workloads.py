@@ -76,7 +76,5 @@ WORKLOADS = {
     "mandelbulb": Workload(mandelbulb(power=8, iterations=10), 1.2),
     "julia": Workload(julia(c=(-0.2, 0.8, 0, 0), iterations=12), 1.5),
 }
-"""The cubes of the Menger sponges are never aligned with the grid: no measured voxel size divides them, so
-the
-sponges are a hard case.
-"""
+"""No measured voxel size divides the cubes of the Menger sponges, so the sponges are as hard as any other
+solid."""
