@@ -12,7 +12,13 @@ from ..kernel.cuda_stubs import device, divide, kernel, real, thread, whole
 
 @kernel
 def clear(A):
-    """Set the sums of all pixels to zero."""
+    """Set the sums of all pixels to zero.
+
+    Parameters
+    ----------
+    A : array of real, shape (pixels, CHANNELS)
+        Sums of the picture, written.
+    """
     k = thread()
     if k < A.shape[0]:
         for c in range(A.shape[1]):
@@ -177,14 +183,36 @@ def show(A, out, width, coarse, exposure, tone):
 
 @device
 def filmic(c):
-    """Filmic tone curve of `film.filmic`."""
+    """Filmic tone curve of `film.filmic`.
+
+    Parameters
+    ----------
+    c : real
+        Linear light.
+
+    Returns
+    -------
+    real
+        Tone-mapped light.
+    """
     a = c * real(0.6)
     return divide(a * (real(2.51) * a + real(0.03)), a * (real(2.43) * a + real(0.59)) + real(0.14))
 
 
 @device
 def encoded(c):
-    """sRGB encoding of `film.encode`."""
+    """sRGB encoding of `film.encode`.
+
+    Parameters
+    ----------
+    c : real
+        Linear light.
+
+    Returns
+    -------
+    real
+        sRGB in [0, 1].
+    """
     a = minimum(maximum(c, real(0)), real(1))
     if a <= real(0.0031308):
         return a * real(12.92)
@@ -193,7 +221,18 @@ def encoded(c):
 
 @device
 def level(c):
-    """Quantise a value in [0, 1] to 8 bits."""
+    """Quantise to 8 bits.
+
+    Parameters
+    ----------
+    c : real
+        Value, clipped to [0, 1].
+
+    Returns
+    -------
+    int
+        Level of 256.
+    """
     return whole(minimum(maximum(c, real(0)), real(1)) * real(255) + real(0.5))
 
 

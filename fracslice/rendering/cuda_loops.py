@@ -143,7 +143,17 @@ def cones(P, S, blocks, limit, frame):
 
 @device
 def gather(A, a, r, g, b):
-    """Add one sample to a pixel. NaN, infinite and negative light is removed."""
+    """Add one sample to a pixel. NaN, infinite and negative light is removed.
+
+    Parameters
+    ----------
+    A : array of real, shape (pixels, CHANNELS)
+        Sums of the picture, changed in place.
+    a : int
+        Row-major index of the pixel.
+    r, g, b : real
+        Linear light.
+    """
     r = tamed(r)
     g = tamed(g)
     b = tamed(b)
@@ -159,5 +169,16 @@ def gather(A, a, r, g, b):
 
 @device
 def tamed(c):
-    """Clamp light to [0, 1e4]; NaN becomes 0."""
+    """Clamp light to [0, 1e4]; NaN becomes 0.
+
+    Parameters
+    ----------
+    c : real
+        Linear light.
+
+    Returns
+    -------
+    real
+        The clamped value.
+    """
     return minimum(maximum(c, real(0.0)), real(1e4)) if c == c else real(0.0)

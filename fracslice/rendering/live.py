@@ -100,8 +100,7 @@ class Shown:
 
     @property
     def caption(self) -> str:
-        """Samples per pixel and surface distance as text, with the error message of the file if there is
-        one."""
+        """Samples per pixel, surface distance and the file's error message, as text."""
         text = f"{self.done.samples:.1f} samples a pixel, surface at {self.room:.2g}"
         return f"{text}\n{self.trouble}" if self.trouble else text
 

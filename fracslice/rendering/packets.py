@@ -149,19 +149,62 @@ def cones(P, S, ids, W, L, rays, n, m, blocks, limit, frame):
 
 
 def load_vector(W, row, m, i):
-    """Load three consecutive rows for the rays from i on."""
+    """Load three consecutive rows of rays.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace or lanes.
+    row : int
+        First row.
+    m : int
+        Numbers per row.
+    i : int
+        First ray.
+
+    Returns
+    -------
+    tuple of lanes
+        WIDTH numbers of each row.
+    """
     return load(W, row * m + i), load(W, (row + 1) * m + i), load(W, (row + 2) * m + i)
 
 
 def store_vector(W, row, m, i, a, b, c):
-    """Store three consecutive rows for the rays from i on."""
+    """Store three consecutive rows of rays.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace, written.
+    row : int
+        First row.
+    m : int
+        Numbers per row.
+    i : int
+        First ray.
+    a, b, c : lanes
+        WIDTH numbers of each row.
+    """
     store(W, row * m + i, a)
     store(W, (row + 1) * m + i, b)
     store(W, (row + 2) * m + i, c)
 
 
 def draw(W, Q, pixels, A, n, m, width, frame):
-    """Draw all random numbers of the next sample of n pixels. Columns beyond n repeat the last pixel."""
+    """Draw all random numbers of the next sample of n pixels. Columns beyond n repeat the last pixel.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace; rows from `Row.px` on are written.
+    Q, pixels, A : pointer
+        Sample sequence, pixels, sums of the picture.
+    n, m, width : int
+        Pixels, numbers per row of W, picture width.
+    frame : Frame
+        Linked frame.
+    """
     for k in range(m):
         pixel = pixels[min(k, n - 1)]
         q = frame.samples * int(A[CHANNELS * ((pixel >> 16) * width + (pixel & 65535)) + 5])
@@ -172,8 +215,21 @@ def draw(W, Q, pixels, A, n, m, width, frame):
 
 
 def begin(W, m, P, frame):
-    """Create the camera rays through the film points (px, py); each starts where it enters the scene's
-    box."""
+    """Create the camera rays of a tile.
+
+    Each ray passes through its film point (px, py) and starts where it enters the scene's box.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace, written.
+    m : int
+        Numbers per row of W.
+    P : pointer to float
+        Scene parameters.
+    frame : Frame
+        Linked frame.
+    """
     for i in range(0, m, WIDTH):
         u, v = (0.0, 0.0) if frame.sharp else (load(W, (Row.px + 2) * m + i), load(W, (Row.px + 3) * m + i))
         px, py = load(W, Row.px * m + i), load(W, Row.py * m + i)
@@ -195,6 +251,19 @@ def follow(W, L, rays, n, m, limit, P, step):
 
     A ray has missed once its free distance exceeds its end; an over-relaxed step beyond the end does not
     count.
+
+    Parameters
+    ----------
+    W, L, rays : pointer
+        Workspace, lanes, ray of each lane.
+    n, m : int
+        Rays, and numbers per row of W.
+    limit : int
+        Steps per ray.
+    P : pointer to float
+        Scene parameters.
+    step : callable
+        `step_ray` or `step_cone`.
     """
     for lane in range(WIDTH):
         rays[lane] = -1
@@ -223,6 +292,13 @@ def follow(W, L, rays, n, m, limit, P, step):
 def finish(W, L, rays, m, lane):
     """Write the result of a lane's ray.
 
+    Parameters
+    ----------
+    W, L, rays : pointer
+        Workspace, lanes, ray of each lane.
+    m, lane : int
+        Numbers per row of W, and the lane.
+
     Returns
     -------
     int
@@ -238,12 +314,19 @@ def finish(W, L, rays, m, lane):
 
 
 def skip_missed(W, m, n, i):
-    """Mark rays with an empty interval as missed.
+    """Mark rays with an empty interval as missed, from ray i on.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace.
+    m, n, i : int
+        Numbers per row of W, rays, first ray.
 
     Returns
     -------
     int
-        Index of the first ray from i on to march, or n.
+        Index of the first ray to march, or n.
     """
     while i < n and W[Row.start * m + i] >= W[Row.end * m + i]:
         W[Row.status * m + i] = 2.0
@@ -254,7 +337,15 @@ def skip_missed(W, m, n, i):
 
 
 def take(W, L, rays, m, lane, i):
-    """Load ray i into a lane."""
+    """Load a ray into a lane.
+
+    Parameters
+    ----------
+    W, L, rays : pointer
+        Workspace, lanes, ray of each lane.
+    m, lane, i : int
+        Numbers per row of W, the lane, the ray.
+    """
     for k in range(Row.path + 1):
         L[k * WIDTH + lane] = W[k * m + i]
     L[Lane.t * WIDTH + lane] = W[Row.start * m + i]
@@ -262,7 +353,15 @@ def take(W, L, rays, m, lane, i):
 
 
 def idle(L, rays, lane):
-    """Park a lane without a ray far from the scene."""
+    """Park a lane without a ray far from the scene.
+
+    Parameters
+    ----------
+    L, rays : pointer
+        Lanes, ray of each lane.
+    lane : int
+        The lane.
+    """
     for k in range(Lane.dz + 1):
         L[k * WIDTH + lane] = 1e4
     L[Lane.end * WIDTH + lane] = 1e30
@@ -273,7 +372,19 @@ def idle(L, rays, lane):
 
 
 def march(L, limit, P, step):
-    """Step all lanes until at least one is done."""
+    """Step all lanes until at least one is done.
+
+    Parameters
+    ----------
+    L : pointer to float
+        Lanes.
+    limit : int
+        Steps per ray.
+    P : pointer to float
+        Scene parameters.
+    step : callable
+        `step_ray` or `step_cone`.
+    """
     ox, oy, oz = load_vector(L, Lane.ox, WIDTH, 0)
     dx, dy, dz = load_vector(L, Lane.dx, WIDTH, 0)
     end = load(L, Lane.end * WIDTH)
@@ -298,7 +409,21 @@ def march(L, limit, P, step):
 
 
 def shade(W, m, first, P, frame):
-    """Add the light of every ray, and replace each ray by its continuation."""
+    """Add the light of every ray, and replace each ray by its continuation.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace.
+    m : int
+        Numbers per row of W.
+    first : int
+        Row of the bounce's first random number.
+    P : pointer to float
+        Scene parameters.
+    frame : Frame
+        Linked frame.
+    """
     for i in range(0, m, WIDTH):
         status = load(W, Row.status * m + i)
         dx, dy, dz = load_vector(W, Row.dx, m, i)
@@ -347,7 +472,17 @@ def shade(W, m, first, P, frame):
 
 
 def gather(W, pixels, A, n, m, width):
-    """Add one sample to each of n pixels. NaN, infinite and negative light is removed."""
+    """Add one sample to each of n pixels. NaN, infinite and negative light is removed.
+
+    Parameters
+    ----------
+    W, pixels : pointer
+        Workspace and pixels.
+    A : pointer to float
+        Sums of the picture, changed in place.
+    n, m, width : int
+        Pixels, numbers per row of W, picture width.
+    """
     for k in range(n):
         pixel = pixels[k]
         a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
@@ -365,5 +500,16 @@ def gather(W, pixels, A, n, m, width):
 
 
 def tamed(c):
-    """Clamp light to [0, 1e4]; NaN becomes 0."""
+    """Clamp light to [0, 1e4]; NaN becomes 0.
+
+    Parameters
+    ----------
+    c : float
+        Linear light.
+
+    Returns
+    -------
+    float
+        The clamped value.
+    """
     return min(max(c, 0.0), 1e4) if c == c else 0.0

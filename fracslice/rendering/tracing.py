@@ -111,7 +111,22 @@ class TraceDialect(FieldDialect):
         return super().write(name, node, given, runs)
 
     def painted(self, name: str, given: Arguments, child: Run) -> str:
-        """Write the function of a material: its paint applies where the child has none."""
+        """Write the function of a material: its paint applies where the child has none.
+
+        Parameters
+        ----------
+        name : str
+            Function name.
+        given : Arguments
+            The paint of the material.
+        child : Run
+            Call of the child.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
         return function(
             name,
             [
@@ -121,7 +136,20 @@ class TraceDialect(FieldDialect):
         )
 
     def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
-        """Write the function of a shape: the field value and the orbit trap."""
+        """Write the function of a shape: the field value and the orbit trap.
+
+        Parameters
+        ----------
+        name : str
+            Function name.
+        given : Arguments
+            Function and arguments of the shape.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
         tree = _KeepsNearest().visit(source.specialised(given.function, dict(given.fixed)))
         tree.body.insert(0, ast.parse("nearest = 0.0 * x + 1e30").body[0])
         called = f"{name}_of"
@@ -135,7 +163,22 @@ class TraceDialect(FieldDialect):
         )
 
     def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
-        """Write the function of a CSG operator: paint and tone of the child that determines the value."""
+        """Write the function of a CSG operator: paint and tone of the child that determines the value.
+
+        Parameters
+        ----------
+        name : str
+            Function name.
+        given : Arguments
+            Function and arguments of the operator.
+        runs : sequence of Run
+            Calls of the children.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
         called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
         lines = [f"f, paint, tone = {runs[0].call()}"]
         if sum(run.count for run in runs) == 1:
@@ -152,7 +195,22 @@ class TraceDialect(FieldDialect):
 
     def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
         """Write the function of a domain operator: paint and tone of the child evaluation with the lowest
-        value."""
+        value.
+
+        Parameters
+        ----------
+        name : str
+            Function name.
+        given : Arguments
+            Function and arguments of the operator.
+        runs : sequence of Run
+            Call of the child.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
         tree = source.specialised(given.function, dict(given.fixed))
         arguments = [a.arg for a in tree.args.args][4:]
         tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]

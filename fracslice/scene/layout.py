@@ -65,13 +65,40 @@ class Version:
     expects: str = "1"
 
     def read(self, text: str) -> int:
-        """Parse the attribute. Raises `ValueError` for another version."""
+        """Parse the attribute.
+
+        Parameters
+        ----------
+        text : str
+            Text of the attribute.
+
+        Returns
+        -------
+        int
+            The version.
+
+        Raises
+        ------
+        ValueError
+            If the version is unknown.
+        """
         if text.strip() != self.expects:
             raise ValueError(self.expects)
         return VERSION
 
     def text(self, value: int) -> str:
-        """Format the attribute."""
+        """Format the attribute.
+
+        Parameters
+        ----------
+        value : int
+            The version.
+
+        Returns
+        -------
+        str
+            Text of the attribute.
+        """
         return str(value)
 
 

@@ -114,7 +114,18 @@ class Length:
         return self.read(value) if isinstance(value, str) else self._possible(value)
 
     def text(self, value: float) -> str:
-        """Format a length in mm."""
+        """Format a length.
+
+        Parameters
+        ----------
+        value : float
+            Length, mm.
+
+        Returns
+        -------
+        str
+            Text with the unit mm.
+        """
         return f"{int(value) if value.is_integer() else value!r}mm"
 
     def _possible(self, value: Any) -> float:

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 
 def reversed_bits(a):
-    """Reverse the bits of a 32-bit integer."""
+    """Reverse the bits of a 32-bit integer.
+
+    Parameters
+    ----------
+    a : int
+        The integer.
+
+    Returns
+    -------
+    int
+        The reversed integer.
+    """
     a = ((a >> 1) & 0x55555555) | ((a & 0x55555555) << 1)
     a = ((a >> 2) & 0x33333333) | ((a & 0x33333333) << 2)
     a = ((a >> 4) & 0x0F0F0F0F) | ((a & 0x0F0F0F0F) << 4)
@@ -13,15 +24,37 @@ def reversed_bits(a):
 
 
 def hashed(a):
-    """32-bit integer hash (Wellons 2018, lowbias32)."""
+    """Hash a 32-bit integer (Wellons 2018, lowbias32).
+
+    Parameters
+    ----------
+    a : int
+        The integer.
+
+    Returns
+    -------
+    int
+        32-bit hash.
+    """
     a = ((a ^ (a >> 16)) * 0x7FEB352D) & 0xFFFFFFFF
     a = ((a ^ (a >> 15)) * 0x846CA68B) & 0xFFFFFFFF
     return a ^ (a >> 16)
 
 
 def scrambled(a, seed):
-    """Owen-scramble a number whose bits are reversed; the result has its bits in order. See
-    `fracslice.rendering.sequence`.
+    """Owen-scramble a 32-bit fraction; see `fracslice.rendering.sequence`.
+
+    Parameters
+    ----------
+    a : int
+        Fraction, bits reversed.
+    seed : int
+        32-bit seed.
+
+    Returns
+    -------
+    int
+        Scrambled fraction, bits in order.
     """
     a = (a ^ (a * 0x3D20ADEA)) & 0xFFFFFFFF
     a = (a + seed) & 0xFFFFFFFF
@@ -54,6 +87,15 @@ def sample(a, pixel, dimension):
 
 def centred(a, pixel, dimension):
     """Like `sample`, digitally shifted so that the first point of the sequence is 1/2, the pixel's centre.
+
+    Parameters
+    ----------
+    a : int
+        Coordinate, bits reversed.
+    pixel : int
+        Pixel, ``y << 16 | x``.
+    dimension : int
+        Dimension of the coordinate.
 
     Returns
     -------

@@ -58,7 +58,20 @@ def occlusion(x, y, z, nx, ny, nz, P, strength, reach):
 
 
 def fog(t, density):
-    """Transmittance of fog over a distance t (Beer-Lambert law)."""
+    """Transmittance of fog (Beer-Lambert law).
+
+    Parameters
+    ----------
+    t : float
+        Distance, scene units.
+    density : float
+        Extinction per scene unit.
+
+    Returns
+    -------
+    float
+        Fraction of the light that passes.
+    """
     return exp(-density * t)
 
 
@@ -105,8 +118,20 @@ def mirrored(dx, dy, dz, nx, ny, nz):
 
 
 def fresnel(cosine, least):
-    """Reflectance at an angle of incidence: `least` at normal incidence, 1 at grazing incidence (Schlick
-    1994)."""
+    """Reflectance at an angle of incidence (Schlick 1994).
+
+    Parameters
+    ----------
+    cosine : float
+        Cosine of the angle of incidence.
+    least : float
+        Reflectance at normal incidence; at grazing incidence it is 1.
+
+    Returns
+    -------
+    float
+        Reflectance.
+    """
     a = 1.0 - minimum(maximum(cosine, 0.0), 1.0)
     a2 = a * a
     return least + (1.0 - least) * a2 * a2 * a
