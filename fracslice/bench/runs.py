@@ -209,8 +209,10 @@ def _child(asked: dict[str, Any], work: Work) -> dict[str, float]:
 
 
 def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
-    """Run a peer and measure its mesh. Time and memory are those of its process, unless it reports its
-    own."""
+    """Run a peer and measure its mesh.
+
+    Time and memory are those of its process, unless it reports its own.
+    """
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder:
         path = Path(folder) / "mesh.ply"
         places = {"workload": about["workload"], "resolution": about["resolution"], "output": path}

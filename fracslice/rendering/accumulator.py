@@ -377,8 +377,10 @@ class HostAccumulator:
 
 
 def _small(stored: NpzFile, name: str, most: int = 0) -> np.ndarray:
-    """Load an array from a file; refuse more than `most` bytes, since a small file can expand to a large
-    array."""
+    """Load an array of at most `most` bytes from a file.
+
+    A small file can expand to a large array.
+    """
     assert stored.zip
     if stored.zip.getinfo(f"{name}.npy").file_size > most + HEADER:
         raise ValueError(name)

@@ -264,8 +264,9 @@ class Live:
         return self._pass()
 
     def _look(self, camera: Camera) -> None:
-        """Restart the picture from a camera; make a new renderer if the distance of the surface has changed
-        much.
+        """Restart the picture from a camera.
+
+        A new renderer is made if the distance to the surface has changed much.
         """
         what = self._renderer.setup
         room = clearance(what.roots[-1], camera)
@@ -297,8 +298,10 @@ class Live:
         return found.st_mtime_ns, found.st_size
 
     def _follow_file(self) -> None:
-        """Load a new version of the file. Its camera is used only if it differs from the previous
-        version's."""
+        """Load a new version of the file.
+
+        Its camera is used only if it differs from the previous version's.
+        """
         now, saved = time.monotonic(), self._saved
         if now - self._looked < AGAIN:
             return

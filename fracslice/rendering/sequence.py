@@ -57,8 +57,10 @@ def points(count: int, dimensions: int) -> np.ndarray:
 
 @lru_cache(maxsize=DIMENSIONS)
 def _columns(dimension: int) -> list[int]:
-    """Generator matrix of a dimension: the bits that each index bit toggles, the first fractional bit
-    lowest."""
+    """Generator matrix of a dimension.
+
+    Column k holds the bits that index bit k toggles, the first fractional bit lowest.
+    """
     element, reads = _DIMENSIONS[dimension]
     columns = []
     for bit in range(32):

@@ -194,8 +194,7 @@ class TraceDialect(FieldDialect):
         return function(name, [*lines, "return f, paint, tone"])
 
     def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
-        """Write the function of a domain operator: paint and tone of the child evaluation with the lowest
-        value.
+        """Write the function of a domain operator: paint and tone of the child's lowest evaluation.
 
         Parameters
         ----------
@@ -237,8 +236,10 @@ class _KeepsNearest(ast.NodeTransformer):
 
 
 class _KeepsChild(ast.NodeTransformer):
-    """Evaluate the child's triple before each statement that calls the child; keep the triple of lowest
-    value."""
+    """Evaluate the child's triple before each statement that calls the child.
+
+    The triple of lowest value is kept.
+    """
 
     def __init__(self, child: Run) -> None:
         self.child = child

@@ -52,8 +52,9 @@ class Scene:
 
     @cached_property
     def hash(self) -> str:
-        """First 12 hexadecimal digits of the SHA-256 of the canonical XML. Equal scenes have equal hashes on
-        every platform.
+        """First 12 hexadecimal digits of the SHA-256 of the canonical XML.
+
+        Equal scenes have equal hashes on every platform.
         """
         from .writer import to_xml
 
@@ -129,8 +130,9 @@ def scene(
 
 
 def _refuse_impossible(root: Node) -> None:
-    """Compute bounds and arguments of all nodes from the leaves up, so that errors of the tree as a whole are
-    raised now.
+    """Compute bounds and arguments of all nodes, from the leaves up.
+
+    Errors of the tree as a whole thus surface at construction.
     """
     for node in reversed(list(root.walk())):
         with computing(node.fail):
