@@ -1,8 +1,4 @@
-"""Camera rays.
-
-px, py: film position in pixels. lens_u, lens_v: random numbers of the lens. corner: direction to the film's
-upper left corner. across, down: change of direction per pixel. Results: origin and unit direction.
-"""
+"""Camera rays."""
 
 from __future__ import annotations
 
@@ -12,6 +8,19 @@ from .normal import normalised
 
 def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):
     """Return the ray of a pinhole camera through a film position.
+
+    Parameters
+    ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers in [0, 1) for the lens.
+    eye : tuple of float
+        Position of the camera.
+    corner : tuple of float
+        Direction to the film's upper left corner.
+    across, down : tuple of float
+        Change of direction per pixel, to the right and down.
 
     Returns
     -------
@@ -34,6 +43,16 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
 
     Parameters
     ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers in [0, 1) for the lens.
+    eye : tuple of float
+        Position of the camera.
+    corner : tuple of float
+        Direction to the film's upper left corner.
+    across, down : tuple of float
+        Change of direction per pixel, to the right and down.
     right, up : tuple of float
         Half axes of the lens.
     focus : float

@@ -1,9 +1,4 @@
-"""Intrinsics of the render units and loops, functions of the scene that the linker writes.
-
-P: scene parameters. ox, oy, oz, dx, dy, dz: origin and unit direction of a ray. t: distance along the ray.
-before, stride: radius of the previous empty ball, and step taken from its centre. side: -1 inside the solid.
-path: length of the path before the ray.
-"""
+"""Intrinsics of the render units and loops: functions of the scene that the linker writes."""
 
 from __future__ import annotations
 
@@ -19,6 +14,15 @@ GIVEN = frozenset({"field"})
 def camera_ray(px, py, lens_u, lens_v, P):
     """Return the ray through a point of the film and a point of the lens.
 
+    Parameters
+    ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers in [0, 1) for the lens.
+    P : array of float
+        Scene parameters.
+
     Returns
     -------
     ox, oy, oz, dx, dy, dz : float
@@ -30,6 +34,13 @@ def camera_ray(px, py, lens_u, lens_v, P):
 @intrinsic
 def span_box(ox, oy, oz, dx, dy, dz, P):
     """Return the interval of a ray in the scene's box.
+
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    P : array of float
+        Scene parameters.
 
     Returns
     -------
@@ -43,6 +54,19 @@ def span_box(ox, oy, oz, dx, dy, dz, P):
 def step_ray(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
     """Take one step along a ray: `march.advance` with the scene's parameters.
 
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    t, before, stride : float
+        Distance along the ray, radius of the previous ball, step taken from its centre.
+    side : float
+        -1 inside the solid, 1 outside.
+    path : float
+        Length of the path before this ray.
+    P : array of float
+        Scene parameters.
+
     Returns
     -------
     t, before, stride, gap : float
@@ -54,6 +78,19 @@ def step_ray(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
 @intrinsic
 def step_cone(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
     """Take one step along a cone: `march.widen` with the scene's parameters.
+
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    t, before, stride : float
+        Distance along the ray, radius of the previous ball, step taken from its centre.
+    side : float
+        -1 inside the solid, 1 outside.
+    path : float
+        Length of the path before this ray.
+    P : array of float
+        Scene parameters.
 
     Returns
     -------
@@ -71,10 +108,20 @@ def surface(x, y, z, dx, dy, dz, t, path, steps, side, u, P):
     ----------
     x, y, z : float
         Surface point.
+    dx, dy, dz : float
+        Unit direction of the ray.
+    t : float
+        Distance along the ray.
+    path : float
+        Length of the path before this ray.
     steps : float
         Steps of the ray.
+    side : float
+        -1 inside the solid, 1 outside.
     u : tuple of float
         Random numbers in [0, 1).
+    P : array of float
+        Scene parameters.
 
     Returns
     -------
@@ -90,6 +137,13 @@ def surface(x, y, z, dx, dy, dz, t, path, steps, side, u, P):
 @intrinsic
 def background(dx, dy, dz, P):
     """Return the light of a ray that misses the scene.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    P : array of float
+        Scene parameters.
 
     Returns
     -------

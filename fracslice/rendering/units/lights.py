@@ -1,8 +1,4 @@
-"""Lights as seen from a point.
-
-x, y, z: the point. u, v: random numbers in [0, 1). A light returns a unit direction, a distance and the
-fraction of its strength that arrives.
-"""
+"""Lights, as seen from a point."""
 
 from __future__ import annotations
 
@@ -16,6 +12,11 @@ def frame(x, y, z):
     """Return two unit vectors orthogonal to a unit vector and to each other.
 
     Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
+
+    Parameters
+    ----------
+    x, y, z : float
+        The unit vector.
 
     Returns
     -------
@@ -33,6 +34,11 @@ def disc(u, v):
 
     Neighbours in the square stay neighbours, so fewer samples suffice than with radius and angle (Shirley and
     Chiu 1997, "A Low Distortion Map Between Disk and Square").
+
+    Parameters
+    ----------
+    u, v : float
+        Random numbers in [0, 1).
 
     Returns
     -------
@@ -55,6 +61,10 @@ def sun(x, y, z, u, v, towards, spread, far):
 
     Parameters
     ----------
+    x, y, z : float
+        Surface point.
+    u, v : float
+        Random numbers in [0, 1).
     towards : tuple of float
         Unit direction to its centre.
     spread : float
@@ -80,6 +90,17 @@ def sun(x, y, z, u, v, towards, spread, far):
 def sharp_sun(x, y, z, u, v, towards, far):
     """Sample a point-like sun, which casts sharp shadows.
 
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    u, v : float
+        Random numbers in [0, 1).
+    towards : tuple of float
+        Unit direction to the sun.
+    far : float
+        Distance of the light.
+
     Returns
     -------
     dx, dy, dz, distance, strength : float
@@ -92,6 +113,17 @@ def sharp_sun(x, y, z, u, v, towards, far):
 
 def lamp(x, y, z, u, v, position, radius):
     """Sample a spherical lamp. Strength is that at distance 1 and falls with the squared distance.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    u, v : float
+        Random numbers in [0, 1).
+    position : tuple of float
+        Centre of the lamp.
+    radius : float
+        Radius of the lamp.
 
     Returns
     -------
@@ -112,6 +144,15 @@ def lamp(x, y, z, u, v, position, radius):
 def sharp_lamp(x, y, z, u, v, position):
     """Sample a point lamp, which casts sharp shadows.
 
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    u, v : float
+        Random numbers in [0, 1).
+    position : tuple of float
+        Centre of the lamp.
+
     Returns
     -------
     dx, dy, dz, distance, strength : float
@@ -129,6 +170,13 @@ def sharp_lamp(x, y, z, u, v, position):
 def upward(nx, ny, nz, u, v):
     """Sample a direction about a normal with cosine-weighted density (Malley's method).
 
+    Parameters
+    ----------
+    nx, ny, nz : float
+        Unit normal.
+    u, v : float
+        Random numbers in [0, 1).
+
     Returns
     -------
     dx, dy, dz : float
@@ -144,6 +192,13 @@ def sky(dx, dy, dz, zenith, horizon, ground):
     """Return the sky's colour in a direction.
 
     The colour is interpolated from the horizon to the zenith above and to the ground below.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction.
+    zenith, horizon, ground : tuple of float
+        Linear colours.
 
     Returns
     -------

@@ -1,8 +1,4 @@
-"""Sphere tracing along rays and cones.
-
-ox, oy, oz, dx, dy, dz: origin and unit direction. P: scene parameters. steepness: 1 / L of the field, L its
-Lipschitz bound.
-"""
+"""Sphere tracing along rays and cones."""
 
 from __future__ import annotations
 
@@ -14,6 +10,13 @@ def span(ox, oy, oz, dx, dy, dz, lo, hi):
     """Return the interval of a ray in a box by the slab method (Kay and Kajiya 1986).
 
     Components of the direction are kept away from zero: 1e-9 bends a ray by less than any pixel.
+
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    lo, hi : tuple of float
+        Lower and upper corner of the box.
 
     Returns
     -------
@@ -49,12 +52,18 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
 
     Parameters
     ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
     t, before, stride : float
         Distance along the ray, radius of the previous ball, step taken from its centre.
     side : float
         -1 inside the solid, 1 outside.
     path : float
         Length of the path before this ray.
+    P : array of float
+        Scene parameters.
+    steepness : float
+        Reciprocal of the field's Lipschitz bound.
     relax : float
         Over-relaxation factor.
     cone, least : float
@@ -90,6 +99,18 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, s
 
     Parameters
     ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    t, before, stride : float
+        Distance along the ray, radius of the previous ball, step taken from its centre.
+    side : float
+        -1 inside the solid, 1 outside.
+    path : float
+        Length of the path before this ray.
+    P : array of float
+        Scene parameters.
+    steepness : float
+        Reciprocal of the field's Lipschitz bound.
     spread : float
         Half width of the cone at distance 1.
 
@@ -111,10 +132,18 @@ def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
 
     Parameters
     ----------
+    x, y, z : float
+        Start of the ray.
+    dx, dy, dz : float
+        Unit direction to the light.
     far : float
         Distance of the light.
     least : float
         Clearance below which the ray is blocked.
+    P : array of float
+        Scene parameters.
+    steepness : float
+        Reciprocal of the field's Lipschitz bound.
     patience : int
         Maximum steps.
 

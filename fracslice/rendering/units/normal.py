@@ -9,6 +9,11 @@ from .intrinsics import field
 def normalised(x, y, z):
     """Normalise a vector; the zero vector stays zero.
 
+    Parameters
+    ----------
+    x, y, z : float
+        The vector.
+
     Returns
     -------
     x, y, z : float
@@ -23,8 +28,12 @@ def normal(x, y, z, h, P):
 
     Parameters
     ----------
+    x, y, z : float
+        Surface point.
     h : float
         Half edge of the cube that contains the corners.
+    P : array of float
+        Scene parameters.
 
     Returns
     -------

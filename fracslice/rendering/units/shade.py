@@ -37,6 +37,12 @@ def occlusion(x, y, z, nx, ny, nz, P, strength, reach):
 
     Parameters
     ----------
+    x, y, z : float
+        Surface point.
+    nx, ny, nz : float
+        Unit normal.
+    P : array of float
+        Scene parameters.
     strength : float
         Factor on the occlusion.
     reach : float
@@ -82,6 +88,8 @@ def palette(tone, P, stops, count):
     ----------
     tone : float
         Position in [0, 1].
+    P : array of float
+        Scene parameters.
     stops : tuple of float
         Red, green and blue of each stop.
     count : int
@@ -107,6 +115,13 @@ def palette(tone, P, stops, count):
 
 def mirrored(dx, dy, dz, nx, ny, nz):
     """Return the direction of reflection.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    nx, ny, nz : float
+        Unit normal.
 
     Returns
     -------
@@ -142,6 +157,10 @@ def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):
 
     Parameters
     ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    nx, ny, nz : float
+        Unit normal.
     cosine : float
         Cosine of the angle between the normal and the reversed ray.
     ratio : float
@@ -162,6 +181,15 @@ def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):
 def reflects(dx, dy, dz, nx, ny, nz, reflect):
     """Return the reflectance of a mirror and the direction of reflection.
 
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    nx, ny, nz : float
+        Unit normal.
+    reflect : float
+        Reflectance at normal incidence.
+
     Returns
     -------
     part, x, y, z : float
@@ -181,6 +209,8 @@ def goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, chance):
 
     Parameters
     ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
     nx, ny, nz : float
         Unit normal.
     side : float
