@@ -1,1 +1,1 @@
-"""Run time against error, ours and other programs', measured on the user's own machine."""
+"""Benchmarks of run time against error, for fracslice and other programs on the user's machine."""

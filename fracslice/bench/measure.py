@@ -1,6 +1,6 @@
-"""One measurement in a process of its own: ``python -m fracslice.bench.measure``, JSON in, JSON out.
+"""One measurement in its own process: ``python -m fracslice.bench.measure``, JSON in, JSON out.
 
-What it reads: {"workload", "resolution"} and {"method"}, or {"mesh"}: the file a peer wrote.
+Input: {"workload", "resolution"} and either {"method", "threads"}, or {"mesh"}, the file written by a peer.
 """
 
 from __future__ import annotations
@@ -20,11 +20,28 @@ from .workloads import WORKLOADS, Workload
 
 SAMPLES = 50_000
 WARM = 24
-"""The resolution at which everything is done once before it is measured."""
+"""Resolution of the warm-up run."""
 
 
 def measured(method: str, what: Workload, resolution: int, work: Work) -> dict[str, Any]:
-    """Time, memory and errors of one of our methods, warm."""
+    """Measure time, memory and errors of a method after a warm-up run.
+
+    Parameters
+    ----------
+    method : str
+        Name in `METHODS`.
+    what : Workload
+        The solid.
+    resolution : int
+        Voxels along the cube.
+    work : Work
+        Threads.
+
+    Returns
+    -------
+    dict
+        wall_s, cpu_s (seconds), peak_mb, evaluations, kept (samples), and the figures of `errors`.
+    """
     from .methods import METHODS
 
     make = METHODS[method]
@@ -38,10 +55,22 @@ def measured(method: str, what: Workload, resolution: int, work: Work) -> dict[s
 
 
 def errors(mesh: Mesh, what: Workload, resolution: int) -> dict[str, Any]:
-    """How far a mesh is from its solid.
+    """Measure the errors of a mesh.
 
-    error_voxels: the mean distance to the zero set, |f| / |grad f|, at points spread evenly over the surface;
-    volume and area: relative errors, where the truth is known.
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh in scene units.
+    what : Workload
+        The exact solid.
+    resolution : int
+        Voxels along the cube.
+
+    Returns
+    -------
+    dict
+        triangles: their number. error_voxels: the mean distance to the zero set, ``|f| / |grad f|``, at
+        points spread evenly over the surface. volume, area: relative errors, if the exact values are known.
     """
     voxel = what.voxel(resolution)
     off = surface_error(what.root, spread(mesh, SAMPLES), voxel) / voxel
@@ -52,7 +81,20 @@ def errors(mesh: Mesh, what: Workload, resolution: int) -> dict[str, Any]:
 
 
 def spread(mesh: Mesh, count: int) -> np.ndarray:
-    """Points on the surface, float64 [count, 3], evenly by area, the same ones each time."""
+    """Sample points on a surface, uniformly by area and deterministically.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    count : int
+        Number of points.
+
+    Returns
+    -------
+    ndarray of float64, shape (count, 3)
+        The points.
+    """
     rng, ends = np.random.default_rng(1), np.cumsum(np.linalg.norm(mesh.normals, axis=1))
     triangles = np.minimum(np.searchsorted(ends, rng.random(count) * ends[-1]), len(ends) - 1)
     a, b, c = (mesh.vertices[mesh.triangles[triangles, k]] for k in range(3))
@@ -62,6 +104,7 @@ def spread(mesh: Mesh, count: int) -> np.ndarray:
 
 
 def main() -> None:
+    """Read a task from standard input, measure it, and write the figures to standard output."""
     asked = json.load(sys.stdin)
     what, resolution = WORKLOADS[asked["workload"]], asked["resolution"]
     if "mesh" in asked:

@@ -1,4 +1,4 @@
-"""The ways to a mesh that are compared."""
+"""Meshing methods that are compared."""
 
 from __future__ import annotations
 
@@ -14,35 +14,95 @@ from ..work import Work
 from .workloads import Workload
 
 SIMPLIFY = 0.1
-"""The tolerance of the simplified mesh, in voxels."""
+"""Simplification tolerance, voxels."""
 
 Made = tuple[Mesh, int, int]
-"""A mesh in scene units, how often the field was evaluated, and how many samples were kept."""
+"""Mesh in scene units, field evaluations, samples kept."""
 
 
 def plain(what: Workload, resolution: int, work: Work) -> Made:
-    """Sparse float32 samples and marching cubes."""
+    """Sparse float32 samples and marching cubes.
+
+    Parameters
+    ----------
+    what : Workload
+        The solid.
+    resolution : int
+        Voxels along the cube.
+    work : Work
+        Threads.
+
+    Returns
+    -------
+    Made
+        Mesh, evaluations, samples.
+    """
     kernel = what.root.kernel()
     bricks = sample(kernel, what.root.bounds, what.lattice(resolution), work)
     return extract(bricks, work.threads), bricks.evaluations, bricks.values.size
 
 
 def exact(what: Workload, resolution: int, work: Work) -> Made:
-    """Sparse float32 samples; vertices on roots of the float64 field, whose evaluations are not told."""
+    """Sparse float32 samples, with vertices on roots of the float64 field.
+
+    Parameters
+    ----------
+    what : Workload
+        The solid.
+    resolution : int
+        Voxels along the cube.
+    work : Work
+        Threads.
+
+    Returns
+    -------
+    Made
+        Mesh, evaluations, samples. Evaluations of the float64 field are not counted.
+    """
     kernel = what.root.kernel()
     bricks = sample(kernel, what.root.bounds, what.lattice(resolution), work)
     return contour(what.root, bricks, work), bricks.evaluations, bricks.values.size
 
 
 def simplified(what: Workload, resolution: int, work: Work) -> Made:
-    """The exact contour, simplified."""
+    """The mesh of `exact`, simplified.
+
+    Parameters
+    ----------
+    what : Workload
+        The solid.
+    resolution : int
+        Voxels along the cube.
+    work : Work
+        Threads.
+
+    Returns
+    -------
+    Made
+        Mesh, evaluations, samples.
+    """
     mesh, evaluations, kept = exact(what, resolution, work)
     fewer, _ = simplify(mesh, SIMPLIFY * what.voxel(resolution), work)
     return fewer, evaluations, kept
 
 
 def dense(what: Workload, resolution: int, work: Work) -> Made:
-    """Every point of the cube by our kernel, then scikit-image's marching cubes."""
+    """Dense samples by our kernel and scikit-image's marching cubes.
+
+    Parameters
+    ----------
+    what : Workload
+        The solid.
+    resolution : int
+        Voxels along the cube.
+    work : Work
+        Threads.
+
+    Returns
+    -------
+    Made
+        Mesh, evaluations, samples.
+    """
     from skimage.measure import marching_cubes
 
     values, spacing = grid(what, resolution, work), (what.voxel(resolution),) * 3
@@ -52,7 +112,22 @@ def dense(what: Workload, resolution: int, work: Work) -> Made:
 
 
 def grid(what: Workload, resolution: int, work: Work) -> np.ndarray:
-    """The field at every point of the cube, float32 [resolution + 1] * 3, by axes x, y, z."""
+    """Sample the field at every grid point of the cube.
+
+    Parameters
+    ----------
+    what : Workload
+        The solid.
+    resolution : int
+        Voxels along the cube.
+    work : Work
+        Threads.
+
+    Returns
+    -------
+    ndarray of float32, shape (resolution + 1, resolution + 1, resolution + 1)
+        Field values by x, y, z.
+    """
     kernel, axis = what.root.kernel(), np.linspace(-what.half, what.half, resolution + 1)
     values = np.empty((len(axis),) * 3, np.float32)
     y, z = (a.ravel().astype(np.float32) for a in np.meshgrid(axis, axis, indexing="ij"))

@@ -1,4 +1,4 @@
-"""What was measured, as a page, plots and numbers."""
+"""Benchmark report: a page, plots and numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 ERROR, TIME = "error_voxels", "cpu_s"
 PLOTS = ("error.png", "growth.png", "memory.png")
 COLOURS = ("#4477aa", "#66ccee", "#aa3377", "#ccbb44", "#888888", "#ee6677", "#228833", "#000000")
-"""The bright scheme of Paul Tol, for readers who do not see all colours."""
+"""Paul Tol's bright scheme, distinguishable for colour-blind readers."""
 
 LABELS = {
     "volume": "volume",
@@ -36,13 +36,37 @@ LABELS = {
 
 
 def require_plots() -> None:
-    """Raises `BenchError` where matplotlib is missing."""
+    """Check that matplotlib is installed.
+
+    Raises
+    ------
+    BenchError
+        If it is missing.
+    """
     if reason := lacking("matplotlib", "plots need"):
         raise BenchError(reason)
 
 
 def write_report(found: list[Measurement], folder: Path) -> list[Path]:
-    """report.md, numbers.json and the plots, in a folder that exists. Raises `ExportError`."""
+    """Write report.md, numbers.json and the plots.
+
+    Parameters
+    ----------
+    found : list of Measurement
+        The measurements.
+    folder : Path
+        Existing folder.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+
+    Raises
+    ------
+    ExportError
+        If a file cannot be written.
+    """
     about = {"version": version(), "machine": _machine()}
     numbers = about | {"measurements": [asdict(one) for one in found]}
     texts = {"report.md": _page(found, about), "numbers.json": json.dumps(numbers, indent=1) + "\n"}
@@ -90,7 +114,7 @@ def _table(rows: list[Measurement]) -> str:
 
 
 def _evaluations(one: Measurement) -> float | None:
-    """How many for each sample that is kept."""
+    """Field evaluations per kept sample."""
     spent, kept = one.numbers.get("evaluations"), one.numbers.get("kept")
     return None if spent is None or not kept else spent / kept
 
@@ -102,7 +126,7 @@ def _cell(value: float | None) -> str:
 
 
 def _plots(found: list[Measurement], folder: Path) -> None:
-    """Small multiples, one for each workload."""
+    """Draw small multiples, one per workload."""
     _plot(found, folder / PLOTS[0], "mean error, voxels of the finest", "CPU seconds", _error)
     _plot(found, folder / PLOTS[1], "voxels along the cube", "CPU seconds", _growth)
     _plot(found, folder / PLOTS[2], "voxels along the cube", "peak memory, MB", _memory)

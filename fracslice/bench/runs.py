@@ -1,4 +1,4 @@
-"""All measurements of a benchmark, one after the other, each in a child process."""
+"""Benchmark runs: every measurement in its own child process, one after the other."""
 
 from __future__ import annotations
 
@@ -25,20 +25,43 @@ from .workloads import WORKLOADS
 
 PLACES = ("{workload}", "{resolution}", "{output}")
 FIGURES = ("wall_s", "cpu_s", "peak_mb", "evaluations")
-"""What a peer may know better than the process around it."""
+"""Figures that a peer may report itself, in place of those of its process."""
 
 
 @dataclass(frozen=True)
 class Peer:
-    """A program to run beside ours. command: words with {workload}, {resolution} and {output}, a mesh file in
-    scene units that it writes."""
+    """External program to compare with.
+
+    Attributes
+    ----------
+    name : str
+        Name in the report.
+    command : tuple of str
+        Command with {workload}, {resolution} and {output}, the mesh file in scene units that it writes.
+    """
 
     name: str
     command: tuple[str, ...]
 
     @classmethod
     def read(cls, text: str) -> Peer:
-        """From NAME=COMMAND. Raises `BenchError`."""
+        """Parse NAME=COMMAND.
+
+        Parameters
+        ----------
+        text : str
+            The text.
+
+        Returns
+        -------
+        Peer
+            The peer.
+
+        Raises
+        ------
+        BenchError
+            If the text is malformed.
+        """
         name, _, command = text.partition("=")
         missing = [place for place in PLACES if place not in command]
         if not name or missing:
@@ -53,8 +76,26 @@ class Peer:
 
 @dataclass(frozen=True)
 class Task:
-    """What to measure. repeats: the median of so many runs is told. limit_s: a method that took longer at a
-    resolution is not tried at finer ones."""
+    """Benchmark task.
+
+    Attributes
+    ----------
+    workloads : tuple of str
+        Names in `WORKLOADS`.
+    resolutions : tuple of int
+        Voxels along the cube.
+    peers : tuple of Peer
+        External programs.
+    repeats : int
+        Runs per measurement; their median is reported.
+    limit_s : float
+        Time limit per run, seconds. A slower method is not run at finer resolutions of the workload.
+
+    Raises
+    ------
+    BenchError
+        If a value is invalid.
+    """
 
     workloads: tuple[str, ...] = tuple(WORKLOADS)
     resolutions: tuple[int, ...] = (64, 128, 256)
@@ -80,8 +121,21 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Measurement:
-    """numbers: wall_s, cpu_s and error_voxels, and what else the method tells; or failed: why there are
-    none."""
+    """Result of one method.
+
+    Attributes
+    ----------
+    workload : str
+        Name of the workload.
+    resolution : int
+        Voxels along the cube.
+    method : str
+        Name of the method or peer.
+    numbers : dict of str to float
+        wall_s, cpu_s, error_voxels and other figures of the method; empty if it failed.
+    failed : str
+        Error message, or "".
+    """
 
     workload: str
     resolution: int
@@ -91,7 +145,25 @@ class Measurement:
 
 
 def measure(task: Task, work: Work) -> list[Measurement]:
-    """Runs everything. A method that fails is told of, and the rest goes on. Raises `Cancelled`."""
+    """Run a benchmark. A failed method is reported, and the others continue.
+
+    Parameters
+    ----------
+    task : Task
+        The task.
+    work : Work
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    list of Measurement
+        One for each workload, resolution and method.
+
+    Raises
+    ------
+    Cancelled
+        If the work was cancelled.
+    """
     methods: list[str | Peer] = [name for name in METHODS if "scikit" not in name or find_spec("skimage")]
     methods += task.peers
     cases = [(w, n, m) for w in task.workloads for n in sorted(task.resolutions) for m in methods]
@@ -137,7 +209,10 @@ def _child(asked: dict[str, Any], work: Work) -> dict[str, float]:
 
 
 def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
-    """Runs a peer: its time is that of the whole command, unless it tells its own."""
+    """Run a peer and measure its mesh.
+
+    Time and memory are those of its process, unless it reports its own.
+    """
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder:
         path = Path(folder) / "mesh.ply"
         places = {"workload": about["workload"], "resolution": about["resolution"], "output": path}
@@ -152,7 +227,7 @@ def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
 
 
 def _run(words: list[str], text: str, work: Work) -> tuple[str, dict[str, float]]:
-    """A command's output, and the time and memory it took. Raises `_FailedError`, `Cancelled`."""
+    """Run a command; return its output, time and memory. Raises `_FailedError`, `Cancelled`."""
     start = time.perf_counter()
     with tempfile.TemporaryFile() as fed, tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         fed.write(text.encode())
@@ -174,7 +249,7 @@ def _run(words: list[str], text: str, work: Work) -> tuple[str, dict[str, float]
 
 
 def _ended(child: subprocess.Popen[bytes], work: Work) -> tuple[int, Any]:
-    """Waits for a child, and stops it when the work is cancelled."""
+    """Wait for a child process; stop it if the work is cancelled."""
     while True:
         pid, status, usage = os.wait4(child.pid, os.WNOHANG)
         if pid:

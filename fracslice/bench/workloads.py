@@ -1,4 +1,4 @@
-"""What is measured: solids in known boxes, some with a known volume and area."""
+"""Benchmark solids in cubes of known size, some with known volume and area."""
 
 from __future__ import annotations
 
@@ -11,8 +11,17 @@ from ..volume import Lattice
 
 @dataclass(frozen=True)
 class Workload:
-    """A solid in a cube of half-width `half`, both in scene units; volume and area where a closed form is
-    known."""
+    """Solid in a cube.
+
+    Attributes
+    ----------
+    root : Node
+        The solid.
+    half : float
+        Half width of the cube, scene units.
+    volume, area : float, optional
+        Exact values, where a closed form is known; scene units.
+    """
 
     root: Node
     half: float
@@ -20,11 +29,33 @@ class Workload:
     area: float | None = None
 
     def voxel(self, resolution: int) -> float:
-        """The voxel when the cube is so many of them wide."""
+        """Return the voxel size at a resolution.
+
+        Parameters
+        ----------
+        resolution : int
+            Voxels along the cube.
+
+        Returns
+        -------
+        float
+            Voxel size, scene units.
+        """
         return 2 * self.half / resolution
 
     def lattice(self, resolution: int) -> Lattice:
-        """The grid on the cube."""
+        """Return the grid of the cube.
+
+        Parameters
+        ----------
+        resolution : int
+            Voxels along the cube.
+
+        Returns
+        -------
+        Lattice
+            The grid.
+        """
         return Lattice.around(Box.centred(self.half), self.voxel(resolution))
 
 
@@ -45,4 +76,5 @@ WORKLOADS = {
     "mandelbulb": Workload(mandelbulb(power=8, iterations=10), 1.2),
     "julia": Workload(julia(c=(-0.2, 0.8, 0, 0), iterations=12), 1.5),
 }
-"""No voxel size measured divides what the Menger sponges are made of: they are as hard as any."""
+"""No measured voxel size divides the cubes of the Menger sponges, so the sponges are as hard as any other
+solid."""

@@ -1,4 +1,4 @@
-"""From a scene to a picture: rays marched through the field, sample after sample."""
+"""Scene to picture: progressive ray marching of the field."""
 
 from __future__ import annotations
 

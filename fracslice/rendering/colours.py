@@ -1,4 +1,4 @@
-"""Materials in a kernel: what the surface is like at a hit."""
+"""Materials in a render kernel."""
 
 from __future__ import annotations
 
@@ -14,16 +14,33 @@ from .units import shade
 
 
 def linear(colour: Sequence[float]) -> tuple[float, ...]:
-    """sRGB, as colours are written, to light (IEC 61966-2-1)."""
+    """Convert an sRGB colour to linear light (IEC 61966-2-1).
+
+    Parameters
+    ----------
+    colour : sequence of float
+        sRGB components in [0, 1].
+
+    Returns
+    -------
+    tuple of float
+        Linear components.
+    """
     return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
 
 
 @dataclass
 class Look:
-    """The materials of a scene, and the lines that put the one at a hit into variables.
+    """Materials of a scene, and the kernel lines that load the material at a hit.
 
-    Where there is one material, its numbers are read from P; where there are several, they are chosen by
-    paint.
+    With one material, its numbers are read from P. With several, `paint` selects among them.
+
+    Attributes
+    ----------
+    linker : Linker
+        Linker of the kernel.
+    root : Node
+        Root of the formula tree.
     """
 
     linker: Linker
@@ -41,7 +58,13 @@ class Look:
         self.bounces = self.inside or any(n["reflect"] for n in self.all)
 
     def lines(self) -> list[str]:
-        """Sets cr, cg, cb, specular, shininess and what else some material has."""
+        """Return the lines that set cr, cg, cb, specular, shininess and the other properties in use.
+
+        Returns
+        -------
+        list of str
+            Kernel source lines.
+        """
         lines = []
         if len(self.all) > 1 or self.palettes:
             trace = link_tree(self.linker, self.root, TraceDialect(self.linker, materials=self.paints))
@@ -58,7 +81,22 @@ class Look:
         return lines
 
     def colour(self, k: int, node: Node) -> tuple[list[str], list[str]]:
-        """Lines, and the expressions of a material's red, green and blue."""
+        """Return the colour of a material.
+
+        Parameters
+        ----------
+        k : int
+            Index of the material.
+        node : Node
+            The material.
+
+        Returns
+        -------
+        lines : list of str
+            Kernel source lines.
+        values : list of str
+            Expressions of red, green and blue.
+        """
         colours = linear(node["colour"])
         if len(colours) == 3:
             return [], [self.linker.argument(c) for c in colours]
@@ -69,7 +107,20 @@ class Look:
         return [turns, f"{', '.join(names)} = palette{k}(turns{k} - floor(turns{k}), P)"], names
 
     def chosen(self, options: list[tuple[list[str], list[str]]], names: tuple[str, ...]) -> list[str]:
-        """Sets the names to the option that paint says."""
+        """Return the lines that set variables to the values of the material selected by `paint`.
+
+        Parameters
+        ----------
+        options : list of tuple
+            Lines and value expressions of each material.
+        names : tuple of str
+            Variables to set.
+
+        Returns
+        -------
+        list of str
+            Kernel source lines.
+        """
         lines = [line for before, _ in options for line in before]
         for i, name in enumerate(names):
             lines.append(f"{name} = {options[0][1][i]} + 0.0 * t")

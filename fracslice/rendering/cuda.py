@@ -1,4 +1,4 @@
-"""Pixels on the GPU, one thread a ray."""
+"""CUDA tracer: one thread per ray."""
 
 from __future__ import annotations
 
@@ -16,7 +16,22 @@ from .sequence import points
 
 
 class CudaTracer:
-    """Adds samples to pixels, with the face of `CpuTracer`. Raises `KernelError` if there is no GPU."""
+    """Tracer on the GPU, with the interface of `CpuTracer`.
+
+    Parameters
+    ----------
+    frame : Frame
+        Linked frame.
+    dtype : dtype
+        Kernel float type, float32 or float64.
+    width, height : int
+        Picture size, pixels.
+
+    Raises
+    ------
+    KernelError
+        If there is no GPU.
+    """
 
     def __init__(self, frame: Frame, dtype: np.dtype, width: int, height: int) -> None:
         self._cuda = require()
@@ -27,24 +42,54 @@ class CudaTracer:
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
-        """Takes the numbers of another frame of the same source: another camera, another depth."""
+        """Load the parameters of another frame of the same source, such as another camera or depth.
+
+        Parameters
+        ----------
+        frame : Frame
+            Linked frame.
+        """
         self.frame = frame
         self._parameters = parameters(frame.linked, self._precision)
         self.blocks = -(-self.width // BLOCK)
         self._starts = self._cuda.to_device(np.zeros(self.blocks * -(-self.height // BLOCK), self.dtype))
 
     def look_ahead(self, limit: int, work: Work) -> None:
-        """Finds, for every block of pixels, up to where all its rays are free."""
+        """Cone prepass: compute the distance up to which all rays of each block are free.
+
+        Parameters
+        ----------
+        limit : int
+            Steps per cone.
+        work : Work
+            Unused.
+        """
         if self.frame.sharp:
             given = (self._parameters, self._starts, self.blocks, self.dtype.type(limit))
             launched(self._loops.cones, self._starts.size, *given)
 
     def add(self, sums: Any, pixels: Any, most: int, limit: int, work: Work) -> None:
-        """Adds to each of the pixels its next sample: the one whose index is how many it has.
+        """Add the next sample to each pixel; a pixel with k samples takes point k of the sequence.
 
-        sums: [height * width, 6] and pixels: int32 ``y << 16 | x``, each once, those below zero left out;
-        on the GPU. No pixel has more than `most` samples. Copies nothing back and does not wait for the
-        GPU.
+        Copies nothing back and does not wait for the GPU.
+
+        Parameters
+        ----------
+        sums : device array, shape (height * width, 6)
+            Sums of the picture, changed in place.
+        pixels : device array of int32
+            Distinct pixels, ``y << 16 | x``; negative entries are skipped.
+        most : int
+            Upper bound of the samples that any pixel has.
+        limit : int
+            Steps per ray.
+        work : Work
+            Cancellation, checked before the launch.
+
+        Raises
+        ------
+        Cancelled
+            If the work was cancelled.
         """
         work.check()
         if len(self._points) <= most:

@@ -1,5 +1,4 @@
-"""A picture in the making that stays on the GPU: only numbers of its statistics, and what is shown, leave
-it."""
+"""Accumulator in GPU memory; only statistics and developed pictures are copied to the host."""
 
 from __future__ import annotations
 
@@ -20,15 +19,25 @@ from .cpu import ordered
 from .cuda_accumulator_loops import LOOPS
 
 PARTS = 8192
-"""Threads that sum over a picture, each over every 8192nd pixel, so that sums come out the same every
-time."""
+"""Threads that sum over a picture, each over every 8192nd pixel, so that sums are deterministic."""
 GONE = -1
-"""As many passes as no picture has: the memory is another's."""
+"""Pass count of an accumulator whose memory has been handed over."""
 TONES = {"none": 0, "filmic": 1, "reinhard": 2}
 
 
 class CudaAccumulator:
-    """The face of `HostAccumulator`, with arrays of the GPU. Raises `KernelError` if there is no GPU."""
+    """Picture in progress in GPU memory, with the interface of `HostAccumulator`.
+
+    Parameters
+    ----------
+    start : HostAccumulator
+        Picture to copy to the GPU.
+
+    Raises
+    ------
+    KernelError
+        If there is no GPU.
+    """
 
     def __init__(self, start: HostAccumulator) -> None:
         cuda = self._cuda = require()
@@ -47,31 +56,59 @@ class CudaAccumulator:
 
     @classmethod
     def of(cls, other: HostAccumulator) -> CudaAccumulator:
+        """Copy a host accumulator to the GPU.
+
+        Parameters
+        ----------
+        other : HostAccumulator
+            The picture.
+
+        Returns
+        -------
+        CudaAccumulator
+            The copy.
+        """
         return cls(other)
 
     def anew(self, coarse: int) -> CudaAccumulator:
+        """Return an empty accumulator in the same memory; this one becomes invalid.
+
+        Parameters
+        ----------
+        coarse : int
+            Grid spacing of the first pass, pixels.
+
+        Returns
+        -------
+        CudaAccumulator
+            The empty accumulator.
+        """
         fresh = copy(self)
         fresh.passes, fresh.coarse, self.passes = 0, coarse, GONE
         launched(self._loops.clear, len(self.sums), self.sums)
         return fresh
 
     def host(self) -> HostAccumulator:
+        """Return a copy in host memory; see `Accumulator.host`."""
         return HostAccumulator(self.width, self.height, self.sums.copy_to_host(), self.passes, self.coarse)
 
     def _sent(self, coarse: int) -> list[Any]:
+        """The pixels of `first_passes`, on the GPU."""
         return [self._cuda.to_device(pixels) for pixels in first_passes(self.width, self.height, coarse)]
 
     def _summed(self, loop: Any, *arguments: Any) -> np.ndarray:
-        """Runs a loop over PARTS; returns the sums, float64 [3]."""
+        """Run a kernel over the partial sums and return their total, float64 [3]."""
         launched(loop, len(self._parts), *arguments)
         total: np.ndarray = self._parts.copy_to_host().sum(0, dtype=np.float64)
         return total
 
     def statistics(self) -> tuple[float, float]:
+        """Return the statistics of the picture; see `Accumulator.statistics`."""
         total, known, samples = self._summed(self._loops.measure, self.sums, self._squares, self._parts)
         return samples / (self.width * self.height), math.sqrt(total / known) if known else math.inf
 
     def wanted(self, most: int, tolerance: float) -> tuple[Any, int]:
+        """Select the pixels of the next pass, -1 for none; see `Accumulator.wanted`."""
         first = self._first_passes(self.coarse)
         if self.passes < len(first):
             return first[self.passes], first[self.passes].size
@@ -85,10 +122,12 @@ class CudaAccumulator:
         return self._pixels, int(self._summed(self._loops.choose, *chosen)[0])
 
     def receive(self, pixels: Any, add: Callable[[Any], None]) -> None:
+        """Run a pass and add its samples; see `Accumulator.receive`."""
         add(self.sums)
         self.passes += 1
 
     def shown(self, film: Film, mode: str) -> np.ndarray:
+        """Develop the picture, on the host if it has bloom; see `Accumulator.shown`."""
         if film.bloom and mode == "light":
             return self.host().shown(film, mode)
         lit = mode == "light"

@@ -1,4 +1,8 @@
-"""The loops over a picture in the making on CUDA: its statistics, the pixels that need more, its colours."""
+"""CUDA kernels of the accumulator: statistics, pixel selection, development.
+
+A holds the sums of the picture, shape (pixels, CHANNELS). T holds partial sums, one row per thread; thread b
+handles every pixel whose index is b modulo the number of rows, so that the sums are deterministic.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,13 @@ from ..kernel.cuda_stubs import device, divide, kernel, real, thread, whole
 
 @kernel
 def clear(A):
-    """No sample in any pixel."""
+    """Set the sums of all pixels to zero.
+
+    Parameters
+    ----------
+    A : array of real, shape (pixels, CHANNELS)
+        Sums of the picture, written.
+    """
     k = thread()
     if k < A.shape[0]:
         for c in range(A.shape[1]):
@@ -17,7 +27,17 @@ def clear(A):
 
 @kernel
 def measure(A, E, T):
-    """The squared error of each pixel."""
+    """Compute the squared standard error of each pixel.
+
+    Parameters
+    ----------
+    A : array of real, shape (pixels, CHANNELS)
+        Sums of the picture.
+    E : array of real, shape (pixels,)
+        Squared errors, written; 1e30 below 2 samples.
+    T : array of real, shape (threads, 3)
+        Partial sums, written: squared error, pixels with a known error, samples.
+    """
     b = thread()
     if b < T.shape[0]:
         total, known, samples = real(0), real(0), real(0)
@@ -40,7 +60,27 @@ def measure(A, E, T):
 
 @kernel
 def judge(A, E, G, T, width, trusted, most, tolerance):
-    """What a sample more in each pixel is worth, 1e30 if it must be, -1 if it need not."""
+    """Compute the gain of one more sample in each pixel.
+
+    Parameters
+    ----------
+    A : array of real, shape (pixels, CHANNELS)
+        Sums of the picture.
+    E : array of real, shape (pixels,)
+        Squared errors.
+    G : array of real, shape (pixels,)
+        Gains, written: 1e30 for a pixel that must be sampled, -1 for a finished one.
+    T : array of real, shape (threads, 3)
+        Partial sums, written: gain, unfinished pixels.
+    width : int
+        Picture width, pixels.
+    trusted : real
+        Samples below which an error counts as infinite.
+    most : real
+        Maximum samples per pixel.
+    tolerance : real
+        Squared error at which a pixel has converged.
+    """
     b = thread()
     if b < T.shape[0]:
         total, unfinished = real(0), real(0)
@@ -69,7 +109,23 @@ def judge(A, E, G, T, width, trusted, most, tolerance):
 
 @kernel
 def choose(G, order, pixels, T, width, least):
-    """The pixels where a sample is worth as much."""
+    """Select the pixels whose gain is at least `least`.
+
+    Parameters
+    ----------
+    G : array of real, shape (pixels,)
+        Gains.
+    order : array of int32, shape (pixels,)
+        All pixels, ``y << 16 | x``, in tile order.
+    pixels : array of int32, shape (pixels,)
+        Selection, written: the pixel, or -1.
+    T : array of real, shape (threads, 3)
+        Partial sums, written: selected pixels.
+    width : int
+        Picture width, pixels.
+    least : real
+        Smallest gain.
+    """
     b = thread()
     if b < T.shape[0]:
         chosen = real(0)
@@ -86,7 +142,23 @@ def choose(G, order, pixels, T, width, least):
 
 @kernel
 def show(A, out, width, coarse, exposure, tone):
-    """As `film.develop` does, but for bloom."""
+    """Develop the picture as `film.develop` does, without bloom.
+
+    Parameters
+    ----------
+    A : array of real, shape (pixels, CHANNELS)
+        Sums of the picture.
+    out : array of uint8, shape (pixels, 3)
+        sRGB, written.
+    width : int
+        Picture width, pixels.
+    coarse : int
+        Grid spacing of the sampled pixels; each is repeated over its cell.
+    exposure : real
+        Factor on the light.
+    tone : int
+        Tone curve: 0 none, 1 filmic, 2 Reinhard; below 0, no sRGB encoding.
+    """
     k = thread()
     if k < out.shape[0]:
         row = k // width
@@ -111,14 +183,36 @@ def show(A, out, width, coarse, exposure, tone):
 
 @device
 def filmic(c):
-    """The filmic curve."""
+    """Filmic tone curve of `film.filmic`.
+
+    Parameters
+    ----------
+    c : real
+        Linear light.
+
+    Returns
+    -------
+    real
+        Tone-mapped light.
+    """
     a = c * real(0.6)
     return divide(a * (real(2.51) * a + real(0.03)), a * (real(2.43) * a + real(0.59)) + real(0.14))
 
 
 @device
 def encoded(c):
-    """sRGB's curve."""
+    """sRGB encoding of `film.encode`.
+
+    Parameters
+    ----------
+    c : real
+        Linear light.
+
+    Returns
+    -------
+    real
+        sRGB in [0, 1].
+    """
     a = minimum(maximum(c, real(0)), real(1))
     if a <= real(0.0031308):
         return a * real(12.92)
@@ -127,7 +221,18 @@ def encoded(c):
 
 @device
 def level(c):
-    """A level of 8 bits."""
+    """Quantise to 8 bits.
+
+    Parameters
+    ----------
+    c : real
+        Value, clipped to [0, 1].
+
+    Returns
+    -------
+    int
+        Level of 256.
+    """
     return whole(minimum(maximum(c, real(0)), real(1)) * real(255) + real(0.5))
 
 

@@ -1,6 +1,6 @@
-"""The loops around the units on CUDA: one thread takes one ray from the film to the last bounce.
+"""CUDA kernels around the render units: one thread follows one ray from the film to its last bounce.
 
-They do what the lanes' loops in `packets` do.
+They compute the same as the loops of `packets`, with the same names for arrays.
 """
 
 from __future__ import annotations
@@ -14,14 +14,46 @@ from .units.random import centred, sample
 
 
 def loops(frame: Frame) -> tuple[Loop, ...]:
-    """The kernels around a frame's source: `tile`, and `cones` where rays start at the eye."""
+    """Return the kernels of a frame: `tile`, and `cones` if rays start at the eye.
+
+    Parameters
+    ----------
+    frame : Frame
+        Linked frame.
+
+    Returns
+    -------
+    tuple of Loop
+        The kernels, with the frame fixed.
+    """
     return tuple(made.fix(frame=frame) for made in ((tile, cones) if frame.sharp else (tile,)))
 
 
 @kernel
 def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
-    """Adds to each pixel, those below zero left out, its next sample, the point of Q whose index is how many
-    it has."""
+    """Add the next sample to each pixel.
+
+    Parameters
+    ----------
+    P : array of real
+        Scene parameters.
+    Q : array of int32, shape (points, samples)
+        Sample sequence; a pixel with k samples takes point k.
+    S : array of real
+        Start distance of each block.
+    pixels : array of int32
+        Pixels, ``y << 16 | x``; negative entries are skipped.
+    A : array of real, shape (pixels, CHANNELS)
+        Sums of the picture, changed in place.
+    width : int
+        Picture width, pixels.
+    limit : real
+        Steps per ray.
+    blocks : int
+        Blocks per row of the picture.
+    frame : Frame
+        Linked frame.
+    """
     k = thread()
     if k < pixels.size and pixels[k] >= 0:
         pixel = whole(pixels[k])
@@ -78,7 +110,21 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
 
 @kernel
 def cones(P, S, blocks, limit, frame):
-    """For every block of pixels, up to where all its rays are free."""
+    """Cone prepass: compute the distance up to which all rays of each block of pixels are free.
+
+    Parameters
+    ----------
+    P : array of real
+        Scene parameters.
+    S : array of real
+        Start distance of each block, written.
+    blocks : int
+        Blocks per row of the picture.
+    limit : real
+        Steps per cone.
+    frame : Frame
+        Linked frame.
+    """
     k = thread()
     if k < S.size:
         px = (real(k % blocks) + real(0.5)) * real(frame.block)
@@ -97,7 +143,17 @@ def cones(P, S, blocks, limit, frame):
 
 @device
 def gather(A, a, r, g, b):
-    """Adds a sample to a pixel; no NaN, no infinity, no negative light."""
+    """Add one sample to a pixel. NaN, infinite and negative light is removed.
+
+    Parameters
+    ----------
+    A : array of real, shape (pixels, CHANNELS)
+        Sums of the picture, changed in place.
+    a : int
+        Row-major index of the pixel.
+    r, g, b : real
+        Linear light.
+    """
     r = tamed(r)
     g = tamed(g)
     b = tamed(b)
@@ -113,5 +169,16 @@ def gather(A, a, r, g, b):
 
 @device
 def tamed(c):
-    """A sum of light that is a number."""
+    """Clamp light to [0, 1e4]; NaN becomes 0.
+
+    Parameters
+    ----------
+    c : real
+        Linear light.
+
+    Returns
+    -------
+    real
+        The clamped value.
+    """
     return minimum(maximum(c, real(0.0)), real(1e4)) if c == c else real(0.0)

@@ -1,8 +1,7 @@
-"""From a scene and how it is looked at to one kernel: only the units that it uses, called one after the
-other.
+"""Kernel generation: scene and view to one kernel that calls only the units in use.
 
-The text that is written here is straight-line code; every calculation is in a unit of
-`fracslice.rendering.units`, bound to its numbers under a name. A scene without an effect has no line of it.
+The generated text is straight-line code. Every calculation is in a unit of `fracslice.rendering.units`, bound
+to its parameters under a name. Effects that a scene does not use generate no code.
 """
 
 from __future__ import annotations
@@ -26,17 +25,28 @@ from .units.intrinsics import GIVEN, background, surface
 from .units.normal import normal
 
 RELAX = 1.4
-"""Measured on the Mandelbulb: 8.1 M evaluations a frame at 1.0, 6.0 at 1.4, 8.4 at 1.7."""
+"""Over-relaxation factor. Evaluations per frame of the Mandelbulb: 8.1 M at 1.0, 6.0 M at 1.4, 8.4 M at
+1.7."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A kernel for one scene, camera and depth. Two frames of one scene differ in their parameters only.
+    """Kernel of one scene, camera and depth. Frames of one scene differ only in their parameters.
 
-    linked: the source and P. camera_samples, bounce_samples: how many random numbers a ray takes at the
-    start, and at each bounce. bounces: how often a ray goes on. sharp: rays of a pixel start at the eye, so
-    that empty space before a block of pixels can be remembered. far: where in P stands how far there is
-    anything. block: pixels along the side of a block, a power of two.
+    Attributes
+    ----------
+    linked : Linked
+        Kernel source and parameters P.
+    camera_samples, bounce_samples : int
+        Random numbers per camera ray, and per bounce.
+    bounces : int
+        Maximum bounces of a ray.
+    sharp : bool
+        True if all rays start at the eye, so that the cone prepass applies.
+    far : int
+        Index in P of the far distance.
+    block : int
+        Side of a block of the cone prepass, pixels; a power of two.
     """
 
     linked: Linked
@@ -49,20 +59,43 @@ class Frame:
 
     @property
     def samples(self) -> int:
+        """Random numbers per sample."""
         return self.camera_samples + (self.bounces + 1) * self.bounce_samples
 
     @property
     def shift(self) -> int:
+        """Binary logarithm of `block`."""
         return self.block.bit_length() - 1
 
 
 def link_frame(root: Node, view: View, camera: Camera, seen: Optics, block: int) -> Frame:
-    """Links a scene whose depths are resolved. block: pixels along the side of a block of the prepass."""
+    """Link the kernel of a scene.
+
+    Parameters
+    ----------
+    root : Node
+        Tree with resolved depths.
+    view : View
+        The view.
+    camera : Camera
+        The camera.
+    seen : Optics
+        Lengths of the kernel.
+    block : int
+        Side of a block of the cone prepass, pixels.
+
+    Returns
+    -------
+    Frame
+        The linked frame.
+    """
     return _Frame(root, view, camera, seen, block).linked()
 
 
 @dataclass
 class _Frame:
+    """Builder of a frame."""
+
     root: Node
     view: View
     camera: Camera
@@ -73,6 +106,7 @@ class _Frame:
     bounces: int = 0
 
     def linked(self) -> Frame:
+        """Link everything and return the frame."""
         linker = self.linker
         linker.field(self.root)
         self.marching()
@@ -87,6 +121,7 @@ class _Frame:
         return Frame(linked, *samples, self.bounces, sharp, far, self.block)
 
     def marching(self) -> None:
+        """Bind the units that march rays and cones."""
         seen, steepness = self.seen, 1 / self.root.bounds.lipschitz
         box = self.root.bounds.box
         lo = tuple(max(a, e - seen.far) for a, e in zip(box.lo, self.camera.eye, strict=True))
@@ -101,11 +136,11 @@ class _Frame:
 
     @property
     def inside(self) -> bool:
-        """Whether rays go through the solid."""
+        """True if some material is transparent, so that rays pass through the solid."""
         return any(n.formula.name == "material" and n["clear"] > 0 for n in self.root.walk())
 
     def cameras(self) -> int:
-        """Binds the camera; returns how many random numbers its rays take."""
+        """Bind the camera; return the number of random numbers per camera ray."""
         camera, (width, height) = self.camera, self.seen.size
         scale = 2 * self.seen.cone
         right, up = np.array(camera.right), np.array(camera.above)
@@ -125,13 +160,13 @@ class _Frame:
         return 4
 
     def draw(self, count: int) -> list[str]:
-        """Names of the next random numbers."""
+        """Reserve random numbers and return their expressions."""
         names = [f"u[{self.dimensions + k}]" for k in range(count)]
         self.dimensions += count
         return names
 
     def surface(self, look: Look) -> str:
-        """The text of `units.intrinsics.surface`."""
+        """Source of `units.intrinsics.surface`."""
         mode = self.view.shading.mode
         lines = ["h = width_at(path + t, P)"]
         if mode in ("light", "normal"):
@@ -146,7 +181,7 @@ class _Frame:
         return text_of(surface, [*lines, f"return (r, g, b), ({onward})"])
 
     def lit(self, look: Look) -> list[str]:
-        """Ambient light, then every light in turn."""
+        """Lines for ambient light and every light."""
         shading = self.view.shading
         lines = ["ambient = 0.0 * t"]
         if self.inside:
@@ -170,7 +205,7 @@ class _Frame:
         return lines
 
     def light(self, k: int, light: Light) -> list[str]:
-        """One sun or lamp."""
+        """Lines for one sun or lamp."""
         self.linker.share(shade.phong)
         u, v = self.draw(2) if light.size else ("t", "t")
         self.bind_light(f"light{k}", light)
@@ -188,6 +223,7 @@ class _Frame:
         ]
 
     def bind_light(self, name: str, light: Light) -> None:
+        """Bind the unit of a sun or lamp."""
         if light.kind == "lamp":
             soft, function = {"radius": light.size}, lights.lamp if light.size else lights.sharp_lamp
             self.linker.bind(name, function, {"position": light.position, **(soft if light.size else {})})
@@ -199,7 +235,7 @@ class _Frame:
         self.linker.bind(name, lights.sun if light.size else lights.sharp_sun, values)
 
     def sky(self, light: Light) -> list[str]:
-        """Light from all around, from one direction a sample; without shadows, from along the normal."""
+        """Lines for light from the sky: one direction per sample, or along the normal without shadows."""
         self.bind_sky(light)
         if light.shadows == "no":
             lines = ["kr, kg, kb = sky_(nx, ny, nz, P)", "open = ambient * 0.0 + 1.0"]
@@ -215,12 +251,13 @@ class _Frame:
         return lines + [f"{c} = {c} + open * k{c} * c{c}" for c in "rgb"]
 
     def bind_sky(self, light: Light) -> None:
+        """Bind the unit of the sky."""
         names = {"zenith": light.colour, "horizon": light.horizon, "ground": light.ground}
         values = {n: tuple(c * light.strength for c in linear(colour)) for n, colour in names.items()}
         self.linker.bind("sky_", lights.sky, values)
 
     def onward(self, look: Look) -> list[str]:
-        """The ray that goes on after a mirror or through glass."""
+        """Lines for the ray that continues after reflection or refraction."""
         if not self.bounces:
             return []
         (u,) = self.draw(1) if look.inside else ("t",)
@@ -242,7 +279,7 @@ class _Frame:
         ]
 
     def shown(self, mode: str) -> list[str]:
-        """The modes that show one number or direction."""
+        """Lines for the modes that show a number or a direction."""
         far, near = self.seen.far, math.dist(self.camera.eye, self.camera.target)
         if mode == "normal":
             return [f"{c} = 0.5 + 0.5 * n{a}" for c, a in zip("rgb", "xyz", strict=True)]
@@ -258,6 +295,7 @@ class _Frame:
         return [f"r = exp(-{scale} * ({reach}))", "g = r", "b = r"]
 
     def fogged(self) -> list[str]:
+        """Lines for fog."""
         fog = self.view.fog
         if fog is None or fog.density == 0:
             return []
@@ -267,7 +305,7 @@ class _Frame:
         return ["air = clearness(t, P)", *lines, *(f"t{c} = air * t{c}" for c in "rgb" if self.bounces)]
 
     def background(self) -> str:
-        """The text of `units.intrinsics.background`."""
+        """Source of `units.intrinsics.background`."""
         view = self.view
         skies = [light for light in view.lights if light.kind == "sky"]
         if view.fog is None and skies and view.shading.mode == "light":
@@ -278,10 +316,24 @@ class _Frame:
 
 
 def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:
-    """The text of a function with these lines."""
+    """Assemble the source of a function.
+
+    Parameters
+    ----------
+    function : callable
+        Function whose name and parameters are used.
+    lines : sequence of str
+        Body.
+
+    Returns
+    -------
+    str
+        Source text.
+    """
     names = ", ".join(language.parameters(function))
     return "\n    ".join([f"def {function.__name__}({names}):", *lines])
 
 
 def _width(t, cone, least):  # type: ignore[no-untyped-def]
+    """Hit tolerance at distance t."""
     return cone * t + least

@@ -1,4 +1,4 @@
-"""A picture that follows its pilot and its file: rendered in a thread of its own, for a window to show."""
+"""Live rendering: a background thread that follows camera input and changes of the scene file."""
 
 from __future__ import annotations
 
@@ -20,18 +20,26 @@ from .progressive import Pass, Renderer
 from .setup import clearance
 
 WITHIN = 0.03
-"""Seconds to the first picture from a new place."""
+"""Time budget of the first pass after a camera move, seconds."""
 AGAIN = 0.2
-"""Seconds between looks at the file."""
+"""Interval between checks of the file, seconds."""
 NEARER = 2.0
-"""Depth and precision are chosen anew when the surface is so much nearer or farther than when they were."""
+"""Ratio of surface distances, in either direction, at which depth and precision are chosen again."""
 BOLD = 0.5
-"""The most of the way to the surface that one step goes."""
+"""Maximum fraction of the distance to the surface per step."""
 
 
 @dataclass(frozen=True)
 class CameraInput:
-    """Where the pilot steers: -1 to 1 each. pace: how often the way to the surface is flown in a second."""
+    """Steering input of the camera.
+
+    Attributes
+    ----------
+    forward, right, up : float
+        Direction of flight, -1 to 1 each.
+    pace : float
+        Speed, in distances to the surface per second.
+    """
 
     forward: float = 0.0
     right: float = 0.0
@@ -39,20 +47,50 @@ class CameraInput:
     pace: float = 1.0
 
     def flown(self, camera: Camera, room: float, seconds: float) -> Camera:
-        """The camera after some time: the nearer the surface, the slower it goes, so that it never gets
-        there. room: how far the surface is, in scene units."""
+        """Move a camera for some time.
+
+        Speed is proportional to the distance of the surface, so the camera never reaches it.
+
+        Parameters
+        ----------
+        camera : Camera
+            Camera to move.
+        room : float
+            Distance to the surface, scene units.
+        seconds : float
+            Duration of the flight.
+
+        Returns
+        -------
+        Camera
+            The moved camera.
+        """
         way = room * min(self.pace * seconds, BOLD) / max(1.0, math.hypot(self.forward, self.right, self.up))
         return camera.moved(way * self.forward, way * self.right, way * self.up)
 
     @property
     def idle(self) -> bool:
+        """True if the camera does not move."""
         return self.forward == self.right == self.up == 0
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What there is to see. pixels: uint8 [height, width, 3], sRGB. camera: where from. room: how far the
-    surface is from there, at least, in scene units. trouble: what is wrong with the file."""
+    """Displayed state of a live picture.
+
+    Attributes
+    ----------
+    pixels : ndarray of uint8, shape (height, width, 3)
+        sRGB.
+    done : Pass
+        Last pass of the picture.
+    camera : Camera
+        Camera of the picture.
+    room : float
+        Lower bound of the distance from the camera to the surface, scene units.
+    trouble : str
+        Error message of the file's current version, or "".
+    """
 
     pixels: np.ndarray = field(repr=False)
     done: Pass
@@ -62,17 +100,41 @@ class Shown:
 
     @property
     def caption(self) -> str:
-        """How far the picture is, in words."""
+        """Samples per pixel, surface distance and the file's error message, as text."""
         text = f"{self.done.samples:.1f} samples a pixel, surface at {self.room:.2g}"
         return f"{text}\n{self.trouble}" if self.trouble else text
 
 
 class Live:
-    """Renders a scene file from where the pilot is, and reads it again whenever it is saved.
+    """Live picture of a scene file, which is read again whenever it is saved.
 
-    settings: as `Scene.with_values` takes them. size: pixels across and down. Raises `SceneError` for a scene
-    that cannot be rendered; what is wrong with a later version of the file stands in `shown.trouble`, and the
-    picture stays. Call `close` at the end.
+    If a later version of the file is invalid, the picture stays and the message is in `shown.trouble`. Call
+    `close` at the end.
+
+    Parameters
+    ----------
+    path : str or Path
+        Scene file.
+    settings : sequence of str
+        Settings as in `Scene.with_values`.
+    size : tuple of int
+        Picture width and height, pixels.
+    work : Work, optional
+        Threads and progress; it is copied with a cancellation event of its own.
+    device : {"cpu", "cuda", "auto"}
+        Device that traces the rays.
+
+    Attributes
+    ----------
+    first : Camera
+        Camera of the first picture.
+    shown : Shown
+        Latest picture.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be rendered.
     """
 
     def __init__(
@@ -84,7 +146,7 @@ class Live:
         device: str = "auto",
     ) -> None:
         self._path, self._settings, self._size, self._device = Path(path), settings, size, device
-        self._work = replace(work or Work(), cancel=threading.Event())  # it ends a pass, not the whole
+        self._work = replace(work or Work(), cancel=threading.Event())  # ends a pass, not the caller's work
         self._saved = self._stamp()
         self._scene = self._read()
         self._renderer = self._made(self._scene.view.camera)
@@ -100,39 +162,57 @@ class Live:
 
     @property
     def camera(self) -> Camera:
-        """Where the picture is seen from."""
+        """Camera of the picture."""
         return self._renderer.setup.camera
 
     @property
     def scene(self) -> Scene:
-        """The last one that could be read."""
+        """Latest valid version of the scene."""
         return self._scene
 
     def steer(self, camera_input: CameraInput) -> None:
-        """Fly on like this."""
+        """Set the steering input.
+
+        Parameters
+        ----------
+        camera_input : CameraInput
+            Input that holds until the next call.
+        """
         with self._lock:
             self._camera_input = camera_input
         self._work.cancel.set()
 
     def turn(self, yaw: float, pitch: float) -> None:
-        """Look so many degrees further to the right, and up."""
+        """Turn the camera.
+
+        Parameters
+        ----------
+        yaw, pitch : float
+            Angles to the right and up, degrees.
+        """
         with self._lock:
             self._aim = self._aim.turned(yaw, pitch)
         self._work.cancel.set()
 
     def look(self, camera: Camera) -> None:
-        """Be there."""
+        """Move the camera to a new place.
+
+        Parameters
+        ----------
+        camera : Camera
+            The new camera.
+        """
         with self._lock:
             self._aim = camera
         self._work.cancel.set()
 
     @property
     def running(self) -> bool:
-        """Whether the picture still follows."""
+        """True while the render thread is alive."""
         return self._thread.is_alive()
 
     def close(self) -> None:
-        """Stop rendering. Raises what has stopped it before, if anything did."""
+        """Stop rendering. Raises the exception that ended the render thread, if any."""
         self._open = False
         self._work.cancel.set()
         self._thread.join()
@@ -140,6 +220,7 @@ class Live:
             raise self._failure
 
     def _run(self) -> None:
+        """Body of the render thread; it keeps the exception that ends it."""
         try:
             while self._open:
                 self._work.cancel.clear()
@@ -148,6 +229,7 @@ class Live:
             self._failure = error
 
     def _step(self) -> None:
+        """Follow the file and the camera; otherwise add a pass, or wait if the picture is complete."""
         self._follow_file()
         try:
             if not self._moved() and not self._pass():
@@ -156,7 +238,7 @@ class Live:
             return
 
     def _pass(self) -> bool:
-        """One more pass, unless the picture is complete."""
+        """Add a pass; False if the picture is complete."""
         done = next(self._renderer.passes(), None)
         if done is None:
             return False
@@ -164,7 +246,7 @@ class Live:
         return True
 
     def _moved(self) -> bool:
-        """Goes where the pilot steers and shows the picture from there, if that is elsewhere."""
+        """Apply the camera input. If the camera has moved, show the picture from its new place."""
         now = time.monotonic()
         with self._lock:
             if not self._camera_input.idle:
@@ -175,13 +257,17 @@ class Live:
             return False
         try:
             self._look(aim)
-        except SceneError:  # there is no looking from inside the solid
+        except SceneError:  # the eye is inside the solid
             with self._lock:
                 self._aim = self.camera
             return False
         return self._pass()
 
     def _look(self, camera: Camera) -> None:
+        """Restart the picture from a camera.
+
+        A new renderer is made if the distance to the surface has changed much.
+        """
         what = self._renderer.setup
         room = clearance(what.roots[-1], camera)
         if self._settled / NEARER < room < self._settled * NEARER:
@@ -190,19 +276,21 @@ class Live:
             self._renderer = self._made(camera)
 
     def _made(self, camera: Camera | None) -> Renderer:
+        """A new renderer of the current scene."""
         view = replace(self._scene.view, camera=camera)
         made = Renderer(self._scene.root, view, self._size, self._work, self._device)
         self._settled = clearance(made.setup.roots[-1], made.setup.camera)
         return made
 
     def _room(self) -> float:
+        """Lower bound of the distance from the camera to the surface."""
         return clearance(self._renderer.setup.roots[-1], self.camera)
 
     def _read(self) -> Scene:
         return read(self._path).with_values(self._settings)
 
     def _stamp(self) -> tuple[int, int] | None:
-        """What changes when the file is saved; None while it is being replaced."""
+        """Modification time and size of the file; None while it is being replaced."""
         try:
             found = self._path.stat()
         except OSError:
@@ -210,7 +298,10 @@ class Live:
         return found.st_mtime_ns, found.st_size
 
     def _follow_file(self) -> None:
-        """Takes up a new version of the file. Its camera counts only if it is another than before."""
+        """Load a new version of the file.
+
+        Its camera is used only if it differs from the previous version's.
+        """
         now, saved = time.monotonic(), self._saved
         if now - self._looked < AGAIN:
             return

@@ -1,4 +1,4 @@
-"""Lengths that a kernel of the renderer follows from."""
+"""Lengths that a render kernel depends on: film size, pixel footprint, hit tolerance, far distance."""
 
 from __future__ import annotations
 
@@ -11,8 +11,19 @@ from ..scene.view import Camera
 
 @dataclass(frozen=True)
 class Optics:
-    """What the kernel has to know of lengths: the film's size in pixels, a pixel's half width at distance 1,
-    the smallest distance that counts, how far there is anything."""
+    """Lengths of a render kernel.
+
+    Attributes
+    ----------
+    size : tuple of int
+        Film width and height, pixels.
+    cone : float
+        Half width of a pixel at distance 1.
+    least : float
+        Smallest hit tolerance, scene units: the rounding error of positions.
+    far : float
+        Distance beyond which the scene is empty, scene units.
+    """
 
     size: tuple[int, int]
     cone: float
@@ -21,7 +32,24 @@ class Optics:
 
 
 def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> Optics:
-    """The optics of a picture of this many pixels."""
+    """Compute the optics of a picture.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    size : tuple of int
+        Film width and height, pixels.
+    root : Node
+        Root of the formula tree; its bounds limit the far distance.
+    least : float
+        Smallest hit tolerance, scene units.
+
+    Returns
+    -------
+    Optics
+        Lengths for the kernel.
+    """
     box = root.bounds.box
     corners = [c for c in box.corners if all(map(math.isfinite, c))]
     far = max([math.dist(camera.eye, c) for c in corners] + [4 * math.dist(camera.eye, camera.target)])

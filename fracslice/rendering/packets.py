@@ -1,9 +1,16 @@
-"""Ray packets: the loops around the units on SIMD lanes, from pixels to sums of light.
+"""Ray packets: CPU loops around the render units on SIMD lanes, from pixels to sums of light.
 
-The rays of a tile lie in the rows of a workspace W, m numbers each: the t of ray i is ``W[Row.t * m + i]``.
-Rays are followed in packets that are refilled: as soon as a lane is done, the next ray takes its place, so no
-lane idles while another is on its way. The lanes of a packet lie in L, WIDTH numbers each; `rays` says which
-ray each lane holds, -1 for none.
+Conventions:
+
+- P holds the scene's parameters, Q the points of the sample sequence, S the distance at which the rays of
+  each block of pixels start, A the sums of the picture.
+- W is the workspace of a tile: one row per quantity in `Row`, m numbers each. The t of ray i is
+  ``W[Row.t * m + i]``.
+- L holds the packet under way: one row per quantity in `Lane`, WIDTH numbers each. `rays` holds the ray of
+  each lane, -1 for none.
+
+Packets are refilled: a lane whose ray is done takes the next ray at once, so no lane idles while rays are
+left.
 """
 
 from __future__ import annotations
@@ -18,30 +25,83 @@ from .units.intrinsics import background, camera_ray, span_box, step_cone, step_
 from .units.random import centred, sample
 
 Row = IntEnum("Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb px py", start=0)
-"""What is known of a ray. status: 1 hit, 2 missed, 3 out of steps. r, g, b: light gathered; tr, tg, tb: how
-much of what is still to come counts. side: -1 inside. path: how long the way was before this ray. px, py:
-where on the film, the first two of its random numbers; the others are in the rows behind.
+"""State of a ray.
+
+- ox, oy, oz, dx, dy, dz: origin and unit direction.
+- start, end: interval of t to march.
+- side: -1 inside the solid.
+- path: length of the path before this ray.
+- status: 1 hit, 2 missed, 3 out of steps.
+- r, g, b: light gathered.
+- tr, tg, tb: throughput, the factor on light still to come.
+- px, py: film position, the first two random numbers. The other random numbers are in the rows after them.
 """
 Lane = IntEnum("Lane", "ox oy oz dx dy dz start end side path t steps done before stride", start=0)
-"""What is known of a ray that is under way, the first ten as in `Row`."""
+"""State of a ray in a packet. The first ten entries are those of `Row`."""
 
 CHANNELS = 6
-"""Of a pixel: the sums of red, green, blue, shown brightness, its square, and the number of samples."""
+"""Numbers per pixel: sums of red, green, blue, displayed brightness and its square, and the sample count."""
 
 
 def loops(frame: Frame) -> tuple[Loop, ...]:
-    """The C functions to make of a frame: `tile`, and `cones` where rays start at the eye."""
+    """Return the C loops of a frame: `tile`, and `cones` if rays start at the eye.
+
+    Parameters
+    ----------
+    frame : Frame
+        Linked frame.
+
+    Returns
+    -------
+    tuple of Loop
+        The loops, with the frame fixed.
+    """
     return tuple(made.fix(frame=frame) for made in ((tile, cones) if frame.sharp else (tile,)))
 
 
 def workspace(frame: Frame, rays: int) -> int:
-    """The numbers in the rows of a tile."""
+    """Return the size of a tile's workspace W.
+
+    Parameters
+    ----------
+    frame : Frame
+        Linked frame.
+    rays : int
+        Rays of the tile.
+
+    Returns
+    -------
+    int
+        Numbers in W.
+    """
     return (Row.px + frame.samples) * rays
 
 
 @loop("rirrriirnnnnn")
 def tile(P, Q, S, W, L, rays, pixels, A, n, m, width, limit, blocks, frame):
-    """Adds to n pixels, ``y << 16 | x`` each, their next sample."""
+    """Add the next sample to each of n pixels.
+
+    Parameters
+    ----------
+    P, Q, S : pointer to float, pointer to int32, pointer to float
+        Scene parameters, sample sequence, start distance of each block.
+    W, L, rays : pointer to float, pointer to float, pointer to int32
+        Workspace, lanes, ray of each lane.
+    pixels : pointer to int32
+        Pixels, ``y << 16 | x``.
+    A : pointer to float
+        Sums of the picture, `CHANNELS` per pixel.
+    n, m : int
+        Pixels, and numbers per row of W.
+    width : int
+        Picture width, pixels.
+    limit : int
+        Steps per ray.
+    blocks : int
+        Blocks per row of the picture.
+    frame : Frame
+        Linked frame.
+    """
     draw(W, Q, pixels, A, n, m, width, frame)
     begin(W, m, P, frame)
     for k in range(n):
@@ -56,7 +116,25 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, m, width, limit, blocks, frame):
 
 @loop("rrirrinnnn")
 def cones(P, S, ids, W, L, rays, n, m, blocks, limit, frame):
-    """Up to where all rays of each of n blocks of pixels are free."""
+    """Cone prepass: compute the distance up to which all rays of each block of pixels are free.
+
+    Parameters
+    ----------
+    P, S : pointer to float
+        Scene parameters; start distance of each block, written.
+    ids : pointer to int32
+        Block numbers.
+    W, L, rays : pointer to float, pointer to float, pointer to int32
+        Workspace, lanes, ray of each lane.
+    n, m : int
+        Blocks, and numbers per row of W.
+    blocks : int
+        Blocks per row of the picture.
+    limit : int
+        Steps per cone.
+    frame : Frame
+        Linked frame.
+    """
     for k in range(m):
         block = ids[min(k, n - 1)]
         W[Row.px * m + k] = (block % blocks + 0.5) * frame.block
@@ -71,19 +149,62 @@ def cones(P, S, ids, W, L, rays, n, m, blocks, limit, frame):
 
 
 def load_vector(W, row, m, i):
-    """Three rows of rays from i on."""
+    """Load three consecutive rows of rays.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace or lanes.
+    row : int
+        First row.
+    m : int
+        Numbers per row.
+    i : int
+        First ray.
+
+    Returns
+    -------
+    tuple of lanes
+        WIDTH numbers of each row.
+    """
     return load(W, row * m + i), load(W, (row + 1) * m + i), load(W, (row + 2) * m + i)
 
 
 def store_vector(W, row, m, i, a, b, c):
-    """Writes three rows of rays from i on."""
+    """Store three consecutive rows of rays.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace, written.
+    row : int
+        First row.
+    m : int
+        Numbers per row.
+    i : int
+        First ray.
+    a, b, c : lanes
+        WIDTH numbers of each row.
+    """
     store(W, row * m + i, a)
     store(W, (row + 1) * m + i, b)
     store(W, (row + 2) * m + i, c)
 
 
 def draw(W, Q, pixels, A, n, m, width, frame):
-    """All random numbers of the next sample of n pixels; rows beyond n repeat the last pixel."""
+    """Draw all random numbers of the next sample of n pixels. Columns beyond n repeat the last pixel.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace; rows from `Row.px` on are written.
+    Q, pixels, A : pointer
+        Sample sequence, pixels, sums of the picture.
+    n, m, width : int
+        Pixels, numbers per row of W, picture width.
+    frame : Frame
+        Linked frame.
+    """
     for k in range(m):
         pixel = pixels[min(k, n - 1)]
         q = frame.samples * int(A[CHANNELS * ((pixel >> 16) * width + (pixel & 65535)) + 5])
@@ -94,7 +215,21 @@ def draw(W, Q, pixels, A, n, m, width, frame):
 
 
 def begin(W, m, P, frame):
-    """The rays through the points (px, py) of the film, from where they enter the scene's box."""
+    """Create the camera rays of a tile.
+
+    Each ray passes through its film point (px, py) and starts where it enters the scene's box.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace, written.
+    m : int
+        Numbers per row of W.
+    P : pointer to float
+        Scene parameters.
+    frame : Frame
+        Linked frame.
+    """
     for i in range(0, m, WIDTH):
         u, v = (0.0, 0.0) if frame.sharp else (load(W, (Row.px + 2) * m + i), load(W, (Row.px + 3) * m + i))
         px, py = load(W, Row.px * m + i), load(W, Row.py * m + i)
@@ -112,9 +247,23 @@ def begin(W, m, P, frame):
 
 
 def follow(W, L, rays, n, m, limit, P, step):
-    """Follows n rays until all have hit, left or used up their steps.
+    """March n rays until each has hit, missed or run out of steps.
 
-    A ray has left where it is known to be free, not where an over-relaxed step took it.
+    A ray has missed once its free distance exceeds its end; an over-relaxed step beyond the end does not
+    count.
+
+    Parameters
+    ----------
+    W, L, rays : pointer
+        Workspace, lanes, ray of each lane.
+    n, m : int
+        Rays, and numbers per row of W.
+    limit : int
+        Steps per ray.
+    P : pointer to float
+        Scene parameters.
+    step : callable
+        `step_ray` or `step_cone`.
     """
     for lane in range(WIDTH):
         rays[lane] = -1
@@ -141,7 +290,20 @@ def follow(W, L, rays, n, m, limit, P, step):
 
 
 def finish(W, L, rays, m, lane):
-    """Writes what became of the ray of a lane; returns how many rays that is."""
+    """Write the result of a lane's ray.
+
+    Parameters
+    ----------
+    W, L, rays : pointer
+        Workspace, lanes, ray of each lane.
+    m, lane : int
+        Numbers per row of W, and the lane.
+
+    Returns
+    -------
+    int
+        1 if the lane held a ray, else 0.
+    """
     i = rays[lane]
     if i < 0:
         return 0
@@ -152,7 +314,20 @@ def finish(W, L, rays, m, lane):
 
 
 def skip_missed(W, m, n, i):
-    """The first ray from i on that is to be followed; those before it miss."""
+    """Mark rays with an empty interval as missed, from ray i on.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace.
+    m, n, i : int
+        Numbers per row of W, rays, first ray.
+
+    Returns
+    -------
+    int
+        Index of the first ray to march, or n.
+    """
     while i < n and W[Row.start * m + i] >= W[Row.end * m + i]:
         W[Row.status * m + i] = 2.0
         W[Row.steps * m + i] = 0.0
@@ -162,7 +337,15 @@ def skip_missed(W, m, n, i):
 
 
 def take(W, L, rays, m, lane, i):
-    """Gives a lane the ray i."""
+    """Load a ray into a lane.
+
+    Parameters
+    ----------
+    W, L, rays : pointer
+        Workspace, lanes, ray of each lane.
+    m, lane, i : int
+        Numbers per row of W, the lane, the ray.
+    """
     for k in range(Row.path + 1):
         L[k * WIDTH + lane] = W[k * m + i]
     L[Lane.t * WIDTH + lane] = W[Row.start * m + i]
@@ -170,7 +353,15 @@ def take(W, L, rays, m, lane, i):
 
 
 def idle(L, rays, lane):
-    """Puts a lane without a ray far away."""
+    """Park a lane without a ray far from the scene.
+
+    Parameters
+    ----------
+    L, rays : pointer
+        Lanes, ray of each lane.
+    lane : int
+        The lane.
+    """
     for k in range(Lane.dz + 1):
         L[k * WIDTH + lane] = 1e4
     L[Lane.end * WIDTH + lane] = 1e30
@@ -181,7 +372,19 @@ def idle(L, rays, lane):
 
 
 def march(L, limit, P, step):
-    """Steps all lanes until one is done."""
+    """Step all lanes until at least one is done.
+
+    Parameters
+    ----------
+    L : pointer to float
+        Lanes.
+    limit : int
+        Steps per ray.
+    P : pointer to float
+        Scene parameters.
+    step : callable
+        `step_ray` or `step_cone`.
+    """
     ox, oy, oz = load_vector(L, Lane.ox, WIDTH, 0)
     dx, dy, dz = load_vector(L, Lane.dx, WIDTH, 0)
     end = load(L, Lane.end * WIDTH)
@@ -206,7 +409,21 @@ def march(L, limit, P, step):
 
 
 def shade(W, m, first, P, frame):
-    """Adds the light of every ray, and turns it into the one that goes on."""
+    """Add the light of every ray, and replace each ray by its continuation.
+
+    Parameters
+    ----------
+    W : pointer to float
+        Workspace.
+    m : int
+        Numbers per row of W.
+    first : int
+        Row of the bounce's first random number.
+    P : pointer to float
+        Scene parameters.
+    frame : Frame
+        Linked frame.
+    """
     for i in range(0, m, WIDTH):
         status = load(W, Row.status * m + i)
         dx, dy, dz = load_vector(W, Row.dx, m, i)
@@ -248,14 +465,24 @@ def shade(W, m, first, P, frame):
                 store(W, Row.end * m + i, where(more > 0.002, leave, 0.0))
         elif frame.bounces:
             store_vector(W, Row.tr, m, i, more, more, more)
-        if frame.bounces:  # behind its end, a ray that is over is not followed: its numbers may be no numbers
+        if frame.bounces:  # start beyond end: terminated rays, whose values may be NaN, are not marched
             store(W, Row.start * m + i, where(more > 0.002, load(W, Row.start * m + i), 1e30))
         sr, sg, sb = load_vector(W, Row.r, m, i)
         store_vector(W, Row.r, m, i, sr + tr * r, sg + tg * g, sb + tb * b)
 
 
 def gather(W, pixels, A, n, m, width):
-    """Adds one sample to n pixels; no NaN, no infinity, no negative light."""
+    """Add one sample to each of n pixels. NaN, infinite and negative light is removed.
+
+    Parameters
+    ----------
+    W, pixels : pointer
+        Workspace and pixels.
+    A : pointer to float
+        Sums of the picture, changed in place.
+    n, m, width : int
+        Pixels, numbers per row of W, picture width.
+    """
     for k in range(n):
         pixel = pixels[k]
         a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
@@ -273,5 +500,16 @@ def gather(W, pixels, A, n, m, width):
 
 
 def tamed(c):
-    """A sum of light that is a number."""
+    """Clamp light to [0, 1e4]; NaN becomes 0.
+
+    Parameters
+    ----------
+    c : float
+        Linear light.
+
+    Returns
+    -------
+    float
+        The clamped value.
+    """
     return min(max(c, 0.0), 1e4) if c == c else 0.0

@@ -1,5 +1,4 @@
-"""A picture that sharpens while one looks: passes over the film, each adding a sample where one is still
-needed."""
+"""Progressive rendering: each pass adds one sample to the pixels that still need one."""
 
 from __future__ import annotations
 
@@ -26,11 +25,11 @@ from .optics import optics
 from .setup import RenderSetup, prepare
 
 STEPS, GROWTH, GROWN = 160, 10, 16
-"""Steps of a ray in the first pass; how often as many after GROWN passes, in equal steps between."""
+"""Step limit of a ray in the first pass. It grows linearly by a factor of GROWTH over GROWN passes."""
 PREVIEWS = (1, 2, 4, 8)
-"""How coarse the first pass from a moved camera may be."""
+"""Allowed grid spacings, in pixels, of the first pass after a camera move."""
 TOLERANCE = 0.002
-"""A pixel has converged when its brightness, as shown, is known to half a level of 256."""
+"""Standard error of displayed brightness at which a pixel has converged: half a level of 256."""
 
 
 SIZE = Vector(None, "pixels across and down", sizes=(2,), least=1, most=32768, whole=True)
@@ -38,11 +37,26 @@ SIZE = Vector(None, "pixels across and down", sizes=(2,), least=1, most=32768, w
 
 @dataclass(frozen=True, eq=False)
 class Pass:
-    """The picture after one more pass.
+    """The picture after a pass.
 
-    number: of the pass, from 1. samples: per pixel, on average. error: the root mean square of the pixels'
-    standard errors, as shown. active: the part of the pixels that this pass was about. rate: samples a
-    second.
+    Attributes
+    ----------
+    number : int
+        Number of the pass, from 1.
+    samples : float
+        Mean samples per pixel.
+    error : float
+        Root mean square of the pixels' standard errors, in displayed brightness.
+    active : float
+        Fraction of the pixels sampled in this pass.
+    rate : float
+        Samples per second.
+    film : Film
+        Film that develops the picture.
+    mode : str
+        `Shading.mode` of the picture.
+    source : Accumulator
+        Accumulator that holds the samples.
     """
 
     number: int
@@ -56,16 +70,38 @@ class Pass:
 
     @cached_property
     def image(self) -> np.ndarray:
-        """float32 [height, width, 3], linear light. Raises `RenderError` if there was another pass since."""
+        """Linear light.
+
+        Returns
+        -------
+        ndarray of float32, shape (height, width, 3)
+            Mean of the samples.
+
+        Raises
+        ------
+        RenderError
+            If a later pass has replaced this picture.
+        """
         return self._current().host().mean()
 
     @cached_property
     def shown(self) -> np.ndarray:
-        """uint8 [height, width, 3], sRGB, as the film says. Raises `RenderError` if there was another pass
-        since."""
+        """Developed picture.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+            sRGB.
+
+        Raises
+        ------
+        RenderError
+            If a later pass has replaced this picture.
+        """
         return self._current().shown(self.film, self.mode)
 
     def _current(self) -> Accumulator:
+        """The accumulator, if it still holds this pass."""
         if self.source.passes != self.number:
             raise RenderError(
                 f"pass {self.number}: its picture is gone, pass {self.source.passes} is over it"
@@ -74,7 +110,7 @@ class Pass:
 
 
 def _machinery(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator], Accumulator]]:
-    """What traces, and what keeps the sums."""
+    """The tracer and the accumulator factory of a device."""
     if device == "cpu":
         return CpuTracer, HostAccumulator.of
     from .cuda import CudaTracer
@@ -84,11 +120,29 @@ def _machinery(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulat
 
 
 class Renderer:
-    """Renders one view of one scene. `passes` may be left at any time and asked for again: it goes on where
-    it was.
+    """Progressive renderer of one view of one scene.
 
-    root: the tree of formulas, depths may be "auto". size: pixels across and down; the film's if not given.
-    Raises `SceneError` for a view that cannot be rendered, `RenderError` for a size that cannot be.
+    Iterating over `passes` can stop and start again at any time; rendering continues from the last pass.
+
+    Parameters
+    ----------
+    root : Node
+        Root of the formula tree; depths may be "auto".
+    view : View
+        Camera, film, lights, fog and shading.
+    size : tuple of int, optional
+        Picture width and height, pixels; the film's size by default.
+    work : Work, optional
+        Threads, progress and cancellation.
+    device : {"cpu", "cuda", "auto"}
+        Device that traces the rays.
+
+    Raises
+    ------
+    SceneError
+        If the view cannot be rendered.
+    RenderError
+        If the size is invalid.
     """
 
     def __init__(
@@ -113,22 +167,36 @@ class Renderer:
 
     @property
     def _empty(self) -> HostAccumulator:
+        """A host accumulator without samples."""
         return HostAccumulator.empty(self.width, self.height, self.dtype, work=self.work)
 
     @property
     def key(self) -> str:
-        """Equal for pictures that the same samples make."""
+        """Hash of everything that determines the samples: scene, view, size, precision and program version.
+
+        Returns
+        -------
+        str
+            Equal keys mean equal pictures after equal passes.
+        """
         what: RenderSetup = self.setup
         frames = [self._frame(k).linked for k in range(len(what.roots))]
         parts = [part for frame in frames for part in (frame.source, frame.parameters)]
         return key(program(), self.width, self.height, what.precision, *parts)
 
     def look(self, camera: Camera, within: float | None = None) -> None:
-        """Begins the picture anew from elsewhere; depths and precision stay as they are.
+        """Restart the picture from another camera; depths and precision are kept.
 
-        For steps so short that they suit; a new renderer finds them again. The eye must be outside the
-        solid. within: seconds that the first pass may take, going by the passes so far; it is as fine as
-        that allows.
+        Suitable for moves that leave the level of detail unchanged; otherwise create a new renderer, which
+        chooses depths and precision again. The eye must be outside the solid.
+
+        Parameters
+        ----------
+        camera : Camera
+            The new camera.
+        within : float, optional
+            Time budget of the first pass, seconds. Its grid is the finest that fits, judged by the rate of
+            earlier passes.
         """
         what = self.setup
         seen = optics(camera, (self.width, self.height), what.roots[-1], what.optics.least)
@@ -137,27 +205,62 @@ class Renderer:
         self.accumulator = self.accumulator.anew(COARSE if within is None else self._affordable(within))
 
     def _affordable(self, within: float) -> int:
-        """How coarse the first pass has to be."""
+        """The finest grid spacing of a first pass that fits the time budget."""
         for coarse in PREVIEWS:
             if self.width * self.height <= coarse * coarse * self._rate * within:
                 return coarse
         return PREVIEWS[-1]
 
     def save(self, file: BinaryIO) -> None:
-        """Writes the picture as it is, so that `resume` goes on with it."""
+        """Write the accumulated samples for `resume`.
+
+        Parameters
+        ----------
+        file : BinaryIO
+            Writable binary file.
+        """
         self.accumulator.host().save(file, self.key)
 
     def resume(self, path: str | Path) -> None:
-        """Goes on with a file that `save` wrote. Raises `RenderError` if it is of another picture."""
+        """Continue from a file written by `save`.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Raises
+        ------
+        RenderError
+            If the file belongs to another picture or is damaged.
+        """
         self.accumulator = self._kept(HostAccumulator.load(path, self.key, self._empty))
 
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
-        """Yields the picture after every pass, until all pixels have so many samples or are within the
-        tolerance.
+        """Yield the picture after every pass until all pixels have converged.
 
-        The first pass has one sample in 16 pixels, the second one in all others; which pixels later ones are
-        about, `Accumulator.wanted` says. Raises `RenderError` for numbers that cannot be, and `Cancelled`;
-        what was complete before stays valid.
+        A pixel is finished when it has `samples` samples or its error is within `tolerance`. The first pass
+        samples one pixel in 16, the second all others; `Accumulator.wanted` chooses the pixels of later
+        passes.
+
+        Parameters
+        ----------
+        samples : int, optional
+            Maximum samples per pixel; the film's `samples` by default.
+        tolerance : float
+            Standard error of a pixel's displayed brightness at which it has converged.
+
+        Yields
+        ------
+        Pass
+            The picture after a pass.
+
+        Raises
+        ------
+        RenderError
+            If `samples` or `tolerance` is invalid.
+        Cancelled
+            If the work was cancelled; completed passes stay valid.
         """
         most = self.setup.view.film.samples if samples is None else samples
         most = validated("samples", most, Film.kinds()["samples"], RenderError)
@@ -179,8 +282,7 @@ class Renderer:
         return self._seen(samples, error, count, self._rate)
 
     def _aim(self, number: int, limit: int) -> None:
-        """Points the tracer at the tree of this pass, and looks ahead once for each, where a block of
-        pixels has more than one ray."""
+        """Load the tree of this pass into the tracer; run the cone prepass if a block holds several rays."""
         ahead = number > 0 or self.accumulator.coarse < BLOCK
         aimed = self.setup.root(number), ahead
         if aimed != self._aimed:
@@ -194,7 +296,13 @@ class Renderer:
         return link_frame(what.root(number), what.view, what.camera, what.optics, BLOCK)
 
     def seen(self) -> Pass:
-        """The picture as it is."""
+        """Return the current picture without another pass.
+
+        Returns
+        -------
+        Pass
+            The current picture.
+        """
         return self._seen(*self.accumulator.statistics(), 0, 0.0)
 
     def _seen(self, samples: float, error: float, traced: int, rate: float) -> Pass:

@@ -1,17 +1,17 @@
-"""Low-discrepancy samples: sixteen dimensions, Owen-scrambled for every pixel and dimension by itself.
+"""Low-discrepancy samples in sixteen dimensions, Owen-scrambled per pixel and dimension.
 
 A digital (0, 16)-sequence in base 16 (Faure 1982, Niederreiter 1987): dimension d multiplies the digits of
-the index by the powers of Pascal's matrix that belong to an element of GF(16). Each digit is read out as
-bits in an order of its dimension's own, chosen so that the dimensions 2k and 2k + 1, which place a sample
-on a pixel, a lens or a light, are also a (0, 2)-sequence in base 2: every 2^m samples are stratified in all
-ways at once (the idea is that of Ahmed, Pharr, Ostromoukhov and Huang's SZ sequences, 2025). Sobol's
-dimensions are so in the first pair only; the fifth and sixth have twice the error at 256 samples. Of the
-orders that do it, a greedy search took those that make four dimensions, a pair and an earlier one, the best
-nets of 8 to 512 samples in base 2.
+the index by the powers of Pascal's matrix that belong to an element of GF(16). Each digit is read out as bits
+in an order specific to its dimension. The orders make each pair of dimensions 2k and 2k + 1, which places a
+sample on a pixel, a lens or a light, a (0, 2)-sequence in base 2 as well: every 2^m samples are stratified in
+all elementary intervals (the idea is that of Ahmed, Pharr, Ostromoukhov and Huang's SZ sequences, 2025).
+Sobol's sequence has this property in its first pair only; its fifth and sixth dimensions have twice the error
+at 256 samples. Among the orders with this property, a greedy search chose those for which four dimensions, a
+pair and an earlier one, form the best nets of 8 to 512 samples in base 2.
 
-Scrambling by a hash: Laine and Karras 2011, "Stratified Sampling for Stochastic Transparency", with the
-constants of Vegdahl 2021, "Owen Scrambling Based on Dithered Blue Noise Sampling"; why that is good: Burley
-2020, "Practical Hash-based Owen Scrambling".
+The hash-based scrambling is that of Laine and Karras 2011, "Stratified Sampling for Stochastic Transparency",
+with the constants of Vegdahl 2021, "Owen Scrambling Based on Dithered Blue Noise Sampling". Burley 2020,
+"Practical Hash-based Owen Scrambling", analyses its quality.
 """
 
 from __future__ import annotations
@@ -26,16 +26,26 @@ _DIMENSIONS = (
     (10, (7, 9, 2, 1)), (11, (13, 6, 2, 1)), (12, (11, 6, 1, 2)), (13, (9, 7, 3, 1)),
     (2, (3, 5, 9, 1)), (3, (1, 14, 4, 2)), (4, (7, 9, 2, 1)), (5, (13, 6, 2, 1)),
 )  # fmt: skip
-"""The element of GF(16) of each dimension, and of which bits of a digit each of its four bits is the
-parity."""
+"""Element of GF(16) of each dimension, and its bit masks: output bit k of a digit is the parity of the input
+bits in mask k.
+"""
 DIMENSIONS = len(_DIMENSIONS)
 
 
 def points(count: int, dimensions: int) -> np.ndarray:
-    """The first points of the sequence as 32-bit whole numbers, int32 bit patterns [count, dimensions],
-    each with its bits REVERSED.
+    """Return the first points of the sequence.
 
-    Dimensions beyond the sixteenth repeat them: their scrambling is another.
+    Parameters
+    ----------
+    count : int
+        Number of points.
+    dimensions : int
+        Number of dimensions. Dimensions beyond the sixteenth repeat the first ones, with another scrambling.
+
+    Returns
+    -------
+    ndarray of int32, shape (count, dimensions)
+        Bit patterns of 32-bit fractions with their bits REVERSED.
     """
     index = np.arange(count, dtype=np.uint32)[:, None]
     found = np.zeros((count, DIMENSIONS), np.uint32)
@@ -47,13 +57,16 @@ def points(count: int, dimensions: int) -> np.ndarray:
 
 @lru_cache(maxsize=DIMENSIONS)
 def _columns(dimension: int) -> list[int]:
-    """What each bit of the index adds (without carry) to the number, the first fractional bit the lowest."""
+    """Generator matrix of a dimension.
+
+    Column k holds the bits that index bit k toggles, the first fractional bit lowest.
+    """
     element, reads = _DIMENSIONS[dimension]
     columns = []
     for bit in range(32):
         place, value, column = bit // 4, 1 << bit % 4, 0
         for digit in range(place, -1, -1):
-            if place & digit == digit:  # Pascal's entry is odd (Lucas)
+            if place & digit == digit:  # Pascal's matrix entry is odd (Lucas' theorem)
                 column |= sum(
                     ((value & read).bit_count() & 1) << 4 * digit + k for k, read in enumerate(reads)
                 )
@@ -63,7 +76,7 @@ def _columns(dimension: int) -> list[int]:
 
 
 def _product(a: int, b: int) -> int:
-    """In GF(16), with x^4 + x + 1."""
+    """Product in GF(16), modulo x^4 + x + 1."""
     found = 0
     for bit in range(4):
         found ^= (a << bit) * (b >> bit & 1)

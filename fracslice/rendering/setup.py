@@ -1,4 +1,4 @@
-"""What a view leaves open, chosen for the scene: camera, lights, depth, precision."""
+"""Defaults of a view: camera, lights, depth and precision chosen for the scene."""
 
 from __future__ import annotations
 
@@ -19,19 +19,31 @@ SKY = Light(
     kind="sky", colour=(0.42, 0.58, 0.85), horizon=(0.82, 0.86, 0.92), ground=(0.35, 0.33, 0.31), strength=0.8
 )
 CELLS = 1 << 13
-"""In which the object is looked for, to have it in view."""
+"""Maximum cells in the search for the object's extent."""
 
 DETAIL = (4.0, 1.0, 0.5)
-"""The finest detail of the first passes and all later ones, in pixels."""
+"""Finest detail in pixels of the first and second pass, and of all later ones."""
 ROUNDING = {"float32": 2.0**-21, "float64": 2.0**-49}
-"""How much nearer than this, relative to the camera's coordinates, float positions cannot be told apart: 4
-ulp."""
+"""Resolution of float positions, relative to the camera's coordinates: 4 ulp."""
 
 
 @dataclass(frozen=True)
 class RenderSetup:
-    """A scene with nothing left open. roots: with the depths of the first passes and, last, of all later
-    ones."""
+    """Scene and view with all defaults resolved.
+
+    Attributes
+    ----------
+    roots : tuple of Node
+        Trees with resolved depths, one for each of the first passes; the last for all later passes.
+    view : View
+        View with lights.
+    camera : Camera
+        The camera.
+    optics : Optics
+        Lengths of the kernel.
+    precision : str
+        "float32" or "float64".
+    """
 
     roots: tuple[Node, ...]
     view: View
@@ -40,12 +52,44 @@ class RenderSetup:
     precision: str
 
     def root(self, index: int) -> Node:
-        """The tree for pass `index`."""
+        """Return the tree of a pass.
+
+        Parameters
+        ----------
+        index : int
+            Number of the pass, from 0.
+
+        Returns
+        -------
+        Node
+            Tree with resolved depths.
+        """
         return self.roots[min(index, len(self.roots) - 1)]
 
 
 def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
-    """Chooses what is open. Raises `SceneError` for a view that shows nothing: from inside the solid, say."""
+    """Resolve the defaults of a view.
+
+    Parameters
+    ----------
+    root : Node
+        Root of the formula tree; depths may be "auto".
+    view : View
+        The view.
+    size : tuple of int
+        Picture width and height, pixels.
+
+    Returns
+    -------
+    RenderSetup
+        The resolved scene and view.
+
+    Raises
+    ------
+    SceneError
+        If the view is invalid: the eye is inside the solid, there are two skies, or an unbounded scene has no
+        camera.
+    """
     camera = view.camera or _whole(root, size[0] / size[1])
     lights = view.lights or (SUN, SKY)
     if sum(light.kind == "sky" for light in lights) > 1:
@@ -60,7 +104,7 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
 
 
 def _whole(root: Node, aspect: float) -> Camera:
-    """A camera that has all cells in view that the object may be in."""
+    """A camera whose view contains every cell that the solid may occupy."""
     box = root.bounds.box
     if not box.finite:
         raise SceneError("<camera> is missing: expected one in a scene without an end")
@@ -74,9 +118,24 @@ def _whole(root: Node, aspect: float) -> Camera:
 
 
 def clearance(root: Node, camera: Camera) -> float:
-    """How far the surface is from the eye, at least, in scene units. root: with its depths.
+    """Return a lower bound of the distance from the eye to the surface.
 
-    Raises `SceneError` from inside the solid.
+    Parameters
+    ----------
+    root : Node
+        Tree with resolved depths.
+    camera : Camera
+        The camera.
+
+    Returns
+    -------
+    float
+        Distance, scene units.
+
+    Raises
+    ------
+    SceneError
+        If the eye is inside the solid.
     """
     f = float(root.kernel("cpu", "float64").points(*(np.array([c]) for c in camera.eye))[0])
     if not f > 0:

@@ -1,9 +1,8 @@
-"""A scene's second function: which material a point of the surface has, and how near its orbit came to the
-origin.
+"""Material and orbit trap at a surface point.
 
-The field's tree once more, with every function returning (f, paint, tone): paint is the number of a material,
-0 for none; tone the smallest |w| of the orbit (Pickover's and Carlson's orbit traps; Carlson 1999). It is
-called once per hit.
+The field's tree is compiled a second time, with every function returning (f, paint, tone). `paint` is the
+material's number, 0 for none. `tone` is the smallest abs(w) of the orbit (Pickover's and Carlson's orbit
+traps; Carlson 1999). The result is evaluated once per hit.
 """
 
 from __future__ import annotations
@@ -22,17 +21,49 @@ from ..kernel.structure import Arguments, Run, Subroutine, arguments, read
 
 @dataclass
 class TraceDialect(FieldDialect):
-    """Functions that return (f, paint, tone). materials: by its id, the paint of every material node."""
+    """Dialect whose functions return (f, paint, tone).
+
+    Attributes
+    ----------
+    materials : dict of int to int
+        Paint number of each material node, by the node's `id`.
+    prefix : str
+        Prefix of the function names.
+    """
 
     materials: dict[int, int] = field(default_factory=dict)
     prefix: str = "T"
 
     def kept(self, node: Node) -> Node:
+        """Skip identity nodes, except materials.
+
+        Parameters
+        ----------
+        node : Node
+            Node of the formula tree.
+
+        Returns
+        -------
+        Node
+            First node at or below it that is a material or not an identity.
+        """
         while node.is_identity and node.formula.name != material.name:
             node = node.children[0]
         return node
 
     def arguments(self, node: Node) -> Arguments:
+        """Return the function and arguments of a node; a material passes its paint number.
+
+        Parameters
+        ----------
+        node : Node
+            Node of the formula tree.
+
+        Returns
+        -------
+        Arguments
+            The node's function and arguments.
+        """
         if node.formula.name != material.name:
             return arguments(node, leading(node))
         paint: list[float] = []
@@ -40,15 +71,62 @@ class TraceDialect(FieldDialect):
         return Arguments(node.function, (), (passed,), tuple(paint))
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
-        """As they stand: where two are as near, the first one's paint is taken."""
+        """Keep the order of the children: at equal distances the first child's paint is taken.
+
+        Parameters
+        ----------
+        node : Node
+            Parent node.
+        parts : sequence of Subroutine
+            Functions of its children.
+
+        Returns
+        -------
+        sequence of int
+            Indices of the children in their given order.
+        """
         return range(len(parts))
 
     def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
+        """Write the function of a node.
+
+        Parameters
+        ----------
+        name : str
+            Function name.
+        node : Node
+            Node of the formula tree.
+        given : Arguments
+            The node's function and arguments.
+        runs : sequence of Run
+            Calls of the children.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
         if node.formula.name == material.name:
             return self.painted(name, given, runs[0])
         return super().write(name, node, given, runs)
 
     def painted(self, name: str, given: Arguments, child: Run) -> str:
+        """Write the function of a material: its paint applies where the child has none.
+
+        Parameters
+        ----------
+        name : str
+            Function name.
+        given : Arguments
+            The paint of the material.
+        child : Run
+            Call of the child.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
         return function(
             name,
             [
@@ -58,6 +136,20 @@ class TraceDialect(FieldDialect):
         )
 
     def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
+        """Write the function of a shape: the field value and the orbit trap.
+
+        Parameters
+        ----------
+        name : str
+            Function name.
+        given : Arguments
+            Function and arguments of the shape.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
         tree = _KeepsNearest().visit(source.specialised(given.function, dict(given.fixed)))
         tree.body.insert(0, ast.parse("nearest = 0.0 * x + 1e30").body[0])
         called = f"{name}_of"
@@ -71,6 +163,22 @@ class TraceDialect(FieldDialect):
         )
 
     def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        """Write the function of a CSG operator: paint and tone of the child that determines the value.
+
+        Parameters
+        ----------
+        name : str
+            Function name.
+        given : Arguments
+            Function and arguments of the operator.
+        runs : sequence of Run
+            Calls of the children.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
         called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
         lines = [f"f, paint, tone = {runs[0].call()}"]
         if sum(run.count for run in runs) == 1:
@@ -86,6 +194,22 @@ class TraceDialect(FieldDialect):
         return function(name, [*lines, "return f, paint, tone"])
 
     def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
+        """Write the function of a domain operator: paint and tone of the child's lowest evaluation.
+
+        Parameters
+        ----------
+        name : str
+            Function name.
+        given : Arguments
+            Function and arguments of the operator.
+        runs : sequence of Run
+            Call of the child.
+
+        Returns
+        -------
+        str
+            Source text.
+        """
         tree = source.specialised(given.function, dict(given.fixed))
         arguments = [a.arg for a in tree.args.args][4:]
         tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]
@@ -97,7 +221,7 @@ class TraceDialect(FieldDialect):
 
 
 class _KeepsNearest(ast.NodeTransformer):
-    """Marks of the orbit become the least r2 so far, which is returned beside the value."""
+    """Replace orbit marks by a running minimum of r2, and return the minimum beside the value."""
 
     def visit_Expr(self, node: ast.Expr) -> Any:
         if not source.is_mark(node):
@@ -112,8 +236,10 @@ class _KeepsNearest(ast.NodeTransformer):
 
 
 class _KeepsChild(ast.NodeTransformer):
-    """Before every statement that looks at the child, its triple is taken; the child with the lowest value
-    stays."""
+    """Evaluate the child's triple before each statement that calls the child.
+
+    The triple of lowest value is kept.
+    """
 
     def __init__(self, child: Run) -> None:
         self.child = child
@@ -145,5 +271,5 @@ class _KeepsChild(ast.NodeTransformer):
 
     @staticmethod
     def parsed(line: str) -> list[Any]:
-        # A return outside a function is no error to the parser.
+        # `ast.parse` accepts a return statement outside a function.
         return ast.parse(line).body

@@ -1,4 +1,4 @@
-"""Scene files: read, checked, built in Python, written."""
+"""Scenes: read from files, built in Python, validated and written."""
 
 from .lengths import parse_length
 from .model import Scene, scene

@@ -1,4 +1,4 @@
-"""The elements of a scene file that are not formulas: what stands around them, and with which attributes."""
+"""Elements of a scene file other than formulas, with their attributes."""
 
 from __future__ import annotations
 
@@ -17,9 +17,22 @@ from .view import PARTS, Part
 
 @dataclass(frozen=True)
 class TopElement:
-    """`<scene>` or an element directly under it; described like a `Formula`, so that it reads like one.
+    """`<scene>` or an element directly under it, with the interface of `Formula`.
 
-    part: the record it becomes, if it is about pictures or printing. many: whether there may be several.
+    Attributes
+    ----------
+    name : str
+        Element name.
+    doc : str
+        Documentation.
+    parameters : mapping of str to Parameter
+        Attributes of the element.
+    children : tuple
+        Minimum and maximum number of children; None for no maximum.
+    part : type of Part, optional
+        Record that the element becomes, for views and printing.
+    many : bool
+        True if the element may be repeated.
     """
 
     name: str
@@ -35,18 +48,57 @@ Element = Formula | TopElement
 
 @dataclass(frozen=True)
 class Version:
-    """The version of the file format: the only one there is."""
+    """Version of the file format; only one exists.
+
+    Attributes
+    ----------
+    default : Any
+        Default value; required.
+    doc : str
+        Meaning.
+    expects : str
+        Accepted text.
+    """
 
     default: Any = REQUIRED
     doc: str = "of the file format"
     expects: str = "1"
 
     def read(self, text: str) -> int:
+        """Parse the attribute.
+
+        Parameters
+        ----------
+        text : str
+            Text of the attribute.
+
+        Returns
+        -------
+        int
+            The version.
+
+        Raises
+        ------
+        ValueError
+            If the version is unknown.
+        """
         if text.strip() != self.expects:
             raise ValueError(self.expects)
         return VERSION
 
     def text(self, value: int) -> str:
+        """Format the attribute.
+
+        Parameters
+        ----------
+        value : int
+            The version.
+
+        Returns
+        -------
+        str
+            Text of the attribute.
+        """
         return str(value)
 
 
@@ -76,5 +128,11 @@ SECTIONS = {section.name: section for section in (SOLID, PRINT, *PICTURE)}
 
 
 def formulas() -> list[Formula]:
-    """Every registered formula, by name."""
+    """Return every registered formula.
+
+    Returns
+    -------
+    list of Formula
+        Sorted by name.
+    """
     return [get(name) for name in names()]

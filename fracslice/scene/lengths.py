@@ -1,4 +1,4 @@
-"""Lengths with a unit: how big the finished object is, how fine its detail."""
+"""Lengths with units."""
 
 from __future__ import annotations
 
@@ -17,8 +17,27 @@ _LENGTH = re.compile(rf"\s*({NUMBER})\s*({'|'.join(MILLIMETRES)})?\s*")
 
 
 def parse_length(value: str | float, what: str = "length") -> float:
-    """`value` in mm; a bare number is in mm already. Raises `SceneError`, which calls it `what`.
+    """Convert a length to mm.
 
+    Parameters
+    ----------
+    value : str or float
+        Text with a unit, or a number of mm.
+    what : str
+        Name of the length in error messages.
+
+    Returns
+    -------
+    float
+        Length, mm.
+
+    Raises
+    ------
+    SceneError
+        If the value is not a length.
+
+    Examples
+    --------
     >>> parse_length("2.5 cm"), parse_length(80)
     (25.0, 80.0)
     """
@@ -30,9 +49,16 @@ def parse_length(value: str | float, what: str = "length") -> float:
 
 @dataclass(frozen=True)
 class Length:
-    """A parameter that is a length: text with a unit, or a number of mm; its value is in mm.
+    """Parameter kind of a length: text with a unit, or a number of mm. Its value is in mm.
 
-    zero: whether it may be 0, for none.
+    Attributes
+    ----------
+    default : Any
+        Default value, mm.
+    doc : str
+        Meaning.
+    zero : bool
+        True if 0 is allowed, for none.
     """
 
     default: Any
@@ -41,18 +67,65 @@ class Length:
 
     @property
     def expects(self) -> str:
+        """Description of the accepted values."""
         return f"0, or {EXPECTS}" if self.zero else EXPECTS
 
     def read(self, text: str) -> float:
+        """Parse text with an optional unit.
+
+        Parameters
+        ----------
+        text : str
+            The text.
+
+        Returns
+        -------
+        float
+            Length, mm.
+
+        Raises
+        ------
+        ValueError
+            With `expects`, if the text is not a length.
+        """
         match = _LENGTH.fullmatch(text)
         if not match:
             raise ValueError(self.expects)
         return self._possible(float(match[1]) * MILLIMETRES[match[2] or "mm"])
 
     def check(self, value: Any) -> float:
+        """Validate text or a number of mm.
+
+        Parameters
+        ----------
+        value : str or float
+            The value.
+
+        Returns
+        -------
+        float
+            Length, mm.
+
+        Raises
+        ------
+        ValueError
+            With `expects`, if the value is not a length.
+        """
         return self.read(value) if isinstance(value, str) else self._possible(value)
 
     def text(self, value: float) -> str:
+        """Format a length.
+
+        Parameters
+        ----------
+        value : float
+            Length, mm.
+
+        Returns
+        -------
+        str
+            Text with the unit mm.
+        """
         return f"{int(value) if value.is_integer() else value!r}mm"
 
     def _possible(self, value: Any) -> float:
@@ -64,7 +137,7 @@ class Length:
 
 @dataclass(frozen=True)
 class Shift(Length):
-    """A parameter that is a length in either direction, or 0; its value is in mm."""
+    """Parameter kind of a signed length, or 0. Its value is in mm."""
 
     expects = "0, or a length such as 0.05mm or -50um, up to 1000m"
 
@@ -77,11 +150,28 @@ class Shift(Length):
 
 @dataclass(frozen=True)
 class Pair(Length):
-    """A parameter that is two lengths, or one that stands for both; its values are in mm."""
+    """Parameter kind of two lengths, or one length for both. Its values are in mm."""
 
     expects = f"two lengths, or one for both, each {EXPECTS}"
 
     def check(self, value: Any) -> Any:
+        """Validate one length or a pair.
+
+        Parameters
+        ----------
+        value : str, float, tuple or list
+            One length for both, or two.
+
+        Returns
+        -------
+        tuple of float
+            Two lengths, mm.
+
+        Raises
+        ------
+        ValueError
+            With `expects`, if the value is not a pair of lengths.
+        """
         pair = tuple(value) if isinstance(value, (tuple, list)) else (value, value)
         if len(pair) != 2:
             raise ValueError(self.expects)

@@ -1,4 +1,4 @@
-"""The scenes that ship with fracslice."""
+"""Scenes that ship with fracslice."""
 
 from __future__ import annotations
 
@@ -12,25 +12,69 @@ _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
 
 
 def folder() -> Path:
-    """Where the shipped scenes are: in the installed package, or beside it in a checkout."""
+    """Return the folder of the shipped scenes: in the installed package, or beside it in a checkout.
+
+    Returns
+    -------
+    Path
+        The folder.
+    """
     package = Path(__file__).parents[1]
     installed = package / "scenes"
     return installed if installed.is_dir() else package.parent / "scenes"
 
 
 def names() -> list[str]:
-    """The names of the shipped scenes, sorted."""
+    """Return the names of the shipped scenes.
+
+    Returns
+    -------
+    list of str
+        Sorted names.
+    """
     return sorted(path.stem for path in folder().glob("*.xml"))
 
 
 def path(name: str) -> Path:
-    """The file of the shipped scene `name`. Raises `SceneError` with the nearest right name."""
+    """Return the file of a shipped scene.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene; the message suggests the nearest name.
+    """
     if name not in names():
         raise SceneError(f"{name}: no such scene; {hint(name, names())}")
     return folder() / f"{name}.xml"
 
 
 def about(name: str) -> str:
-    """What the shipped scene is: its first comment, as one line. Raises `SceneError`."""
+    """Return the description of a shipped scene: its first comment, on one line.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+
+    Returns
+    -------
+    str
+        The description, or "".
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene.
+    """
     comment = _COMMENT.search(path(name).read_text(encoding="utf-8"))
     return " ".join(comment[1].split()) if comment else ""

@@ -1,4 +1,4 @@
-"""The documentation of every element, made from the registry."""
+"""Documentation of every element, generated from the registry."""
 
 from __future__ import annotations
 
@@ -50,7 +50,13 @@ A scene file is XML. It says what the object is, in units of its own, and how la
 
 
 def markdown() -> str:
-    """The page of all elements."""
+    """Return the page of all elements.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     return "\n".join(_page())
 
 
@@ -67,7 +73,7 @@ def _page() -> Iterator[str]:
 
 
 def _call(formula: Formula) -> str:
-    """How Python calls a formula, with its defaults."""
+    """Python call of a formula, with its defaults."""
     found = inspect.signature(formula).parameters.values()
     return f"{formula.name}({', '.join(str(p.replace(annotation=p.empty)) for p in found)})"
 
@@ -88,24 +94,63 @@ def _code(text: str) -> str:
 
 
 def default(kind: Any) -> str:
-    """A default as text: "required" if there is none, "" if leaving it out is a choice of its own."""
+    """Return the default of a parameter as text.
+
+    Parameters
+    ----------
+    kind : Parameter
+        Parameter kind.
+
+    Returns
+    -------
+    str
+        "required" without a default; "" if omission is a choice of its own.
+    """
     if kind.default is REQUIRED:
         return "required"
     return "" if kind.default is None else str(kind.text(kind.default))
 
 
 def prose(doc: str) -> str:
-    """A docstring without its indentation."""
+    """Return a docstring without its indentation.
+
+    Parameters
+    ----------
+    doc : str
+        The docstring.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     return inspect.cleandoc(doc)
 
 
 def summary(doc: str) -> str:
-    """The first paragraph of a docstring, on one line."""
+    """Return the first paragraph of a docstring on one line.
+
+    Parameters
+    ----------
+    doc : str
+        The docstring.
+
+    Returns
+    -------
+    str
+        The paragraph.
+    """
     return " ".join(doc.split("\n\n")[0].split())
 
 
 def overview() -> str:
-    """Every formula with the summary of its documentation, as plain text."""
+    """Return every formula with its summary, as plain text.
+
+    Returns
+    -------
+    str
+        The list, grouped by kind.
+    """
     lines = []
     for kind, (title, _) in _GROUPS.items():
         members = [formula for formula in formulas() if formula.kind == kind]
@@ -114,7 +159,23 @@ def overview() -> str:
 
 
 def page(name: str) -> str:
-    """All that is known of one element, as plain text. Raises `SceneError` with the nearest right name."""
+    """Return the documentation of one element, as plain text.
+
+    Parameters
+    ----------
+    name : str
+        Element name.
+
+    Returns
+    -------
+    str
+        The page.
+
+    Raises
+    ------
+    SceneError
+        If there is no such element; the message suggests the nearest name.
+    """
     known: dict[str, Element] = {SCENE.name: SCENE, **SECTIONS, **{f.name: f for f in formulas()}}
     if name not in known:
         raise SceneError(f"{name}: no such formula; {hint(name, known)}")

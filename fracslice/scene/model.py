@@ -1,4 +1,4 @@
-"""What a scene file says, as frozen records, and the one expression that builds a scene in Python."""
+"""Scene records, and the function that builds a scene in Python."""
 
 from __future__ import annotations
 
@@ -19,11 +19,25 @@ from .view import View
 
 @dataclass(frozen=True)
 class Scene:
-    """One solid, how large to make it, what makes it printable, and how to look at it.
+    """One solid with its size, print settings and view.
 
-    root: the tree of formulas. size_mm: the longest side of the finished object. name: a label, not content.
-    printing: what meshes and slices differ in from the root. view: for pictures; meshes do not depend on it.
-    Raises `SceneError` for a tree that makes no sense as a whole: a twist of something unbounded, say.
+    Attributes
+    ----------
+    root : Node
+        Root of the formula tree.
+    size_mm : float
+        Longest side of the finished object, mm; text with a unit is accepted.
+    name : str
+        Label; not compared and not written.
+    view : View
+        View for pictures; meshes do not depend on it.
+    printing : Print
+        Changes for printing, which meshes and slices contain and the root does not.
+
+    Raises
+    ------
+    SceneError
+        If the tree is invalid as a whole, such as a twist of an unbounded solid.
     """
 
     root: Node
@@ -38,16 +52,32 @@ class Scene:
 
     @cached_property
     def hash(self) -> str:
-        """12 hexadecimal digits of the SHA-256 of the canonical XML: equal for equal scenes, everywhere."""
+        """First 12 hexadecimal digits of the SHA-256 of the canonical XML.
+
+        Equal scenes have equal hashes on every platform.
+        """
         from .writer import to_xml
 
         return hashlib.sha256(to_xml(self).encode()).hexdigest()[:12]
 
     def with_values(self, settings: Iterable[str]) -> Scene:
-        """A copy with settings: "mandelbulb.power=6", "box[2].round=0.1" (the second), "solid.size=4cm".
+        """Return a copy with changed values.
 
-        Without a number in brackets every element of that name changes. Elements are counted from 1 in the
-        order of the file. Raises `SceneError` for a name that the scene does not have or an impossible value.
+        Parameters
+        ----------
+        settings : iterable of str
+            Settings: "mandelbulb.power=6", "box[2].round=0.1" (the second box), "solid.size=4cm". Elements
+            are counted from 1 in the order of the file. Without a number, all elements of the name change.
+
+        Returns
+        -------
+        Scene
+            The changed scene.
+
+        Raises
+        ------
+        SceneError
+            If the scene has no such element or attribute, or the value is invalid.
         """
         from .values import changed
 
@@ -61,8 +91,33 @@ def scene(
     view: View | None = None,
     printing: Print | None = None,
 ) -> Scene:
-    """A scene of one or more elements; several are a union.
+    """Build a scene from elements.
 
+    Parameters
+    ----------
+    *elements : Node
+        One or more elements; several form a union.
+    size : str or float
+        Longest side of the finished object: text with a unit, or mm.
+    name : str
+        Label.
+    view : View, optional
+        View for pictures.
+    printing : Print, optional
+        Changes for printing.
+
+    Returns
+    -------
+    Scene
+        The scene.
+
+    Raises
+    ------
+    SceneError
+        If there is no element, or a value is invalid.
+
+    Examples
+    --------
     >>> from fracslice.formulas import sphere, transform
     >>> ball = scene(sphere(radius=0.5), transform(sphere(), translate=(1, 0, 0)), size="4cm")
     >>> ball.size_mm, ball.root
@@ -75,7 +130,10 @@ def scene(
 
 
 def _refuse_impossible(root: Node) -> None:
-    """Works out, from the leaves up, all that a kernel will ask for: what only the whole tree can tell."""
+    """Compute bounds and arguments of all nodes, from the leaves up.
+
+    Errors of the tree as a whole thus surface at construction.
+    """
     for node in reversed(list(root.walk())):
         with computing(node.fail):
             depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
@@ -84,7 +142,18 @@ def _refuse_impossible(root: Node) -> None:
 
 @contextmanager
 def computing(fail: Callable[[str], SceneError]) -> Iterator[None]:
-    """Numbers that overflow, or vanish where they must not, become the error that `fail` makes."""
+    """Convert numeric errors in a block, such as overflow or division by zero, to `SceneError`.
+
+    Parameters
+    ----------
+    fail : callable
+        Makes the error from a message.
+
+    Raises
+    ------
+    SceneError
+        If a computation overflows, divides by zero or is invalid.
+    """
     import numpy as np
 
     try:

@@ -1,4 +1,4 @@
-"""How a scene is made printable: the record behind `<print>`, which the commands' flags fill as well."""
+"""Print settings of a scene: the record behind `<print>`, which command-line flags fill as well."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ def _length(doc: str, default: float = 0.0) -> Length:
 
 @dataclass(frozen=True, kw_only=True)
 class Print(Part):
-    """What is changed so that the object prints, in this order.
+    """Changes that make the object printable, applied in this order.
 
-    Lengths are of the finished object: a millimetre is a millimetre, whatever the field says. The size of
-    the solid is that of the bodies that stay, before anything is cut off them or added.
+    Lengths are those of the finished object, in mm. The size of the solid is measured on the connected
+    components that are kept, before anything is cut off or added.
     """
 
     element = "print"
@@ -38,20 +38,21 @@ class Print(Part):
     raft: float = described(_length("the object stands on a plate of this height"))
 
     def validate(self) -> None:
+        """Raise `SceneError` for `keep` combined with `bridge`."""
         if self.keep == "largest" and self.bridge:
             raise self.fail("keep and bridge: expected one of them; where one body stays, none is loose")
 
     @property
     def chooses(self) -> bool:
-        """Whether it matters which bodies there are."""
+        """True if the result depends on the connected components."""
         return self.keep == "largest" or self.bridge > 0
 
     @property
     def sorts(self) -> bool:
-        """Whether bodies or cavities go."""
+        """True if connected components or cavities may be removed."""
         return self.keep == "largest" or self.cavities == "fill"
 
     @property
     def whole(self) -> bool:
-        """Whether bodies and cavities stay or go as a whole, and nothing else is changed."""
+        """True if connected components and cavities are only kept or removed as a whole."""
         return not any((self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft))

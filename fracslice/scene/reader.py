@@ -1,7 +1,7 @@
-"""XML -> Scene.
+"""Scene files: XML to `Scene`.
 
-Parsed by expat, which reports where a tag starts, stops at a document type declaration before it can declare
-anything, and opens no other file: no entity is ever expanded, nothing is included, nothing fetched.
+The parser is expat. It reports where a tag starts and stops at a document type declaration before that can
+declare anything. It opens no other file: no entity is expanded, nothing is included or fetched.
 """
 
 from __future__ import annotations
@@ -25,11 +25,27 @@ from .view import Part, View
 
 LARGEST_FILE = 16 << 20
 BEFORE = b"\0\xff\xfe\xef\xbb\xbf \t\r\n"
-"""What may stand before the first tag, or within it, as UTF-16 has it: marks of byte order, white space."""
+"""Bytes allowed before the first tag, or within it in UTF-16: byte order marks and white space."""
 
 
 def read(path: str | os.PathLike[str]) -> Scene:
-    """The scene in a file, named after it. Raises `SceneError`: "file:line: <element> what is wrong"."""
+    """Read a scene file.
+
+    Parameters
+    ----------
+    path : str or path
+        The file; the scene is named after it.
+
+    Returns
+    -------
+    Scene
+        The scene.
+
+    Raises
+    ------
+    SceneError
+        If the file is unreadable or invalid: "file:line: <element> message".
+    """
     source = os.fspath(path)
     try:
         with open(source, "rb") as file:
@@ -40,7 +56,25 @@ def read(path: str | os.PathLike[str]) -> Scene:
 
 
 def reads(text: str | bytes, name: str = "scene") -> Scene:
-    """The scene in a string. Raises `SceneError`, which calls the file `name`."""
+    """Parse a scene.
+
+    Parameters
+    ----------
+    text : str or bytes
+        XML.
+    name : str
+        Name of the scene, and of the file in error messages.
+
+    Returns
+    -------
+    Scene
+        The scene.
+
+    Raises
+    ------
+    SceneError
+        If the text is invalid.
+    """
     return _scene(text.encode() if isinstance(text, str) else text, name, name)
 
 
@@ -60,7 +94,7 @@ def _scene(data: bytes, source: str, name: str) -> Scene:
 
 @dataclass
 class _Open:
-    """An element whose end tag has not come yet."""
+    """An element before its end tag."""
 
     element: Element
     place: str
@@ -68,11 +102,12 @@ class _Open:
     children: list[Node] = field(default_factory=list)
 
     def fail(self, message: str) -> SceneError:
+        """The error to raise about this element."""
         return SceneError(f"{self.place}: <{self.element.name}> {message}")
 
 
 class _Builder:
-    """Makes nodes from the inside out while the file is parsed: without recursion, whatever the depth."""
+    """Builds nodes from the leaves up during parsing, without recursion at any depth."""
 
     def __init__(self, source: str) -> None:
         self.source = source
@@ -89,10 +124,11 @@ class _Builder:
 
     @property
     def place(self) -> str:
+        """Current position, "file:line"."""
         return f"{self.source}:{self.parser.CurrentLineNumber}"
 
     def sections(self, data: bytes) -> dict[str, _Open]:
-        """The elements under `<scene>` by name."""
+        """Parse the file; return the elements under `<scene>` by name."""
         try:
             self.parser.Parse(data, True)
         except expat.ExpatError as error:
@@ -103,9 +139,11 @@ class _Builder:
         return self.done
 
     def doctype(self, *_: object) -> None:
+        """Refuse a document type declaration."""
         raise SceneError(f"{self.place}: <!DOCTYPE>: document types and entities are not allowed in a scene")
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
+        """Handle a start tag: check the element and its attributes."""
         if len(self.open) > DEEPEST + 1:
             raise SceneError(f"{self.place}: <{name}> {TOO_DEEP}")
         opened = _Open(self.element(name), self.place, {})
@@ -117,7 +155,7 @@ class _Builder:
         self.open.append(opened)
 
     def element(self, name: str) -> Element:
-        """What may stand here under this name."""
+        """The element of this name, if it is allowed here."""
         if not self.open:
             allowed: Mapping[str, Element] = {SCENE.name: SCENE}
         elif self.open[-1].element is SCENE:
@@ -135,6 +173,7 @@ class _Builder:
         return allowed[name]
 
     def end(self, name: str) -> None:
+        """Handle an end tag: build the node."""
         closed = self.open.pop()
         if isinstance(closed.element, TopElement):
             self.close_section(closed)
@@ -148,6 +187,7 @@ class _Builder:
         self.open[-1].children.append(node)
 
     def close_section(self, closed: _Open) -> None:
+        """Store an element that is no formula."""
         section = closed.element
         if isinstance(section, TopElement) and section.part:
             self.parts.append(section.part(place=closed.place, **closed.values))
@@ -161,12 +201,14 @@ class _Builder:
             raise closed.fail(f"expected <{SOLID.name}> inside it")
 
     def text(self, text: str) -> None:
+        """Refuse text other than white space."""
         if text.strip():
             shown = " ".join(text.split())[:40]
             raise self.open[-1].fail(f"holds the text {shown!r}: expected elements only")
 
 
 def _value(opened: _Open, attribute: str, text: str) -> Any:
+    """Parse an attribute of an element."""
     kind = opened.element.parameters.get(attribute)
     if kind is None:
         near = hint(attribute, opened.element.parameters)
@@ -178,6 +220,6 @@ def _value(opened: _Open, attribute: str, text: str) -> Any:
 
 
 def _quoted(text: str) -> str:
-    """The value as one short line, whatever it holds."""
+    """A value as one short quoted line."""
     line = "".join(c if c.isprintable() else "?" for c in text)
     return f'"{line if len(line) <= 60 else line[:57] + "..."}"'

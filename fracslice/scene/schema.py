@@ -1,7 +1,8 @@
-"""The RELAX NG schema of scene files, made from the registry: editors complete and check with it.
+"""RELAX NG schema of scene files, generated from the registry, for completion and validation in editors.
 
 Clark and Murata 2001, "RELAX NG Specification"; data types of XML Schema part 2; documentation and defaults
-as in "RELAX NG DTD Compatibility" (OASIS 2001). What no grammar can say (min < max), only the reader checks.
+as in "RELAX NG DTD Compatibility" (OASIS 2001). Constraints between attributes (min < max) are beyond the
+grammar; only the reader checks them.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from .layout import SCENE, SECTIONS, VERSION, Element, Version, formulas
 from .lengths import MILLIMETRES, Length
 
 PATH = Path(__file__).with_name("scene.rng")
-"""The schema as it ships."""
+"""The shipped schema."""
 
 _NOTES = "http://relaxng.org/ns/compatibility/annotations/1.0"
 _FACETS = {"above": "minExclusive", "least": "minInclusive", "below": "maxExclusive", "most": "maxInclusive"}
@@ -24,7 +25,13 @@ _LENGTH = rf"\s*\+?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+\-]?[0-9]+)?\s*({'|'.join(MI
 
 
 def relaxng() -> str:
-    """The schema in XML form."""
+    """Return the schema in XML form.
+
+    Returns
+    -------
+    str
+        XML.
+    """
     grammar = Tree.Element(
         "grammar",
         {
@@ -86,7 +93,7 @@ def _count(parent: Tree.Element, kind: Count) -> None:
 def _vector(parent: Tree.Element, kind: Vector) -> None:
     first = kind.sizes[0]
     if len(kind.sizes) > 2 and all(size % first == 0 for size in kind.sizes):
-        # So many times the first size; how many at most is left to the reader, for brevity.
+        # Any multiple of the first size, for brevity; the reader checks the maximum.
         group = Tree.SubElement(Tree.SubElement(parent, "list"), "oneOrMore")
         _items(Tree.SubElement(group, "group"), kind, first)
         return
@@ -133,14 +140,14 @@ _PATTERNS: dict[type, Any] = {
 
 
 def _data(parent: Tree.Element, kind: str, limits: Number | Count | Vector) -> None:
-    """A data type with its limits."""
+    """Add a data type with its limits."""
     data = Tree.SubElement(parent, "data", type=kind)
     for name, facet in _FACETS.items():
         limit = getattr(limits, name, math.inf)
         if math.isfinite(limit):
             _param(data, facet, f"{int(limit) if float(limit).is_integer() else limit}")
     if kind == "double":
-        _param(data, "pattern", "[^NI]*")  # neither NaN nor INF
+        _param(data, "pattern", "[^NI]*")  # excludes NaN and INF
 
 
 def _param(data: Tree.Element, name: str, text: str) -> None:

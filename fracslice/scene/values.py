@@ -1,4 +1,4 @@
-"""Single values changed from outside: what --set does."""
+"""Settings that change single values of a scene, as with ``--set``."""
 
 from __future__ import annotations
 
@@ -21,7 +21,21 @@ _FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*(\d+)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.D
 
 @dataclass(frozen=True)
 class Override:
-    """One change: of every element of that name, or of the one with this number."""
+    """One parsed setting.
+
+    Attributes
+    ----------
+    source : str
+        Text of the setting, for error messages.
+    element : str
+        Element name.
+    number : int or None
+        Number of the element, from 1; None for all elements of the name.
+    attribute : str
+        Attribute name.
+    text : str
+        New value.
+    """
 
     source: str
     element: str
@@ -30,10 +44,38 @@ class Override:
     text: str
 
     def fail(self, message: str) -> SceneError:
+        """Return the error to raise about this setting.
+
+        Parameters
+        ----------
+        message : str
+            The message.
+
+        Returns
+        -------
+        SceneError
+            The error.
+        """
         return SceneError(f"{self.source}: {message}")
 
     def value(self, element: Element) -> Any:
-        """The text as a value of this element's attribute."""
+        """Parse the value for an element.
+
+        Parameters
+        ----------
+        element : Element
+            Element with the attribute.
+
+        Returns
+        -------
+        Any
+            The value.
+
+        Raises
+        ------
+        SceneError
+            If the element has no such attribute, or the value is invalid.
+        """
         kind = element.parameters.get(self.attribute)
         if kind is None:
             near = hint(self.attribute, element.parameters)
@@ -45,7 +87,25 @@ class Override:
 
 
 def changed(scene: Scene, settings: Iterable[str]) -> Scene:
-    """`scene` with the settings applied, later ones over earlier ones. Raises `SceneError`."""
+    """Apply settings to a scene, in order.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    settings : iterable of str
+        Settings, "ELEMENT.ATTRIBUTE=VALUE".
+
+    Returns
+    -------
+    Scene
+        The changed scene.
+
+    Raises
+    ------
+    SceneError
+        If a setting is malformed, its element is missing or its value is invalid.
+    """
     for source in settings:
         scene = _changed(scene, _parsed(source))
     return scene
@@ -76,7 +136,7 @@ def _changed(scene: Scene, override: Override) -> Scene:
 
 
 def _relit(view: View, override: Override) -> View:
-    """The view with one value of its elements changed; film and shading are always there."""
+    """The view with one value changed; film and shading can be changed even if they are not in the file."""
     section = SECTIONS[override.element]
     always = [part for part in (view.film, view.shading) if part not in view.parts]
     found, counted = [], 0
@@ -92,6 +152,7 @@ def _relit(view: View, override: Override) -> View:
 
 
 def _rebuilt(node: Node, override: Override, seen: Counter[str]) -> Node:
+    """The tree with one value changed; `seen` counts the nodes visited."""
     seen[node.formula.name] += 1
     meant = node.formula.name == override.element and override.number in (None, seen[node.formula.name])
     values: Mapping[str, Any] = {override.attribute: override.value(node.formula)} if meant else {}

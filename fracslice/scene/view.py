@@ -1,7 +1,7 @@
 # ruff: noqa: RUF009 -- `described` makes a field, as dataclasses.field does
-"""How a scene is looked at: the records behind `<camera>`, `<film>`, `<light>`, `<fog>` and `<shading>`.
+"""View of a scene: the records behind `<camera>`, `<film>`, `<light>`, `<fog>` and `<shading>`.
 
-Every field carries the kind that reads, checks, writes and describes it, as the parameters of a formula do.
+Every field carries a parameter kind that reads, validates, writes and documents it, as in formulas.
 """
 
 from __future__ import annotations
@@ -21,19 +21,45 @@ if TYPE_CHECKING:
 Triple = tuple[float, float, float]
 WHITE = (1.0, 1.0, 1.0)
 FILLED = 0.95
-"""Of the picture, by the object that a camera is chosen for."""
+"""Fraction of the picture that the object fills with an automatic camera."""
 SHIFT = Vector((0.0, 0.0, 0.0), "so much forwards, to the right and up")
 TURN = Vector((0.0, 0.0), "degrees to the right and up", sizes=(2,))
 
 
 def described(kind: Any) -> Any:
-    """A field of a record, with the kind's default."""
+    """Return a dataclass field with a parameter kind.
+
+    Parameters
+    ----------
+    kind : Parameter
+        Parameter kind; its default is the field's.
+
+    Returns
+    -------
+    Any
+        The field.
+    """
     return field(default=kind.default, metadata={"kind": kind})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """What the records have in common. Raises `SceneError` for a value that its kind refuses."""
+    """Base of the records of a scene file.
+
+    Attributes
+    ----------
+    element : str
+        Element name.
+    many : bool
+        True if the element may be repeated.
+    place : str or None
+        Position in the file, "file:line".
+
+    Raises
+    ------
+    SceneError
+        If a value is invalid.
+    """
 
     element: ClassVar[str]
     many: ClassVar[bool] = False
@@ -44,21 +70,38 @@ class Part:
         self.validate()
 
     def validate(self) -> None:
-        """Raises `SceneError` for values that are possible alone but not together."""
+        """Raise `SceneError` for values that are invalid in combination."""
 
     @classmethod
     def kinds(cls) -> dict[str, Any]:
-        """The parameters by name."""
+        """Return the parameter kinds.
+
+        Returns
+        -------
+        dict of str to Parameter
+            Kinds by field name.
+        """
         return {f.name: f.metadata["kind"] for f in fields(cls) if "kind" in f.metadata}
 
     def fail(self, message: str) -> SceneError:
-        """The error to raise about this element."""
+        """Return the error to raise about this element.
+
+        Parameters
+        ----------
+        message : str
+            The message.
+
+        Returns
+        -------
+        SceneError
+            The error.
+        """
         return SceneError(f"{self.place + ': ' if self.place else ''}<{self.element}> {message}")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Camera(Part):
-    """From where and how the scene is looked at; without one, the whole object is in view."""
+    """Position, direction and lens of the camera; without one, the whole object is in view."""
 
     element = "camera"
     eye: Triple = described(Vector((2.2, -2.0, 1.4), "where the camera is, in scene units"))
@@ -77,6 +120,7 @@ class Camera(Part):
     )
 
     def validate(self) -> None:
+        """Raise `SceneError` if `eye`, `target` and `up` do not define a view."""
         if not 0 < math.dist(self.eye, self.target) < math.inf:
             raise self.fail("eye and target: expected two different points")
         if math.hypot(*_cross(self.forward, _unit(self.up))) < 1e-6:
@@ -84,10 +128,23 @@ class Camera(Part):
 
     @classmethod
     def around(cls, box: Box, points: np.ndarray | None = None, aspect: float = 1.0) -> Camera:
-        """A camera that looks at the middle of a finite box and has points [3, n] in view, the box' corners
-        if none are given. aspect: of the picture, its width by its height.
+        """Return a camera with a box or points in view.
+
+        Parameters
+        ----------
+        box : Box
+            Finite box; the camera looks at its centre.
+        points : ndarray of float64, shape (3, n), optional
+            Points to have in view, scene units; the corners of the box by default.
+        aspect : float
+            Width of the picture divided by its height.
+
+        Returns
+        -------
+        Camera
+            The camera.
         """
-        import numpy as np  # help does without
+        import numpy as np  # not needed for help texts
 
         away = _unit((2.2, -2.0, 1.4))
         draft = cls(eye=_along(box.centre, away, max(box.size)), target=box.centre)
@@ -99,26 +156,59 @@ class Camera(Part):
 
     @property
     def forward(self) -> Triple:
+        """Unit viewing direction."""
         return _unit(_minus(self.target, self.eye))
 
     @property
     def right(self) -> Triple:
+        """Unit direction to the right of the picture."""
         return _unit(_cross(self.forward, self.up))
 
     @property
     def above(self) -> Triple:
-        """What is up in the picture, at right angles to where the camera looks."""
+        """Unit direction to the top of the picture, orthogonal to `forward`."""
         return _cross(self.right, self.forward)
 
     def moved(self, forward: float = 0.0, right: float = 0.0, up: float = 0.0) -> Camera:
-        """Flown by so much, in scene units, looking in the same direction."""
+        """Return the camera translated along its own axes.
+
+        Parameters
+        ----------
+        forward, right, up : float
+            Distances, scene units.
+
+        Returns
+        -------
+        Camera
+            The moved camera, with the same viewing direction.
+
+        Raises
+        ------
+        SceneError
+            If a distance is invalid.
+        """
         by = validated("moved", (forward, right, up), SHIFT, self.fail)
         shift = tuple(_dot(by, axes) for axes in zip(self.forward, self.right, self.above, strict=True))
         return replace(self, eye=_plus(self.eye, shift), target=_plus(self.target, shift))
 
     def turned(self, yaw: float = 0.0, pitch: float = 0.0) -> Camera:
-        """Looking elsewhere from the same place: so many degrees to the right, and up (never over the
-        zenith)."""
+        """Return the camera turned in place; it never turns over the zenith.
+
+        Parameters
+        ----------
+        yaw, pitch : float
+            Angles to the right and up, degrees.
+
+        Returns
+        -------
+        Camera
+            The turned camera.
+
+        Raises
+        ------
+        SceneError
+            If an angle is invalid.
+        """
         yaw, pitch = validated("turned", (yaw, pitch), TURN, self.fail)
         ahead = math.asin(max(-1.0, min(1.0, _dot(self.forward, _unit(self.up)))))
         rise = max(-1.55, min(1.55, ahead + math.radians(pitch))) - ahead
@@ -127,7 +217,23 @@ class Camera(Part):
         return replace(self, target=_along(self.eye, turned, math.dist(self.eye, self.target)))
 
     def orbited(self, degrees: float) -> Camera:
-        """Carried around the target, about the direction that is up."""
+        """Return the camera rotated around the target, about `up`.
+
+        Parameters
+        ----------
+        degrees : float
+            Angle, degrees.
+
+        Returns
+        -------
+        Camera
+            The rotated camera.
+
+        Raises
+        ------
+        SceneError
+            If the angle is invalid.
+        """
         degrees = validated("degrees", degrees, Number(0.0, "an angle"), self.fail)
         arm = _turn(_minus(self.eye, self.target), _unit(self.up), math.radians(degrees))
         return replace(self, eye=_plus(self.target, arm))
@@ -135,7 +241,7 @@ class Camera(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Film(Part):
-    """The picture: how large, how clean, and how light becomes colour."""
+    """Size, sampling and tone mapping of the picture."""
 
     element = "film"
     width: int = described(Count(1280, "pixels across", least=1, most=32768))
@@ -155,7 +261,7 @@ class Film(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Light(Part):
-    """A source of light; there may be several. Without any, a sun and a sky."""
+    """Light source, repeatable; without any, the scene has a sun and a sky."""
 
     element = "light"
     many = True
@@ -182,7 +288,7 @@ class Light(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Fog(Part):
-    """Haze that hides what is far."""
+    """Haze that hides distant surfaces."""
 
     element = "fog"
     colour: Triple = described(Vector((0.7, 0.75, 0.8), "red, green and blue", least=0, most=1))
@@ -193,7 +299,7 @@ class Fog(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Shading(Part):
-    """What is shown of the surface."""
+    """Display mode and surface effects."""
 
     element = "shading"
     mode: str = described(
@@ -212,7 +318,21 @@ class Shading(Part):
 
 @dataclass(frozen=True)
 class View:
-    """All of it; what is left out is None or empty, and chosen for the scene."""
+    """Complete view of a scene. Omitted parts are None or empty, and chosen for the scene.
+
+    Attributes
+    ----------
+    camera : Camera or None
+        The camera.
+    film : Film
+        Size, sampling and tone mapping.
+    lights : tuple of Light
+        Light sources.
+    fog : Fog or None
+        Fog.
+    shading : Shading
+        Display mode and surface effects.
+    """
 
     camera: Camera | None = None
     film: Film = Film()
@@ -222,7 +342,23 @@ class View:
 
     @classmethod
     def of(cls, parts: Iterable[Part]) -> View:
-        """The view that so many elements make. Raises `SceneError` if one of a kind stands there twice."""
+        """Build a view from its elements.
+
+        Parameters
+        ----------
+        parts : iterable of Part
+            Elements of a scene file.
+
+        Returns
+        -------
+        View
+            The view.
+
+        Raises
+        ------
+        SceneError
+            If an element that is not repeatable occurs twice.
+        """
         found: dict[str, Any] = {}
         for part in parts:
             name = "lights" if isinstance(part, Light) else part.element
@@ -233,7 +369,7 @@ class View:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The elements again, without those that say nothing."""
+        """Elements of the view, without film and shading of default values."""
         single = [
             part
             for part in (self.camera, self.film, self.fog, self.shading)

@@ -1,4 +1,4 @@
-"""Scene -> XML."""
+"""Scene files: `Scene` to XML."""
 
 from __future__ import annotations
 
@@ -14,12 +14,34 @@ from .view import Part
 
 
 def to_xml(scene: Scene) -> str:
-    """The canonical scene file: only what differs from the defaults, two spaces a level. Reads back equal."""
+    """Return the canonical scene file: non-default values only, indented by two spaces per level.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    str
+        XML that reads back as an equal scene.
+    """
     return "\n".join(_lines(scene)) + "\n"
 
 
 def part_to_xml(part: Part | Print) -> str:
-    """A camera, a light, what makes the object printable, ... as an element of a scene file."""
+    """Return a record of a scene as an XML element.
+
+    Parameters
+    ----------
+    part : Part
+        A camera, a light, print settings, ...
+
+    Returns
+    -------
+    str
+        One line of XML.
+    """
     section = SECTIONS[part.element]
     values = {name: getattr(part, name) for name in section.parameters}
     return f"<{section.name}{_attributes(section, values)}/>"

@@ -1,4 +1,4 @@
-"""Windows and pictures of meshes and scenes; the only importer of pyvista."""
+"""Windows and pictures of meshes and scenes. No other package imports pyvista."""
 
 from fracslice.viewer.picture import need_pyvista, picture
 from fracslice.viewer.screen import need_screen

@@ -1,7 +1,7 @@
-"""Light, material and camera for a mesh. Run as a program it draws one picture off screen.
+"""Light, material and camera for a mesh. Run as a program, it draws one picture off screen.
 
-It imports nothing else of fracslice: `picture` starts it by its path, in a process of its own, since VTK ends
-the process where the machine cannot draw.
+The module imports nothing else of fracslice: `picture` runs it by its path in a separate process, since VTK
+ends the process on a machine that cannot draw.
 """
 
 from __future__ import annotations
@@ -13,16 +13,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 CLAY = "#efe3d0"
-INSIDE = "#b3543f"  # what a cut lays open
+INSIDE = "#b3543f"  # inner side, visible after a cut
 CLAY_LIGHT = {"ambient": 0.2, "diffuse": 1.0, "specular": 0.06, "specular_power": 12}
-BACKGROUNDS = {"light": ("#c4c9cd", "#f4f5f5"), "dark": ("#08090b", "#2a2f37")}  # below, above
-SHARP = 50.0  # degrees between triangles that make an edge look sharp
+BACKGROUNDS = {"light": ("#c4c9cd", "#f4f5f5"), "dark": ("#08090b", "#2a2f37")}  # bottom, top
+SHARP = 50.0  # feature angle, degrees: edges above it are drawn sharp
 THREE_QUARTER = (0.62, -1.0, 0.52)
-FILLED = 0.86  # of the picture, by the model
+FILLED = 0.86  # fraction of the picture that the model fills
 
 
 def body(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Any:
-    """The mesh for VTK, smooth but for its sharp edges."""
+    """Convert a mesh to a VTK surface, smooth except at sharp edges.
+
+    Parameters
+    ----------
+    vertices : ndarray of float64, shape (n, 3)
+        Vertices.
+    triangles : ndarray of int32, shape (m, 3)
+        Vertex indices.
+
+    Returns
+    -------
+    pyvista.PolyData
+        Surface with vertex normals.
+    """
     import pyvista
 
     surface: Any = pyvista.PolyData()
@@ -34,9 +47,23 @@ def body(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Any:
 
 
 def set_lighting(plotter: Any, surface: Any, background: str, brightness: float = 1.0) -> Any:
-    """The mesh in matte clay under a key, a fill and a rim light, in a three-quarter view; returns its actor.
+    """Add a mesh in matte clay under a key, a fill and a rim light, in a three-quarter view.
 
-    brightness: 1 where ambient occlusion darkens the picture, less without.
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+        The plotter.
+    surface : pyvista.PolyData
+        The mesh.
+    background : {"light", "dark"}
+        Background gradient.
+    brightness : float
+        Factor on the lights: 1 with ambient occlusion, which darkens the picture; less without.
+
+    Returns
+    -------
+    pyvista.Actor
+        Actor of the mesh.
     """
     import pyvista
 
@@ -59,7 +86,15 @@ def set_lighting(plotter: Any, surface: Any, background: str, brightness: float 
 
 
 def look(plotter: Any, surface: Any) -> None:
-    """The three-quarter view from the front, a little from above, near enough to fill the picture."""
+    """Set a three-quarter view from the front, slightly from above, that fills the picture.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+        The plotter.
+    surface : pyvista.PolyData
+        The mesh.
+    """
     plotter.view_vector(THREE_QUARTER, viewup=(0, 0, 1))
     camera = plotter.camera
     back = np.array(camera.position) - np.array(camera.focal_point)
@@ -76,7 +111,19 @@ def look(plotter: Any, surface: Any) -> None:
 
 
 def draw(source: str, target: str, width: int, height: int, background: str) -> None:
-    """Draw the vertices and triangles of an .npz file into a PNG."""
+    """Draw a mesh to a PNG file.
+
+    Parameters
+    ----------
+    source : str
+        .npz file with `vertices` and `triangles`.
+    target : str
+        PNG file, written.
+    width, height : int
+        Picture size, pixels.
+    background : {"light", "dark"}
+        Background gradient.
+    """
     import pyvista
 
     with np.load(source) as arrays:

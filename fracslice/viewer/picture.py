@@ -1,4 +1,4 @@
-"""A shaded picture of a mesh, without a screen."""
+"""Off-screen pictures of meshes."""
 
 from __future__ import annotations
 
@@ -29,11 +29,32 @@ def picture(
     size: tuple[int, int] = (1280, 960),
     background: Literal["light", "dark"] = "light",
 ) -> Path:
-    """Draw the mesh in matte clay from a three-quarter view into a PNG of `size` pixels; returns the path.
+    """Draw a mesh in matte clay from a three-quarter view into a PNG file.
 
     Needs no screen, but OpenGL in software or hardware (Debian: libegl1 with libgl1-mesa-dri, or libosmesa6).
-    Raises RenderError for a size that cannot be, when pyvista is not installed, the machine cannot draw or
-    the mesh is empty, ExportError when the file cannot be written.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    path : str or Path
+        PNG file to write.
+    size : tuple of int
+        Picture width and height, pixels.
+    background : {"light", "dark"}
+        Background gradient.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    RenderError
+        If the size is invalid, the mesh is empty, pyvista is missing or the machine cannot draw.
+    ExportError
+        If the file cannot be written.
     """
     size = validated("size", size, SIZE, RenderError)
     validated("background", background, Choice("light", "", tuple(lighting.BACKGROUNDS)), RenderError)
@@ -49,13 +70,19 @@ def picture(
 
 
 def need_pyvista() -> None:
-    """Raises RenderError where pyvista is not installed."""
+    """Check that pyvista is installed.
+
+    Raises
+    ------
+    RenderError
+        If it is missing.
+    """
     if reason := lacking("pyvista", "pictures of meshes need"):
         raise RenderError(reason)
 
 
 def _draw(arguments: list[str]) -> None:
-    """Draw in another process, first as the machine is set up, then with OSMesa."""
+    """Draw in a child process, first with the default OpenGL window, then with OSMesa."""
     command = [sys.executable, "-P", lighting.__file__, *arguments]
     for extra in ({}, SOFTWARE):
         try:

@@ -1,4 +1,4 @@
-"""Whether a window can be opened here."""
+"""Detection of a screen."""
 
 from __future__ import annotations
 
@@ -11,7 +11,13 @@ from fracslice.extras import lacking
 
 
 def need_screen() -> None:
-    """Raises `RenderError` when there is no pyvista or no screen."""
+    """Check that a window can be opened.
+
+    Raises
+    ------
+    RenderError
+        If pyvista or a screen is missing.
+    """
     if reason := lacking("pyvista", "windows need"):
         raise RenderError(reason)
     if not has_screen():
@@ -19,7 +25,16 @@ def need_screen() -> None:
 
 
 def has_screen() -> bool:
-    """On Linux, whether an X server answers: VTK ends the process where none does. Elsewhere always."""
+    """Return whether a window can be opened.
+
+    On Linux, an X server must answer: VTK ends the process without one. Other systems always count as having
+    a screen.
+
+    Returns
+    -------
+    bool
+        True if there is a screen.
+    """
     if not sys.platform.startswith("linux"):
         return True
     library = ctypes.util.find_library("X11")
@@ -27,5 +42,5 @@ def has_screen() -> bool:
         return False
     x11 = ctypes.CDLL(library)
     x11.XOpenDisplay.restype = ctypes.c_void_p
-    # Left open: a server that loses its only client may begin anew, and turn away who comes meanwhile.
+    # Keep the display open: a server that loses its only client may reset and refuse connections meanwhile.
     return bool(x11.XOpenDisplay(None))

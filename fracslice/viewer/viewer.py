@@ -1,4 +1,4 @@
-"""A window to fly through a scene in, while its picture sharpens and its file is edited."""
+"""Interactive window to fly through a scene while its picture refines and its file is edited."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ AXES = {
 }
 FASTER = 1.25
 TICK = 20
-"""Milliseconds between looks at what is new."""
+"""Timer interval, milliseconds."""
 LIFTED = 0.05
-"""Seconds after which a key that was lifted is: a key held down is lifted and pressed again all the time."""
+"""Delay, in seconds, after which a key release counts: key repeat sends releases and presses continuously."""
 TEXT: dict[str, Any] = {"font_size": 9, "color": "#f4f5f5", "shadow": True}
 HELP = "drag: look around   W, S, A, D, R, F: fly   wheel: pace   V: first view   Q: close"
 
@@ -38,13 +38,38 @@ def fly(
     work: Work | None = None,
     device: str = "auto",
 ) -> Camera:
-    """Open a window on a scene file and return the last camera when it is closed.
+    """Open a window on a scene file.
 
-    Keys: W, S, A, D, R, F fly forward, back, left, right, up and down, the slower the nearer the surface is;
-    dragging looks around, the wheel changes the pace, V goes back to the first view, Q closes. The file is
-    read again whenever it is saved. settings: as `Scene.with_values` takes them. size: pixels.
-    Raises `RenderError` when there is no pyvista or no screen, `SceneError` for a scene that cannot be
-    rendered, `Cancelled`.
+    Keys: W, S, A, D, R, F fly forward, back, left, right, up and down, more slowly near the surface; dragging
+    looks around, the wheel changes the pace, V returns to the first view, Q closes. The file is read again
+    whenever it is saved.
+
+    Parameters
+    ----------
+    path : str or Path
+        Scene file.
+    settings : sequence of str
+        Settings as in `Scene.with_values`.
+    size : tuple of int
+        Window width and height, pixels.
+    work : Work, optional
+        Threads, progress and cancellation.
+    device : {"cpu", "cuda", "auto"}
+        Device that traces the rays.
+
+    Returns
+    -------
+    Camera
+        Camera at the time the window was closed.
+
+    Raises
+    ------
+    RenderError
+        If pyvista or a screen is missing.
+    SceneError
+        If the scene cannot be rendered.
+    Cancelled
+        If the work was cancelled.
     """
     need_screen()
     work = work or Work()
@@ -58,7 +83,20 @@ def fly(
 
 
 def steered(held: Iterable[str], pace: float) -> CameraInput:
-    """What the keys that are held down ask for."""
+    """Convert pressed keys to camera input.
+
+    Parameters
+    ----------
+    held : iterable of str
+        Keys of `AXES` that are held down.
+    pace : float
+        Speed, in distances to the surface per second.
+
+    Returns
+    -------
+    CameraInput
+        The input.
+    """
     ways = {"forward": 0.0, "right": 0.0, "up": 0.0}
     for key in held:
         axis, way = AXES[key]
@@ -67,7 +105,17 @@ def steered(held: Iterable[str], pace: float) -> CameraInput:
 
 
 class Viewer:
-    """A pyvista window with its keys. stopped: whether somebody outside wants it closed."""
+    """A pyvista window with its key bindings.
+
+    Parameters
+    ----------
+    live : Live
+        The live picture.
+    size : tuple of int
+        Picture width and height, pixels.
+    stopped : callable
+        Returns True when the window must close.
+    """
 
     def __init__(self, live: Live, size: tuple[int, int], stopped: Callable[[], bool]) -> None:
         import pyvista
@@ -84,7 +132,7 @@ class Viewer:
         self.put(live.shown)
 
     def open(self) -> None:
-        """Show it until it is closed."""
+        """Show the window until it is closed."""
         interactor = self.plotter.iren.interactor
         self.plotter.iren.initialize()
         interactor.SetInteractorStyle(None)
@@ -103,7 +151,7 @@ class Viewer:
         self.plotter.show()
 
     def tick(self) -> None:
-        """Show what is new."""
+        """Timer callback: release keys and show a new picture."""
         now = time.monotonic()
         for key in [key for key, since in self.lifted.items() if now - since > LIFTED]:
             del self.lifted[key]
@@ -116,13 +164,25 @@ class Viewer:
             self.plotter.render()
 
     def put(self, shown: Shown) -> None:
-        """This is the picture."""
+        """Display a picture.
+
+        Parameters
+        ----------
+        shown : Shown
+            The picture.
+        """
         self.shown = shown
         self.image.point_data["picture"] = np.ascontiguousarray(shown.pixels[::-1].reshape(-1, 3))
         self.caption.set_text("upper_left", shown.caption)
 
     def press(self, key: str) -> None:
-        """A key goes down, or is held."""
+        """Handle a key press, including key repeat.
+
+        Parameters
+        ----------
+        key : str
+            Key symbol, lower case.
+        """
         if key in ("q", "escape"):
             self.plotter.iren.interactor.TerminateApp()
         elif key == "v":
@@ -134,24 +194,49 @@ class Viewer:
                 self.steer()
 
     def lift(self, key: str) -> None:
-        """A key goes up, or is held."""
+        """Handle a key release, including those of key repeat.
+
+        Parameters
+        ----------
+        key : str
+            Key symbol, lower case.
+        """
         if key in self.held:
             self.lifted[key] = time.monotonic()
 
     def hurry(self, factor: float) -> None:
-        """Fly faster, or slower."""
+        """Multiply the pace.
+
+        Parameters
+        ----------
+        factor : float
+            Factor on the pace.
+        """
         self.pace *= factor
         self.steer()
 
     def steer(self) -> None:
+        """Send the pressed keys to the live picture."""
         self.live.steer(steered(self.held, self.pace))
 
     def grasp(self, at: tuple[int, int] | None) -> None:
-        """The picture is held there, or let go."""
+        """Begin or end a drag.
+
+        Parameters
+        ----------
+        at : tuple of int or None
+            Pointer position, pixels; None ends the drag.
+        """
         self.grip = at
 
     def drag(self, to: tuple[int, int]) -> None:
-        """What is held follows the pointer."""
+        """Turn the camera so that the grasped point follows the pointer.
+
+        Parameters
+        ----------
+        to : tuple of int
+            Pointer position, pixels.
+        """
         if self.grip is None:
             return
         degrees = self.live.camera.fov / self.plotter.window_size[1]
@@ -160,7 +245,7 @@ class Viewer:
 
 
 def _whole_window(image: Any) -> Any:
-    """An image as what fills the window, however large that is."""
+    """An actor that scales an image to the whole window."""
     from vtkmodules.vtkRenderingCore import vtkActor2D, vtkImageMapper
 
     mapper, actor = vtkImageMapper(), vtkActor2D()

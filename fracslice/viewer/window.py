@@ -1,4 +1,4 @@
-"""A window to inspect a mesh in."""
+"""Interactive window to inspect a mesh."""
 
 from __future__ import annotations
 
@@ -16,10 +16,21 @@ HELP = "drag: turn   wheel: zoom   W, S: wires, surface   C: cut open   V: first
 
 
 def show(mesh: Mesh | str | Path) -> None:
-    """Open a window on a mesh or a model file and return when it is closed.
+    """Open a window on a mesh and return when it is closed.
 
-    Keys: W wires, S surface, C a plane that cuts the model open (drag it) on and off, V first view, Q close.
-    Raises RenderError when there is no pyvista or no screen, MeshError when the file cannot be read.
+    Keys: W wireframe, S surface, C clipping plane on and off (drag it), V first view, Q close.
+
+    Parameters
+    ----------
+    mesh : Mesh, str or Path
+        A mesh or a model file.
+
+    Raises
+    ------
+    RenderError
+        If pyvista or a screen is missing.
+    MeshError
+        If the file cannot be read.
     """
     name = "" if isinstance(mesh, Mesh) else f"{Path(mesh).name}: "
     model = mesh if isinstance(mesh, Mesh) else read_mesh(mesh)
@@ -28,7 +39,18 @@ def show(mesh: Mesh | str | Path) -> None:
 
 
 def caption(mesh: Mesh) -> str:
-    """Size and weight of a mesh in words."""
+    """Return size and triangle count of a mesh as text.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+
+    Returns
+    -------
+    str
+        The caption.
+    """
     x, y, z = mesh.size
     return f"{x:.1f} x {y:.1f} x {z:.1f} mm, {len(mesh.triangles):,} triangles"
 
@@ -40,7 +62,15 @@ def _plotter(title: str) -> Any:
 
 
 class ViewerWindow:
-    """A pyvista window with its keys."""
+    """A pyvista window with its key bindings.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    name : str
+        Start of the title.
+    """
 
     def __init__(self, mesh: Mesh, name: str) -> None:
         self.surface = body(mesh.vertices, mesh.triangles)
@@ -56,12 +86,20 @@ class ViewerWindow:
         self.bind("v", self.reset)
 
     def bind(self, key: str, action: Callable[[], None]) -> None:
-        """Let a key mean this alone, whatever pyvista had it do."""
+        """Bind a key and remove pyvista's own bindings of it.
+
+        Parameters
+        ----------
+        key : str
+            Key symbol.
+        action : callable
+            Called on a press.
+        """
         self.plotter.clear_events_for_key(key, raise_on_missing=False)
         self.plotter.add_key_event(key, action)
 
     def toggle_cut(self) -> None:
-        """A plane to drag that cuts the model open, or the whole again."""
+        """Switch the clipping plane on or off."""
         if self.cutting:
             self.close_up()
         else:
@@ -70,7 +108,15 @@ class ViewerWindow:
         self.plotter.render()
 
     def cut(self, normal: tuple[float, float, float], origin: tuple[float, float, float]) -> None:
-        """Hide what lies before the plane, on the graphics card, so that large models follow the pointer."""
+        """Clip the mesh at a plane, on the GPU, so that large models stay interactive.
+
+        Parameters
+        ----------
+        normal : tuple of float
+            Normal of the plane.
+        origin : tuple of float
+            Point of the plane.
+        """
         from vtkmodules.vtkCommonDataModel import vtkPlane
 
         plane = vtkPlane()
@@ -80,13 +126,13 @@ class ViewerWindow:
         self.actor.mapper.AddClippingPlane(plane)
 
     def close_up(self) -> None:
-        """Take the plane away."""
+        """Remove the clipping plane."""
         self.cutting = False
         self.plotter.clear_plane_widgets()
         self.actor.mapper.RemoveAllClippingPlanes()
 
     def reset(self) -> None:
-        """The whole model as at first."""
+        """Restore the first view of the whole model."""
         self.close_up()
         self.actor.prop.style = "Surface"
         self.plotter.camera_position = self.view

@@ -1,4 +1,4 @@
-"""From a point of the film to a ray."""
+"""Camera rays."""
 
 from __future__ import annotations
 
@@ -7,7 +7,26 @@ from .normal import normalised
 
 
 def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):
-    """The ray through pixel position (px, py) of an ideal camera: everything is sharp."""
+    """Return the ray of a pinhole camera through a film position.
+
+    Parameters
+    ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers in [0, 1) for the lens.
+    eye : tuple of float
+        Position of the camera.
+    corner : tuple of float
+        Direction to the film's upper left corner.
+    across, down : tuple of float
+        Change of direction per pixel, to the right and down.
+
+    Returns
+    -------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction.
+    """
     ex, ey, ez = eye
     cx, cy, cz = corner
     ax, ay, az = across
@@ -18,10 +37,31 @@ def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):
 
 
 def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
-    """The ray from a point of a thin lens to where the ideal camera's ray meets the plane of focus.
+    """Return the ray of a thin-lens camera (Cook, Porter, Carpenter 1984, "Distributed Ray Tracing").
 
-    Cook, Porter, Carpenter 1984, "Distributed Ray Tracing". right, up: the lens' half axes; focus: the
-    plane's distance.
+    The ray runs from a point of the lens to the intersection of the pinhole ray with the plane of focus.
+
+    Parameters
+    ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers in [0, 1) for the lens.
+    eye : tuple of float
+        Position of the camera.
+    corner : tuple of float
+        Direction to the film's upper left corner.
+    across, down : tuple of float
+        Change of direction per pixel, to the right and down.
+    right, up : tuple of float
+        Half axes of the lens.
+    focus : float
+        Distance of the plane of focus.
+
+    Returns
+    -------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction.
     """
     ex, ey, ez = eye
     cx, cy, cz = corner

@@ -1,5 +1,4 @@
-"""Intrinsics of the renderer's units and loops: functions of the scene, which the linker writes under these
-names."""
+"""Intrinsics of the render units and loops: functions of the scene that the linker writes."""
 
 from __future__ import annotations
 
@@ -8,42 +7,147 @@ from ...kernel.intrinsics import field, intrinsic
 __all__ = ["GIVEN", "background", "camera_ray", "field", "span_box", "step_cone", "step_ray", "surface"]
 
 GIVEN = frozenset({"field"})
-"""What units may call before it is written."""
+"""Intrinsics that units may call before the linker writes them."""
 
 
 @intrinsic
 def camera_ray(px, py, lens_u, lens_v, P):
-    """The ray through a point of the film and one of the lens: origin and unit direction."""
+    """Return the ray through a point of the film and a point of the lens.
+
+    Parameters
+    ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers in [0, 1) for the lens.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction.
+    """
     raise NotImplementedError
 
 
 @intrinsic
 def span_box(ox, oy, oz, dx, dy, dz, P):
-    """Where a ray enters and leaves the scene's box."""
+    """Return the interval of a ray in the scene's box.
+
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    enter, leave : float
+        Distances along the ray; enter >= leave for a miss.
+    """
     raise NotImplementedError
 
 
 @intrinsic
 def step_ray(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
-    """`march.advance` with the scene's numbers."""
+    """Take one step along a ray: `march.advance` with the scene's parameters.
+
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    t, before, stride : float
+        Distance along the ray, radius of the previous ball, step taken from its centre.
+    side : float
+        -1 inside the solid, 1 outside.
+    path : float
+        Length of the path before this ray.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    t, before, stride, gap : float
+        New state; gap is negative at a hit.
+    """
     raise NotImplementedError
 
 
 @intrinsic
 def step_cone(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
-    """`march.widen` with the scene's numbers."""
+    """Take one step along a cone: `march.widen` with the scene's parameters.
+
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    t, before, stride : float
+        Distance along the ray, radius of the previous ball, step taken from its centre.
+    side : float
+        -1 inside the solid, 1 outside.
+    path : float
+        Length of the path before this ray.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    t, before, stride, gap : float
+        New state; gap is negative at the end of the free part.
+    """
     raise NotImplementedError
 
 
 @intrinsic
 def surface(x, y, z, dx, dy, dz, t, path, steps, side, u, P):
-    """The light from a point of the surface, and what goes on: shares, origin, direction and side; none where
-    rays do not go on. u: random numbers.
+    """Shade a surface point.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    dx, dy, dz : float
+        Unit direction of the ray.
+    t : float
+        Distance along the ray.
+    path : float
+        Length of the path before this ray.
+    steps : float
+        Steps of the ray.
+    side : float
+        -1 inside the solid, 1 outside.
+    u : tuple of float
+        Random numbers in [0, 1).
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    light : tuple of float
+        Light towards the ray's origin: red, green, blue.
+    onward : tuple of float
+        Continued ray: throughput (red, green, blue), origin, direction and side; empty if rays do not
+        continue.
     """
     raise NotImplementedError
 
 
 @intrinsic
 def background(dx, dy, dz, P):
-    """The light where nothing is."""
+    """Return the light of a ray that misses the scene.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    r, g, b : float
+        Linear light.
+    """
     raise NotImplementedError

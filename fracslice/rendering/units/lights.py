@@ -1,5 +1,4 @@
-"""Where light comes from, seen from a point: a unit direction, a distance, and how much of its strength
-arrives."""
+"""Lights, as seen from a point."""
 
 from __future__ import annotations
 
@@ -10,8 +9,20 @@ TURN = 6.283185307179586
 
 
 def frame(x, y, z):
-    """Two unit vectors at right angles to a unit vector and to each other (Duff et al. 2017, "Building an
-    Orthonormal Basis, Revisited")."""
+    """Return two unit vectors orthogonal to a unit vector and to each other.
+
+    Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
+
+    Parameters
+    ----------
+    x, y, z : float
+        The unit vector.
+
+    Returns
+    -------
+    ax, ay, az, bx, by, bz : float
+        The two vectors.
+    """
     sign = where(z < 0.0, -1.0, 1.0 + 0.0 * z)
     a = -1.0 / (sign + z)
     b = x * y * a
@@ -19,9 +30,20 @@ def frame(x, y, z):
 
 
 def disc(u, v):
-    """A point of the unit disc, as likely as its area; neighbours in the square stay neighbours (Shirley
-    and Chiu 1997, "A Low Distortion Map Between Disk and Square"), so that fewer samples do than
-    by radius and angle.
+    """Map the unit square to the unit disc, uniformly by area.
+
+    Neighbours in the square stay neighbours, so fewer samples suffice than with radius and angle (Shirley and
+    Chiu 1997, "A Low Distortion Map Between Disk and Square").
+
+    Parameters
+    ----------
+    u, v : float
+        Random numbers in [0, 1).
+
+    Returns
+    -------
+    p, q : float
+        Point of the disc.
     """
     a = 2.0 * u - 1.0
     b = 2.0 * v - 1.0
@@ -35,7 +57,26 @@ def disc(u, v):
 
 
 def sun(x, y, z, u, v, towards, spread, far):
-    """A disc in the sky: u, v choose a point of it. spread: the tangent of half its angle."""
+    """Sample a sun: a disc in the sky.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    u, v : float
+        Random numbers in [0, 1).
+    towards : tuple of float
+        Unit direction to its centre.
+    spread : float
+        Tangent of half its angular diameter.
+    far : float
+        Distance of the light.
+
+    Returns
+    -------
+    dx, dy, dz, distance, strength : float
+        Unit direction, distance, fraction of the strength.
+    """
     lx, ly, lz = towards
     zero = 0.0 * x
     ax, ay, az, bx, by, bz = frame(lx + zero, ly + zero, lz + zero)
@@ -47,14 +88,48 @@ def sun(x, y, z, u, v, towards, spread, far):
 
 
 def sharp_sun(x, y, z, u, v, towards, far):
-    """A point in the sky: its shadows are sharp."""
+    """Sample a point-like sun, which casts sharp shadows.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    u, v : float
+        Random numbers in [0, 1).
+    towards : tuple of float
+        Unit direction to the sun.
+    far : float
+        Distance of the light.
+
+    Returns
+    -------
+    dx, dy, dz, distance, strength : float
+        Unit direction, distance, fraction of the strength.
+    """
     lx, ly, lz = towards
     zero = 0.0 * x
     return lx + zero, ly + zero, lz + zero, far + zero, 1.0 + zero
 
 
 def lamp(x, y, z, u, v, position, radius):
-    """A ball: u, v choose a point on it. Its strength is that at distance 1 and falls with the square."""
+    """Sample a spherical lamp. Strength is that at distance 1 and falls with the squared distance.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    u, v : float
+        Random numbers in [0, 1).
+    position : tuple of float
+        Centre of the lamp.
+    radius : float
+        Radius of the lamp.
+
+    Returns
+    -------
+    dx, dy, dz, distance, strength : float
+        Unit direction, distance, fraction of the strength.
+    """
     px, py, pz = position
     h = 1.0 - 2.0 * u
     r = radius * sqrt(maximum(1.0 - h * h, 0.0))
@@ -67,7 +142,22 @@ def lamp(x, y, z, u, v, position, radius):
 
 
 def sharp_lamp(x, y, z, u, v, position):
-    """A point: its shadows are sharp."""
+    """Sample a point lamp, which casts sharp shadows.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    u, v : float
+        Random numbers in [0, 1).
+    position : tuple of float
+        Centre of the lamp.
+
+    Returns
+    -------
+    dx, dy, dz, distance, strength : float
+        Unit direction, distance, fraction of the strength.
+    """
     px, py, pz = position
     lx = px - x
     ly = py - y
@@ -78,7 +168,20 @@ def sharp_lamp(x, y, z, u, v, position):
 
 
 def upward(nx, ny, nz, u, v):
-    """A direction around a normal, as likely as the cosine of the angle to it (Malley's method)."""
+    """Sample a direction about a normal with cosine-weighted density (Malley's method).
+
+    Parameters
+    ----------
+    nx, ny, nz : float
+        Unit normal.
+    u, v : float
+        Random numbers in [0, 1).
+
+    Returns
+    -------
+    dx, dy, dz : float
+        Unit direction.
+    """
     ax, ay, az, bx, by, bz = frame(nx, ny, nz)
     p, q = disc(u, v)
     h = sqrt(maximum(1.0 - p * p - q * q, 0.0))
@@ -86,7 +189,22 @@ def upward(nx, ny, nz, u, v):
 
 
 def sky(dx, dy, dz, zenith, horizon, ground):
-    """The colour of the sky in a direction: from the horizon up to the zenith, and down to the ground."""
+    """Return the sky's colour in a direction.
+
+    The colour is interpolated from the horizon to the zenith above and to the ground below.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction.
+    zenith, horizon, ground : tuple of float
+        Linear colours.
+
+    Returns
+    -------
+    r, g, b : float
+        Linear light.
+    """
     zr, zg, zb = zenith
     hr, hg, hb = horizon
     gr, gg, gb = ground

@@ -1,4 +1,4 @@
-"""Along a ray to the surface."""
+"""Sphere tracing along rays and cones."""
 
 from __future__ import annotations
 
@@ -7,10 +7,21 @@ from .intrinsics import field
 
 
 def span(ox, oy, oz, dx, dy, dz, lo, hi):
-    """Where a ray enters and leaves a box; it misses where the first is not smaller (Kay and Kajiya 1986,
-    slabs).
+    """Return the interval of a ray in a box by the slab method (Kay and Kajiya 1986).
 
-    A direction's component is kept from zero: 1e-9 bends a ray by less than any pixel.
+    Components of the direction are kept away from zero: 1e-9 bends a ray by less than any pixel.
+
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    lo, hi : tuple of float
+        Lower and upper corner of the box.
+
+    Returns
+    -------
+    enter, leave : float
+        Distances along the ray; enter >= leave for a miss.
     """
     x0, y0, z0 = lo
     x1, y1, z1 = hi
@@ -29,14 +40,41 @@ def span(ox, oy, oz, dx, dy, dz, lo, hi):
 
 
 def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, relax, cone, least, glass):
-    """One step of safe, over-relaxed sphere tracing: the new t, radius and stride, and the gap, negative at
-    a hit.
+    """Take one step of safe, over-relaxed sphere tracing.
 
-    Hart 1996, "Sphere Tracing"; over-relaxation: Keinert et al. 2014, "Enhanced Sphere Tracing". ``|f| / L``
-    is the radius of an empty ball. A step of `relax` times it is kept if the next ball touches the one
-    before; if not, the ray goes back to the end of that ball. A hit is where the surface is nearer than half
-    a pixel is wide. side: -1 inside, where the field of a fractal says little: there a hit is a change of
-    sign, and steps are two pixels at least.
+    Sphere tracing: Hart 1996, "Sphere Tracing". Over-relaxation: Keinert et al. 2014, "Enhanced Sphere
+    Tracing". ``|f| / L`` is the radius of an empty ball. A step of `relax` radii is kept if the next ball
+    touches the previous one; otherwise the ray returns to the end of the previous ball. A hit is a point
+    nearer to the surface than half a pixel's width.
+
+    Inside the solid (side -1), the field of a fractal is no useful bound: a hit is a change of sign, and
+    steps are at least two pixels.
+
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    t, before, stride : float
+        Distance along the ray, radius of the previous ball, step taken from its centre.
+    side : float
+        -1 inside the solid, 1 outside.
+    path : float
+        Length of the path before this ray.
+    P : array of float
+        Scene parameters.
+    steepness : float
+        Reciprocal of the field's Lipschitz bound.
+    relax : float
+        Over-relaxation factor.
+    cone, least : float
+        Half width of a pixel at distance 1; smallest hit tolerance.
+    glass : bool
+        True if rays may be inside the solid.
+
+    Returns
+    -------
+    t, before, stride, gap : float
+        New state; gap is negative at a hit.
     """
     f = field(ox + t * dx, oy + t * dy, oz + t * dz, P)
     if glass:
@@ -57,9 +95,30 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
 
 
 def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, spread):
-    """One step of a cone `spread` wide at distance 1: as far as the empty ball holds the whole cone.
+    """Take one step of a cone, as far as the empty ball contains the whole cone.
 
-    The gap is negative where the ball is hardly wider than the cone: up to there every ray in it is free.
+    Parameters
+    ----------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction of the ray.
+    t, before, stride : float
+        Distance along the ray, radius of the previous ball, step taken from its centre.
+    side : float
+        -1 inside the solid, 1 outside.
+    path : float
+        Length of the path before this ray.
+    P : array of float
+        Scene parameters.
+    steepness : float
+        Reciprocal of the field's Lipschitz bound.
+    spread : float
+        Half width of the cone at distance 1.
+
+    Returns
+    -------
+    t, before, stride, gap : float
+        New state; gap is negative where the ball is hardly wider than the cone. Every ray of the cone is free
+        up to t.
     """
     radius = field(ox + t * dx, oy + t * dy, oz + t * dz, P) * steepness
     width = spread * (t + maximum(radius, 0.0))
@@ -69,8 +128,30 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, s
 
 
 def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
-    """1 where the light at distance `far` along a ray is seen, 0 where something is nearer than `least` to
-    the ray."""
+    """Trace a shadow ray.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Start of the ray.
+    dx, dy, dz : float
+        Unit direction to the light.
+    far : float
+        Distance of the light.
+    least : float
+        Clearance below which the ray is blocked.
+    P : array of float
+        Scene parameters.
+    steepness : float
+        Reciprocal of the field's Lipschitz bound.
+    patience : int
+        Maximum steps.
+
+    Returns
+    -------
+    float
+        1 if the light is visible, 0 if it is blocked.
+    """
     t = 0.0 * x
     blocked = 0.0 * x
     going = t < far

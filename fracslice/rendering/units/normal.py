@@ -1,4 +1,4 @@
-"""The direction in which the field grows."""
+"""Surface normals."""
 
 from __future__ import annotations
 
@@ -7,13 +7,39 @@ from .intrinsics import field
 
 
 def normalised(x, y, z):
-    """A vector of length 1; zero stays zero."""
+    """Normalise a vector; the zero vector stays zero.
+
+    Parameters
+    ----------
+    x, y, z : float
+        The vector.
+
+    Returns
+    -------
+    x, y, z : float
+        Vector of length 1.
+    """
     over = rsqrt(maximum(x * x + y * y + z * z, 1e-36))
     return x * over, y * over, z * over
 
 
 def normal(x, y, z, h, P):
-    """The unit normal from four samples at the corners of a tetrahedron of half edge h (Quilez 2015)."""
+    """Return the unit normal from four field samples at the corners of a tetrahedron (Quilez 2015).
+
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    h : float
+        Half edge of the cube that contains the corners.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    nx, ny, nz : float
+        Normalised gradient of the field.
+    """
     gx, gy, gz = 0.0 * x, 0.0 * x, 0.0 * x
     for k in range(4):
         sy = 1.0 if k > 1 else -1.0

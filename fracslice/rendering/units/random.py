@@ -1,11 +1,21 @@
-"""Numbers between 0 and 1 that fill space evenly: whole-number arithmetic on one sample, for loops over
-samples."""
+"""Owen-scrambled random numbers in [0, 1): integer arithmetic on one sample, for loops over samples."""
 
 from __future__ import annotations
 
 
 def reversed_bits(a):
-    """32 bits, the last first."""
+    """Reverse the bits of a 32-bit integer.
+
+    Parameters
+    ----------
+    a : int
+        The integer.
+
+    Returns
+    -------
+    int
+        The reversed integer.
+    """
     a = ((a >> 1) & 0x55555555) | ((a & 0x55555555) << 1)
     a = ((a >> 2) & 0x33333333) | ((a & 0x33333333) << 2)
     a = ((a >> 4) & 0x0F0F0F0F) | ((a & 0x0F0F0F0F) << 4)
@@ -14,15 +24,38 @@ def reversed_bits(a):
 
 
 def hashed(a):
-    """A 32-bit hash without patterns (Wellons 2018, lowbias32)."""
+    """Hash a 32-bit integer (Wellons 2018, lowbias32).
+
+    Parameters
+    ----------
+    a : int
+        The integer.
+
+    Returns
+    -------
+    int
+        32-bit hash.
+    """
     a = ((a ^ (a >> 16)) * 0x7FEB352D) & 0xFFFFFFFF
     a = ((a ^ (a >> 15)) * 0x846CA68B) & 0xFFFFFFFF
     return a ^ (a >> 16)
 
 
 def scrambled(a, seed):
-    """Owen's scrambling of a number whose bits come reversed; they leave in order. See
-    `fracslice.rendering.sequence`."""
+    """Owen-scramble a 32-bit fraction; see `fracslice.rendering.sequence`.
+
+    Parameters
+    ----------
+    a : int
+        Fraction, bits reversed.
+    seed : int
+        32-bit seed.
+
+    Returns
+    -------
+    int
+        Scrambled fraction, bits in order.
+    """
     a = (a ^ (a * 0x3D20ADEA)) & 0xFFFFFFFF
     a = (a + seed) & 0xFFFFFFFF
     a = (a * ((seed >> 16) | 1)) & 0xFFFFFFFF
@@ -32,14 +65,43 @@ def scrambled(a, seed):
 
 
 def sample(a, pixel, dimension):
-    """Number `dimension` of a point of the sequence, scrambled for a pixel: a float in [0, 1)."""
+    """Return one coordinate of a sequence point, scrambled for a pixel.
+
+    Parameters
+    ----------
+    a : int
+        Coordinate, bits reversed.
+    pixel : int
+        Pixel, ``y << 16 | x``.
+    dimension : int
+        Dimension of the coordinate.
+
+    Returns
+    -------
+    float
+        Number in [0, 1).
+    """
     seed = hashed((pixel * 64 + dimension) & 0xFFFFFFFF)
     return (scrambled(a & 0xFFFFFFFF, seed) >> 8) * 5.9604644775390625e-08
 
 
 def centred(a, pixel, dimension):
-    """As `sample`, digitally shifted so that the first point of the sequence is 1/2: the middle of the
-    pixel."""
+    """Like `sample`, digitally shifted so that the first point of the sequence is 1/2, the pixel's centre.
+
+    Parameters
+    ----------
+    a : int
+        Coordinate, bits reversed.
+    pixel : int
+        Pixel, ``y << 16 | x``.
+    dimension : int
+        Dimension of the coordinate.
+
+    Returns
+    -------
+    float
+        Number in [0, 1).
+    """
     seed = hashed((pixel * 64 + dimension) & 0xFFFFFFFF)
     shifted = scrambled(a & 0xFFFFFFFF, seed) ^ scrambled(0, seed) ^ 0x80000000
     return (shifted >> 8) * 5.9604644775390625e-08

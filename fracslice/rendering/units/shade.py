@@ -1,4 +1,4 @@
-"""What a surface does with light."""
+"""Surface shading: reflection, refraction, occlusion, fog and palettes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,23 @@ from .normal import normalised
 
 
 def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):
-    """Diffuse and specular factors of one light (Phong 1975, with Blinn's 1977 half vector).
+    """Return the diffuse and specular factors of one light (Phong 1975, with Blinn's 1977 half vector).
 
-    n: unit normal; d: unit direction of the ray; l: unit direction to the light.
+    Parameters
+    ----------
+    nx, ny, nz : float
+        Unit normal.
+    dx, dy, dz : float
+        Unit direction of the ray.
+    lx, ly, lz : float
+        Unit direction to the light.
+    specular, shininess : float
+        Strength and exponent of the highlight.
+
+    Returns
+    -------
+    diffuse, gloss : float
+        Factors on the light.
     """
     diffuse = maximum(nx * lx + ny * ly + nz * lz, 0.0)
     hx, hy, hz = normalised(lx - dx, ly - dy, lz - dz)
@@ -19,8 +33,26 @@ def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):
 
 
 def occlusion(x, y, z, nx, ny, nz, P, strength, reach):
-    """How open a point is: the field along the normal against the distance walked (Evans 2006; five
-    samples)."""
+    """Estimate ambient occlusion from five field samples along the normal (Evans 2006).
+
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    nx, ny, nz : float
+        Unit normal.
+    P : array of float
+        Scene parameters.
+    strength : float
+        Factor on the occlusion.
+    reach : float
+        Distance of the last sample, scene units.
+
+    Returns
+    -------
+    float
+        Openness: 1 for an open point, 0 for a fully occluded one.
+    """
     closed = 0.0 * x
     weight = 0.5
     for i in range(5):
@@ -32,12 +64,42 @@ def occlusion(x, y, z, nx, ny, nz, P, strength, reach):
 
 
 def fog(t, density):
-    """The part of the light that comes through (Beer and Lambert)."""
+    """Transmittance of fog (Beer-Lambert law).
+
+    Parameters
+    ----------
+    t : float
+        Distance, scene units.
+    density : float
+        Extinction per scene unit.
+
+    Returns
+    -------
+    float
+        Fraction of the light that passes.
+    """
     return exp(-density * t)
 
 
 def palette(tone, P, stops, count):
-    """A colour between stops; tone 0 is the first of them, 1 the first again: the palette is a ring."""
+    """Interpolate a cyclic palette; tone 0 and tone 1 are both the first stop.
+
+    Parameters
+    ----------
+    tone : float
+        Position in [0, 1].
+    P : array of float
+        Scene parameters.
+    stops : tuple of float
+        Red, green and blue of each stop.
+    count : int
+        Number of stops.
+
+    Returns
+    -------
+    r, g, b : float
+        The colour.
+    """
     r = 0.0 * tone
     g = 0.0 * tone
     b = 0.0 * tone
@@ -52,23 +114,64 @@ def palette(tone, P, stops, count):
 
 
 def mirrored(dx, dy, dz, nx, ny, nz):
-    """The direction of a reflection."""
+    """Return the direction of reflection.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    nx, ny, nz : float
+        Unit normal.
+
+    Returns
+    -------
+    x, y, z : float
+        Unit direction.
+    """
     twice = 2.0 * (dx * nx + dy * ny + dz * nz)
     return dx - twice * nx, dy - twice * ny, dz - twice * nz
 
 
 def fresnel(cosine, least):
-    """The part that is reflected at an angle: `least` head on, all at grazing (Schlick 1994)."""
+    """Reflectance at an angle of incidence (Schlick 1994).
+
+    Parameters
+    ----------
+    cosine : float
+        Cosine of the angle of incidence.
+    least : float
+        Reflectance at normal incidence; at grazing incidence it is 1.
+
+    Returns
+    -------
+    float
+        Reflectance.
+    """
     a = 1.0 - minimum(maximum(cosine, 0.0), 1.0)
     a2 = a * a
     return least + (1.0 - least) * a2 * a2 * a
 
 
 def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):
-    """The direction of a refraction, and what is below zero where all is reflected (Snell).
+    """Return the direction of refraction (Snell's law).
 
-    cosine: of the angle between the normal and the ray's reverse; ratio: of the refractive indices, here over
-    there.
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    nx, ny, nz : float
+        Unit normal.
+    cosine : float
+        Cosine of the angle between the normal and the reversed ray.
+    ratio : float
+        Ratio of the refractive indices, near side to far side.
+
+    Returns
+    -------
+    x, y, z : float
+        Direction of the refracted ray.
+    left : float
+        Negative for total internal reflection.
     """
     left = 1.0 - ratio * ratio * (1.0 - cosine * cosine)
     k = ratio * cosine - sqrt(maximum(left, 0.0))
@@ -76,7 +179,22 @@ def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):
 
 
 def reflects(dx, dy, dz, nx, ny, nz, reflect):
-    """The part that a mirror reflects, and where to."""
+    """Return the reflectance of a mirror and the direction of reflection.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    nx, ny, nz : float
+        Unit normal.
+    reflect : float
+        Reflectance at normal incidence.
+
+    Returns
+    -------
+    part, x, y, z : float
+        Reflectance and direction.
+    """
     cosine = -(dx * nx + dy * ny + dz * nz)
     part = where(reflect > 0.0, fresnel(cosine, reflect), 0.0)
     rx, ry, rz = mirrored(dx, dy, dz, nx, ny, nz)
@@ -84,10 +202,34 @@ def reflects(dx, dy, dz, nx, ny, nz, reflect):
 
 
 def goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, chance):
-    """The part of the light that goes on, one direction for it, and -1 if that is through the surface.
+    """Return the continuation of a ray at a transparent or mirroring surface.
 
-    n points to where the ray comes from. Between reflection and refraction chance decides, as Fresnel's law
-    weighs them.
+    A random number chooses between reflection and refraction with Fresnel weights. The normal points to the
+    side of the incoming ray.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    nx, ny, nz : float
+        Unit normal.
+    side : float
+        -1 inside the solid, 1 outside.
+    reflect, clear : float
+        Reflectance at normal incidence; fraction of the light that a transparent surface passes on.
+    index : float
+        Refractive index of the solid.
+    chance : float
+        Random number in [0, 1).
+
+    Returns
+    -------
+    share : float
+        Fraction of the light that continues.
+    x, y, z : float
+        Direction of the continued ray.
+    out : float
+        -1 if the ray passes through the surface, 1 if it is reflected.
     """
     cosine = -(dx * nx + dy * ny + dz * nz)
     glass = (index - 1.0) / (index + 1.0)
