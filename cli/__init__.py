@@ -1,4 +1,4 @@
-"""The command line: the only place that prints and exits."""
+"""Command line interface: the only code that prints and exits."""
 
 from .main import main
 

@@ -1,4 +1,4 @@
-"""fracslice bench: run time against error, on this machine."""
+"""fracslice bench: run time against error on this machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""fracslice check: would it print?"""
+"""fracslice check: printability of a model, or of the mesh or layers of a scene."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def check(
         line += "" if problems else ", would print"
     else:
         refuse_options(context, OF_LAYERS, "only with --layer")
-        from fracslice.printing.checks import check_solid  # it needs Numba, and a model does not
+        from fracslice.printing.checks import check_solid  # imported here: models need no Numba
 
         scene = load_scene(source, settings)
         with working(threads, quiet) as work:

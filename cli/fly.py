@@ -1,4 +1,4 @@
-"""fracslice fly: a window to fly through a scene in."""
+"""fracslice fly: a window for flying through a scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""fracslice formulas: what scenes are made of."""
+"""fracslice formulas: the elements of scenes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a command reads, a scene file, the name of a shipped scene or a model file, and where it writes."""
+"""Inputs and outputs of commands: scene files, names of shipped scenes, model files and output paths."""
 
 from __future__ import annotations
 
@@ -17,13 +17,16 @@ if TYPE_CHECKING:
 
 
 class BadInput(click.ClickException):
-    """What the command was pointed at cannot be used."""
+    """The input of a command cannot be used."""
 
     exit_code = 2
 
 
 def scene_path(source: str) -> Path:
-    """A scene file, or that of the shipped scene of that name if there is no such file."""
+    """Path of a scene file, or of the shipped scene of that name if there is no such file.
+
+    Raises `BadInput` for a model file.
+    """
     from fracslice.scene import library
 
     if is_model(source) and Path(source).is_file():
@@ -33,21 +36,21 @@ def scene_path(source: str) -> Path:
 
 
 def load_scene(source: str, settings: Iterable[str] = ()) -> Scene:
-    """The scene that the command is pointed at; --set applied."""
+    """Read the scene of a command and apply the values of --set."""
     from fracslice.scene import read
 
     return read(scene_path(source)).with_values(settings)
 
 
 def is_model(source: str) -> bool:
-    """Whether the file's name is that of a model."""
+    """True if the file name has the extension of a model."""
     from fracslice.mesh.reading import READERS
 
     return Path(source).suffix.lower() in READERS
 
 
 def load_model(source: str) -> Mesh:
-    """The mesh in a model file; one that cannot be read is bad input."""
+    """Read the mesh of a model file. Raises `BadInput` if it cannot be read."""
     from fracslice.mesh.reading import read_mesh
 
     try:
@@ -57,7 +60,7 @@ def load_model(source: str) -> Mesh:
 
 
 def refuse_options(context: click.Context, names: Container[str], why: str) -> None:
-    """Raises for an option that was given, though it would say nothing."""
+    """Raise a usage error for a given option that has no effect here."""
     for option in context.command.params:
         name = str(option.name)
         given = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
@@ -66,15 +69,16 @@ def refuse_options(context: click.Context, names: Container[str], why: str) -> N
 
 
 def refuse_scene_options(context: click.Context) -> None:
-    """Options that would say something about a scene say nothing about a model."""
+    """Raise a usage error for a given option that applies to scenes only."""
     names = {str(option.name) for option in context.command.params}
     of_both = {"source", "as_json", "threads", "quiet"}
     refuse_options(context, names - of_both, "only for scenes, and a model was given")
 
 
 def check_targets(source: str, *targets: str | None) -> None:
-    """Refuses files that could not be written, or would replace the scene or each other, before any work is
-    done.
+    """Check output files before any work is done.
+
+    Raises an error for a file that cannot be written, or that would replace the scene or another output.
     """
     from fracslice.export import check_target
 
@@ -89,7 +93,7 @@ def check_targets(source: str, *targets: str | None) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Refuses a folder that could not be made or written to before any work is done."""
+    """Check before any work is done that a folder can be made or written to."""
     from fracslice.export import check_target
 
     if folder.exists() and not folder.is_dir():

@@ -1,6 +1,6 @@
-"""The entry point: commands in, an exit status out, and one line for everything that goes wrong.
+"""Entry point: runs a command, prints errors as one line and returns the exit status.
 
-Status: 0 done; 1 failed; 2 bad input or usage; 128 + the signal's number when stopped by one (Ctrl-C: 130).
+Exit status: 0 success; 1 failure; 2 bad input or usage; 128 + n when stopped by signal n (Ctrl-C: 130).
 """
 
 from __future__ import annotations
@@ -62,12 +62,23 @@ for command in (mesh, render, slice_, check, show, fly, formulas, scenes, bench)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Runs one command and exits."""
+    """Run one command and exit with its status."""
     sys.exit(run(arguments))
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command; returns the exit status."""
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Arguments of the command line; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     try:
         with warnings.catch_warnings():
             warnings.showwarning = told
@@ -86,7 +97,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return say("out of memory: a coarser voxel needs less", FAILED)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush at exit
+        # Without it, Python fails to flush stdout at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except OSError as error:
         return say(f"{error.filename or 'error'}: {error.strerror or error}", FAILED)
@@ -100,7 +112,7 @@ def told(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """A warning of ours as one line, any other as Python shows it."""
+    """Show a warning of fracslice as one line, any other in Python's format."""
     if issubclass(category, FracsliceWarning):
         say(str(message), 0)
     else:
@@ -109,6 +121,6 @@ def told(
 
 
 def say(message: str, status: int) -> int:
-    """One line on stderr."""
+    """Print a message as one line on stderr and return the status."""
     click.echo(f"fracslice: {' '.join(message.split())}", err=True)
     return status

@@ -1,4 +1,4 @@
-"""fracslice mesh: a scene becomes a file to print."""
+"""fracslice mesh: a printable mesh of a scene."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def mesh(
 
 
 def store_in(folder: str | None) -> Store | None:
-    """Where finished work is kept, if it is."""
+    """Store of finished work in a folder; None without a folder."""
     from fracslice.store import Store
 
     if folder is None:
@@ -114,7 +114,7 @@ def store_in(folder: str | None) -> Store | None:
 
 
 def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> Report:
-    """Make the mesh and write the files that are wanted."""
+    """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.export import write
     from fracslice.job import make_mesh, metadata
 
@@ -134,7 +134,7 @@ def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Wor
 
 
 def check_outputs(source: str, output: str, report: str | None, picture: str | None) -> None:
-    """Refuses files that could not be written before any work is done."""
+    """Check before any work is done that the output files can be written."""
     from fracslice.export import FORMATS
 
     for path, ending in ((report, ".json"), (picture, ".png")):
@@ -150,7 +150,7 @@ def check_outputs(source: str, output: str, report: str | None, picture: str | N
 
 
 def write_grid(result: Result, path: str, about: dict[str, str]) -> None:
-    """Writes the samples, in mm, as an OpenVDB file."""
+    """Write the samples, in mm, as an OpenVDB file."""
     from fracslice.export import replacing
     from fracslice.volume.grid import write_vdb
 
@@ -162,7 +162,7 @@ def write_grid(result: Result, path: str, about: dict[str, str]) -> None:
 
 
 def write_report(report: Report, path: str) -> None:
-    """Writes the numbers as JSON."""
+    """Write the report as JSON."""
     from fracslice.export import replacing
 
     with replacing(path) as file:

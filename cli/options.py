@@ -1,4 +1,4 @@
-"""The options that commands share, and the kinds of values they take."""
+"""Options shared by commands, and their parameter types."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Name(click.types.StringParamType):
-    """The name of a file or folder."""
+    """Name of a file or folder."""
 
     name = "name"
 
@@ -58,12 +58,12 @@ NAME, NUMBER, WHOLE = Name(), Finite(), Whole()
 
 
 def source_argument(metavar: str) -> Callable[..., Any]:
-    """What the command is pointed at."""
+    """Decorator that adds the input of the command."""
     return click.argument("source", type=NAME, metavar=metavar)
 
 
 def length(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
-    """A length with a unit, in mm."""
+    """Parse a length into mm."""
     from fracslice.scene import parse_length
 
     try:
@@ -73,14 +73,14 @@ def length(_: click.Context, __: click.Parameter, value: str | None) -> float | 
 
 
 def amount(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
-    """A number of at least zero."""
+    """Check that a number is at least zero."""
     if value is not None and value < 0:
         raise click.BadParameter(f"{value:g}: expected a number >= 0")
     return value
 
 
 def job_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """What to make: adds the options that `job_of` takes."""
+    """Decorator that adds the mesh options, which `job_of` takes."""
     for option in reversed(_JOB):
         command = option(command)
     return command
@@ -123,7 +123,7 @@ _JOB = [
 
 
 def print_value(context: click.Context, option: click.Parameter, text: str | None) -> Any:
-    """What an attribute of `<print>` would be with this text."""
+    """Parse the value of an attribute of `<print>`."""
     from fracslice.scene import Print
 
     try:
@@ -133,7 +133,7 @@ def print_value(context: click.Context, option: click.Parameter, text: str | Non
 
 
 def print_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """What makes the object printable: adds the options that `printing_of` takes."""
+    """Decorator that adds the print preparation options, which `printing_of` takes."""
     for name, metavar, text in reversed(_PRINT):
         command = click.option(f"--{name}", callback=print_value, metavar=metavar, help=text)(command)
     return command
@@ -150,11 +150,11 @@ _PRINT = [
     ("base", "LENGTH", "Cut off this much at the bottom, to stand flat."),
     ("raft", "LENGTH", "Put the object on a plate of this height."),
 ]
-"""The attributes of `<print>`; each option overrides the scene's."""
+"""Attributes of `<print>`; each option overrides the scene's."""
 
 
 def printing_of(scene: Scene, options: dict[str, Any]) -> Print:
-    """What the scene says, overridden by the options that are given."""
+    """Print settings of the scene, overridden by the given options."""
     names = [name for name, *_ in _PRINT]
     return replace(scene.printing, **{n: options[n] for n in names if options[n] is not None})
 
@@ -185,7 +185,7 @@ quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress, no
 def job_of(
     scene: Scene, size: float | None, voxel: float | None, resolution: int | None, **others: Any
 ) -> MeshJob:
-    """The job that the options ask for."""
+    """Mesh job with the given options."""
     from fracslice.meshjob import MeshJob
 
     return MeshJob(

@@ -1,4 +1,4 @@
-"""fracslice render: a scene becomes a picture."""
+"""fracslice render: a picture of a scene."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 def pixels(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int] | None:
-    """A size such as 1280x720."""
+    """Parse a size such as 1280x720 into pixels across and down."""
     if value is None:
         return None
     match = re.fullmatch(r"\s*(\d{1,5})\s*x\s*(\d{1,5})\s*", value)
@@ -34,7 +34,7 @@ def pixels(_: click.Context, __: click.Parameter, value: str | None) -> tuple[in
 
 
 def duration(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
-    """A time such as 10s, in seconds."""
+    """Parse a time such as 10s into seconds."""
     if value is None:
         return None
     match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", value)
@@ -137,7 +137,7 @@ def render(
 
 
 def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
-    """The passes that fit into the time; at least one."""
+    """Iterate over passes until the time limit, in seconds, is exceeded; at least one is made."""
     start = time.monotonic()
     for done in renderer.passes(samples):
         yield done
@@ -146,16 +146,17 @@ def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Itera
 
 
 def reached(done: Pass) -> str:
-    """How far the picture is, in words."""
+    """Samples per pixel and error of a pass, as text."""
     return f"{done.samples:.1f} samples a pixel, error {done.error:.2g}"
 
 
 def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
+    """Completed fraction of the samples, from 0 to 1."""
     return min(done.samples / (samples or renderer.setup.view.film.samples), 1.0)
 
 
 def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:
-    """Writes a picture with what it is of."""
+    """Write the picture of a pass, with the scene and the samples in its metadata."""
     from fracslice.export import application
     from fracslice.export.images import write_image
     from fracslice.rendering import develop
@@ -172,6 +173,7 @@ def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:
 
 
 def save_state(renderer: Renderer, path: str) -> None:
+    """Write the state of a renderer, from which it can resume."""
     from fracslice.export import replacing
 
     with replacing(path) as file:

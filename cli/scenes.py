@@ -1,4 +1,4 @@
-"""fracslice scenes: the scenes that ship with it."""
+"""fracslice scenes: a list of the shipped scenes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""fracslice show: a window to turn a mesh in."""
+"""fracslice show: a window that shows a mesh."""
 
 from __future__ import annotations
 

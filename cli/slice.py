@@ -1,4 +1,4 @@
-"""fracslice slice: a scene becomes the layers of a print. And what "fracslice check --layer" does."""
+"""fracslice slice and "fracslice check --layer": writing and checking the layers of a print."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ LAYER, PIXEL_MM = "0.05mm", 0.05
 
 
 def shift(_: click.Context, __: click.Parameter, text: str) -> float:
-    """A length in mm that may be negative, or 0."""
+    """Parse a length, zero or negative ones included, into mm."""
     from fracslice.scene.lengths import Shift
 
     try:
@@ -48,7 +48,7 @@ def shift(_: click.Context, __: click.Parameter, text: str) -> float:
 def heights(
     context: click.Context, option: click.Parameter, text: str | None
 ) -> tuple[float, float | None] | None:
-    """A layer height in mm, or the lowest and the highest of adaptive layers."""
+    """Parse a layer height into mm, or the minimum and maximum of adaptive layers."""
     if text is None:
         return None
     low, _, high = text.partition("..")
@@ -58,7 +58,7 @@ def heights(
 
 
 def printer(context: click.Context, _: click.Parameter, name: str | None) -> Printer | None:
-    """The printer of that name; "list" shows all of them and ends the command."""
+    """Look up a printer by name; "list" prints all printers and ends the command."""
     from fracslice.slicing import printers
 
     if name != "list":
@@ -70,7 +70,7 @@ def printer(context: click.Context, _: click.Parameter, name: str | None) -> Pri
 
 
 def printer_option(text: str) -> Callable[..., Any]:
-    """--printer, looked at before anything that is missing. text: its help."""
+    """Decorator that adds --printer, parsed before missing options are reported. text: its help."""
     return click.option("--printer", "machine", callback=printer, is_eager=True, metavar="NAME", help=text)
 
 
@@ -187,7 +187,10 @@ def slice_(
 
 
 def refuse_what_no_sl1_says(output: str, options: dict[str, Any]) -> None:
-    """Before the object is made printable, which may take minutes."""
+    """Raise a usage error for options that an SL1 archive does not allow.
+
+    This is checked before print preparation, which may take minutes.
+    """
     if options["machine"] is None:
         raise click.UsageError(f'{output}: an SL1 archive needs --printer, such as sl1s; "list" shows all')
     if options["layer"][1] is not None:
@@ -195,7 +198,7 @@ def refuse_what_no_sl1_says(output: str, options: dict[str, Any]) -> None:
 
 
 def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
-    """What the options ask for."""
+    """Slice job with the given options."""
     from fracslice.slicing import SliceJob
 
     pixel, machine = options["pixel"], options["machine"]
@@ -208,14 +211,14 @@ def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
 
 
 def stack_of(scene: Scene, options: dict[str, Any], work: Work) -> Stack:
-    """Layers of one height, of the object made printable."""
+    """Plan layers of one height for the object after print preparation."""
     from fracslice.slicing import plan_stack
 
     return plan_stack(scene.root, job(scene, options), work)
 
 
 def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:
-    """Layers that are as high as the slope allows, if a range of heights is given."""
+    """Adaptive layers if a range of heights is given; otherwise the stack itself."""
     from fracslice.slicing import adapted
 
     most = options["layer"][1]
@@ -223,6 +226,7 @@ def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stac
 
 
 def write_preview(stack: Stack, path: str, work: Work) -> None:
+    """Write a contact sheet (.png) or an animation (.webp) of the layers."""
     from fracslice.export import replacing
     from fracslice.slicing.preview import animation, contact_sheet
 
@@ -233,7 +237,7 @@ def write_preview(stack: Stack, path: str, work: Work) -> None:
 def check_print(
     source: str, settings: tuple[str, ...], as_json: bool, threads: int, quiet: bool, **options: Any
 ) -> int:
-    """Says whether the layers of a scene would print; the exit status."""
+    """Check the layers of a scene, print the result and return the exit status."""
     from fracslice.export import replacing
     from fracslice.slicing.checks import check_layers, misfit
     from fracslice.slicing.preview import worst_layers
@@ -258,14 +262,14 @@ def check_print(
 
 
 def limits_of(options: dict[str, Any]) -> Limits:
-    """What counts as too thin."""
+    """Minimum thicknesses of walls and floors."""
     from fracslice.printing.checks import Limits
 
     return Limits(wall=options["wall"], floor=options["floor"])
 
 
 def told(source: str, report: PrintReport) -> str:
-    """A line of numbers, then one for each reason not to print, and what layers may lose."""
+    """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
     size = " x ".join(f"{s:.2f}" for s in report.size)
     first = (
         f"{source}: {report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
@@ -275,5 +279,5 @@ def told(source: str, report: PrintReport) -> str:
 
 
 def verdict(problems: Sequence[str]) -> str:
-    """Whether it would print, and a line for each reason why not."""
+    """Verdict on printability, with a line for each problem."""
     return os.linesep.join(["would not print:", *(f"  {p}" for p in problems)]) if problems else "would print"

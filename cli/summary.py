@@ -1,4 +1,4 @@
-"""What was made or found, in words."""
+"""Text summaries of meshes and reports."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def summary(path: str, report: Report) -> str:
-    """What was made, in a line or two."""
+    """Summary of a mesh job: figures, notes and accuracy."""
     error, back, fewer = report.surface_error_mm, report.surface_to_mesh_mm, ""
     if report.simplified is not None:
         done = report.simplified
@@ -26,7 +26,7 @@ def summary(path: str, report: Report) -> str:
 
 
 def found(mesh: MeshReport) -> str:
-    """A mesh and whether it prints, in one line."""
+    """Figures and printability of a mesh, in one line."""
     (x0, y0, z0), (x1, y1, z1) = mesh.bbox_mm
     size = f"{x1 - x0:.2f} x {y1 - y0:.2f} x {z1 - z0:.2f} mm"
     bodies = f"{mesh.components} {'body' if mesh.components == 1 else 'bodies'}"

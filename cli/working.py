@@ -1,4 +1,4 @@
-"""How a command works: threads, a bar that shows how far it is, and Ctrl-C to stop it in an orderly way."""
+"""Execution of a command: threads, progress bar and orderly cancellation by Ctrl-C."""
 
 from __future__ import annotations
 
@@ -17,7 +17,13 @@ Progress = Callable[[str, float], None]
 
 
 class StoppedError(FracsliceError):
-    """A signal ended the work; the exit status is the shell's convention for it, 130 for Ctrl-C."""
+    """A signal stopped the work.
+
+    Attributes
+    ----------
+    status : int
+        Exit status by the shell's convention, 128 + the signal's number; 130 for Ctrl-C.
+    """
 
     def __init__(self, number: int) -> None:
         super().__init__("stopped; nothing was written")
@@ -26,9 +32,23 @@ class StoppedError(FracsliceError):
 
 @contextmanager
 def working(how: int | Work, quiet: bool) -> Iterator[Work]:
-    """Work that shows its progress if somebody may be looking, and is cancelled by SIGINT and SIGTERM.
+    """Work that shows its progress on a terminal and is cancelled by SIGINT and SIGTERM.
 
-    how: the work that it is like, or the number of its threads.
+    Parameters
+    ----------
+    how : int or Work
+        Number of threads, or a record to copy.
+    quiet : bool
+        True for no progress bar.
+
+    Yields
+    ------
+    Work
+
+    Raises
+    ------
+    StoppedError
+        When the work is cancelled.
     """
     like = Work(how) if isinstance(how, int) else how
     with _bar(quiet) as progress, _cancelled_by_signals() as cancel:
@@ -37,6 +57,7 @@ def working(how: int | Work, quiet: bool) -> Iterator[Work]:
 
 @contextmanager
 def _bar(quiet: bool) -> Iterator[Progress]:
+    """Progress bar on stderr; without a terminal, a function that does nothing."""
     if quiet or not sys.stderr.isatty():
         yield lambda stage, done: None
         return
@@ -57,7 +78,7 @@ def _bar(quiet: bool) -> Iterator[Progress]:
 
 @contextmanager
 def _cancelled_by_signals() -> Iterator[threading.Event]:
-    """An event that the first SIGINT or SIGTERM sets; the second one interrupts at once."""
+    """Event set by the first SIGINT or SIGTERM; the second one raises KeyboardInterrupt at once."""
     cancel = threading.Event()
     received: list[int] = []
 

@@ -9,8 +9,8 @@ difference(menger(level=2), sphere(radius=1.2))
 >>> float(cheese.distance([0, 0, 2]))
 1.0
 
-One call makes the mesh, in mm, and a report on it. It goes to a file of the kind that the name says, whole
-or not at all:
+One call makes the mesh, in mm, and its report. `Mesh.export` writes a file atomically, in the format of its
+extension:
 
 >>> mesh = make_mesh(cheese, size="30mm", resolution=48)
 >>> mesh.size.round(3).tolist(), mesh.is_watertight
@@ -29,7 +29,7 @@ Layers of a print and pictures are arrays:
 >>> render(cheese, size=(32, 24), samples=1).shape
 (24, 32, 3)
 
-A scene is a shape with a size, what makes it printable, and a view, from a file or not:
+A scene is a shape with a size, print settings and a view. It is built in Python or read from a file:
 
 >>> from fracslice import Scene, reads, to_xml
 >>> scene = Scene(cheese, "30mm", name="cheese")
@@ -45,13 +45,14 @@ A scene is a shape with a size, what makes it printable, and a view, from a file
 >>> reads(to_xml(scene)) == scene
 True
 
-Values can be changed from outside, as ``--set`` does:
+A scene's values can be overridden by name, like the option ``--set``:
 
 >>> smaller = scene.with_values(["menger.level=1", "solid.size=2cm"])
 >>> smaller.root, smaller.size_mm
 (difference(menger(level=1), sphere(radius=1.2)), 20.0)
 
-*What* to make (`MeshJob`) and *how* (`Work`) are records that keywords stand for:
+Keywords are short for the fields of two records, the settings of the mesh (`MeshJob`) and its execution
+(`Work`):
 
 >>> from fracslice import MeshJob, Work
 >>> make_mesh(smaller, MeshJob(resolution=27), Work(threads=2)).report.mesh.printable
@@ -200,7 +201,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The public names, loaded when first used, so that importing fracslice costs nothing."""
+    """Load a public name on first use, so that importing fracslice loads no other modules."""
     if name == "__version__":
         return import_module(".report", __name__).version()
     if name not in _WHERE:

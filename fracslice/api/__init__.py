@@ -1,1 +1,1 @@
-"""What `fracslice` offers by name: short calls that build the records of the layers below."""
+"""The public calls of `fracslice`, which build the records of the layers below."""

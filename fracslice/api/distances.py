@@ -1,4 +1,4 @@
-"""The field of a shape at points."""
+"""Signed distances of a shape at points."""
 
 from __future__ import annotations
 
@@ -15,7 +15,26 @@ from ..work import Work, chunks
 
 
 def distance(shape: Node, points: ArrayLike) -> NDArray[np.floating]:
-    """As `Node.distance`."""
+    """Signed distance field of a shape at points, as `Node.distance`.
+
+    Parameters
+    ----------
+    shape : Node
+        The shape.
+    points : array of float32 or float64, [..., 3]
+        Coordinates in scene units.
+
+    Returns
+    -------
+    ndarray [...]
+        Values in the precision of the points; float64 for other numeric types.
+
+    Raises
+    ------
+    SceneError
+        If the last axis of the points is not x, y, z, or an unbounded shape contains a fractal with
+        automatic iterations.
+    """
     array = _points(points)
     kernel = _with_depths(shape).kernel("cpu", "float32" if array.dtype == np.float32 else "float64")
     flat, found = array.reshape(-1, 3), np.empty(array.size // 3, array.dtype)
@@ -28,7 +47,7 @@ def distance(shape: Node, points: ArrayLike) -> NDArray[np.floating]:
 
 
 def _points(points: ArrayLike) -> NDArray[np.floating]:
-    """An array of float32 or float64, [..., 3]."""
+    """Points as an array of float32 or float64, [..., 3]. Raises `SceneError` for any other shape or type."""
     try:
         array = np.asarray(points)
         array = array if array.dtype == np.float32 else array.astype(np.float64, casting="same_kind")
@@ -41,7 +60,7 @@ def _points(points: ArrayLike) -> NDArray[np.floating]:
 
 @lru_cache(maxsize=32)
 def _with_depths(shape: Node) -> Node:
-    """The shape with every depth a number. Raises `SceneError` where none follows from the shape."""
+    """The shape with automatic iterations replaced by numbers. Raises `SceneError` if it is unbounded."""
     known = with_depths(shape)
     for node in known.walk():
         if AUTO in (value for value in node.values.values() if isinstance(value, str)):

@@ -1,4 +1,4 @@
-"""A shape becomes a mesh."""
+"""Meshing of shapes and scenes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,12 @@ if TYPE_CHECKING:
 class Result(Mesh):
     """A mesh in mm, standing on z = 0, with its report.
 
-    A mesh larger than memory is only in the file that was written: its vertices raise `TooLargeError`.
+    A mesh larger than memory is only in the file that was written; its vertices raise `TooLargeError`.
+
+    Attributes
+    ----------
+    made : Result
+        Result of the mesh job.
     """
 
     made: Made
@@ -40,22 +45,22 @@ class Result(Mesh):
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh alone."""
+        """The mesh without its report."""
         return self.made.mesh
 
     @property  # type: ignore[misc]
     def vertices(self) -> NDArray[np.float64]:
-        """float64 [n, 3], mm."""
+        """Vertices, float64 [n, 3], mm."""
         return self.mesh.vertices
 
     @property  # type: ignore[misc]
     def triangles(self) -> NDArray[np.int32]:
-        """int32 [m, 3], counter-clockwise seen from outside."""
+        """Triangles, int32 [m, 3], counter-clockwise seen from outside."""
         return self.mesh.triangles
 
     @property
     def report(self) -> Report:
-        """What was made, how good it is and what it took."""
+        """Settings, accuracy, problems, run time and memory of the mesh job."""
         return self.made.report
 
     @property
@@ -65,12 +70,12 @@ class Result(Mesh):
 
     @property
     def place(self) -> Placement:
-        """The map from the scene to the mesh."""
+        """Transform from scene coordinates to mesh coordinates."""
         return self.made.place
 
     @property
     def bricks(self) -> Bricks:
-        """Samples of the field where the mesh was made, scene units; taken when first asked for."""
+        """Samples of the field near the surface, in scene units, read-only; computed on first access."""
         found = self.made.bricks
         for array in (found.ijk, found.values, found.index):
             array.flags.writeable = False
@@ -94,8 +99,8 @@ def make_mesh(
 ) -> Result:
     """Make a printable mesh of a shape.
 
-    Lengths are numbers of mm, or text such as "0.5mm". Keywords stand for the fields of `MeshJob`, `Print`
-    and `Work`, and count more than those of the records and of the scene.
+    Lengths are numbers in mm, or text such as "0.5mm". Keywords set the fields of `MeshJob`, `Print` and
+    `Work`, and override those of the records and of the scene.
 
     Parameters
     ----------
@@ -103,44 +108,44 @@ def make_mesh(
         A shape such as ``sphere(0.5) - box()``, a scene, a scene file, or the name of a shipped scene or a
         formula.
     what : MeshJob, optional
-        What to make, as a record.
+        Settings of the mesh, as a record.
     work : Work, optional
-        How to make it, as a record.
+        Threads, progress, cancellation, store and device, as a record.
     size : float or str, optional
-        The longest side. A scene has its own; without one, a scene unit of a shape is a millimetre.
+        Longest side. A scene has its own; for a shape the default is one millimetre per scene unit.
     resolution : float, optional
         Voxels along the longest side; 256 if neither this nor `voxel` is given.
     voxel : float or str, optional
-        The voxel's size.
+        Voxel size.
     chord : float or str, optional
-        More triangles where the surface bends farther than this from them.
+        Split triangles farther than this from the surface.
     simplify : float or str, optional
-        Fewer triangles, nowhere farther off than this.
+        Remove triangles within this tolerance.
     dust : float, optional
-        Bodies of less volume are dropped, mm3; 1e-5 of the whole if not given.
+        Drop connected components of less volume, mm3; 1e-5 of the whole by default.
     path : str or path, optional
-        The file to write, of the kind that its name ends in. An .stl file may be larger than memory: the
-        mesh is then in that file only, and `TooLargeError` is raised where its vertices are asked for.
+        The file to write, in the format of its extension. An .stl file may be larger than memory: the mesh
+        is then only in that file, and access to its vertices raises `TooLargeError`.
     cavities, keep, bridge, gap, thickness, hollow, drain, base, raft : optional
-        What makes the object printable, as the fields of `Print`.
+        Print preparation: the fields of `Print`.
     threads : int, optional
-        How many threads to use; one for each core if not given.
+        Number of threads; one for each core by default.
     progress : callable, optional
-        Called as ``progress(stage, share)`` from time to time, the share from 0 to 1.
+        Called repeatedly as ``progress(stage, share)`` with the completed share from 0 to 1.
     cancel : threading.Event, optional
-        Stops the work with `Cancelled` once it is set.
+        Setting it stops the work with `Cancelled`.
     device : {"cpu", "cuda", "auto"}, optional
-        What samples the field.
+        Device that samples the field.
 
     Returns
     -------
     Result
-        The mesh, in mm, and its `report`. A mesh that would not print is returned, too; the report says why.
+        The mesh in mm and its `report`. An unprintable mesh is returned, too; its report lists the problems.
 
     Raises
     ------
     SceneError
-        For a shape, a name or a value that cannot be.
+        For an invalid shape, name or value.
     VolumeError, MeshError
         For a field without a surface, or too large a job.
     ExportError
@@ -148,7 +153,7 @@ def make_mesh(
     TypeError
         For an unknown keyword.
     Cancelled
-        When somebody asked to stop.
+        When `cancel` is set.
 
     Examples
     --------

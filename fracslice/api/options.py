@@ -1,4 +1,4 @@
-"""The keyword arguments that several calls share, and the records that they become."""
+"""Keyword arguments shared by several calls, and their conversion to records."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 Length = float | str
-"""A number of mm, or text with a unit, such as "0.5mm"."""
+"""A number in mm, or text with a unit, such as "0.5mm"."""
 
 
 class WorkOptions(TypedDict, total=False):
-    """How the work is done, as the fields of `Work`."""
+    """Execution: fields of `Work`."""
 
     threads: int | None
     progress: Callable[[str, float], None] | None
@@ -31,7 +31,7 @@ class WorkOptions(TypedDict, total=False):
 
 
 class PrintOptions(TypedDict, total=False):
-    """What makes the object printable, as the fields of `Print`."""
+    """Print preparation: the fields of `Print`."""
 
     cavities: Literal["keep", "fill"] | None
     keep: Literal["all", "largest"] | None
@@ -45,16 +45,27 @@ class PrintOptions(TypedDict, total=False):
 
 
 class Options(PrintOptions, WorkOptions, total=False):
-    """Both."""
+    """Print preparation and execution."""
 
 
 def work_of(options: WorkOptions | Options, work: Work | None = None) -> Work:
-    """How the work is done: as `work` says, and the options over it.
+    """Work record with the given options.
+
+    Parameters
+    ----------
+    options : WorkOptions or Options
+        Fields to override; None keeps the field of `work`.
+    work : Work, optional
+        Base record; the defaults of `Work` without it.
+
+    Returns
+    -------
+    Work
 
     Raises
     ------
     TypeError
-        For a progress that cannot be called.
+        If progress is not callable.
     """
     given = _given(options, WorkOptions)
     if "device" in given:
@@ -65,7 +76,19 @@ def work_of(options: WorkOptions | Options, work: Work | None = None) -> Work:
 
 
 def print_of(scene: Scene, options: Options) -> Print:
-    """What makes the object printable: as the scene says, and the options over it."""
+    """Print record of a scene with the given options.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene with its own print settings.
+    options : Options
+        Fields to override; None keeps the field of the scene.
+
+    Returns
+    -------
+    Print
+    """
     return replace(scene.printing, **_given(options, PrintOptions))
 
 
@@ -74,12 +97,18 @@ def _given(options: Any, kind: type) -> dict[str, Any]:
 
 
 def keywords(function: Callable[P, R]) -> Callable[P, R]:
-    """Spells out the options of a function in its signature; unknown names get a hint.
+    """Decorate a function whose ``**options`` are a typed dictionary: list them in its signature.
 
-    Raises
-    ------
-    TypeError
-        When the function is called with a keyword that it does not have: the message names the nearest one.
+    Parameters
+    ----------
+    function : callable
+        The function.
+
+    Returns
+    -------
+    callable
+        The function with its full signature. Called with an unknown keyword, it raises a `TypeError` that
+        names the nearest known one.
     """
     own = signature(function)
     listed = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]

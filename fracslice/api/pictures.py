@@ -1,4 +1,4 @@
-"""A shape becomes a picture."""
+"""Rendering of shapes and scenes."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .options import WorkOptions, keywords, work_of
 from .sources import Source, found
 
 FILM = Film(width=640, height=480, samples=16)
-"""Of a shape that has no scene around it: soon done."""
+"""Film of a shape without a scene, for a quick picture."""
 
 
 class Picture(np.ndarray):
-    """A picture, uint8 [height, width, 3], that notebooks show."""
+    """A picture, uint8 [height, width, 3], sRGB, that notebooks display."""
 
     def _repr_png_(self) -> bytes | None:
         from PIL import Image
 
         if self.dtype != np.uint8 or self.ndim != 3 or self.shape[2] != 3:
-            return None  # a part of it that is no picture
+            return None  # a slice of a picture need not be a picture
         file = io.BytesIO()
         Image.fromarray(np.asarray(self)).save(file, "PNG")
         return file.getvalue()
@@ -47,37 +47,37 @@ def render(
     Parameters
     ----------
     shape : Node, Scene, str or path
-        As `make_mesh` takes it.
+        As for `make_mesh`.
     size : two whole numbers, optional
-        Pixels across and down; the scene's, or 640 x 480 of a shape.
+        Pixels across and down; by default the scene's, or 640 x 480 for a shape.
     samples : int, optional
-        The most samples of a pixel; the scene's, or 16 of a shape.
+        Maximum number of samples per pixel; by default the scene's, or 16 for a shape.
     camera : Camera, optional
-        From where to look, in scene units; the scene's, or one that has the whole shape in view.
+        The camera, in scene units; by default the scene's, or one that shows the whole shape.
     lights : sequence of Light, optional
-        What lights it; the scene's, or a sun and a sky.
+        The lights; by default the scene's, or a sun and a sky.
     threads : int, optional
-        How many threads to use; one for each core if not given.
+        Number of threads; one for each core by default.
     progress : callable, optional
         Called as ``progress("rendering", share)`` after every pass.
     cancel : threading.Event, optional
-        Stops the work with `Cancelled` once it is set.
+        Setting it stops the work with `Cancelled`.
     device : {"cpu", "cuda", "auto"}, optional
-        What traces the rays; the GPU, if there is one.
+        Device that traces the rays; by default the GPU, if there is one.
 
     Returns
     -------
     Picture
-        An array, uint8 [height, width, 3], sRGB, that notebooks show.
+        An array, uint8 [height, width, 3], sRGB, that notebooks display.
 
     Raises
     ------
     SceneError, RenderError
-        For a shape, a view or a size that cannot be.
+        For an invalid shape, view or size.
     TypeError
         For an unknown keyword.
     Cancelled
-        When somebody asked to stop.
+        When `cancel` is set.
 
     Examples
     --------

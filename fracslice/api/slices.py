@@ -1,4 +1,4 @@
-"""A shape becomes the layers of a print, as arrays and as polygons."""
+"""Slicing of shapes and scenes into the layers of a print, as arrays and as polygons."""
 
 from __future__ import annotations
 
@@ -26,11 +26,20 @@ T_co = TypeVar("T_co", covariant=True)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Layers(Sequence[T_co], Generic[T_co]):
-    """One thing for each layer, from the bottom up, computed when it is asked for.
+    """Sequence with one item for each layer, from the bottom up, computed on access.
 
-    Iterating computes layers in parallel, a few ahead; nothing is kept.
+    Iteration computes layers in parallel, a few ahead. Nothing is cached.
 
-    stack: the plan of the layers. chosen: their numbers. make: what is made of each. work: how.
+    Attributes
+    ----------
+    stack : Stack
+        Plan of the layers.
+    chosen : range
+        Indices of the layers in the stack.
+    make : callable
+        Converts a `Layer` to an item.
+    work : Work
+        Threads, progress and cancellation.
     """
 
     stack: Stack
@@ -61,7 +70,7 @@ class Layers(Sequence[T_co], Generic[T_co]):
 
     @property
     def tops(self) -> NDArray[np.float64]:
-        """Upper faces of the layers, mm above the object's lowest point, float64 [n]."""
+        """Tops of the layers, mm above the object's lowest point, float64 [n]."""
         return _frozen(self.stack.tops[list(self.chosen)])
 
     @property
@@ -81,14 +90,14 @@ class Layers(Sequence[T_co], Generic[T_co]):
 
 
 class Slices(Layers[NDArray[np.uint8]]):
-    """The layers as pictures: uint8 [ny, nx], 255 where a pixel is wholly inside; row 0 is the front.
+    """Layers as pictures: uint8 [ny, nx], 255 where a pixel is entirely inside; row 0 is the front.
 
-    The object's middle is in the middle of the picture. ``np.stack(slices)`` is the whole volume.
+    The object's centre is at the centre of the picture. ``np.stack(slices)`` is the whole volume.
     """
 
     @property
     def polygons(self) -> Layers[MultiPolygon]:
-        """The layers as MultiPolygon objects of shapely, mm from the middle of the object's box.
+        """Layers as MultiPolygon objects of shapely, in mm from the centre of the object's box.
 
         Raises
         ------
@@ -101,7 +110,7 @@ class Slices(Layers[NDArray[np.uint8]]):
 
     @property
     def contours(self) -> Layers[Contours]:
-        """The layers as closed polylines, without shapely."""
+        """Layers as closed polylines, without shapely."""
         return Layers(self.stack, self.chosen, _contours, self.work)
 
 
@@ -115,42 +124,43 @@ def slice_layers(
     up: Sequence[float] = (0.0, 0.0, 1.0),
     **options: Unpack[Options],
 ) -> Slices:
-    """Cut a shape into the layers of a print, straight from its field.
+    """Slice a shape into the layers of a print, directly from its field.
 
-    Lengths are numbers of mm, or text such as "0.05mm".
+    Lengths are numbers in mm, or text such as "0.05mm".
 
     Parameters
     ----------
     shape : Node, Scene, str or path
-        As `make_mesh` takes it.
+        As for `make_mesh`.
     layer : float or str, or two of them
-        The layer height; or the lowest and the highest, for layers as high as the slope allows.
+        Layer height; or its minimum and maximum, for adaptive layers that are thick where the surface is
+        steep.
     size : float or str, optional
-        The longest side. A scene has its own; without one, a scene unit of a shape is a millimetre.
+        Longest side. A scene has its own; for a shape the default is one millimetre per scene unit.
     pixel : float or str, or two of them
         Width and height of a pixel, or one length for both.
     up : three numbers
-        The direction of the shape that is up in the print.
+        Direction of the shape that is up in the print.
     cavities, keep, bridge, gap, thickness, hollow, drain, base, raft : optional
-        What makes the object printable, as the fields of `Print`.
+        Print preparation: the fields of `Print`.
     threads, progress, cancel, device : optional
-        As of `make_mesh`.
+        As for `make_mesh`.
 
     Returns
     -------
     Slices
-        A sequence of arrays, one for each layer, that are computed when they are asked for.
+        A sequence of arrays, one for each layer, computed on access.
 
     Raises
     ------
     SceneError, SliceError
-        For a shape or a value that cannot be.
+        For an invalid shape or value.
     VolumeError
         For a field without a surface.
     TypeError
         For an unknown keyword.
     Cancelled
-        When somebody asked to stop.
+        When `cancel` is set.
 
     Examples
     --------
@@ -189,7 +199,18 @@ def _frozen(array: NDArray[S]) -> NDArray[S]:
 
 
 def as_polygons(contours: Contours) -> MultiPolygon:
-    """The inside of contours: each outer one with the holes just within it."""
+    """Convert contours to polygons: each outer contour with the holes directly inside it.
+
+    Parameters
+    ----------
+    contours : Contours
+        Contours of a layer.
+
+    Returns
+    -------
+    MultiPolygon
+        In mm from the centre of the object's box.
+    """
     from shapely import MultiPolygon, Polygon
 
     depth = [0] * len(contours)

@@ -1,4 +1,4 @@
-"""What is made: a shape, a scene, a scene file, or the name of a shipped scene or a formula."""
+"""Inputs of the public calls: a shape, a scene, a scene file, or the name of a shipped scene or formula."""
 
 from __future__ import annotations
 
@@ -19,16 +19,25 @@ from .options import Length
 Source: TypeAlias = Node | Scene | str | os.PathLike[str]
 
 RESOLUTION = 64
-"""Voxels along the longest side when a shape is measured."""
+"""Voxels along the longest side for measuring a shape."""
 
 
 def found(source: Source) -> Node | Scene:
-    """The shape or scene itself.
+    """Resolve a source to a shape or scene.
+
+    Parameters
+    ----------
+    source : Node, Scene, path or name
+        A shape, a scene, a scene file, or the name of a shipped scene or formula.
+
+    Returns
+    -------
+    Node or Scene
 
     Raises
     ------
     SceneError
-        Where nothing has that name, with the nearest one, or a file cannot be read.
+        For an unknown name, with the nearest known one, or a file that cannot be read.
     """
     if isinstance(source, (Node, Scene)):
         return source
@@ -49,27 +58,31 @@ def found(source: Source) -> Node | Scene:
 
 
 def _is_ready(formula: Formula) -> bool:
-    """Whether a formula is a shape without further values."""
+    """True if a formula is a bounded shape without required parameters."""
     required = any(kind.default is REQUIRED for kind in formula.parameters.values())
     return formula.kind == "shape" and "bounds" in formula.hooks and not required
 
 
 def as_scene(source: Source, size: Length | None, work: Work) -> Scene:
-    """The scene of a source; a shape becomes one of a size.
+    """Resolve a source to a scene.
 
     Parameters
     ----------
     source : Node, Scene, path or name
-        What is made.
+        A shape, a scene, a scene file, or the name of a shipped scene or formula.
     size : float or str, optional
-        The longest side of a shape. Without one, its scene unit is a millimetre.
+        Longest side of a shape; by default, its scene unit is a millimetre.
     work : Work
-        How the shape is measured.
+        Threads, progress and cancellation while the shape is measured.
+
+    Returns
+    -------
+    Scene
 
     Raises
     ------
     SceneError
-        As `found`, and for a shape without an end.
+        As `found`, and for an unbounded shape.
     """
     what = found(source)
     if isinstance(what, Scene):
@@ -78,5 +91,5 @@ def as_scene(source: Source, size: Length | None, work: Work) -> Scene:
 
 
 def _measured(shape: Node, work: Work) -> float:
-    """The longest side of a shape, scene units."""
+    """Longest side of a shape, scene units."""
     return max(extent(with_depths(shape, work), RESOLUTION, work).box.size)

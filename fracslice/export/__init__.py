@@ -1,4 +1,4 @@
-"""Files out: one format per module, each `write(mesh, file, metadata)`, found by the ending of the name."""
+"""Mesh file formats: one module each with `write(mesh, file, metadata)`, selected by file name extension."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FORMATS: dict[str, Callable[[Mesh, BinaryIO, Mapping[str, str]], None]] = {
 
 
 def application() -> str:
-    """Name and version of this program, as files carry it."""
+    """Name and version of this program, for file metadata."""
     try:
         return f"fracslice {version('fracslice')}"
     except PackageNotFoundError:
@@ -32,7 +32,23 @@ def application() -> str:
 
 
 def check_format(path: str | Path) -> str:
-    """The ending that names the format of `path`; raises ExportError, naming those known, for any other."""
+    """Extension of a mesh file.
+
+    Parameters
+    ----------
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    str
+        Extension in lower case, a key of `FORMATS`.
+
+    Raises
+    ------
+    ExportError
+        For an unknown extension; the message lists the known ones.
+    """
     ending = Path(path).suffix.lower()
     if ending not in FORMATS:
         raise ExportError(f"{path}: unknown kind of file; known are {', '.join(FORMATS)}")
@@ -40,12 +56,29 @@ def check_format(path: str | Path) -> str:
 
 
 def write(mesh: Mesh, path: str | Path, metadata: Mapping[str, str] | None = None) -> Path:
-    """Write a mesh in mm to a file of the kind its name ends in, whole or not at all; same mesh, same bytes.
+    """Write a mesh to a file atomically, in the format of its extension. Equal meshes give equal bytes.
 
-    metadata: names and values that the format has room for, such as Title, Description or scene_hash;
-    Application is added. Coordinates are written as float32: pass a mesh through
-    `fracslice.mesh.quantisation.quantised` first, and check that. Returns the path. Raises ExportError in
-    one line for an empty mesh, an unknown ending, or what the file system refuses.
+    Coordinates are written as float32: quantise the mesh with `fracslice.mesh.quantisation.quantised` first,
+    and check the quantised mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    path : str or path
+        The file to write.
+    metadata : mapping of str to str, optional
+        Names and values for the file, such as Title, Description or scene_hash, as far as the format holds
+        them; Application is added.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For an empty mesh, an unknown extension, or an error of the file system.
     """
     format_write = FORMATS[check_format(path)]
     if not len(mesh.triangles):

@@ -1,4 +1,4 @@
-"""Files that are whole or not there, brought to the disk, and errors of the file system in words."""
+"""Atomic and durable file writing, and messages for file system errors."""
 
 from __future__ import annotations
 
@@ -14,9 +14,22 @@ from fracslice.errors import ExportError
 
 
 def check_target(path: str | Path) -> Path:
-    """Where a file for `path` would go (links followed), if it can be made there; changes nothing.
+    """Check that a file can be written; nothing is changed.
 
-    Raises ExportError if the folder is missing or not writable, or if `path` is itself a folder.
+    Parameters
+    ----------
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+        The path with links resolved.
+
+    Raises
+    ------
+    ExportError
+        If the folder is missing or not writable, or if `path` is itself a folder.
     """
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
@@ -30,10 +43,25 @@ def check_target(path: str | Path) -> Path:
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[BinaryIO]:
-    """Open a file that appears at `path` complete when the block ends, and never otherwise.
+    """Write a file atomically: it appears at `path`, complete, when the block ends without an error.
 
-    As `fracslice.files.replacing`, and on the disk before it gets its name; what was at `path` leaves its
-    permissions. Raises ExportError for what the file system refuses.
+    As `fracslice.files.replacing`, but the file is flushed to disk before it is renamed. It takes the
+    permissions of the file that it replaces.
+
+    Parameters
+    ----------
+    path : str or path
+        The file to write.
+
+    Yields
+    ------
+    file
+        Binary file, open for writing.
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system.
     """
     target = check_target(path)
     try:
@@ -46,8 +74,21 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
 
 
 def put(path: str, data: bytes) -> None:
-    """Writes a file in as few calls as can be: one of many, of which what an error leaves is looked at before
-    it is used. It is neither renamed into place nor forced to the disk.
+    """Write one of many files with as few system calls as possible, neither atomically nor flushed to disk.
+
+    The caller must check what an interrupted job has left before using it.
+
+    Parameters
+    ----------
+    path : str
+        The file to write; links are not followed.
+    data : bytes
+        Contents.
+
+    Raises
+    ------
+    OSError
+        For an error of the file system.
     """
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o666)
     try:
@@ -58,7 +99,22 @@ def put(path: str, data: bytes) -> None:
 
 
 def into_place(file: BinaryIO, path: str | Path) -> None:
-    """Renames an open file that is whole to `path`, as `replacing` does. Raises OSError."""
+    """Flush a complete, open file to disk and rename it to `path`, as `replacing` does.
+
+    Parameters
+    ----------
+    file : file
+        The open file.
+    path : str or path
+        The new name.
+
+    Raises
+    ------
+    OSError
+        For an error of the file system.
+    ExportError
+        As `check_target`.
+    """
     target = check_target(path)
     _settle(file, target)
     os.replace(file.name, target)
@@ -66,16 +122,16 @@ def into_place(file: BinaryIO, path: str | Path) -> None:
 
 
 def _settle(file: BinaryIO, target: Path) -> None:
-    """Brings a file to the disk, with the permissions that the target has, or a new file gets."""
+    """Flush a file to disk, with the permissions of the target, or of a new file if there is none."""
     file.flush()
-    mask = os.umask(0o077)  # there is no other way to ask for it
+    mask = os.umask(0o077)  # the umask cannot be read without setting it
     os.umask(mask)
     os.fchmod(file.fileno(), target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~mask)
     os.fsync(file.fileno())
 
 
 def _settle_folder(folder: Path) -> None:
-    """Bring the folder's new entry to the disk, where the system can."""
+    """Flush the folder's new entry to disk, where the system supports it."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -85,7 +141,7 @@ def _settle_folder(folder: Path) -> None:
 
 
 def reason(error: OSError) -> str:
-    """Why the file system refuses, in words."""
+    """Message for an error of the file system."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return "the disk is full; nothing was written"
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):

@@ -1,6 +1,6 @@
 """Binary glTF 2.0.
 
-Coordinates stay in mm with z up, bit by bit; the node turns and scales them to glTF's metres with y up.
+Coordinates stay in mm with z up, bit for bit; the node's matrix converts them to glTF's metres with y up.
 """
 
 from __future__ import annotations
@@ -21,7 +21,22 @@ GREY = {"baseColorFactor": [0.8, 0.8, 0.78, 1], "metallicFactor": 0, "roughnessF
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh in mm; without normals, so that viewers shade it flat as printed."""
+    """Write a mesh without normals, so that viewers use flat shading, as printed.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    file : file
+        Binary file, open for writing.
+    metadata : mapping of str to str
+        Names and values, with Application among them.
+
+    Raises
+    ------
+    ExportError
+        For a file of 4 GiB or more.
+    """
     positions = mesh.vertices.astype("<f4")
     indices = mesh.triangles.astype("<u4")
     text = json.dumps(_document(positions, indices, metadata), separators=(",", ":")).encode()

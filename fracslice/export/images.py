@@ -1,4 +1,4 @@
-"""Pictures: PNG of 8 or 16 bits, OpenEXR and TIFF of floats, text in all. Written whole or not at all."""
+"""Image files with text metadata, written atomically: PNG of 8 or 16 bits, OpenEXR and TIFF of floats."""
 
 from __future__ import annotations
 
@@ -17,8 +17,23 @@ IMAGES = (".png", ".exr", ".tif", ".tiff")
 
 
 def check_image(path: str | Path) -> str:
-    """The ending that names the format of `path`; raises ExportError, with those that are known, for any
-    other."""
+    """Extension of an image file.
+
+    Parameters
+    ----------
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    str
+        Extension in lower case, one of `IMAGES`.
+
+    Raises
+    ------
+    ExportError
+        For an unknown extension; the message lists the known ones.
+    """
     ending = Path(path).suffix.lower()
     if ending not in IMAGES:
         raise ExportError(f"{path}: unknown kind of picture; known are {', '.join(IMAGES)}")
@@ -32,10 +47,29 @@ def write_image(
     bits: int = 8,
     text: Mapping[str, str] | None = None,
 ) -> Path:
-    """Writes a picture to a file of the kind its name ends in.
+    """Write an image to a file, in the format of its extension.
 
-    shown: float32 [height, width, 3], sRGB in [0, 1], for PNG of `bits` 8 or 16; text: keywords and what they
-    say, in the file. light: float32 of the same shape, linear, for OpenEXR and TIFF. Raises ExportError.
+    Parameters
+    ----------
+    path : str or path
+        The file to write.
+    shown : ndarray, float32 [height, width, 3]
+        sRGB in [0, 1], for PNG.
+    light : ndarray, float32 [height, width, 3]
+        Linear light, for OpenEXR and TIFF.
+    bits : {8, 16}
+        Bits per channel of a PNG.
+    text : mapping of str to str, optional
+        Keywords and texts of the metadata.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For an unknown extension, another number of bits, or an error of the file system.
     """
     if bits not in (8, 16):
         raise ExportError(f"{path}: {bits} bits: expected 8 or 16")
@@ -51,7 +85,21 @@ def write_image(
 
 
 def png(shown: np.ndarray, bits: int, text: Mapping[str, str]) -> bytes:
-    """A PNG file (ISO/IEC 15948): filtered rows, sRGB and text chunks."""
+    """Encode a PNG file (ISO/IEC 15948) with filtered rows, sRGB and text chunks.
+
+    Parameters
+    ----------
+    shown : ndarray, float [height, width, 3]
+        sRGB in [0, 1].
+    bits : {8, 16}
+        Bits per channel.
+    text : mapping of str to str
+        Keywords and texts of the metadata.
+
+    Returns
+    -------
+    bytes
+    """
     height, width, _ = shown.shape
     most = 2**bits - 1
     levels = np.round(np.clip(shown, 0, 1) * np.float64(most)).astype(">u2" if bits == 16 else np.uint8)
@@ -63,8 +111,7 @@ def png(shown: np.ndarray, bits: int, text: Mapping[str, str]) -> bytes:
 
 
 def _filtered(rows: np.ndarray, pixel: int) -> np.ndarray:
-    """Rows of bytes as differences to what is left of and above them, each row by the filter that leaves
-    least."""
+    """Filter rows of bytes, each by the PNG filter with the smallest sum of absolute differences."""
     value = rows.astype(np.int16)
     above = np.vstack([np.zeros_like(value[:1]), value[:-1]])
     left = np.pad(value, ((0, 0), (pixel, 0)))[:, : value.shape[1]]
@@ -84,12 +131,23 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def exr(light: np.ndarray, text: Mapping[str, str]) -> bytes:
-    """An OpenEXR file (Academy Software Foundation): 32-bit floats of red, green and blue, compressed without
-    loss."""
+    """Encode an OpenEXR file (Academy Software Foundation): 32-bit floats, losslessly compressed.
+
+    Parameters
+    ----------
+    light : ndarray, float32 [height, width, 3]
+        Linear red, green and blue.
+    text : mapping of str to str
+        Keywords and texts of the metadata.
+
+    Returns
+    -------
+    bytes
+    """
     import OpenEXR
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **text}
-    with TemporaryDirectory() as folder:  # the library writes to names only
+    with TemporaryDirectory() as folder:  # the library only writes to named files
         path = Path(folder) / "picture.exr"
         with OpenEXR.File(header, {"RGB": np.ascontiguousarray(light, np.float32)}) as file:
             file.write(str(path))
@@ -97,7 +155,19 @@ def exr(light: np.ndarray, text: Mapping[str, str]) -> bytes:
 
 
 def tiff(light: np.ndarray, text: Mapping[str, str]) -> bytes:
-    """A TIFF file (Adobe 1992, revision 6.0): one strip of interleaved 32-bit floats, little-endian."""
+    """Encode a TIFF file (Adobe 1992, revision 6.0): one strip of interleaved 32-bit floats, little-endian.
+
+    Parameters
+    ----------
+    light : ndarray, float32 [height, width, 3]
+        Linear red, green and blue.
+    text : mapping of str to str
+        Keywords and texts of the metadata.
+
+    Returns
+    -------
+    bytes
+    """
     height, width, _ = light.shape
     pixels = np.ascontiguousarray(light, "<f4").tobytes()
     note = "\n".join(f"{k}: {v}" for k, v in text.items()).encode() + b"\0"

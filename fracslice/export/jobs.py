@@ -1,4 +1,4 @@
-"""What the layer formats have in common: the run of a job, and archives that are written layer by layer."""
+"""Shared parts of the layer formats: the slice run, and archives that are written layer by layer."""
 
 from __future__ import annotations
 
@@ -28,10 +28,25 @@ EXPOSURE = Vector((8.0, 35.0), "seconds of each layer, and of the first", sizes=
 
 @dataclass(frozen=True, eq=False)
 class SliceRun:
-    """A planned stack, how its layers become pictures, and what files say about it.
+    """A planned stack with the screen, exposure and metadata of its files.
 
-    exposure: seconds per layer, first layers. metadata: names and values, among them "scene_hash". Raises
-    `ExportError` for seconds that cannot be.
+    Attributes
+    ----------
+    stack : Stack
+        The planned layers.
+    screen : Screen
+        Conversion of layers to pictures.
+    work : Work
+        Threads, progress and cancellation.
+    exposure : (float, float)
+        Exposure of each layer and of the first, s.
+    metadata : dict of str to str
+        Names and values for the files, "scene_hash" among them.
+
+    Raises
+    ------
+    ExportError
+        For an invalid exposure.
     """
 
     stack: Stack
@@ -45,14 +60,26 @@ class SliceRun:
 
     @property
     def slicer(self) -> Slicer:
+        """Slicer of the stack."""
         return Slicer(self.stack, self.work)
 
     @property
     def layers(self) -> int:
+        """Number of layers."""
         return len(self.stack.z)
 
     def key(self, form: str | bytes) -> str:
-        """The key of all that the bytes of the layers follow from. form: of the file."""
+        """Key of everything that determines the bytes of the layers.
+
+        Parameters
+        ----------
+        form : str or bytes
+            File format.
+
+        Returns
+        -------
+        str
+        """
         stack = [getattr(self.stack, f.name) for f in fields(self.stack) if f.name != "root"]
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
         field = self.stack.root.key
@@ -61,7 +88,7 @@ class SliceRun:
         )
 
     def describe(self) -> bytes:
-        """What files say of the layers, as JSON."""
+        """Manifest of the layers, as JSON."""
         stack, screen = self.stack, self.screen
         manifest = {
             "application": "fracslice",
@@ -82,16 +109,34 @@ class SliceRun:
 
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """The members of a ZIP file, uncompressed and without times; their list comes at its end."""
+    """A ZIP file of stored members without times; the central directory is written at the end.
+
+    Attributes
+    ----------
+    file : file
+        Binary file, open for reading and writing.
+    members : list of ZipInfo
+        The members written so far.
+    """
 
     file: BinaryIO
     members: list[zipfile.ZipInfo]
 
     @property
     def names(self) -> set[str]:
+        """Names of the members."""
         return {info.filename for info in self.members}
 
     def add(self, name: str, data: bytes) -> None:
+        """Append a member.
+
+        Parameters
+        ----------
+        name : str
+            Name of the member.
+        data : bytes
+            Contents.
+        """
         info = _info(name, crc32(data), len(data))
         info.header_offset = _end(self.members)
         self.file.write(info.FileHeader())
@@ -99,14 +144,32 @@ class Stored:
         self.members.append(info)
 
     def close(self) -> None:
+        """Write the central directory."""
         with zipfile.ZipFile(self.file, "w") as archive:
             archive.filelist.extend(self.members)
 
 
 @contextmanager
 def resumable_zip(path: Path, job: str) -> Iterator[Stored]:
-    """A stored ZIP file that appears at `path` when the block ends; what an interrupted block wrote is a
-    `remainder`, gone on with after its last whole member.
+    """Write a stored ZIP file that appears at `path` when the block ends.
+
+    An interrupted block leaves a `remainder`; the next one resumes after its last complete member.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    job : str
+        Key of everything that determines the bytes.
+
+    Yields
+    ------
+    Stored
+
+    Raises
+    ------
+    ExportError
+        As `remainder`.
     """
     with remainder(path, job) as file:
         whole = _members(file)
@@ -122,7 +185,7 @@ _HEADER = struct.Struct("<4s5H3L2H")
 
 
 def _members(file: BinaryIO) -> list[zipfile.ZipInfo]:
-    """The stored members at the start of a file that are whole."""
+    """Complete stored members at the start of a file."""
     found: list[zipfile.ZipInfo] = []
     while len(head := file.read(_HEADER.size)) == _HEADER.size:
         signature, _, flags, method, _, _, crc, size, _, name_size, extra_size = _HEADER.unpack(head)
@@ -140,7 +203,7 @@ def _members(file: BinaryIO) -> list[zipfile.ZipInfo]:
 
 
 def _info(name: str, crc: int, size: int) -> zipfile.ZipInfo:
-    """A stored member that carries no time."""
+    """Header of a stored member without a time."""
     info = zipfile.ZipInfo(name)
     info.CRC, info.file_size, info.compress_size = crc, size, size
     info.external_attr = 0o644 << 16
@@ -148,7 +211,7 @@ def _info(name: str, crc: int, size: int) -> zipfile.ZipInfo:
 
 
 def _end(members: list[zipfile.ZipInfo]) -> int:
-    """Where the next one goes."""
+    """Offset of the next member."""
     if not members:
         return 0
     last = members[-1]

@@ -1,4 +1,4 @@
-"""What an interrupted job had made, layer by layer."""
+"""Journal of a job's finished layers, from which an interrupted job resumes."""
 
 from __future__ import annotations
 
@@ -14,23 +14,37 @@ from fracslice.errors import ExportError
 from fracslice.export.resuming import remainder
 
 _HEAD = struct.Struct("<II")
-"""Of a record: the length and the CRC-32 of what follows."""
+"""Header of a record: length and CRC-32 of the data."""
 
 
 @dataclass(eq=False)
 class Journal:
-    """The layers that are made. count: how many."""
+    """The finished layers of a job.
+
+    Attributes
+    ----------
+    file : file
+        Binary file, open for reading and writing.
+    count : int
+        Number of finished layers.
+    """
 
     file: BinaryIO
     count: int = 0
 
     def append(self, layer: bytes) -> None:
-        """Keeps the next layer."""
+        """Append the next layer.
+
+        Parameters
+        ----------
+        layer : bytes
+            The encoded layer.
+        """
         self.file.write(_HEAD.pack(len(layer), zlib.crc32(layer)) + layer)
         self.count += 1
 
     def __iter__(self) -> Iterator[bytes]:
-        """All layers, in order."""
+        """Iterate over all layers in order. Raises `ExportError` if a record cannot be read back."""
         self.file.seek(0)
         for _ in range(self.count):
             layer = _read(self.file)
@@ -41,7 +55,24 @@ class Journal:
 
 @contextmanager
 def journal(path: str | Path, job: str) -> Iterator[Journal]:
-    """The journal of a job whose file is to be at `path`: a `remainder`, up to its last whole layer."""
+    """Open the journal of a job: a `remainder`, truncated after its last complete layer.
+
+    Parameters
+    ----------
+    path : str or path
+        The file that the job writes.
+    job : str
+        Key of everything that determines the bytes.
+
+    Yields
+    ------
+    Journal
+
+    Raises
+    ------
+    ExportError
+        As `remainder`.
+    """
     with remainder(path, job) as file:
         kept, end = Journal(file), 0
         while _read(file) is not None:
@@ -52,7 +83,7 @@ def journal(path: str | Path, job: str) -> Iterator[Journal]:
 
 
 def _read(file: BinaryIO) -> bytes | None:
-    """The next record, None where there is no whole one."""
+    """Data of the next record; None if it is missing, incomplete or damaged."""
     head = file.read(_HEAD.size)
     if len(head) < _HEAD.size:
         return None

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: text, vertices numbered from one."""
+"""Wavefront OBJ: text, with vertices numbered from one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,17 @@ from fracslice.mesh.model import Mesh
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh in mm; nine digits keep every float32."""
+    """Write a mesh; nine digits represent every float32 exactly.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    file : file
+        Binary file, open for writing.
+    metadata : mapping of str to str
+        Names and values, written as comments.
+    """
     for key, value in (*metadata.items(), ("units", "mm")):
         file.write(f"# {key}: {' '.join(value.split())}\n".encode("ascii", "replace"))
     file.writelines(rows("v %.9g %.9g %.9g\n", mesh.vertices.astype(np.float32)))

@@ -1,4 +1,4 @@
-"""Layers as outlines: SVG, the Common Layer Interface, and JSON."""
+"""Layers as contours: SVG, Common Layer Interface and JSON."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from fracslice.export.resuming import JOB, resumable_folder
 from fracslice.slicing import Contours, Layer
 
 MICRON = 0.001
-"""The unit of the Common Layer Interface files, mm."""
+"""Unit of Common Layer Interface files, mm."""
 
 
 def _streamed(
     run: SliceRun, path: str | Path, head: bytes, make: Callable[[Layer], bytes], tail: bytes
 ) -> Path:
+    """Write a head, the encoded layers and a tail to one file; an interrupted job resumes."""
     with journal(path, run.key(head)) as kept:
         for layer in run.slicer.map(make, range(kept.count, run.layers)):
             kept.append(layer)
@@ -34,28 +35,27 @@ def _streamed(
 
 
 def _pairs(points: np.ndarray, template: str, between: str) -> str:
-    """Points [n, 2] as text, each by a %-template."""
+    """Points [n, 2] as text, each formatted by a %-template."""
     return between.join([template] * len(points)) % tuple(points.ravel().tolist())
 
 
 def _holes(found: Contours) -> np.ndarray:
-    """Which contours are holes, bool [m]: those at an odd depth."""
+    """Mask of the contours that are holes, bool [m]: contours at an odd nesting depth."""
     depth = np.zeros(len(found), np.int32)
     for i, parent in enumerate(found.parent):
         depth[i] = depth[parent] + 1 if parent >= 0 else 0
     return np.asarray(depth % 2 == 1)
 
 
-# --- SVG ----------------------------------------------------------------------------------------------------
-# -----------
+# --- SVG
 def _size(run: SliceRun) -> tuple[float, float]:
-    """Width and height of the layers' window in mm."""
+    """Width and height of the layers' window, mm."""
     ny, nx = run.stack.shape
     return nx * run.stack.pixel[0], ny * run.stack.pixel[1]
 
 
 def _down(run: SliceRun, points: np.ndarray) -> np.ndarray:
-    """Points as SVG counts them: mm from the upper left corner."""
+    """Points in SVG coordinates: mm from the upper left corner, y down."""
     return np.array(_size(run)) / 2 + points * (1, -1)
 
 
@@ -68,9 +68,25 @@ def _head(run: SliceRun, namespaces: str = "") -> str:
 
 
 def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
-    """A folder with an SVG file for each layer, one path with all contours, in mm.
+    """Write a folder with an SVG file for each layer: one path with all contours, in mm.
 
-    An interrupted job goes on, as in `pictures.write_folder`.
+    An interrupted job resumes, as with `pictures.write_folder`.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write.
+    path : str or path
+        The folder; it must be new, empty, or left by an interrupted job.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For a folder with other files, or an error of the file system.
     """
     folder = Path(path)
 
@@ -96,7 +112,24 @@ def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
 
 
 def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
-    """One SVG file with a group for each layer, as Slic3r writes it and DLP software reads it."""
+    """Write one SVG file with a group for each layer, as Slic3r writes it and DLP software reads it.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system.
+    """
 
     def make(layer: Layer) -> bytes:
         found = layer.contours
@@ -112,14 +145,47 @@ def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
 
 
 # --- Common Layer Interface, version 2.0 (1994)
-# --------------------------------------------------------------------
 def write_cli(run: SliceRun, path: str | Path) -> Path:
-    """The Common Layer Interface as text."""
+    """Write a Common Layer Interface file as text.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system.
+    """
     return _streamed(run, path, _cli_head(run, "ASCII") + b"$$GEOMETRYSTART\n", _cli_text, b"$$GEOMETRYEND\n")
 
 
 def write_cli_binary(run: SliceRun, path: str | Path) -> Path:
-    """The Common Layer Interface in binary: long layer and polyline commands."""
+    """Write a binary Common Layer Interface file with long layer and polyline commands.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system.
+    """
     return _streamed(run, path, _cli_head(run, "BINARY").rstrip(b"\n"), _cli_bytes, b"")
 
 
@@ -160,9 +226,25 @@ def _cli_bytes(layer: Layer) -> bytes:
 
 
 # --- JSON
-# ------------------------------------------------------------------------------------------------------------
 def write_json(run: SliceRun, path: str | Path) -> Path:
-    """Contours as JSON: for each layer its top and height, and its polygons with their parents, in mm."""
+    """Write contours as JSON: for each layer its top, height and polygons with their parents, in mm.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system.
+    """
     head = json.loads(run.describe())
     del head["layers"]
     opening = json.dumps(head)[:-1] + ', "unit": "mm", "layers": ['

@@ -1,4 +1,4 @@
-"""Layers as pictures: a folder of PNG files with a manifest, and the archives of Prusa's SL1 and SL1S."""
+"""Layers as pictures: a folder of PNG files with a manifest, and archives for Prusa's SL1 and SL1S."""
 
 from __future__ import annotations
 
@@ -16,10 +16,26 @@ MOST_MEMBERS = 65_535
 
 
 def write_folder(run: SliceRun, path: str | Path) -> Path:
-    """00000.png, ... and, when all are there, manifest.json that says what they are.
+    """Write a folder of pictures 00000.png, ... and, last, manifest.json.
 
-    A folder that an interrupted job left is gone on with, after its last whole picture; its job.json tells
-    that it was the same job. Raises ExportError for a folder with anything else in it.
+    A folder left by an interrupted run of the same job, by its job.json, is resumed after its last complete
+    picture.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write.
+    path : str or path
+        The folder; it must be new, empty, or left by an interrupted job.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For a folder with other files, or an error of the file system.
     """
     folder = Path(path)
     start = resumable_folder(folder, run.key("png"), "{:05d}.png".format, png.is_whole)
@@ -40,11 +56,26 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
 
 
 def write_sl1(run: SliceRun, path: str | Path) -> Path:
-    """An archive for the SL1 family: config.ini, prusaslicer.ini and a PNG for each layer; opens in
-    PrusaSlicer.
+    """Write an archive for the SL1 family: config.ini, prusaslicer.ini and a PNG for each layer.
 
-    Interrupted, it goes on from what it had. Raises ExportError without a printer, or for layers of unequal
-    heights, which the format cannot say.
+    PrusaSlicer opens the archive. An interrupted job resumes.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write, with a printer.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        Without a printer, for layers of unequal heights, which the format cannot express, for too many
+        layers, or for an error of the file system.
     """
     target = Path(path)
     if not run.screen.printer:
@@ -75,7 +106,7 @@ def _ini(values: dict[str, object]) -> bytes:
 
 
 def _config(run: SliceRun, name: str) -> dict[str, object]:
-    """What the printer reads; the keys of PrusaSlicer 2.5."""
+    """Settings for the printer, with the keys of PrusaSlicer 2.5."""
     exposure, first = run.exposure
     printer = run.screen.printer
     assert printer
@@ -105,7 +136,7 @@ def _config(run: SliceRun, name: str) -> dict[str, object]:
 
 
 def _settings(run: SliceRun) -> dict[str, object]:
-    """What PrusaSlicer needs to read the layers back."""
+    """Settings with which PrusaSlicer can import the layers."""
     printer = run.screen.printer
     assert printer
     (width, depth), (across, along) = printer.screen, printer.pixels

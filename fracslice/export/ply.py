@@ -13,7 +13,17 @@ FACE = np.dtype([("count", "u1"), ("indices", "<i4", 3)])
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh in mm; metadata goes into comments."""
+    """Write a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    file : file
+        Binary file, open for writing.
+    metadata : mapping of str to str
+        Names and values, written as comments.
+    """
     comments = [f"comment {key}: {' '.join(value.split())}" for key, value in metadata.items()]
     header = [
         "ply",

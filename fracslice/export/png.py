@@ -15,12 +15,34 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 def encode(image: np.ndarray) -> bytes:
-    """A grey picture, uint8 [rows, columns], as a PNG file."""
+    """Encode a grey picture as a PNG file.
+
+    Parameters
+    ----------
+    image : ndarray, uint8 [rows, columns]
+        The picture.
+
+    Returns
+    -------
+    bytes
+    """
     return _file((image.shape[0], image.shape[1]), deflated(image))
 
 
 def encode_layer(screen: Screen, layer: Layer) -> bytes:
-    """The picture of a layer as a PNG file."""
+    """Encode the picture of a layer as a PNG file.
+
+    Parameters
+    ----------
+    screen : Screen
+        Conversion of layers to pictures.
+    layer : Layer
+        The layer.
+
+    Returns
+    -------
+    bytes
+    """
     return _file(screen.shape, screen.deflated(layer))
 
 
@@ -34,5 +56,5 @@ def _chunk(kind: bytes, data: bytes) -> tuple[bytes, bytes, bytes, bytes]:
 
 
 def is_whole(data: bytes) -> bool:
-    """Whether the bytes begin and end as a PNG file does."""
+    """True if the bytes begin and end like a PNG file."""
     return data.startswith(SIGNATURE) and data.endswith(b"IEND\xaeB`\x82")

@@ -1,4 +1,4 @@
-"""Where an interrupted job goes on: only what this user's same job left is taken."""
+"""Resumption of interrupted jobs, only from files that the same job of the same user has left."""
 
 from __future__ import annotations
 
@@ -17,22 +17,38 @@ from fracslice.export.files import check_target, reason
 from fracslice.seals import seal
 
 JOB = "job.json"
-"""What an unfinished folder says of itself."""
+"""Name of the file that identifies the job of an unfinished folder."""
 
 OURS = b'{"application": "fracslice", '
 
 LAYER = re.compile(r"\d{5,}\.(png|svg)")
-"""The names of layers in a folder."""
+"""Names of layer files in a folder."""
 
 
 @contextmanager
 def remainder(path: str | Path, job: str) -> Iterator[BinaryIO]:
-    """What an interrupted job had written of the file `path`, open to be read and written; empty if nothing.
+    """Open the partial file that an interrupted job left; empty if there is none.
 
-    It is a hidden file beside the target, and another one says of which job it is: both gone when the block
-    ends, kept when it is interrupted. job: the key of all that the bytes follow from. What another job left,
-    or another user, is dropped, and a warning says so. Raises ExportError for what the file system refuses,
-    and if another process is at it.
+    The partial file is hidden beside the target; a second hidden file identifies its job. Both are removed
+    when the block ends and kept when it is interrupted. A partial file of another job or another user is
+    discarded with a warning.
+
+    Parameters
+    ----------
+    path : str or path
+        The file that the job writes.
+    job : str
+        Key of everything that determines the bytes.
+
+    Yields
+    ------
+    file
+        Binary file, open for reading and writing.
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system, or if another process is writing the same file.
     """
     target = check_target(path)
     part, manifest = (target.with_name(f".{target.name}.{end}") for end in ("part", "job"))
@@ -45,7 +61,7 @@ def remainder(path: str | Path, job: str) -> Iterator[BinaryIO]:
                     _tell(path)
                 manifest.unlink(missing_ok=True)
                 file.truncate()
-                os.fsync(file.fileno())  # or after a power cut what is said could be of what was there before
+                os.fsync(file.fileno())  # else, after a power cut, the new job could own the old data
                 _write_manifest(manifest, job)
             yield file
         manifest.unlink(missing_ok=True)
@@ -57,10 +73,30 @@ def remainder(path: str | Path, job: str) -> Iterator[BinaryIO]:
 def resumable_folder(
     folder: Path, job: str, name: Callable[[int], str], is_whole: Callable[[bytes], bool]
 ) -> int:
-    """Makes the folder of a job, or finds how many layers of it an interrupted one left; they must be whole.
+    """Make the folder of a job, or count the complete layers that an interrupted job left in it.
 
-    job: its key. name: of each layer's file. The layers of another interrupted job are removed, and a warning
-    says so. Raises ExportError for a folder with anything else in it.
+    Layers of another interrupted job are removed with a warning.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    job : str
+        Key of everything that determines the bytes.
+    name : callable
+        File name of the layer with a given index.
+    is_whole : callable
+        True if the bytes are a complete layer file.
+
+    Returns
+    -------
+    int
+        Index of the first layer to write.
+
+    Raises
+    ------
+    ExportError
+        For a folder with other files, or an error of the file system.
     """
     try:
         folder.mkdir(exist_ok=True)
@@ -84,7 +120,7 @@ def resumable_folder(
 
 
 def _read(manifest: Path) -> bytes:
-    """What a file says of a job, if only this user can have written it; nothing otherwise."""
+    """Contents of a job file; empty if it is missing or others can have written it."""
     try:
         with files.opened(manifest, "rb") as file:
             return file.read()
@@ -107,7 +143,7 @@ def _tell(path: str | Path) -> None:
 
 
 def _remove_foreign(part: Path) -> None:
-    """Removes what stands in a remainder's place and others can write, a link say: it is not written to."""
+    """Remove an entry in place of the partial file, such as a link, that others can write."""
     try:
         with files.opened(part, "rb"):
             return
@@ -123,4 +159,4 @@ def _lock(file: BinaryIO, path: str | Path) -> None:
     except BlockingIOError:
         raise ExportError(f"{path}: another process is at it") from None
     except OSError:
-        pass  # not every file system has locks
+        pass  # some file systems have no locks

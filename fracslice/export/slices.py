@@ -1,4 +1,4 @@
-"""Layers out: the formats by name."""
+"""Layer file formats by name."""
 
 from __future__ import annotations
 
@@ -29,9 +29,24 @@ ENDINGS = {
 
 
 def slice_format(path: str | Path, name: str | None = None) -> str:
-    """The format called `name`, or the one that the path's ending says; checks that it can be written there.
+    """Name of the layer format of a file or folder, which is checked to be writable.
 
-    Raises ExportError.
+    Parameters
+    ----------
+    path : str or path
+        The file or folder to write.
+    name : str, optional
+        Name of the format; by default, the extension of `path` selects it.
+
+    Returns
+    -------
+    str
+        A key of `FORMATS`.
+
+    Raises
+    ------
+    ExportError
+        For an unknown format or extension, or a path that cannot be written.
     """
     ending = Path(path).suffix.lower()
     if name is None:
@@ -47,8 +62,28 @@ def slice_format(path: str | Path, name: str | None = None) -> str:
 
 
 def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Path:
-    """Cuts a planned stack into a file or folder; returns its path.
+    """Slice a planned stack and write the layers to a file or folder.
 
-    name: of the format, if the path's ending does not say it. Raises ExportError, SliceError, Cancelled.
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write.
+    path : str or path
+        The file or folder.
+    name : str, optional
+        Name of the format; by default, the extension of `path` selects it.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For an unknown format, or an error of the file system.
+    SliceError
+        If the layers cannot be cut.
+    Cancelled
+        When the work is cancelled.
     """
     return FORMATS[slice_format(path, name)](run, path)

@@ -1,4 +1,4 @@
-"""3MF with the slice extension 1.0: contours of every layer, and the mesh of the same field."""
+"""3MF with the slice extension 1.0: contours of every layer and a mesh of the same field."""
 
 from __future__ import annotations
 
@@ -29,14 +29,31 @@ HEAD = (
 )
 OBJECT = '</s:slicestack>\n<object id="2" type="model" s:slicestackid="1" s:meshresolution="fullres">'
 ALONG = 256
-"""Voxels along the longest side of the mesh, at most: as many as one that is made without slices has."""
+"""Maximum number of voxels along the longest side of the mesh: the default resolution of a mesh job."""
 
 DUST = 1e-5
-"""The share of the whole below which a body is left out of it, as there."""
+"""Connected components below this fraction of the total volume are dropped, as by default in a mesh job."""
 
 
 def write_3mf(run: SliceRun, path: str | Path) -> Path:
-    """The slice stack of one object, streamed, and its mesh, for programs that do not read slices."""
+    """Write the slice stack of an object, streamed, and its mesh for programs that do not read slices.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system.
+    """
     mesh = _mesh(run)
     with journal(path, run.key("3mf")) as kept:
         for slice_ in run.slicer.map(lambda layer: _slice(run, layer), range(kept.count, run.layers)):
@@ -77,13 +94,13 @@ def _slice(run: SliceRun, layer: Layer) -> bytes:
 
 
 def _middle(run: SliceRun) -> np.ndarray:
-    """What moves the window's corner to the origin: coordinates of a build must not be negative."""
+    """Offset from the window's corner to its middle: build coordinates must not be negative."""
     return np.array(run.stack.shape[::-1]) * run.stack.pixel / 2
 
 
 def _mesh(run: SliceRun) -> Mesh:
-    """The object's mesh in mm, where its slices are."""
-    from fracslice.printing.connectivity import shown  # it needs Numba, and other formats do not
+    """Mesh of the object in mm, aligned with its slices."""
+    from fracslice.printing.connectivity import shown  # imported here: only this format needs Numba
 
     stack, longest = run.stack, max(run.stack.size)
     finest = max(*stack.pixel, float(stack.heights.max()))

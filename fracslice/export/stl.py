@@ -1,4 +1,4 @@
-"""Binary STL: loose triangles in float32, no unit in the format; the header says mm."""
+"""Binary STL: unindexed triangles in float32. The format has no unit; the header states mm."""
 
 from __future__ import annotations
 
@@ -15,12 +15,42 @@ BLOCK = 1 << 18
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh in mm."""
+    """Write a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    file : file
+        Binary file, open for writing and able to seek.
+    metadata : mapping of str to str
+        Names and values; the header holds Application.
+
+    Raises
+    ------
+    ExportError
+        For more than 4294967295 triangles.
+    """
     write_pieces([mesh], file, metadata)
 
 
 def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh in mm that comes in pieces, one in memory at a time; `file` must be able to seek."""
+    """Write a mesh piece by piece, with one piece in memory at a time.
+
+    Parameters
+    ----------
+    meshes : iterable of Mesh
+        The pieces, mm.
+    file : file
+        Binary file, open for writing and able to seek.
+    metadata : mapping of str to str
+        Names and values; the header holds Application.
+
+    Raises
+    ------
+    ExportError
+        For more than 4294967295 triangles.
+    """
     start, count = file.tell(), 0
     header = f"binary STL, units: mm, {metadata['Application']}".encode("ascii", "replace")
     file.write(header[:80].ljust(80) + bytes(4))

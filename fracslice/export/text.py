@@ -1,4 +1,4 @@
-"""Numbers to text, many rows at a time."""
+"""Formatting of number arrays as text."""
 
 from __future__ import annotations
 
@@ -11,9 +11,21 @@ ROWS = 1 << 16
 
 
 def rows(template: str, values: NDArray[Any]) -> Iterator[bytes]:
-    """Fill the %-template with each row of a 2D array, in blocks of bounded size.
+    """Format each row of an array by a %-template, in blocks of bounded size.
 
-    One formatting call per block: several times faster than one per row.
+    One formatting call per block is several times faster than one per row.
+
+    Parameters
+    ----------
+    template : str
+        Template with as many fields as a row has items.
+    values : ndarray [n, k]
+        The rows.
+
+    Yields
+    ------
+    bytes
+        ASCII text of a block.
     """
     block = template * ROWS
     for begin in range(0, len(values), ROWS):

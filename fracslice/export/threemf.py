@@ -1,4 +1,4 @@
-"""3MF, core specification 1.3: one object in millimetres, the same bytes for the same mesh."""
+"""3MF, core specification 1.3: one object in millimetres. Equal meshes give equal bytes."""
 
 from __future__ import annotations
 
@@ -31,11 +31,21 @@ MODEL = (
 )
 CORE_NAMES = {"Title", "Designer", "Description", "Copyright", "LicenseTerms", "Rating", "Application"}
 CORE_NAMES |= {"CreationDate", "ModificationDate"}
-LEVEL = 3  # of deflate: a third of the time of the usual 6, and files a twentieth larger
+LEVEL = 3  # of deflate: a third of the time of the default 6, for files a twentieth larger
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh in mm, streaming; metadata that 3MF has no name for goes into fracslice's namespace."""
+    """Write a mesh, streamed.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    file : file
+        Binary file, open for writing.
+    metadata : mapping of str to str
+        Names and values; names that 3MF does not define get fracslice's namespace.
+    """
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
         _add(archive, "[Content_Types].xml", [TYPES.encode()])
         _add(archive, "_rels/.rels", [RELATIONS.encode()])
@@ -43,14 +53,14 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
 
 
 def _add(archive: zipfile.ZipFile, name: str, texts: Iterable[bytes], large: bool = False) -> None:
-    """Stream a member; opened by name it carries no time, unlike one of `zipfile.ZipFile.writestr`."""
+    """Stream a member. Opened by name it carries no time, unlike a member of `zipfile.ZipFile.writestr`."""
     with archive.open(name, "w", force_zip64=large) as part:
         for text in texts:
             part.write(text)
 
 
 def _is_large(mesh: Mesh) -> bool:
-    """Whether the text may pass the 2 GiB of a plain ZIP member; rows take at most 66 and 54 bytes."""
+    """True if the text may exceed the 2 GiB of a plain ZIP member; rows take at most 66 and 54 bytes."""
     return 66 * len(mesh.vertices) + 54 * len(mesh.triangles) > 2**31 - 2**20
 
 
@@ -65,7 +75,18 @@ def _model(mesh: Mesh, metadata: Mapping[str, str]) -> Iterator[bytes]:
 
 
 def mesh_element(mesh: Mesh) -> Iterator[bytes]:
-    """A mesh in mm as the element of an object, piece after piece."""
+    """Encode a mesh as the mesh element of an object, in blocks.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+
+    Yields
+    ------
+    bytes
+        Part of the element.
+    """
     yield b"<mesh>\n<vertices>\n"
     yield from rows('<vertex x="%.9g" y="%.9g" z="%.9g"/>\n', mesh.vertices.astype(np.float32))
     yield b"</vertices>\n<triangles>\n"

@@ -1,7 +1,7 @@
-"""Linear algebra in three dimensions that rounds alike everywhere.
+"""Linear algebra in three dimensions with a fixed order of operations, for the same results on all machines.
 
-Libraries of linear algebra choose the order of their sums, and what they fuse, by the processor; a scene that
-is turned would have other parameters, and another mesh in its last bits, on another machine.
+Linear algebra libraries choose the summation order and fused operations by processor. With them, a rotated
+scene would have other parameters, and its mesh other last bits, on another machine.
 """
 
 from __future__ import annotations
@@ -15,7 +15,19 @@ SMALL = 2.0**-52
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The product of a matrix [n, k] and a matrix [k, m] or a vector [k]."""
+    """Matrix product.
+
+    Parameters
+    ----------
+    a : ndarray [n, k]
+        Matrix.
+    b : ndarray [k, m] or [k]
+        Matrix or vector.
+
+    Returns
+    -------
+    ndarray [n, m] or [n]
+    """
     terms = [np.multiply.outer(a[:, k], b[k]) for k in range(a.shape[1])]
     total: np.ndarray = terms[0]
     for term in terms[1:]:
@@ -24,7 +36,7 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> float:
-    """The inner product of two vectors."""
+    """Inner product of two vectors of equal length."""
     total = 0.0
     for x, y in zip(a.tolist(), b.tolist(), strict=True):
         total += x * y
@@ -32,12 +44,22 @@ def dot(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def length(vector: np.ndarray) -> float:
-    """The Euclidean norm of a vector."""
+    """Euclidean norm of a vector."""
     return math.sqrt(dot(vector, vector))
 
 
 def inverse(matrix: np.ndarray) -> np.ndarray:
-    """The inverse of a matrix [3, 3], by Gauss and Jordan's elimination with partial pivoting."""
+    """Inverse by Gauss-Jordan elimination with partial pivoting.
+
+    Parameters
+    ----------
+    matrix : ndarray [3, 3]
+        Invertible matrix.
+
+    Returns
+    -------
+    ndarray, float64 [3, 3]
+    """
     rows = np.hstack([np.asarray(matrix, float), np.eye(3)])
     for k in range(3):
         pivot = k + int(np.abs(rows[k:, k]).argmax())
@@ -49,10 +71,19 @@ def inverse(matrix: np.ndarray) -> np.ndarray:
 
 
 def stretches(matrix: np.ndarray) -> np.ndarray:
-    """The singular values of a matrix [3, 3], the largest first.
+    """Singular values, in descending order.
 
-    One-sided Jacobi rotations make its columns orthogonal (Hestenes 1958, "Inversion of matrices by
+    One-sided Jacobi rotations make the columns orthogonal (Hestenes 1958, "Inversion of matrices by
     biorthogonalization and related results").
+
+    Parameters
+    ----------
+    matrix : ndarray [3, 3]
+        Matrix.
+
+    Returns
+    -------
+    ndarray, float64 [3]
     """
     columns = np.array(matrix, float).T.copy()
     for _ in range(SWEEPS):

@@ -1,4 +1,4 @@
-"""Operators that know where their element ends: a bounding volume, offset, endless repetition."""
+"""Domain operators that bound their element: bounding box, offset and repetition."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from .parameters import REQUIRED, Number, Vector
 from .registry import Fixed, Node, domain_operator
 from .vocabulary import absolute, any_of, floor, maximum, minimum
 
-# Each operator below that confines its child returns ``maximum(d, minimum(child, 2 m - d))`` with d a
-# distance to a volume around the child and m > 0. The surface is unchanged where d <= 0, the result does not
-# jump, and where d >= m it is d whatever the child's value: there the child need not be evaluated, and its
-# Lipschitz bound is not needed either.
+# An operator that confines its child returns ``maximum(d, minimum(child, 2 m - d))``, where d is the signed
+# distance to a volume around the child and m > 0 a margin. The surface is unchanged where d <= 0, and the
+# result is continuous. Where d >= m the result is d for any value of the child: neither the child's value nor
+# its Lipschitz bound is needed there.
 
 
 @domain_operator(
@@ -21,9 +21,9 @@ from .vocabulary import absolute, any_of, floor, maximum, minimum
     max=Vector(REQUIRED, "the corner with the largest coordinates"),
 )
 def bounds(child, x, y, z, centre, half, margin):  # type: ignore[no-untyped-def]
-    """What is inside a box; the element is not looked at far from it, however much of it there is.
+    """The part of the element inside a box; far from the box the element is not evaluated.
 
-    L = max of 1, which is the box', and the element's.
+    The element may be unbounded. L = maximum of 1 (the box) and the element's.
     """
     cx, cy, cz = centre
     hx, hy, hz = half
@@ -61,12 +61,13 @@ def bounds_slope(node: Node) -> float:
     distance=Number(REQUIRED, "how far outward the surface moves, in scene units; negative: inward")
 )
 def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-def]
-    """The element grown or shrunk; exact where its field is a distance.
+    """The element grown or shrunk by a distance; exact where its field is a distance.
 
-    A field that underestimates distances would grow further than it should; it is cut off at the grown box.
-    L = the element's, at least 1, the box'; more around an escape-time fractal, whose field is steeper away
-    from its surface (`Bounds.steepening`; measured). What is shrunk lies in the element: where that is a
-    fractal, whose inside bounds nothing, space is skipped by its own field.
+    A field that underestimates distances would grow too far; the result is clipped at the grown box.
+    L = maximum of 1 (the box) and the element's; more for an escape-time fractal, whose field is steeper away
+    from its surface (`Bounds.steepening`; measured). A shrunk element lies inside the original. The field of
+    a fractal is an exterior bound only, so the conservative field of a shrunk fractal is that of the
+    original.
     """
     cx, cy, cz = centre
     hx, hy, hz = half
@@ -92,9 +93,21 @@ def offset_slope(node: Node) -> float:
 
 
 def moved_slope(inner: Bounds, distance: float) -> float:
-    """The Lipschitz bound of a field less a constant."""
+    """Lipschitz bound of a field minus a constant.
+
+    Parameters
+    ----------
+    inner : Bounds
+        Bounds of the field.
+    distance : float
+        The constant, scene units.
+
+    Returns
+    -------
+    float
+    """
     n = inner.steepening
-    # By how steeply the stretch along circles of latitude ends: within 1/n, in narrow rings within 3/n^2.
+    # The stretch along circles of latitude ends within 1/n, in narrow rings within 3/n^2.
     return inner.lipschitz * (2 + n / 4 + n * n / 128 if inner.exterior_only and distance > 0 else 1.0)
 
 
@@ -104,7 +117,7 @@ def offset_identity(node: Node) -> bool:
 
 
 def _frame(box: Box) -> dict[str, object]:
-    """The box' centre, zero along endless axes, and half sizes."""
+    """Centre of a box, 0 along unbounded axes, and its half sizes."""
     return {
         "centre": tuple(c if math.isfinite(c) else 0.0 for c in box.centre),
         "half": tuple(s / 2 for s in box.size),
@@ -122,11 +135,11 @@ def _frame(box: Box) -> dict[str, object]:
     ),
 )
 def repeat(child, x, y, z, period, first, last, centre, half, middle, reach, gap, nx, ny, nz):  # type: ignore[no-untyped-def]
-    """Copies on a lattice. Every copy that can be the nearest is looked at, so cell borders are right.
+    """Copies on a lattice. Every copy that can be the nearest is evaluated, so cell borders are right.
 
-    Copies further than `gap` are not; the value never exceeds it inside the lattice, so that leaving one out
-    is not seen. A copy's value is at least the distance to its box, for the same reason. L = max of 1 and
-    the element's: all that is left out is larger than `gap`, and minima keep the bound.
+    Copies farther than `gap` are skipped. The value never exceeds `gap` inside the lattice, so a skipped copy
+    does not change it. For the same reason a copy's value is at least the distance to its box. L = maximum of
+    1 and the element's: skipped values are larger than `gap`, and minima preserve the bound.
     """
     px, py, pz = period
     fx, fy, fz = first
@@ -154,7 +167,7 @@ ENDLESS = 1 << 20
 
 
 def _window(node: Node, axis: int) -> int:
-    """How many neighbouring copies can be nearest along an axis."""
+    """Number of neighbouring copies along an axis that can be the nearest."""
     box, period, count = node.children[0].bounds.box, node["period"][axis], node["count"][axis]
     if count == 1:
         return 1
@@ -191,6 +204,7 @@ def repeat_arguments(node: Node) -> dict[str, object]:
 
 
 def _lattice(node: Node) -> Box:
+    """Bounding box of all copies."""
     box, lo, hi = node.children[0].bounds.box, [], []
     for a, b, p, c in zip(box.lo, box.hi, node["period"], node["count"], strict=True):
         reach = (c - 1) / 2 * p if c else math.inf

@@ -1,4 +1,4 @@
-"""One field from the values of others: union, intersection, difference, shell."""
+"""CSG operators: union, intersection, difference and shell."""
 
 from __future__ import annotations
 
@@ -18,23 +18,32 @@ SMOOTH = Number(
 
 @csg_operator((1, None), smooth=SMOOTH)
 def union(a, b, smooth):  # type: ignore[no-untyped-def]
-    """All that is in any of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
+    """The union of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
     quadratic).
 
-    The seam weighs the gradients of the two with weights whose sum is 1, so L = max of theirs; a seam with an
-    escape-time fractal has 1.25 times that, one between several 3 times (measured; `conservative_union` does
-    better).
+    The gradient in a seam is a weighted mean of the elements' gradients, so L = maximum of the elements'. A
+    seam with one escape-time fractal has 1.25 times that, a seam between several 3 times (measured;
+    `conservative_union` avoids the factor).
     """
     h = maximum(smooth - absolute(a - b), 0.0)
     return minimum(a, b) - h * h / (4.0 * smooth)
 
 
 def conservative_union(a, b, smooth, steepest):  # type: ignore[no-untyped-def]
-    """What bounds the distance to a union with a seam, of fields that bound distances to their own surfaces.
+    """Conservative bound of the distance to a smooth union.
 
-    The seam lies on other level sets than the surfaces: where both are below 5/4 of its width. Fields of
-    escape-time fractals are steeper there (`Bounds.steepening`), by about the factor `steepest`; elsewhere
-    they need not be trusted less for the sake of a seam. L = max of theirs.
+    The seam lies on level sets other than the surfaces: where both fields are below 5/4 of its width. Fields
+    of escape-time fractals are steeper there (`Bounds.steepening`), by about the factor `steepest`; elsewhere
+    the seam does not loosen the bound. L = maximum of the elements'.
+
+    Parameters
+    ----------
+    a, b
+        Values of conservative fields of the elements.
+    smooth
+        Width of the seam, scene units.
+    steepest
+        Ratio of the steepest slope in the seam to the Lipschitz bound.
     """
     h = maximum(smooth - absolute(a - b), 0.0)
     low, high = minimum(a, b), maximum(a, b)
@@ -47,7 +56,7 @@ def hard_union(a, b):  # type: ignore[no-untyped-def]
 
 @csg_operator((1, None), smooth=SMOOTH)
 def intersection(a, b, smooth):  # type: ignore[no-untyped-def]
-    """What is in all of the elements. L = max of theirs, as of a union."""
+    """The intersection of the elements. L = maximum of the elements', as for a union."""
     h = maximum(smooth - absolute(a - b), 0.0)
     return maximum(a, b) + h * h / (4.0 * smooth)
 
@@ -58,7 +67,7 @@ def hard_intersection(a, b):  # type: ignore[no-untyped-def]
 
 @csg_operator((1, None), smooth=SMOOTH)
 def difference(a, b, smooth):  # type: ignore[no-untyped-def]
-    """The first element without the others. L = max of theirs, as of a union."""
+    """The first element minus the others. L = maximum of the elements', as for a union."""
     h = maximum(smooth - absolute(a + b), 0.0)
     return maximum(a, -b) + h * h / (4.0 * smooth)
 
@@ -68,7 +77,7 @@ def hard_difference(a, b):  # type: ignore[no-untyped-def]
 
 
 def conservative_difference(a, b):  # type: ignore[no-untyped-def]
-    """What bounds the distance to a difference where the inside of what is taken away bounds nothing."""
+    """Conservative bound of the distance to a difference, where the field of b is an exterior bound only."""
     return maximum(a, minimum(-b, 0.0))
 
 
@@ -77,7 +86,7 @@ def _is_sharp(node: Node) -> bool:
 
 
 def _needs_conservative(node: Node) -> bool:
-    """Whether it is a seam with an escape-time fractal, and space is to be skipped by it."""
+    """True for the conservative field of a smooth operator with an escape-time fractal among its elements."""
     return (
         node.is_conservative
         and not _is_sharp(node)
@@ -120,7 +129,9 @@ def difference_select(node: Node):  # type: ignore[no-untyped-def]
 
 
 def _is_cut_sharp(node: Node) -> bool:
-    """A seam only takes away from the sharp solid: a ball that is free of that one is free."""
+    """True if the sharp operator serves: a seam only removes material, so a ball outside the sharp solid is
+    outside the smooth one.
+    """
     return _is_sharp(node) or _needs_conservative(node)
 
 
@@ -133,10 +144,21 @@ difference.arguments(cut_arguments)
 
 
 def csg_slope(node: Node) -> float:
-    """Minimum, maximum and their quadratic seams weigh the gradients with weights whose sum is 1: L = max.
+    """Lipschitz bound of a CSG operator.
 
-    A seam follows level sets other than the surface, where the field of an escape-time fractal is steeper
-    than its bound says. How much is measured (`docs/how/accuracy.md`): for one such field, and for several.
+    Minimum, maximum and their quadratic seams take a weighted mean of the gradients: L = maximum of the
+    elements'. A seam follows level sets other than the surface, where the field of an escape-time fractal is
+    steeper than its bound. The factors for one such field and for several are measured
+    (`docs/how/accuracy.md`).
+
+    Parameters
+    ----------
+    node : Node
+        A union, intersection or difference.
+
+    Returns
+    -------
+    float
     """
     fields = [child.bounds for child in node.children]
     exterior_only = (
@@ -172,12 +194,12 @@ def difference_bounds(node: Node) -> Box:
     ),
 )
 def shell(a, thickness):  # type: ignore[no-untyped-def]
-    """The element made hollow: what is deeper inside than the thickness is taken out. L = the element's."""
+    """The element made hollow: material deeper inside than the thickness is removed. L = the element's."""
     return maximum(a, -(a + thickness))
 
 
 def conservative_shell(a, thickness):  # type: ignore[no-untyped-def]
-    """What bounds the distance to a wall of an element whose inside bounds nothing."""
+    """Conservative bound of the distance to a shell, where the element's field is an exterior bound only."""
     return maximum(a, minimum(-(a + thickness), 0.0))
 
 

@@ -1,5 +1,6 @@
-"""Twisted and bent space (Barr 1984, "Global and Local Deformations of Solid Primitives"). They confine, see
-`confining`.
+"""Domain operators that twist and bend (Barr 1984, "Global and Local Deformations of Solid Primitives").
+
+Both confine their element, see `confining`.
 """
 
 from __future__ import annotations
@@ -18,12 +19,11 @@ from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqr
     degrees=Number(REQUIRED, "how far to turn per unit of length along the axis"),
 )
 def twist(child, x, y, z, rate, radius, margin, along_x, along_y):  # type: ignore[no-untyped-def]
-    """Turned about an axis, further the further along it (Barr 1984, "Global and Local Deformations of Solid
-    Primitives").
+    """The element twisted about an axis (Barr 1984, "Global and Local Deformations of Solid Primitives").
 
-    At radius rho space is sheared by s = rate rho, which stretches by (s + sqrt(s^2 + 4)) / 2. With that at
-    5/4 of the element's own radius, L = the product of it and the element's. Beyond, the value is the
-    distance to the cylinder around it.
+    At radius rho the twist shears space by s = rate rho, which stretches lengths by (s + sqrt(s^2 + 4)) / 2.
+    L = the element's times this stretch at 5/4 of the element's radius. Beyond, the value is the distance to
+    the cylinder around the element.
     """
     if along_x:
         a, b, t = y, z, x
@@ -49,6 +49,7 @@ def twist(child, x, y, z, rate, radius, margin, along_x, along_y):  # type: igno
 
 
 def _twist_radius(node: Node) -> float:
+    """Radius of the element about the axis of the twist. Raises `SceneError` if it is unbounded."""
     across = [a for a in range(3) if a != "xyz".index(node["axis"])]
     radius = node.children[0].bounds.box.radius(*across)
     if not math.isfinite(radius):
@@ -90,12 +91,14 @@ def twist_slope(node: Node) -> float:
     degrees=Number(REQUIRED, "how far to turn per unit of length along the bent axis"),
 )
 def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, margin, along_x, along_y):  # type: ignore[no-untyped-def]
-    """A straight axis made an arc (Barr 1984, "Global and Local Deformations of Solid Primitives").
+    """The element bent: a straight axis becomes an arc (Barr 1984, "Global and Local Deformations of Solid
+    Primitives").
 
-    In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is looked
-    at in theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; at half the smallest
-    radius r that the element reaches, L = 2 / (curvature r) times the element's. Nearer than that, and near
-    the cut opposite to it, the value is a distance to the sector that holds the element.
+    In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is
+    evaluated at theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; at half the
+    smallest radius r that the element reaches, L = 2 / (curvature r) times the element's. Nearer to the
+    centre, and near the cut opposite to the element, the value is a distance to the sector that holds the
+    element.
     """
     if along_x:
         a, b, t = y, side * z, x
@@ -103,8 +106,7 @@ def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, mar
         a, b, t = z, side * x, y
     else:
         a, b, t = x, side * y, z
-    # Distances are taken from the arc, not from its centre, which for a slight bend is too far away for
-    # float32.
+    # Distances are measured from the arc: for a slight bend its centre is too far away for float32.
     s = curvature * a
     c = 1.0 - curvature * b
     r = sqrt(s * s + c * c)
@@ -125,8 +127,8 @@ def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, mar
 
 
 def _bend_frame(node: Node) -> tuple[float, float, float, float]:
-    """Curvature, side (+1 or -1), the smallest radius the element reaches, and its half length along the bent
-    axis.
+    """Curvature, side (+1 or -1), smallest radius that the element reaches, and half length along the bent
+    axis. Raises `SceneError` for a bend too strong for the element.
     """
     hinge, box = "xyz".index(node["axis"]), node.children[0].bounds.box
     along, across = (hinge + 1) % 3, (hinge + 2) % 3

@@ -1,13 +1,14 @@
-"""What escape-time fractals have in common: from an orbit to a signed distance.
+"""Escape-time fractals: signed distance from an orbit.
 
 The solid of N iterations and bailout R is ``{p : |w_N(p)| <= R}``, exactly. A point whose orbit leaves a
-larger circle E at step n < N would have ``log |w_N| = p^(N-n) log |w_n|``, p the power; that continues the
-field through zero into the inside. log |w| jumps by about |c| / E^p where n changes.
-With the potential ``G = log |w_n| / p^n`` the distance to the solid is about ``G / |G'|`` near it, and for
+larger circle E at step n < N would have ``log |w_N| = p^(N-n) log |w_n|``, where p is the power. This
+continues the field through zero into the inside. log |w| jumps by about |c| / E^p where n changes.
+
+Let ``G = log |w_n| / p^n`` be the potential. The distance to the solid is about ``G / |G'|`` near it, and for
 the complex quadratic maps at least ``(1 - exp(-2 G)) / (4 |G'|)`` (Koebe's 1/4 theorem, as in Milnor 2006,
 "Dynamics in One Complex Variable", and Hart, Sandin, Kauffman 1989, "Ray Tracing Deterministic 3-D
-Fractals"). We return ``(G - G_0) / (|G'| (1 + 2 G))``, which is about the distance near the surface, never
-above twice that lower bound, and needs no exponential.
+Fractals"). The estimate is ``(G - G_0) / (|G'| (1 + 2 G))``: about the distance near the surface, never above
+twice that lower bound, and free of exponentials.
 """
 
 from __future__ import annotations
@@ -17,45 +18,61 @@ import math
 from .vocabulary import log, maximum, minimum, sqrt
 
 CORE = 0.5
-"""The least |w|^2 that the derivative is taken at where a set falls apart.
+"""Minimum |w|^2 at which the derivative of a disconnected set is taken.
 
-Koebe's theorem wants a connected set. Where the critical point 0 escapes, the potential has critical points
-outside the set, one at each preimage of 0; G' vanishes there and the quotient grows without limit. With D the
-distance from w^2 + c to its set, that of w is at least sqrt(|w|^2 + D) - |w|. Where |w|^2 is small against D,
-D / (2 |w|) overshoots it, and D / (2 sqrt(CORE)) does not.
+Koebe's theorem requires a connected set. Where the critical point 0 escapes, the potential has critical
+points outside the set, one at each preimage of 0; G' vanishes there and the quotient grows without limit. If
+D is the distance from w^2 + c to its set, the distance of w is at least sqrt(|w|^2 + D) - |w|. Where |w|^2 is
+small against D, D / (2 |w|) exceeds this bound, and D / (2 sqrt(CORE)) does not.
 """
 
 
 def potential_distance(r2, slope2, level, first_level, last_level, least):  # type: ignore[no-untyped-def]
-    """Signed distance estimate from an orbit's last radius.
+    """Signed distance estimate from the last radius of an orbit.
 
-    r2: |w|^2 where the orbit stopped. slope2: the square of the largest bound of the norm of the derivative
-    of w along the orbit, at least 1. level: log R^2 / p^(N-n), what log |w|^2 would be on the surface;
-    first_level and last_level: the same for n = 0 and n = N. least: below R^2, where r2 is cut off.
+    The derivative bound is the largest along the orbit, not the last: inside, an attracting orbit lets the
+    derivative decay and the quotient grow without limit. Clipping r2 leaves about ``0.1 / slope`` there. This
+    is nearly always below the distance to the surface; deep sets have exceptions, so interior values bound
+    nothing (`registry.Bounds`).
 
-    The largest, not the last: inside, an attracting orbit lets the derivative decay and the quotient grow
-    without limit. There r2 is cut off so that about ``0.1 / slope`` is left, which is below the distance to
-    the surface nearly always; deep sets have exceptions, so nothing may rely on it (`registry.Bounds`).
+    Parameters
+    ----------
+    r2
+        |w|^2 where the orbit stopped.
+    slope2
+        Square of the largest bound of the norm of the derivative of w along the orbit, at least 1.
+    level
+        log R^2 / p^(N-n): the value of log |w|^2 on the surface.
+    first_level, last_level
+        The same for n = 0 and n = N.
+    least
+        Lower limit of r2, below R^2.
     """
     r2 = minimum(maximum(r2, least), 1e30)
     level = minimum(level, last_level)
     height = log(r2)
     damping = (2.0 * first_level) * height + 2.0 * level
-    quotient = maximum(sqrt(r2 / slope2), 1e-30)  # where slope2 has overflown, something to carry the sign
+    quotient = maximum(sqrt(r2 / slope2), 1e-30)  # not zero where slope2 overflows: it carries the sign
     return (height - level) * (level * quotient) / damping
 
 
 def sure_distance(apart, slope, bend):  # type: ignore[no-untyped-def]
-    """A radius around the start point within which the orbit's n-th point cannot have moved by `apart`.
+    """Radius around the start point within which the orbit's n-th point moves by less than `apart`.
 
-    slope: a bound of the norm of the derivative of w_n there. bend: the sum over the steps k < n of
-    ``slope_k (p - 1) / (2 |w_k|)``.
+    When w, |w| = r, moves by e < 1/b, w^p moves by at most ``(r + e)^p - r^p <= a e / (1 - b e)`` with
+    ``a = p r^(p-1)`` and ``b = (p - 1) / (2 r)``, term by term of the binomial series. A further step and the
+    addition of the start point keep this form: a is multiplied, and bend grows by slope * b. So e is at least
+    ``apart / (slope + bend * apart)``: the method of majorants (Cauchy 1842). The bound holds for
+    disconnected sets, too, but for connected ones it is several times less than that of the potential.
 
-    w^p moves by at most ``(r + e)^p - r^p <= a e / (1 - b e)`` when w, |w| = r, moves by e < 1/b, with
-    ``a = p r^(p-1)`` and ``b = (p - 1) / (2 r)``: term by term of the binomial series. Bounds of this form
-    stay of this form under a further step and the addition of the start point: a is multiplied and bend
-    grows by slope * b. So e is at least ``apart / (slope + bend * apart)``: the method of majorants (Cauchy
-    1842). It needs no connected set, but is several times less than what the potential says of one.
+    Parameters
+    ----------
+    apart
+        Displacement of the n-th point of the orbit.
+    slope
+        Bound of the norm of the derivative of w_n at the start point.
+    bend
+        Sum over the steps k < n of ``slope_k (p - 1) / (2 |w_k|)``.
     """
     apart = maximum(apart, 1e-30)
     return apart / minimum(slope + bend * apart, 1e30)
@@ -64,7 +81,24 @@ def sure_distance(apart, slope, bend):  # type: ignore[no-untyped-def]
 def levels(
     power: float, iterations: int, bailout: float, escaped: float
 ) -> tuple[float, float, float, float]:
-    """first_level, last_level, E^2 and the least r2 for a formula of this power; E^power is `escaped`."""
+    """Level parameters of an escape-time formula, as `potential_distance` takes them.
+
+    Parameters
+    ----------
+    power : float
+        Exponent of the formula.
+    iterations : int
+        Steps of the orbit, N.
+    bailout : float
+        Bailout radius, R.
+    escaped : float
+        |w| one step past the escape circle: E^power.
+
+    Returns
+    -------
+    (float, float, float, float)
+        first_level, last_level, E^2 and the lower limit of r2.
+    """
     steps = min(iterations, int(30 / math.log10(power)))
     last = 2 * math.log(bailout)
     escape = max(bailout, escaped ** (1 / power))
@@ -72,7 +106,22 @@ def levels(
 
 
 def farthest(power: float, bailout: float, constant: float) -> float:
-    """How far from the origin the solid of any number of steps may reach, |constant| being added in each."""
+    """Bound of the solid's radius for any number of steps.
+
+    Parameters
+    ----------
+    power : float
+        Exponent of the formula.
+    bailout : float
+        Bailout radius.
+    constant : float
+        Norm of the constant added in each step.
+
+    Returns
+    -------
+    float
+        Largest distance from the origin.
+    """
     first = radius = (bailout + constant) ** (1 / power)
     for _ in range(100):
         radius = (radius + constant) ** (1 / power)

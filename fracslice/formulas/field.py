@@ -1,4 +1,4 @@
-"""A distance field, as all that samples, meshes, slices and checks it sees it, whatever it is made of."""
+"""Interfaces of distance fields to sampling, meshing, slicing and checks."""
 
 from __future__ import annotations
 
@@ -19,17 +19,24 @@ Device = Literal["cpu", "cuda"]
 
 @dataclass(frozen=True)
 class Bounds:
-    """What is known of a field without evaluating it.
+    """Properties of a field that hold without evaluating it.
 
-    box: encloses all points where the field is negative, in the node's own coordinates.
-    lipschitz: L such that ``|f(p) - f(q)| <= L |p - q|``; of a field with an escape-time fractal in it: such
-    that a point outside is at least ``f(p) / L`` away from the surface.
-    exterior_only: True if there is an escape-time fractal in it. Its inside values are much smaller than the
-    distance to the surface, and bound nothing: the inside cannot be recognised from afar.
-    steepening: of such a field, the highest power n in it. Along circles of latitude the derivative changes
-    n times within 2/n of the poles; so level sets other than the surface are steeper: how much is measured
-    (`docs/how/accuracy.md`).
-    boxless: the names of the formulas in it that state no box.
+    Attributes
+    ----------
+    box : Box
+        Encloses all points where the field is negative, in the node's own coordinates.
+    lipschitz : float
+        L such that ``|f(p) - f(q)| <= L |p - q|``. For a field with an escape-time fractal: L such that a
+        point outside is at least ``f(p) / L`` away from the surface.
+    exterior_only : bool
+        True if the field contains an escape-time fractal. Its interior values are much smaller than the
+        distance to the surface and bound nothing: none proves that its neighbourhood is inside.
+    steepening : float
+        For such a field, the highest power n in it. Along circles of latitude the derivative changes n times
+        within 2/n of the poles, so level sets other than the surface are steeper; by how much is measured
+        (`docs/how/accuracy.md`).
+    boxless : tuple of str
+        Names of the formulas in the field that state no box.
     """
 
     box: Box
@@ -40,9 +47,14 @@ class Bounds:
 
 
 class Kernel(Protocol):
-    """A field that can be evaluated, by many threads at once.
+    """Evaluator of a field; many threads may call it at once.
 
-    dtype: of its values, float32 or float64. batch: samples worth a call.
+    Attributes
+    ----------
+    dtype : dtype
+        Type of the values, float32 or float64.
+    batch : int
+        Samples that make a call worthwhile.
     """
 
     dtype: np.dtype
@@ -80,7 +92,7 @@ class Kernel(Protocol):
 
     @property
     def entry(self) -> Any:
-        """The field for native code: machine code and its parameters, or a function of points [3, n] that
+        """Entry point for native code: machine code and its parameters, or a function of points [3, n] that
         writes their values to [1, n].
         """
 
@@ -94,19 +106,48 @@ class Run(Protocol):
     """A loop over a field."""
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
-        """Run the loop on its frame, the rows that it reads, those that it writes, both C-contiguous, and its
-        numbers.
+        """Run the loop.
+
+        Parameters
+        ----------
+        frame
+            Parameters of the loop.
+        rows
+            Input rows, C-contiguous.
+        out
+            Receives the output rows, C-contiguous.
+        *numbers
+            Integer arguments of the loop.
         """
 
     def native(self, frame: np.ndarray) -> tuple[Any, ...] | Callable[..., None]:
-        """The loop for native code: machine code, parameters and frame, or a function of rows, rows to write
-        and numbers.
+        """Entry point for native code.
+
+        Parameters
+        ----------
+        frame
+            Parameters of the loop.
+
+        Returns
+        -------
+        tuple or callable
+            Machine code, parameters and frame; or a function of input rows, output rows and numbers.
         """
 
 
 @dataclass(frozen=True, eq=False)
 class Loops:
-    """Loops over a field by their names. width: points come in multiples of it. batch: worth a call."""
+    """Compiled loops over a field.
+
+    Attributes
+    ----------
+    width : int
+        The number of points in a call is a multiple of it.
+    batch : int
+        Points that make a call worthwhile.
+    runs : mapping of str to Run
+        The loops by name.
+    """
 
     width: int
     batch: int
@@ -117,34 +158,77 @@ class Field(Protocol):
     """A signed distance field: negative inside, zero on the surface."""
 
     @property
-    def bounds(self) -> Bounds: ...
+    def bounds(self) -> Bounds:
+        """Box, Lipschitz bound and kind of the field."""
+        ...
 
     @property
     def key(self) -> str:
-        """The hash of all that the field's values, and what is known of them, follow from. Raises
-        `KernelError`.
+        """Hash of everything that determines the field's values and bounds.
+
+        Raises
+        ------
+        KernelError
+            If the field cannot be compiled.
         """
 
     @property
     def tree(self) -> Node | None:
-        """The field as a tree of formulas, if it is one."""
+        """The field as a tree of formulas; None if it is not one."""
         return None
 
     @property
     def escape_time_only(self) -> bool:
-        """True if the field is made of nothing but escape-time fractals."""
+        """True if all shapes of the field are escape-time fractals."""
         return False
 
     def conservative(self) -> Field:
-        """The field by which space may be skipped: its values, where positive, divided by its own Lipschitz
-        bound are lower bounds of the distance to this field's surface.
+        """Conservative field, for skipping empty space.
+
+        Returns
+        -------
+        Field
+            Its positive values, divided by its own Lipschitz bound, are lower bounds of the distance to this
+            field's surface.
         """
         return self
 
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
-        """What evaluates the field on a device, or on the CPU where it cannot be on that one. Raises
-        `KernelError`.
+        """Kernel of the field.
+
+        Parameters
+        ----------
+        device : {"cpu", "cuda"}
+            Device that evaluates the field; the CPU serves where the device cannot.
+        precision : {"float32", "float64"}
+            Type of the values.
+
+        Returns
+        -------
+        Kernel
+
+        Raises
+        ------
+        KernelError
+            If the field cannot be compiled.
         """
 
     def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
-        """Loops (`kernel.loops`) over the field on the CPU. Raises `KernelError`."""
+        """Compiled loops (`kernel.loops`) over the field on the CPU.
+
+        Parameters
+        ----------
+        loops : sequence
+            The loops to compile.
+        precision : {"float32", "float64"}
+            Type of the values.
+
+        Returns
+        -------
+        Loops
+
+        Raises
+        ------
+        KernelError
+            If a loop cannot be compiled.
+        """

@@ -12,7 +12,7 @@ from .registry import Fixed, Node, shape
 from .vocabulary import any_of, maximum, orbit, where
 
 ESCAPED = 256.0
-"""How large |w| is one step past the escape circle."""
+"""|w| one step past the escape circle."""
 
 
 @shape(
@@ -34,13 +34,13 @@ ESCAPED = 256.0
     bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
 )
 def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat, loose):  # type: ignore[no-untyped-def]
-    """The solid filled Julia set of q^2 + c in the quaternions, cut at k = 0.
+    """The filled Julia set of q^2 + c in the quaternions, cut at k = 0.
 
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
     1989, "Ray Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is
-    Koebe's bound for connected complex Julia sets; one that falls apart has its derivative taken at a larger
-    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/how/accuracy.md`. What is returned
-    is held still from the escape on; w itself runs on, and its lanes are not looked at.
+    Koebe's bound for connected complex Julia sets; for a disconnected set, the derivative near zero is taken
+    at a larger |q|, see `escape.CORE`. For quaternions L = 2 is measured (`docs/how/accuracy.md`). Results
+    are frozen once a lane has escaped; w itself runs on, unused.
     """
     cr, ci, cj, ck = c
     imaginary2 = y * y + z * z
@@ -87,7 +87,9 @@ def julia_arguments(node: Node) -> dict[str, object]:
 
 
 def _falls_apart(c: Sequence[float], iterations: int, bailout: float, escape2: float) -> bool:
-    """Whether the critical point 0 is outside. Its orbit stays in the complex plane of c."""
+    """True if the critical point 0 is outside: the set is disconnected. Its orbit stays in the complex plane
+    of c.
+    """
     constant, w = complex(c[0], math.hypot(*c[1:])), 0j
     for _ in range(iterations):
         w = w * w + constant
@@ -103,7 +105,7 @@ def julia_steepening(node: Node) -> float:
 
 @julia.bounds
 def julia_bounds(node: Node) -> Box:
-    # |w_n+1| >= |w_n|^2 - |c|, so |w_N| <= R bounds |w_n| backwards, down to the point itself.
+    # |w_n+1| >= |w_n|^2 - |c|, so |w_N| <= R bounds every |w_n| backwards, down to the start point.
     radius, steps = node["bailout"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
     for _ in range(steps):
         radius = math.sqrt(radius + math.hypot(*node["c"]))

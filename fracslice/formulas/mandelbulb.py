@@ -27,11 +27,11 @@ from .vocabulary import (
 )
 
 ESCAPED = 1e4
-"""How large |w| is one step past the escape circle."""
+"""|w| one step past the escape circle."""
 
 CALM = 3.0
-"""At this |w|^2, in units of the farthest of the solid, only radii count. A shorter way there costs fewer
-evaluations, but makes the levels steeper that seams lie on.
+"""Value of |w|^2, relative to that of the farthest point of the solid, from which only the radial stretch
+counts. A smaller value costs fewer evaluations, but makes the level sets steeper that seams lie on.
 """
 
 
@@ -79,19 +79,21 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
-    w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n): both powers are products,
-    and Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The real part of a
-    square is 2 re^2 minus the squared norm, which is known. Of the azimuth u + iv = e^(2 i phi) is taken,
-    which needs no root, to the power n/2; what is left of rho e^(i n phi) is x + iy where n is odd, else rho.
+    w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n). Both powers are products;
+    Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The real part of a square is
+    2 re^2 minus the squared norm, which is known. The azimuth enters as u + iv = e^(2 i phi), which needs no
+    root, to the power n/2; the remaining factor of rho e^(i n phi) is x + iy for odd n, else rho.
 
     The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
-    latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
-    it is taken here, as far out as a point of the solid can come (`escape.farthest`). Beyond, each step leads
-    farther away whatever its direction, so that only how radii stretch matters; there it is faded out.
-    There is no theorem for three dimensions; L = 2 is measured (`docs/how/accuracy.md`). Where a set falls
-    apart (a constant far out) that fails, and the field is also kept below twice a sure distance,
-    `escape.sure_distance`. A power that is not whole tears space where the azimuth jumps from pi to -pi: no
-    bound holds across the tear, and the guarded field stays below the sure distance from it.
+    latitude. The usual dr ignores the second stretch, and overestimates distances up to 13 times near the
+    poles. Here it counts as far out as a point of the solid can come (`escape.farthest`). Farther out, each
+    step increases the radius in any direction, so only the radial stretch matters, and the second is faded
+    out.
+
+    There is no theorem for three dimensions; L = 2 is measured (`docs/how/accuracy.md`). It fails for a
+    disconnected set (a constant far out): there the field also stays below twice `escape.sure_distance`. A
+    fractional power tears space where the azimuth jumps from pi to -pi. No bound holds across the tear, so
+    the conservative field stays below the sure distance to it.
     """
     first_level, last_level, escape2, least_r2 = levels
     fade, fading = calm
@@ -192,7 +194,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
 
 
 def _digits(n: int) -> tuple[int, ...]:
-    """The binary digits of n after the first: square for each, multiply where it is 1."""
+    """Binary digits of n after the first. Exponentiation squares for each and multiplies where it is 1."""
     return tuple(int(d) for d in bin(n)[3:])
 
 
@@ -220,12 +222,14 @@ def mandelbulb_arguments(node: Node) -> dict[str, object]:
 
 
 def _constant(node: Node) -> float:
-    """The largest |c| of all points of the solid."""
+    """Largest |c| over all points of the solid."""
     return math.hypot(*node["julia"]) if node["julia"] else node.bounds.box.hi[0]
 
 
 def _falls_apart(node: Node, escape2: float) -> bool:
-    """Whether 0, the critical point of w^n, is outside, where the constant is one for all."""
+    """True if 0, the critical point of w^n, is outside: for one constant at all points, the set is then
+    disconnected.
+    """
     c = node["julia"] or (0.0, 0.0, 0.0)
     w = (0.0, 0.0, 0.0)
     for _ in range(node["iterations"]):
@@ -245,7 +249,7 @@ def _step(w: Triple, power: float, c: Triple) -> Triple:
 
 
 def _products(power: float) -> dict[str, Fixed]:
-    """Which products make a whole power; none are compiled for another."""
+    """Products that make a whole power; a fractional power compiles none."""
     whole = power == int(power)
     n = int(power) if whole else 2
     return {
@@ -273,7 +277,8 @@ def mandelbulb_check(node: Node) -> None:
 
 @mandelbulb.bounds
 def mandelbulb_bounds(node: Node) -> Box:
-    # |w_n+1| >= |w_n|^power - |c|, c the start point or the constant: backwards from |w_N| <= R, from above.
+    # |w_n+1| >= |w_n|^power - |c|, where c is the start point or the constant, bounds |w_n| backwards from
+    # |w_N| <= R. Where c is the start point, its own bound is iterated from above.
     power, steps = node["power"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
     constant = math.hypot(*node["julia"]) if node["julia"] else None
     radius = node["bailout"] + ESCAPED

@@ -1,4 +1,4 @@
-"""What an element looks like. It changes no shape: meshes are the same with and without."""
+"""Appearance of an element. It does not change the shape: meshes are the same with and without a material."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from .registry import Node, domain_operator
     ),
 )
 def material(child, x, y, z):  # type: ignore[no-untyped-def]
-    """What the element inside looks like in pictures. A material further inside takes precedence.
+    """The appearance of the element in pictures. A material nested deeper takes precedence.
 
-    It is not in the field: L = the element's.
+    The field is that of the element: L = the element's.
     """
     return child(x, y, z)
 

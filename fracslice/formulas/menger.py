@@ -14,11 +14,12 @@ from .vocabulary import absolute, floor, maximum, minimum, orbit, sqrt
 def menger(x, y, z, level):  # type: ignore[no-untyped-def]
     """The Menger sponge of any level in the cube [-1, 1]^3.
 
-    Menger 1926; distance: Quilez 2011, "Menger fractal": a box minus, per level, an infinite lattice of
-    crosses. Every term is the distance to its own solid or less, so their maximum has L = 1. Volume 8
+    Menger 1926; distance: Quilez 2011, "Menger fractal": a box minus an infinite lattice of crosses for each
+    level. Every term is the distance to its own solid or less, so their maximum has L = 1. Volume 8
     (20/27)^n, area 4 (2 (20/9)^n + 4 (8/9)^n).
 
-    q is how far a point is from the middle of its cell, in cells; the next level's is |3 q - nearest whole|.
+    q is the offset of a point from the centre of its cell, in cells; the next level's is
+    |3 q - nearest whole|.
     """
     ax = absolute(x) - 1.0
     ay = absolute(y) - 1.0
@@ -59,10 +60,21 @@ def menger_bounds(node: Node) -> Box:
 
 @menger.visible
 def menger_visible(node: Node, voxel: float) -> Node:
-    """The deepest level whose bars, a cell wide, are wider than a voxel: thinner ones fall between samples.
+    """The sponge of the deepest level whose bars, one cell wide, are wider than a voxel.
 
-    The sponge has all edges of its cells, so that no point of the solid shown is farther than sqrt(2) / 6
-    cells, 0.71 voxels, from the one meant.
+    Thinner bars fall between samples. The sponge contains all edges of its cells, so no point of the returned
+    solid is farther than sqrt(2) / 6 cells, 0.71 voxels, from the sponge of full depth.
+
+    Parameters
+    ----------
+    node : Node
+        A Menger sponge.
+    voxel : float
+        Voxel size in the node's own units.
+
+    Returns
+    -------
+    Node
     """
     deepest = max(math.ceil(math.log(2.0 / voxel, 3.0) - 1e-6) - 1, 0)
     return node if node["level"] <= deepest else node.changed(level=deepest)

@@ -19,8 +19,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Node(Operators, Field):
-    """A formula with its parameters and children: one element of a scene. `place` is "file:line";
-    `is_conservative` is set by `conservative`; `depth` counts nested elements, this one included.
+    """A formula with its parameters and children: one element of a scene.
+
+    Attributes
+    ----------
+    formula : Formula
+        The registered formula.
+    values : mapping of str to value
+        Parameter values by name.
+    children : tuple of Node
+        The elements inside.
+    place : str or None
+        "file:line" of the element in its scene file.
+    is_conservative : bool
+        True for a tree made by `conservative`.
+    depth : int
+        Levels of nesting, this element included.
     """
 
     formula: Formula
@@ -34,6 +48,7 @@ class Node(Operators, Field):
         object.__setattr__(self, "depth", 1 + max((child.depth for child in self.children), default=0))
 
     def __getitem__(self, parameter: str) -> Any:
+        """Value of a parameter."""
         return self.values[parameter]
 
     def __repr__(self) -> str:
@@ -45,7 +60,7 @@ class Node(Operators, Field):
         return hash((self.formula.name, tuple(self.values.items()), self.children))
 
     def walk(self) -> Iterator[Node]:
-        """This node and all below it, parents first."""
+        """Iterate over this node and all below it, parents first."""
         left = [self]
         while left:
             node = left.pop()
@@ -53,26 +68,59 @@ class Node(Operators, Field):
             left += reversed(node.children)
 
     def changed(self, children: tuple[Node, ...] | None = None, **values: Any) -> Node:
-        """A copy with other values or children."""
+        """Copy with other values or children.
+
+        Parameters
+        ----------
+        children : tuple of Node, optional
+            New children; the present ones by default.
+        **values
+            New parameter values by name.
+
+        Returns
+        -------
+        Node
+
+        Raises
+        ------
+        SceneError
+            For an invalid value or number of children.
+        """
         kept = self.children if children is None else children
         return self.formula(*kept, place=self.place, **{**_given(self), **values})
 
     def conservative(self) -> Node:
-        """The scene by whose field space may be skipped, where its own exceeds its bound: beside the tears of
-        powers that are not whole, and at seams with an escape-time fractal. Only its positive values say
-        something: as much, divided by its own Lipschitz bound, is the distance from the surface at least.
+        """Conservative tree, for skipping empty space where the node's own field exceeds its bound.
+
+        The two differ beside the tears of fractional powers and at seams with an escape-time fractal.
+
+        Returns
+        -------
+        Node
+            Its positive values, divided by its own Lipschitz bound, are lower bounds of the distance to this
+            node's surface. Other values bound nothing.
         """
         return replace(
             self, is_conservative=True, children=tuple(child.conservative() for child in self.children)
         )
 
     def fail(self, message: str) -> SceneError:
-        """The error to raise about this node: file, line and element, then `message`."""
+        """Error about this node: file, line and element, then the message.
+
+        Parameters
+        ----------
+        message : str
+            What is wrong and what was expected.
+
+        Returns
+        -------
+        SceneError
+        """
         return SceneError(f"{self.place + ': ' if self.place else ''}<{self.formula.name}> {message}")
 
     @cached_property
     def bounds(self) -> Bounds:
-        """Box, Lipschitz bound and weakness of this field."""
+        """Box, Lipschitz bound and kind of this field."""
         hooks, below = self.formula.hooks, [child.bounds for child in self.children]
         box = hooks["bounds"](self) if "bounds" in hooks else Box.everywhere()
         slope = (
@@ -91,62 +139,73 @@ class Node(Operators, Field):
 
     @property
     def tree(self) -> Node:
-        """`Field.tree`."""
+        """See `Field.tree`."""
         return self
 
     @property
     def escape_time_only(self) -> bool:
-        """`Field.escape_time_only`."""
+        """See `Field.escape_time_only`."""
         return all(node.formula.exterior_only for node in self.walk() if node.formula.kind == "shape")
 
     @property
     def key(self) -> str:
-        """`Field.key`. All depths must be resolved, as for kernels and loops."""
-        from ..kernel import tree  # a method stands for the function of a layer above
+        """See `Field.key`. All depths must be resolved, as for kernels and loops."""
+        from ..kernel import tree  # imported here: it is a layer above
 
         return tree.key(self)
 
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
-        """`Field.kernel`."""
+        """See `Field.kernel`."""
         from ..kernel import tree
 
         return tree.kernel(self, device, precision)
 
     def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
-        """`Field.loops`."""
+        """See `Field.loops`."""
         from ..kernel import tree
 
         return tree.loops(self, loops, precision)
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """What the kernel's function is called with: numbers, tuples of numbers, or `Fixed`."""
+        """Arguments of the kernel function by name: numbers, tuples of numbers, or `Fixed`."""
         hook = self.formula.hooks.get("arguments")
         return hook(self) if hook else dict(self.values)
 
     @property
     def function(self) -> Callable[..., Any]:
-        """The function to compile for this node."""
+        """Function to compile for this node."""
         hook = self.formula.hooks.get("select")
         return hook(self) if hook else self.formula.function
 
     def visible(self, voxel: float) -> Node:
-        """This node without detail that a voxel, in its own units, is too large for; its children as they
-        are.
+        """This node without detail finer than a voxel; its children are unchanged.
+
+        Parameters
+        ----------
+        voxel : float
+            Voxel size in the node's own units.
+
+        Returns
+        -------
+        Node
         """
         hook = self.formula.hooks.get("visible")
         return hook(self, voxel) if hook else self
 
     @property
     def is_identity(self) -> bool:
+        """True if the node changes nothing and can be left out."""
         hook = self.formula.hooks.get("identity")
         return bool(hook and hook(self))
 
     @property
     def is_unordered(self) -> bool:
+        """True if the elements but the first may be folded in any order, to the same bits."""
         hook = self.formula.hooks.get("unordered")
         return bool(hook and hook(self))
 
 
 def _given(node: Node) -> dict[str, Any]:
+    """Parameter values that are not None."""
     return {name: value for name, value in node.values.items() if value is not None}

@@ -1,4 +1,4 @@
-"""Operators and methods of shapes: `Node` inherits them, and each stands for a formula."""
+"""Operators and methods of shapes. `Node` inherits them; each makes a node of a formula."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 
 
 class Operators:
-    """Shapes combined and changed.
+    """CSG operators and domain operators as methods of shapes.
 
-    Lengths are scene units, and angles degrees. Every operator makes a new shape.
+    Lengths are in scene units, angles in degrees. Every operator makes a new shape.
 
     Examples
     --------
@@ -29,87 +29,133 @@ class Operators:
     twist(transform(transform(box(), scale=(2.0,)), rotate=(0.0, 0.0, 1.0, 45.0)), degrees=30.0)
     """
 
-    __array_ufunc__ = None  # NumPy leaves operators to the shape
+    __array_ufunc__ = None  # makes NumPy defer to the operators of the shape
 
     def __or__(self, other: Node) -> Node:
-        """All that is in any of the two."""
+        """Union of two shapes."""
         return _folded("union", self, other) if isinstance(other, Operators) else NotImplemented
 
     def __and__(self, other: Node) -> Node:
-        """What is in both."""
+        """Intersection of two shapes."""
         return _folded("intersection", self, other) if isinstance(other, Operators) else NotImplemented
 
     def __sub__(self, other: Node) -> Node:
-        """The first without the second."""
+        """Difference of two shapes."""
         pieces = _elements("difference", self)
         return _made("difference", *pieces, other) if isinstance(other, Operators) else NotImplemented
 
     def __add__(self, offset: Sequence[float] | NDArray[Any]) -> Node:
-        """The shape moved by an offset (x, y, z)."""
+        """Translation by an offset (x, y, z)."""
         return NotImplemented if isinstance(offset, Operators) else self.translate(offset)
 
     def union(self, *others: Node, smooth: float = 0.0) -> Node:
-        """All that is in any of the shapes.
+        """Union of this shape and others.
 
         Parameters
         ----------
         *others : Node
             The other shapes.
         smooth : float
-            Width of the rounded seam.
+            Width of the rounded seam; 0: a sharp seam.
+
+        Returns
+        -------
+        Node
         """
         return _made("union", self, *others, smooth=smooth)
 
     def intersection(self, *others: Node, smooth: float = 0.0) -> Node:
-        """What is in all of the shapes.
+        """Intersection of this shape and others.
 
         Parameters
         ----------
         *others : Node
             The other shapes.
         smooth : float
-            Width of the rounded seam.
+            Width of the rounded seam; 0: a sharp seam.
+
+        Returns
+        -------
+        Node
         """
         return _made("intersection", self, *others, smooth=smooth)
 
     def difference(self, *others: Node, smooth: float = 0.0) -> Node:
-        """The shape without the others.
+        """This shape minus others.
 
         Parameters
         ----------
         *others : Node
-            What is taken away.
+            The shapes to subtract.
         smooth : float
-            Width of the rounded seam.
+            Width of the rounded seam; 0: a sharp seam.
+
+        Returns
+        -------
+        Node
         """
         return _made("difference", self, *others, smooth=smooth)
 
     def translate(self, offset: Sequence[float] | NDArray[Any]) -> Node:
-        """The shape moved by an offset (x, y, z)."""
+        """Translate the shape.
+
+        Parameters
+        ----------
+        offset : three numbers
+            Displacement along x, y and z.
+
+        Returns
+        -------
+        Node
+        """
         return _made("transform", self, translate=offset)
 
     def scale(self, factor: float | Sequence[float]) -> Node:
-        """The shape scaled about the origin, by one factor or by one for each axis."""
+        """Scale the shape about the origin.
+
+        Parameters
+        ----------
+        factor : float or three numbers
+            One factor, or one for each axis.
+
+        Returns
+        -------
+        Node
+        """
         return _made("transform", self, scale=factor)
 
     def rotate(self, degrees: float, axis: Axis | Sequence[float] = "z") -> Node:
-        """The shape rotated about an axis through the origin.
+        """Rotate the shape about an axis through the origin.
 
         Parameters
         ----------
         degrees : float
-            The angle, counter-clockwise seen against the axis.
+            Angle, counter-clockwise seen against the axis.
         axis : {"x", "y", "z"} or three numbers
-            The axis.
+            Axis of rotation.
+
+        Returns
+        -------
+        Node
         """
         return _made("transform", self, rotate=(*_direction(axis), degrees))
 
     def mirror(self, axis: Axis) -> Node:
-        """The half of the shape on the positive side of an axis, and its mirror image."""
+        """Union of the half of the shape on the positive side of an axis and its mirror image.
+
+        Parameters
+        ----------
+        axis : {"x", "y", "z"}
+            Normal of the mirror plane through the origin.
+
+        Returns
+        -------
+        Node
+        """
         return _made("mirror", self, axis=axis)
 
     def repeat(self, period: float | Sequence[float], count: int | Sequence[int] = 0) -> Node:
-        """Copies on a lattice centred at the origin.
+        """Repeat the shape on a lattice centred at the origin.
 
         Parameters
         ----------
@@ -117,55 +163,108 @@ class Operators:
             Distance between copies along x, y and z.
         count : int or three whole numbers
             Copies along x, y and z; 0: without end.
+
+        Returns
+        -------
+        Node
         """
         return _made("repeat", self, period=_three(period), count=_three(count))
 
     def twist(self, degrees: float, axis: Axis = "z") -> Node:
-        """The shape twisted about an axis by an angle per unit of length."""
+        """Twist the shape about an axis.
+
+        Parameters
+        ----------
+        degrees : float
+            Angle per unit of length along the axis.
+        axis : {"x", "y", "z"}
+            Axis of the twist.
+
+        Returns
+        -------
+        Node
+        """
         return _made("twist", self, degrees=degrees, axis=axis)
 
     def bend(self, degrees: float, axis: Axis = "z") -> Node:
-        """The shape bent about an axis by an angle per unit of length."""
+        """Bend the shape.
+
+        Parameters
+        ----------
+        degrees : float
+            Angle per unit of length along the bent axis.
+        axis : {"x", "y", "z"}
+            The hinge, which stays straight: z bends x towards y, x bends y towards z, y bends z towards x.
+
+        Returns
+        -------
+        Node
+        """
         return _made("bend", self, degrees=degrees, axis=axis)
 
     def offset(self, distance: float) -> Node:
-        """The shape grown by a distance, or shrunk by a negative one."""
+        """Offset the surface of the shape.
+
+        Parameters
+        ----------
+        distance : float
+            Outward displacement; negative: inward.
+
+        Returns
+        -------
+        Node
+        """
         return _made("offset", self, distance=distance)
 
     def shell(self, thickness: float) -> Node:
-        """The shape hollowed out, leaving a wall."""
+        """Hollow the shape, leaving a wall.
+
+        Parameters
+        ----------
+        thickness : float
+            Thickness of the wall. Its outer face is the surface of the shape.
+
+        Returns
+        -------
+        Node
+        """
         return _made("shell", self, thickness=thickness)
 
     def material(self, **appearance: Any) -> Node:
-        """The shape with an appearance in pictures, such as ``colour=(1, 0, 0)``.
+        """Set the appearance of the shape in pictures, such as ``colour=(1, 0, 0)``.
 
         Parameters
         ----------
         **appearance
-            As of the formula `material`.
+            Parameters of the formula `material`.
+
+        Returns
+        -------
+        Node
         """
         return _made("material", self, **appearance)
 
     def distance(self, points: ArrayLike) -> NDArray[np.floating]:
-        """The signed distance field of the shape at points, negative inside.
+        """Signed distance field of the shape at points, negative inside.
 
-        It is exact for primitives. For the rest it is a bound: no surface is nearer than the value divided
-        by the Lipschitz bound, outside.
+        The field is exact for primitives. For other shapes it is a bound: outside, the distance to the
+        surface is at least the value divided by the Lipschitz bound.
 
         Parameters
         ----------
         points : array of float32 or float64, [..., 3]
-            Coordinates in scene units: those of the shape itself, before a mesh is brought to its size in mm.
+            Coordinates in scene units: those of the shape itself, before a mesh is scaled to its size in mm.
 
         Returns
         -------
         ndarray [...]
-            In the precision of the points; float64 for other numbers.
+            Values in the precision of the points; float64 for other numeric types.
 
         Raises
         ------
         SceneError
-            If the last axis of the points is not x, y, z, or the depth of an endless fractal is open.
+            If the last axis of the points is not x, y, z, or an unbounded shape contains a fractal with
+            automatic iterations.
 
         Examples
         --------
@@ -173,13 +272,13 @@ class Operators:
         >>> sphere(0.5).distance([[0, 0, 0], [2, 0, 0]])
         array([-0.5,  1.5])
         """
-        from ..api.distances import distance  # a method stands for the function of a layer above
+        from ..api.distances import distance  # imported here: it is a layer above
 
         return distance(cast("Node", self), points)
 
 
 def _made(name: str, *elements: Operators, **values: Any) -> Node:
-    """The node of a formula."""
+    """Node of the formula with this name."""
     from .registry import get
 
     node: Node = get(name)(*cast("tuple[Node, ...]", elements), **values)
@@ -187,24 +286,24 @@ def _made(name: str, *elements: Operators, **values: Any) -> Node:
 
 
 def _folded(name: str, first: Operators, second: Operators) -> Node:
-    """One operator over the elements of both: ``a | b | c`` is ``union(a, b, c)``, however many there are."""
+    """One operator over the elements of both, so that ``a | b | c`` is ``union(a, b, c)``."""
     return _made(name, *_elements(name, first), *_elements(name, second))
 
 
 def _elements(name: str, shape: Operators) -> tuple[Node, ...]:
-    """The elements of a sharp combination made in Python, or the shape itself."""
+    """Elements of a sharp operator of this name made in Python; otherwise the shape itself."""
     node = cast("Node", shape)
     same = node.formula.name == name and node["smooth"] == 0 and node.place is None
     return node.children if same else (node,)
 
 
 def _direction(axis: Any) -> tuple[Any, ...]:
-    """The axis of a letter, or that of three numbers."""
+    """Direction of an axis that is given by a letter or by three numbers."""
     if isinstance(axis, str):
         return AXES.get(axis, (axis,))
     return tuple(axis) if hasattr(axis, "__len__") else (axis,)
 
 
 def _three(value: Any) -> Any:
-    """The value for each axis."""
+    """One value for each axis."""
     return value if hasattr(value, "__len__") else (value,) * 3

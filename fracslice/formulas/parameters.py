@@ -1,8 +1,8 @@
-"""What a parameter of a formula can be: how it is read, checked, written and described.
+"""Kinds of formula parameters: parsing, validation, writing and description.
 
-Each kind turns text from a scene file into a value (`read`), refuses what cannot be (`check`, a `ValueError`
-that says what is expected) and writes the value back (`text`). The schema and the documentation are made from
-the same objects, and `validate` gives a record's fields the same care.
+Each kind parses text from a scene file (`read`), validates a value (`check`, which raises a `ValueError` that
+says what is expected) and writes it back (`text`). The schema and the documentation are made from the same
+objects; `validate` applies them to the fields of a record.
 """
 
 from __future__ import annotations
@@ -17,12 +17,24 @@ REQUIRED: Any = ...
 AUTO = "auto"
 
 SMALLEST, LARGEST = 1e-15, 1e9
-"""Between these a number is large and small enough for kernels in float32, which square and multiply."""
+"""Range of magnitudes whose squares and products float32 kernels can represent."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """One finite number. `above` and `below` exclude their own value, `least` and `most` include it."""
+    """One finite number.
+
+    Attributes
+    ----------
+    default : float, None or REQUIRED
+        Default value.
+    doc : str
+        Description.
+    above, below : float
+        Exclusive limits.
+    least, most : float
+        Inclusive limits.
+    """
 
     default: Any
     doc: str
@@ -47,7 +59,19 @@ class Number:
 
 @dataclass(frozen=True)
 class Count:
-    """A whole number; with `auto`, also the word "auto"."""
+    """A whole number.
+
+    Attributes
+    ----------
+    default : int, str, None or REQUIRED
+        Default value.
+    doc : str
+        Description.
+    least, most : int
+        Inclusive limits.
+    auto : bool
+        True if the word "auto" is allowed, too.
+    """
 
     default: Any
     doc: str
@@ -82,7 +106,25 @@ class Count:
 
 @dataclass(frozen=True)
 class Vector:
-    """Several finite numbers, separated by spaces. `sizes` says how many there may be."""
+    """Several finite numbers, separated by spaces.
+
+    Attributes
+    ----------
+    default : tuple of float, None or REQUIRED
+        Default value.
+    doc : str
+        Description.
+    sizes : tuple of int
+        Allowed lengths.
+    above, below : float
+        Exclusive limits of each number.
+    least, most : float
+        Inclusive limits of each number.
+    nonzero : bool
+        True if the numbers must not all be zero.
+    whole : bool
+        True if the numbers must be whole.
+    """
 
     default: Any
     doc: str
@@ -120,7 +162,17 @@ class Vector:
 
 @dataclass(frozen=True)
 class Axis:
-    """One of the letters x, y and z."""
+    """One of the letters x, y and z.
+
+    Attributes
+    ----------
+    default : str or REQUIRED
+        Default value.
+    doc : str
+        Description.
+    expects : str
+        Allowed values, in words.
+    """
 
     default: Any
     doc: str
@@ -140,7 +192,17 @@ class Axis:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some words."""
+    """One word of a list.
+
+    Attributes
+    ----------
+    default : str or REQUIRED
+        Default value.
+    doc : str
+        Description.
+    words : tuple of str
+        Allowed words.
+    """
 
     default: Any
     doc: str
@@ -166,10 +228,16 @@ Parameter = Number | Count | Vector | Axis | Choice
 
 
 def validate(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exception]) -> None:
-    """Replaces fields of a frozen record by what their kinds make of them. None stays where it is the
-    default.
+    """Validate and convert fields of a frozen record in place. None is kept where it is the default.
 
-    Raises what `fail` makes of "name=value: expected ...".
+    Parameters
+    ----------
+    record : dataclass
+        The record.
+    kinds : mapping of str to Parameter
+        Kind of each field.
+    fail : callable
+        Makes the exception to raise from the message "name=value: expected ...".
     """
     for name, kind in kinds.items():
         value = getattr(record, name)
@@ -178,7 +246,24 @@ def validate(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Except
 
 
 def validated(name: str, value: Any, kind: Any, fail: Callable[[str], Exception]) -> Any:
-    """What a kind makes of one value. Raises as `validate`."""
+    """Validate and convert one value.
+
+    Parameters
+    ----------
+    name : str
+        Name in the message.
+    value : object
+        The value.
+    kind : Parameter
+        Its kind.
+    fail : callable
+        Makes the exception to raise from the message "name=value: expected ...".
+
+    Returns
+    -------
+    object
+        The value in the kind's type.
+    """
     try:
         return kind.check(value)
     except ValueError as error:
@@ -186,16 +271,27 @@ def validated(name: str, value: Any, kind: Any, fail: Callable[[str], Exception]
 
 
 def shown(value: Any) -> str:
-    """A value as one short line, whatever it is."""
+    """Representation of any value on one line of at most 60 characters."""
     try:
         line = " ".join(repr(value).split())
-    except ValueError:  # a whole number with more digits than Python writes
+    except ValueError:  # a whole number with more digits than Python prints
         line = f"a huge {type(value).__name__}"
     return line if len(line) <= 60 else line[:57] + "..."
 
 
 def finite(value: Any) -> float | None:
-    """A real number, NumPy's included, as a float; None for what is none, or not finite."""
+    """Convert a real number to a float.
+
+    Parameters
+    ----------
+    value : object
+        Any value; NumPy scalars count as numbers, booleans do not.
+
+    Returns
+    -------
+    float or None
+        None if the value is not a real number, or not finite.
+    """
     if isinstance(value, bool) or not isinstance(value, Real):
         return None
     try:
@@ -206,7 +302,7 @@ def finite(value: Any) -> float | None:
 
 
 def _items(value: Any) -> Sequence[Any]:
-    """What a sequence or an array holds; anything else is one item."""
+    """Items of a sequence or an array; any other value is one item."""
     plain = value.tolist() if hasattr(value, "tolist") else value
     return plain if isinstance(plain, Sequence) and not isinstance(plain, (str, bytes)) else (plain,)
 
@@ -219,7 +315,7 @@ def _number(text: str, expects: str) -> float:
 
 
 def _plain(text: str) -> str:
-    """Refuses what only Python takes for a number: 1_000, and digits of other scripts."""
+    """Reject numbers in Python's extended syntax: underscores and non-ASCII digits."""
     if "_" in text or not text.isascii():
         raise ValueError
     return text

@@ -1,6 +1,4 @@
-"""The solids that everything else is cut with: exact distances, after Quilez, "Distance functions"
-(2008-2020).
-"""
+"""Primitives with exact signed distances, after Quilez, "Distance functions" (2008-2020)."""
 
 from __future__ import annotations
 
@@ -15,7 +13,7 @@ from .vocabulary import absolute, maximum, minimum, sqrt, where
 
 @shape(radius=Number(1.0, "the radius", above=0))
 def sphere(x, y, z, radius):  # type: ignore[no-untyped-def]
-    """A sphere around the origin. L = 1: a distance."""
+    """A sphere centred at the origin. L = 1: an exact distance."""
     return sqrt(x * x + y * y + z * z) - radius
 
 
@@ -29,7 +27,7 @@ def sphere_bounds(node: Node) -> Box:
     round=Number(0.0, "radius of the rounded edges and corners, within the size", least=0),
 )
 def box(x, y, z, half, round):  # type: ignore[no-untyped-def]
-    """A box around the origin, its edges sharp or rounded. L = 1: a distance."""
+    """A box centred at the origin, with sharp or rounded edges. L = 1: an exact distance."""
     hx, hy, hz = half
     qx = absolute(x) - hx
     qy = absolute(y) - hy
@@ -63,7 +61,7 @@ def box_bounds(node: Node) -> Box:
     tube=Number(0.25, "radius of the tube", above=0),
 )
 def torus(x, y, z, radius, tube):  # type: ignore[no-untyped-def]
-    """A torus around the z axis. L = 1: a distance."""
+    """A torus around the z axis. L = 1: an exact distance."""
     q = sqrt(x * x + y * y) - radius
     return sqrt(q * q + z * z) - tube
 
@@ -79,7 +77,7 @@ def torus_bounds(node: Node) -> Box:
     height=Number(1.0, "the height along z, centred at the origin", above=0),
 )
 def cylinder(x, y, z, radius, half):  # type: ignore[no-untyped-def]
-    """A cylinder along the z axis, with flat ends. L = 1: a distance."""
+    """A cylinder along the z axis, with flat ends. L = 1: an exact distance."""
     q = sqrt(x * x + y * y) - radius
     h = absolute(z) - half
     oq = maximum(q, 0.0)
@@ -106,7 +104,7 @@ _CAPSULE: dict[str, Any] = {
 
 @shape(**_CAPSULE)
 def capsule(x, y, z, start, along, scale, radius):  # type: ignore[no-untyped-def]
-    """All points within the radius of a segment. L = 1: a distance."""
+    """A capsule: all points within the radius of a segment. L = 1: an exact distance."""
     sx, sy, sz = start
     ax, ay, az = along
     px = x - sx
@@ -141,8 +139,8 @@ def capsule_bounds(node: Node) -> Box:
     height=Number(1.0, "from the base up to the tip along z, centred at the origin", above=0),
 )
 def cone(x, y, z, radius, half, scale):  # type: ignore[no-untyped-def]
-    """A cone along the z axis, its tip up. L = 1: a distance."""
-    # In the half plane (q, z): the distance to the base segment and to the side, the sign from both.
+    """A cone along the z axis, with its tip up. L = 1: an exact distance."""
+    # In the half plane (q, z): distances to the base segment and to the side; both give the sign.
     q = sqrt(x * x + y * y)
     base = maximum(q - radius, 0.0)
     below = -half - z
@@ -170,7 +168,7 @@ def cone_bounds(node: Node) -> Box:
     offset=Number(0.0, "distance of the plane from the origin along the normal"),
 )
 def plane(x, y, z, normal, offset):  # type: ignore[no-untyped-def]
-    """The half space behind a plane. L = 1: a distance."""
+    """The half-space behind a plane. L = 1: an exact distance."""
     nx, ny, nz = normal
     return x * nx + y * ny + z * nz - offset
 
@@ -193,13 +191,13 @@ def plane_bounds(node: Node) -> Box:
 
 @shape(radius=Number(1.0, "from the centre to each of the six corners", above=0))
 def octahedron(x, y, z, radius):  # type: ignore[no-untyped-def]
-    """A regular octahedron around the origin. L = 1: a distance."""
+    """A regular octahedron centred at the origin. L = 1: an exact distance."""
     ax = absolute(x)
     ay = absolute(y)
     az = absolute(z)
     m = ax + ay + az - radius
-    # The nearest of the face and, where its foot leaves the face, the edge opposite to the smallest
-    # coordinate.
+    # Distance to the face or, where the foot of the perpendicular is off the face, to the edge opposite to
+    # the smallest coordinate.
     in_x = 3.0 * ax < m
     in_y = 3.0 * ay < m
     in_z = 3.0 * az < m

@@ -1,11 +1,10 @@
-"""One formula, one registration: the scene reader, the kernels, the schema, the docs and the tests follow
-from it.
+"""Registry of formulas. The scene reader, the kernels, the schema, the docs and the tests follow from it.
 
-A *shape* is a distance field ``f(x, y, z, ...)``: negative inside, zero exactly on the surface. A *blend*
-makes one field of the values of others. A *warp* decides at which points its child is evaluated; it is
-written as a function whose first argument is the child. All three are plain functions in the words of
-`fracslice.formulas.vocabulary`; decorating one makes it a `Formula`, and calling a `Formula` makes a `Node`
-of a scene tree.
+A *shape* is a distance field ``f(x, y, z, ...)``: negative inside, zero exactly on the surface. A *CSG
+operator* combines the values of several fields into one. A *domain operator* chooses the points where its
+child is evaluated; it is a function whose first argument is the child. All three are plain functions in the
+vocabulary of `fracslice.formulas.vocabulary`. A decorator turns one into a `Formula`, and calling a `Formula`
+makes a `Node` of a scene tree.
 """
 
 from __future__ import annotations
@@ -26,15 +25,20 @@ from .parameters import REQUIRED, Parameter, validated
 Kind = Literal["shape", "csg", "domain"]
 
 DEEPEST = 100
-"""How deep elements may be nested: far above any use, far below Python's limit on recursion."""
+"""Maximum nesting of elements: far above any use, far below Python's recursion limit."""
 
 TOO_DEEP = f"is nested too deeply: expected at most {DEEPEST} elements inside each other"
 
 
 @dataclass(frozen=True)
 class Fixed:
-    """An argument that is compiled into the kernel instead of being passed to it: it changes which code is
-    needed.
+    """An argument that is compiled into the kernel instead of being passed to it, because the code depends on
+    it.
+
+    Attributes
+    ----------
+    value : object
+        The constant.
     """
 
     value: Any
@@ -45,7 +49,27 @@ Hook = Callable[..., Any]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Formula:
-    """A registered formula. Its hooks take a `Node` and tell what the kernel and the sampler need to know."""
+    """A registered formula.
+
+    Attributes
+    ----------
+    name : str
+        Name of the element in a scene file.
+    kind : {"shape", "csg", "domain"}
+        Shape, CSG operator or domain operator.
+    function : callable
+        The function to compile.
+    parameters : mapping of str to Parameter
+        Kinds of the parameters by name.
+    children : (int, int or None)
+        Minimum and maximum number of elements inside; None: any number.
+    lipschitz : float
+        Lipschitz bound of a shape; of an operator, the minimum.
+    exterior_only : bool
+        True for an escape-time fractal, see `Bounds`.
+    hooks : dict of str to callable
+        Functions of a `Node` that supply its box, bounds and kernel arguments.
+    """
 
     name: str
     kind: Kind
@@ -70,17 +94,34 @@ class Formula:
 
     @cached_property
     def names(self) -> Mapping[str, str]:
-        """The parameters by their names in Python, in the order of positional arguments."""
+        """Parameter names by their names in Python, in the order of positional arguments."""
         return MappingProxyType({signatures.python_name(name): name for name in signatures.ordered(self)})
 
     @property
     def __signature__(self) -> Signature:
+        """Signature of the formula as a Python function."""
         return signatures.signature(self)
 
     def __call__(self, *arguments: Any, place: str | None = None, **keywords: Any) -> Node:
-        """A scene node. Raises `SceneError` if a value or the number of elements is not possible.
+        """Make a scene node.
 
-        arguments: the elements inside it, or a shape's values in order.
+        Parameters
+        ----------
+        *arguments
+            Values of a shape in order; for other formulas, the elements inside.
+        place : str, optional
+            "file:line" of the element.
+        **keywords
+            Parameter values by name.
+
+        Returns
+        -------
+        Node
+
+        Raises
+        ------
+        SceneError
+            For an invalid value, an unknown name or a wrong number of elements.
         """
         elements, values = signatures.bound(self, arguments, keywords)
         checked = {name: self._value(name, values.get(name)) for name in self.parameters}
@@ -112,41 +153,43 @@ class Formula:
             return (get("union")(*children),)
         return tuple(children)
 
-    # The hooks, set by decorating a function with them.
+    # Decorators that set a hook: each takes the function and returns it.
     def bounds(self, hook: Callable[[Node], Box]) -> Callable[[Node], Box]:
-        """The box that encloses the inside; without one nothing is known of it, and it has no end."""
+        """Set the hook that returns a box enclosing the inside. Without it, the solid counts as unbounded."""
         return self._hook("bounds", hook)
 
     def slope(self, hook: Callable[[Node], float]) -> Callable[[Node], float]:
-        """The Lipschitz bound, where it depends on parameters or children."""
+        """Set the hook that returns the Lipschitz bound, where it depends on parameters or children."""
         return self._hook("slope", hook)
 
     def steepening(self, hook: Callable[[Node], float]) -> Callable[[Node], float]:
-        """`Bounds.steepening`, where it is not the largest of the children's."""
+        """Set the hook that returns `Bounds.steepening`, where it is not the maximum of the children's."""
         return self._hook("steepening", hook)
 
     def arguments(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
-        """The function's arguments after points or values, where they are not the parameters themselves."""
+        """Set the hook that returns the arguments after points or values, if they are not the parameters."""
         return self._hook("arguments", hook)
 
     def select(self, hook: Callable[[Node], Callable[..., Any]]) -> Callable[[Node], Callable[..., Any]]:
-        """Another function for these parameters, when they need less or different code."""
+        """Set the hook that selects another function for a node that needs less or different code."""
         return self._hook("select", hook)
 
     def identity(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
-        """True if the node changes nothing and can be left out."""
+        """Set the hook that returns True if the node changes nothing and can be left out."""
         return self._hook("identity", hook)
 
     def unordered(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
-        """True if the elements of a blend but the first may be folded in any order, to the same bits."""
+        """Set the hook that returns True if all elements of a CSG operator but the first may be folded in any
+        order, to the same bits.
+        """
         return self._hook("unordered", hook)
 
     def visible(self, hook: Callable[[Node, float], Node]) -> Callable[[Node, float], Node]:
-        """The node with no more detail than voxels of a size in its own units can show."""
+        """Set the hook that returns the node without detail finer than a voxel size in its own units."""
         return self._hook("visible", hook)
 
     def check(self, hook: Callable[[Node], None]) -> Callable[[Node], None]:
-        """Raises `SceneError` for values that are possible alone but not together."""
+        """Set the hook that raises `SceneError` for values that are valid alone but not together."""
         return self._hook("check", hook)
 
     def _hook(self, name: str, hook: Hook) -> Hook:
@@ -155,6 +198,7 @@ class Formula:
 
     @property
     def doc(self) -> str:
+        """Docstring of the function."""
         return (self.function.__doc__ or "").strip()
 
 
@@ -164,17 +208,71 @@ _REGISTRY: dict[str, Formula] = {}
 def shape(
     lipschitz: float = 1.0, exterior_only: bool = False, **parameters: Parameter
 ) -> Callable[..., Formula]:
-    """Registers ``f(x, y, z, ...)`` under the function's name."""
+    """Register a shape ``f(x, y, z, ...)`` under the function's name.
+
+    Parameters
+    ----------
+    lipschitz : float
+        Lipschitz bound of the field.
+    exterior_only : bool
+        True for an escape-time fractal, see `Bounds`.
+    **parameters : Parameter
+        Kinds of the parameters by name.
+
+    Returns
+    -------
+    callable
+        Decorator that turns the function into a `Formula`.
+
+    Raises
+    ------
+    SceneError
+        If another formula has this name.
+    """
     return _register("shape", (0, 0), parameters, lipschitz=lipschitz, exterior_only=exterior_only)
 
 
 def csg_operator(children: tuple[int, int | None], **parameters: Parameter) -> Callable[..., Formula]:
-    """Registers ``f(a, ...)`` of one child's values, or ``f(a, b, ...)`` that folds the values of several."""
+    """Register a CSG operator: ``f(a, ...)`` of one child's values, or ``f(a, b, ...)`` that folds several.
+
+    Parameters
+    ----------
+    children : (int, int or None)
+        Minimum and maximum number of elements; None: any number.
+    **parameters : Parameter
+        Kinds of the parameters by name.
+
+    Returns
+    -------
+    callable
+        Decorator that turns the function into a `Formula`.
+
+    Raises
+    ------
+    SceneError
+        If another formula has this name.
+    """
     return _register("csg", children, parameters)
 
 
 def domain_operator(**parameters: Parameter) -> Callable[..., Formula]:
-    """Registers ``f(child, x, y, z, ...)``, which calls ``child(x, y, z)``."""
+    """Register a domain operator ``f(child, x, y, z, ...)``, which calls ``child(x, y, z)``.
+
+    Parameters
+    ----------
+    **parameters : Parameter
+        Kinds of the parameters by name.
+
+    Returns
+    -------
+    callable
+        Decorator that turns the function into a `Formula`.
+
+    Raises
+    ------
+    SceneError
+        If another formula has this name.
+    """
     return _register("domain", (1, 1), parameters)
 
 
@@ -197,15 +295,30 @@ def _register(
 
 
 def _is_run_again(old: Callable[..., Any], new: Callable[..., Any]) -> bool:
-    """Whether it is a cell of a notebook, edited and run once more."""
+    """True if both are from `__main__`: a notebook cell that was edited and run again."""
     return new.__module__ == old.__module__ == "__main__"
 
 
 def get(name: str) -> Formula:
-    """The formula called `name`; `KeyError` if there is none."""
+    """Look up a formula.
+
+    Parameters
+    ----------
+    name : str
+        Name of the formula.
+
+    Returns
+    -------
+    Formula
+
+    Raises
+    ------
+    KeyError
+        If there is no formula of this name.
+    """
     return _REGISTRY[name]
 
 
 def names() -> list[str]:
-    """The names of all formulas, sorted."""
+    """Names of all formulas, sorted."""
     return sorted(_REGISTRY)

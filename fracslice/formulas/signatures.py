@@ -1,4 +1,4 @@
-"""What calling a formula looks like in Python: names, positions, types and a docstring, from the registry."""
+"""Python signatures, docstrings and stubs of formulas, from the registry."""
 
 from __future__ import annotations
 
@@ -20,22 +20,38 @@ if TYPE_CHECKING:
 
 
 def python_name(name: str) -> str:
-    """The name of a parameter in Python: `from` is a keyword, and becomes ``from_`` (PEP 8)."""
+    """Name of a parameter in Python; a keyword such as ``from`` becomes ``from_`` (PEP 8)."""
     return f"{name}_" if iskeyword(name) else name
 
 
 def ordered(formula: Formula) -> dict[str, Any]:
-    """The parameters, those without a default first, as Python wants them."""
+    """Parameters of a formula by name; Python requires parameters without a default to come first."""
     return dict(sorted(formula.parameters.items(), key=lambda item: item[1].default is not REQUIRED))
 
 
 def bound(
     formula: Formula, positional: tuple[Any, ...], keywords: Mapping[str, Any]
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """The elements inside a formula, and its values by the names of its parameters.
+    """Bind the arguments of a call to elements and parameters.
 
-    Positional arguments of a shape fill its parameters in order; those of other formulas are elements.
-    Raises `SceneError` for an unknown name, and for a value that is given twice or has no parameter.
+    Parameters
+    ----------
+    formula : Formula
+        The formula that is called.
+    positional : tuple
+        Values of a shape's parameters in order; for other formulas, the elements inside.
+    keywords : mapping of str to value
+        Parameter values by their names in Python.
+
+    Returns
+    -------
+    (tuple, dict)
+        The elements inside, and the values by parameter name.
+
+    Raises
+    ------
+    SceneError
+        For an unknown name, a value that is given twice, or more values than parameters.
     """
     names = formula.names
     given = {names.get(name, name): value for name, value in keywords.items()}
@@ -55,7 +71,7 @@ def bound(
 
 
 def signature(formula: Formula) -> Signature:
-    """The signature of a formula as a Python function."""
+    """Signature of a formula as a Python function."""
     from .registry import Node
 
     shape = formula.kind == "shape"
@@ -74,7 +90,7 @@ def signature(formula: Formula) -> Signature:
 
 
 def annotation(parameter: Any) -> Any:
-    """The type of a parameter's values."""
+    """Type annotation of a parameter's values."""
     match parameter:
         case Count(auto=auto):
             found: Any = int | Literal["auto"] if auto else int
@@ -91,7 +107,7 @@ def annotation(parameter: Any) -> Any:
 
 
 def docstring(formula: Formula) -> str:
-    """The docstring of a formula with its parameters, as numpydoc has it."""
+    """Docstring of a formula with its parameters, in numpydoc style."""
     lines = [inspect.cleandoc(formula.doc)]
     if formula.kind != "shape" or formula.parameters:
         lines += ["", "Parameters", "----------"]
@@ -107,7 +123,7 @@ _ELEMENTS = {True: "What it is applied to; several are a union.", False: "What i
 
 
 def stub() -> str:
-    """The stub file of `fracslice.formulas`: every formula as a function, everything else as it is."""
+    """Text of the stub file of `fracslice.formulas`: formulas as functions, all other names re-exported."""
     from .registry import get, names
 
     package = Path(__file__).with_name("__init__.py")
@@ -130,7 +146,7 @@ from typing import Literal, Union
 
 
 def _function(formula: Formula) -> str:
-    """A formula in a stub file."""
+    """Function of a formula in the stub file."""
     text = re.sub(r"\b(?:fracslice\.formulas\.\w+|collections\.abc)\.", "", str(signature(formula)))
     body = docstring(formula).replace("\n", "\n    ").replace("\n    \n", "\n\n")
     return f'def {formula.name}{text}:\n    """{body}\n    """'

@@ -1,4 +1,4 @@
-"""Where an element is looked at: scaled, turned, moved, mirrored."""
+"""Domain operators for affine maps and mirroring."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from .vocabulary import absolute
     matrix=Vector(None, "3 x 4 or 4 x 4 numbers row by row, applied before the other three", sizes=(12, 16)),
 )
 def transform(child, x, y, z, back, shrink):  # type: ignore[no-untyped-def]
-    """Scaled, then rotated, then moved.
+    """The element scaled, then rotated, then translated.
 
-    The child's field is multiplied by the smallest stretch of the map, its smallest singular value: f never
-    grows faster than the child's (L = the child's), and is a distance where the scale is uniform.
+    The element's field is multiplied by the smallest singular value of the map. So L = the element's, and an
+    exact distance stays exact where the scale is uniform.
     """
     a, b, c, d, e, f, g, h, i, tx, ty, tz = back
     return shrink * child(
@@ -37,12 +37,13 @@ def transform(child, x, y, z, back, shrink):  # type: ignore[no-untyped-def]
 
 
 def moved(child, x, y, z, offset):  # type: ignore[no-untyped-def]
+    """The element translated by an offset."""
     tx, ty, tz = offset
     return child(x - tx, y - ty, z - tz)
 
 
 def _rotation(rotate: Sequence[float]) -> np.ndarray:
-    """Rodrigues' formula."""
+    """Rotation matrix of an axis and an angle in degrees, by Rodrigues' formula."""
     axis = np.array(rotate[:3]) / length(np.array(rotate[:3]))
     angle = math.radians(rotate[3])
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
@@ -51,7 +52,18 @@ def _rotation(rotate: Sequence[float]) -> np.ndarray:
 
 
 def affine(node: Node) -> tuple[np.ndarray, np.ndarray]:
-    """The 3 x 3 matrix and the translation of a transform node."""
+    """Affine map of a transform node.
+
+    Parameters
+    ----------
+    node : Node
+        A `transform`.
+
+    Returns
+    -------
+    (ndarray [3, 3], ndarray [3])
+        Linear part and translation, float64.
+    """
     linear = np.diag(np.broadcast_to(np.array(node["scale"]), 3))
     if node["rotate"]:
         linear = product(_rotation(node["rotate"]), linear)
@@ -115,9 +127,9 @@ def transform_bounds(node: Node) -> Box:
     )
 )
 def mirror(child, x, y, z, along_x, along_y):  # type: ignore[no-untyped-def]
-    """The half of the element on the axis' positive side, and its mirror image.
+    """The half of the element on the positive side of an axis, and its mirror image.
 
-    L = the element's: folding brings points no further apart.
+    L = the element's: folding space does not increase distances.
     """
     if along_x:
         x = absolute(x)
@@ -142,4 +154,5 @@ def mirror_bounds(node: Node) -> Box:
 
 
 def along(node: Node) -> dict[str, object]:
+    """Kernel arguments that select the axis of a node."""
     return {"along_x": Fixed(node["axis"] == "x"), "along_y": Fixed(node["axis"] == "y")}

@@ -1,11 +1,11 @@
-"""The words a formula may use, with their NumPy meaning.
+"""Functions that a formula may use, with their NumPy implementation.
 
-A formula is a plain function over ``x, y, z``. It is written once, in these words, Python arithmetic, ``for``
-and ``if not any_of(mask): break``. Here the words mean NumPy on arrays (the reference); `fracslice.kernel`
-gives the same names a meaning on SIMD lanes and on CUDA threads.
+A formula is a plain function of ``x, y, z``. It is written once, with these functions, Python arithmetic,
+``for`` and ``if not any_of(mask): break``. Here the functions act on NumPy arrays (the reference);
+`fracslice.kernel` implements the same names for SIMD lanes and CUDA threads.
 
-Two rules keep one source fast on all of them: branches on points are `where`, never ``if``; float constants
-are written as floats (``2.0 * x``), so that a machine that cares about the width of a literal can set it.
+Two rules keep one source fast on all targets. Branches on points use `where`, never ``if``. Float constants
+are written as floats (``2.0 * x``), so that each target can set the width of literals.
 """
 
 from __future__ import annotations
@@ -26,25 +26,31 @@ absolute = np.abs
 
 
 def any_of(mask: np.ndarray) -> bool:
-    """True if the condition holds on at least one point: the only way from points to control flow."""
+    """True if the condition holds at any point: the only way for points to affect control flow."""
     return bool(np.any(mask))
 
 
 def rsqrt(a: np.ndarray) -> np.ndarray:
-    """1/sqrt(a) of a positive, finite argument; the lanes have an instruction for it."""
+    """1/sqrt(a) of a positive, finite argument; SIMD units have an instruction for it."""
     found: np.ndarray = 1.0 / np.sqrt(a)
     return found
 
 
 def ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a/b of a normal, finite b whose inverse is normal too; a GPU has an instruction for the inverse."""
+    """a/b for a normal, finite b whose inverse is normal, too; GPUs have an instruction for the inverse."""
     found: np.ndarray = a / b
     return found
 
 
 def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
-    """Marks a step of an orbit that is r2 = |w|^2 away from the origin where `alive`; only pictures with
-    palettes look.
+    """Record a step of an orbit for the palettes of pictures; elsewhere it does nothing.
+
+    Parameters
+    ----------
+    r2
+        |w|^2 after the step.
+    alive
+        Mask of the points whose orbit is still running.
     """
 
 
