@@ -32,12 +32,14 @@ from .vocabulary import sqrt as sqrt
 from .vocabulary import where as where
 
 def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
-    """A straight axis made an arc (Barr 1984, "Global and Local Deformations of Solid Primitives").
+    """The element bent: a straight axis becomes an arc (Barr 1984, "Global and Local Deformations of Solid
+    Primitives").
 
-    In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is looked
-    at in theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; at half the smallest
-    radius r that the element reaches, L = 2 / (curvature r) times the element's. Nearer than that, and near
-    the cut opposite to it, the value is a distance to the sector that holds the element.
+    In polar coordinates (r, theta) around the arc's centre, at distance 1 / curvature, the element is
+    evaluated at theta / curvature and 1 / curvature - r. Lengths shrink towards the centre; at half the
+    smallest radius r that the element reaches, L = 2 / (curvature r) times the element's. Nearer to the
+    centre, and near the cut opposite to the element, the value is a distance to the sector that holds the
+    element.
 
     Parameters
     ----------
@@ -54,9 +56,9 @@ def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') ->
     """
 
 def bounds(*elements: Node, min: Sequence[float], max: Sequence[float]) -> Node:
-    """What is inside a box; the element is not looked at far from it, however much of it there is.
+    """The part of the element inside a box; far from the box the element is not evaluated.
 
-    L = max of 1, which is the box', and the element's.
+    The element may be unbounded. L = maximum of 1 (the box) and the element's.
 
     Parameters
     ----------
@@ -73,7 +75,7 @@ def bounds(*elements: Node, min: Sequence[float], max: Sequence[float]) -> Node:
     """
 
 def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> Node:
-    """A box around the origin, its edges sharp or rounded. L = 1: a distance.
+    """A box centred at the origin, with sharp or rounded edges. L = 1: an exact distance.
 
     Parameters
     ----------
@@ -88,7 +90,7 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> Node:
     """
 
 def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.0, 0.0, 0.5), radius: float = 0.25) -> Node:
-    """All points within the radius of a segment. L = 1: a distance.
+    """A capsule: all points within the radius of a segment. L = 1: an exact distance.
 
     Parameters
     ----------
@@ -105,7 +107,7 @@ def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.
     """
 
 def cone(radius: float = 0.5, height: float = 1.0) -> Node:
-    """A cone along the z axis, its tip up. L = 1: a distance.
+    """A cone along the z axis, with its tip up. L = 1: an exact distance.
 
     Parameters
     ----------
@@ -120,7 +122,7 @@ def cone(radius: float = 0.5, height: float = 1.0) -> Node:
     """
 
 def cylinder(radius: float = 0.5, height: float = 1.0) -> Node:
-    """A cylinder along the z axis, with flat ends. L = 1: a distance.
+    """A cylinder along the z axis, with flat ends. L = 1: an exact distance.
 
     Parameters
     ----------
@@ -135,7 +137,7 @@ def cylinder(radius: float = 0.5, height: float = 1.0) -> Node:
     """
 
 def difference(*elements: Node, smooth: float = 0.0) -> Node:
-    """The first element without the others. L = max of theirs, as of a union.
+    """The first element minus the others. L = maximum of the elements', as for a union.
 
     Parameters
     ----------
@@ -150,7 +152,7 @@ def difference(*elements: Node, smooth: float = 0.0) -> Node:
     """
 
 def intersection(*elements: Node, smooth: float = 0.0) -> Node:
-    """What is in all of the elements. L = max of theirs, as of a union.
+    """The intersection of the elements. L = maximum of the elements', as for a union.
 
     Parameters
     ----------
@@ -165,13 +167,13 @@ def intersection(*elements: Node, smooth: float = 0.0) -> Node:
     """
 
 def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0) -> Node:
-    """The solid filled Julia set of q^2 + c in the quaternions, cut at k = 0.
+    """The filled Julia set of q^2 + c in the quaternions, cut at k = 0.
 
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
     1989, "Ray Tracing Deterministic 3-D Fractals". The derivative of q^2 has the norm 2|q| exactly. L = 2 is
-    Koebe's bound for connected complex Julia sets; one that falls apart has its derivative taken at a larger
-    |q| near zero, see `escape.CORE`. For quaternions it is measured: `docs/how/accuracy.md`. What is returned
-    is held still from the escape on; w itself runs on, and its lanes are not looked at.
+    Koebe's bound for connected complex Julia sets; for a disconnected set, the derivative near zero is taken
+    at a larger |q|, see `escape.CORE`. For quaternions L = 2 is measured (`docs/how/accuracy.md`). Results
+    are frozen once a lane has escaped; w itself runs on, unused.
 
     Parameters
     ----------
@@ -191,19 +193,21 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
-    w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n): both powers are products,
-    and Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The real part of a
-    square is 2 re^2 minus the squared norm, which is known. Of the azimuth u + iv = e^(2 i phi) is taken,
-    which needs no root, to the power n/2; what is left of rho e^(i n phi) is x + iy where n is odd, else rho.
+    w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n). Both powers are products;
+    Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The real part of a square is
+    2 re^2 minus the squared norm, which is known. The azimuth enters as u + iv = e^(2 i phi), which needs no
+    root, to the power n/2; the remaining factor of rho e^(i n phi) is x + iy for odd n, else rho.
 
     The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
-    latitude. The textbook's dr forgets the second, and overestimates distances up to 13 times near the poles;
-    it is taken here, as far out as a point of the solid can come (`escape.farthest`). Beyond, each step leads
-    farther away whatever its direction, so that only how radii stretch matters; there it is faded out.
-    There is no theorem for three dimensions; L = 2 is measured (`docs/how/accuracy.md`). Where a set falls
-    apart (a constant far out) that fails, and the field is also kept below twice a sure distance,
-    `escape.sure_distance`. A power that is not whole tears space where the azimuth jumps from pi to -pi: no
-    bound holds across the tear, and the guarded field stays below the sure distance from it.
+    latitude. The usual dr ignores the second stretch, and overestimates distances up to 13 times near the
+    poles. Here it counts as far out as a point of the solid can come (`escape.farthest`). Farther out, each
+    step increases the radius in any direction, so only the radial stretch matters, and the second is faded
+    out.
+
+    There is no theorem for three dimensions; L = 2 is measured (`docs/how/accuracy.md`). It fails for a
+    disconnected set (a constant far out): there the field also stays below twice `escape.sure_distance`. A
+    fractional power tears space where the azimuth jumps from pi to -pi. No bound holds across the tear, so
+    the conservative field stays below the sure distance to it.
 
     Parameters
     ----------
@@ -222,9 +226,9 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     """
 
 def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
-    """What the element inside looks like in pictures. A material further inside takes precedence.
+    """The appearance of the element in pictures. A material nested deeper takes precedence.
 
-    It is not in the field: L = the element's.
+    The field is that of the element: L = the element's.
 
     Parameters
     ----------
@@ -259,11 +263,12 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats
 def menger(level: int = 3) -> Node:
     """The Menger sponge of any level in the cube [-1, 1]^3.
 
-    Menger 1926; distance: Quilez 2011, "Menger fractal": a box minus, per level, an infinite lattice of
-    crosses. Every term is the distance to its own solid or less, so their maximum has L = 1. Volume 8
+    Menger 1926; distance: Quilez 2011, "Menger fractal": a box minus an infinite lattice of crosses for each
+    level. Every term is the distance to its own solid or less, so their maximum has L = 1. Volume 8
     (20/27)^n, area 4 (2 (20/9)^n + 4 (8/9)^n).
 
-    q is how far a point is from the middle of its cell, in cells; the next level's is |3 q - nearest whole|.
+    q is the offset of a point from the centre of its cell, in cells; the next level's is
+    |3 q - nearest whole|.
 
     Parameters
     ----------
@@ -276,9 +281,9 @@ def menger(level: int = 3) -> Node:
     """
 
 def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
-    """The half of the element on the axis' positive side, and its mirror image.
+    """The half of the element on the positive side of an axis, and its mirror image.
 
-    L = the element's: folding brings points no further apart.
+    L = the element's: folding space does not increase distances.
 
     Parameters
     ----------
@@ -293,7 +298,7 @@ def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
     """
 
 def octahedron(radius: float = 1.0) -> Node:
-    """A regular octahedron around the origin. L = 1: a distance.
+    """A regular octahedron centred at the origin. L = 1: an exact distance.
 
     Parameters
     ----------
@@ -306,12 +311,13 @@ def octahedron(radius: float = 1.0) -> Node:
     """
 
 def offset(*elements: Node, distance: float) -> Node:
-    """The element grown or shrunk; exact where its field is a distance.
+    """The element grown or shrunk by a distance; exact where its field is a distance.
 
-    A field that underestimates distances would grow further than it should; it is cut off at the grown box.
-    L = the element's, at least 1, the box'; more around an escape-time fractal, whose field is steeper away
-    from its surface (`Bounds.steepening`; measured). What is shrunk lies in the element: where that is a
-    fractal, whose inside bounds nothing, space is skipped by its own field.
+    A field that underestimates distances would grow too far; the result is clipped at the grown box.
+    L = maximum of 1 (the box) and the element's; more for an escape-time fractal, whose field is steeper away
+    from its surface (`Bounds.steepening`; measured). A shrunk element lies inside the original. The field of
+    a fractal is an exterior bound only, so the conservative field of a shrunk fractal is that of the
+    original.
 
     Parameters
     ----------
@@ -326,7 +332,7 @@ def offset(*elements: Node, distance: float) -> Node:
     """
 
 def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> Node:
-    """The half space behind a plane. L = 1: a distance.
+    """The half-space behind a plane. L = 1: an exact distance.
 
     Parameters
     ----------
@@ -341,11 +347,11 @@ def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> Nod
     """
 
 def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 0, 0)) -> Node:
-    """Copies on a lattice. Every copy that can be the nearest is looked at, so cell borders are right.
+    """Copies on a lattice. Every copy that can be the nearest is evaluated, so cell borders are right.
 
-    Copies further than `gap` are not; the value never exceeds it inside the lattice, so that leaving one out
-    is not seen. A copy's value is at least the distance to its box, for the same reason. L = max of 1 and
-    the element's: all that is left out is larger than `gap`, and minima keep the bound.
+    Copies farther than `gap` are skipped. The value never exceeds `gap` inside the lattice, so a skipped copy
+    does not change it. For the same reason a copy's value is at least the distance to its box. L = maximum of
+    1 and the element's: skipped values are larger than `gap`, and minima preserve the bound.
 
     Parameters
     ----------
@@ -362,7 +368,7 @@ def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 
     """
 
 def shell(*elements: Node, thickness: float) -> Node:
-    """The element made hollow: what is deeper inside than the thickness is taken out. L = the element's.
+    """The element made hollow: material deeper inside than the thickness is removed. L = the element's.
 
     Parameters
     ----------
@@ -377,7 +383,7 @@ def shell(*elements: Node, thickness: float) -> Node:
     """
 
 def sphere(radius: float = 1.0) -> Node:
-    """A sphere around the origin. L = 1: a distance.
+    """A sphere centred at the origin. L = 1: an exact distance.
 
     Parameters
     ----------
@@ -390,7 +396,7 @@ def sphere(radius: float = 1.0) -> Node:
     """
 
 def torus(radius: float = 1.0, tube: float = 0.25) -> Node:
-    """A torus around the z axis. L = 1: a distance.
+    """A torus around the z axis. L = 1: an exact distance.
 
     Parameters
     ----------
@@ -405,10 +411,10 @@ def torus(radius: float = 1.0, tube: float = 0.25) -> Node:
     """
 
 def transform(*elements: Node, translate: Sequence[float] = (0.0, 0.0, 0.0), rotate: Sequence[float] | None = None, scale: float | Sequence[float] = (1.0,), matrix: Sequence[float] | None = None) -> Node:
-    """Scaled, then rotated, then moved.
+    """The element scaled, then rotated, then translated.
 
-    The child's field is multiplied by the smallest stretch of the map, its smallest singular value: f never
-    grows faster than the child's (L = the child's), and is a distance where the scale is uniform.
+    The element's field is multiplied by the smallest singular value of the map. So L = the element's, and an
+    exact distance stays exact where the scale is uniform.
 
     Parameters
     ----------
@@ -429,12 +435,11 @@ def transform(*elements: Node, translate: Sequence[float] = (0.0, 0.0, 0.0), rot
     """
 
 def twist(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
-    """Turned about an axis, further the further along it (Barr 1984, "Global and Local Deformations of Solid
-    Primitives").
+    """The element twisted about an axis (Barr 1984, "Global and Local Deformations of Solid Primitives").
 
-    At radius rho space is sheared by s = rate rho, which stretches by (s + sqrt(s^2 + 4)) / 2. With that at
-    5/4 of the element's own radius, L = the product of it and the element's. Beyond, the value is the
-    distance to the cylinder around it.
+    At radius rho the twist shears space by s = rate rho, which stretches lengths by (s + sqrt(s^2 + 4)) / 2.
+    L = the element's times this stretch at 5/4 of the element's radius. Beyond, the value is the distance to
+    the cylinder around the element.
 
     Parameters
     ----------
@@ -451,12 +456,12 @@ def twist(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -
     """
 
 def union(*elements: Node, smooth: float = 0.0) -> Node:
-    """All that is in any of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
+    """The union of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
     quadratic).
 
-    The seam weighs the gradients of the two with weights whose sum is 1, so L = max of theirs; a seam with an
-    escape-time fractal has 1.25 times that, one between several 3 times (measured; `conservative_union` does
-    better).
+    The gradient in a seam is a weighted mean of the elements' gradients, so L = maximum of the elements'. A
+    seam with one escape-time fractal has 1.25 times that, a seam between several 3 times (measured;
+    `conservative_union` avoids the factor).
 
     Parameters
     ----------
