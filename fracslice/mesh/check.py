@@ -98,7 +98,7 @@ class MeshReport:
 
     @property
     def printable(self) -> bool:
-        """True if the mesh is closed, manifold, oriented, without self-intersections and of positive volume."""
+        """True if the mesh is a closed, oriented manifold of positive volume without self-intersections."""
         return not self.problems
 
     def as_dict(self) -> dict[str, Any]:
