@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -107,8 +107,8 @@ def make_mesh(
     """
     job = _Job(scene, what or MeshJob(), Clock(work or Work()), None if path is None else Path(path))
     job.refuse()
-    with job.aside() as folder:
-        return job.result(*job.surface(folder))
+    with job.aside() as aside:
+        return job.result(*job.surface(aside))
 
 
 @dataclass(frozen=True)
@@ -139,16 +139,18 @@ class _Job:
             check_target(self.path)
 
     @contextmanager
-    def aside(self) -> Iterator[Path | None]:
-        """A folder for pieces beside the file, if one may be made of them."""
+    def aside(self) -> Iterator[Callable[[], Path] | None]:
+        """Yields what makes a folder for pieces beside the file, or None where the file takes no pieces."""
         if self.path is None or self.path.suffix.lower() != STL:
             yield None
             return
         from .export import check_target
 
         beside = check_target(self.path).parent
-        with tempfile.TemporaryDirectory(prefix=".fracslice-", dir=beside) as folder:
-            yield Path(folder)
+        with ExitStack() as stack:
+            yield lambda: Path(
+                stack.enter_context(tempfile.TemporaryDirectory(prefix=".fracslice-", dir=beside))
+            )
 
     def planned(self) -> _Sized:
         """The field to be meshed, edited if it is to be."""
@@ -171,18 +173,18 @@ class _Job:
         # A hollow is a cavity, too.
         return _Sized(made, scale, Print(keep=keep, cavities=how.cavities if how.whole else "keep"))
 
-    def surface(self, folder: Path | None) -> tuple[_Sized, Surface, str]:
+    def surface(self, aside: Callable[[], Path] | None) -> tuple[_Sized, Surface, str]:
         """The surface of what stays; and a note on walls that are thinner than a voxel."""
         sized = self.planned()
-        surface = self.meshed(sized, folder)
+        surface = self.meshed(sized, aside)
         thin, how = surface.thin, self.what.how(self.scene)
         if thin and how.whole and how.sorts:  # what is one body only the field tells
             sized = self.edited(sized.planned)
-            surface = self.meshed(sized, folder)
+            surface = self.meshed(sized, aside)
             thin = surface.thin
         return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, surface, thin
 
-    def meshed(self, sized: _Sized, folder: Path | None) -> Surface:
+    def meshed(self, sized: _Sized, aside: Callable[[], Path] | None) -> Surface:
         """The surface, in one piece if it fits in memory."""
         signs = surfaces.sampled(sized.planned, self.clock)
         most, voxel = len(signs), self.what.size(self.scene) / self.what.voxels(self.scene)
@@ -192,10 +194,11 @@ class _Job:
             for name, length in (("chord", self.what.chord_mm), ("simplify", self.what.simplify_mm)):
                 if length is not None:
                     raise SceneError(f"{name} {length:g}mm needs the whole mesh: {error}") from None
-            if folder is None:
+            if aside is None:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
-        return surfaces.made(sized.planned, signs, most, folder if most < len(signs) else None, self.clock)
+        folder = aside() if aside and most < len(signs) else None
+        return surfaces.made(sized.planned, signs, most, folder, self.clock)
 
     def result(self, sized: _Sized, surface: Surface, thin: str) -> Result:
         """The finished mesh, and what is told of it."""

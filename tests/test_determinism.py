@@ -26,7 +26,7 @@ from fracslice.rendering import cpu as tiles
 from fracslice.rendering.film import reinhard
 from fracslice.scene.view import View
 from fracslice.slicing import SliceJob, Slicer, plan_stack
-from fracslice.volume import Lattice, roots, sample
+from fracslice.volume import Lattice, sample
 from fracslice.work import Work
 from tests.threads import hurried, together
 
@@ -73,7 +73,7 @@ MAKE: dict[str, Callable[[Work], bytes]] = {
 
 def made(name: str, threads: int) -> str:
     """The hash of what new kernels make."""
-    for known in (cpu._kernel, roots._compiled):
+    for known in (cpu._kernel, cpu.compile_loops):
         known.cache_clear()
     return hashlib.sha256(MAKE[name](Work(threads=threads))).hexdigest()
 

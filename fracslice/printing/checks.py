@@ -131,7 +131,7 @@ def check_solid(
     """
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
-    most = float(BINS[-1]) / scale
+    most = max(float(BINS[-1]), limits.wall, limits.floor) / scale
     solid = Samples(bricks)
     work.check()
     thin, tight = thin_features(root, solid, work)

@@ -32,7 +32,6 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.kernel import compile_scene
 from fracslice.printing import printable
 from fracslice.printing.checks import Limits, SolidReport, check_object
 from fracslice.printing.components import components_of
@@ -294,7 +293,7 @@ def test_gaps_of_fractals_are_closed() -> None:
     planned = plan(mandelbulb(iterations=6), 64)
     points = np.random.default_rng(0).uniform(-1.2, 1.2, (3, 400_000))
     before, after = (
-        compile_scene(root, "float64").points(*points) < 0
+        root.kernel(precision="float64").points(*points) < 0
         for root in (planned.root, printable(planned, 40, Print(gap=1))[0].root)
     )
     assert after[before].all()

@@ -63,9 +63,7 @@ def test_a_strut_is_no_thinner_than_the_least_thickness() -> None:
 
 
 def sample_points(planned: Plan, *points: np.ndarray) -> np.ndarray:
-    from fracslice.kernel import compile_scene
-
-    return np.asarray(compile_scene(planned.root, "float64").points(*points))
+    return np.asarray(planned.root.kernel(precision="float64").points(*points))
 
 
 def test_pores_that_only_a_coarse_mesh_seals_are_filled() -> None:

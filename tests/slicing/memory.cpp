@@ -15,8 +15,8 @@ void operator delete(void* p) noexcept { std::free(p); }
 void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 
 int main() {
-    fracslice::Memory memory;
-    fracslice::Tiles first = memory.take(4), second = memory.take(4), third = memory.take(4);
+    fracslice::slices::Memory memory;
+    fracslice::slices::Tiles first = memory.take(4), second = memory.take(4), third = memory.take(4);
     full = true;
     memory.give(std::move(first));
     memory.give(std::move(second));

@@ -14,5 +14,5 @@ def test_tiles_are_given_back_without_memory(tmp_path) -> None:  # type: ignore[
     program = tmp_path / "memory"
     sources = [Path(__file__).with_name("memory.cpp"), SOURCES / "tiles.cpp"]
     compiler = os.environ.get("CXX", "g++")
-    subprocess.run([compiler, "-std=c++17", "-I", SOURCES, *sources, "-o", program], check=True)
+    subprocess.run([compiler, "-std=c++20", "-I", SOURCES, *sources, "-o", program], check=True)
     subprocess.run([program], check=True)
