@@ -228,6 +228,6 @@ def _boxes(
 
 
 def _areas(mesh: Mesh, labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
-    """Vector area of each component, float64 [count, 3]: the sum of its normals, each of its triangle's area."""
+    """Vector area of each component, float64 [count, 3]: the sum of the vector areas of its triangles."""
     normals = mesh.normals / 2
     return np.stack([np.bincount(labels, normals[:, k], minlength=count) for k in range(3)], axis=1)
