@@ -264,7 +264,7 @@ class _Job:
     def written(
         self, finish: Finish, check: Check, tips: np.ndarray
     ) -> tuple[Mesh | None, Simplified | None]:
-        """Write the file. Returns the mesh if it is one piece, and the result of its simplification, if any."""
+        """Write the file. Returns the mesh, if in one piece, and the result of its simplification, if any."""
         from .export import write
 
         finished, simplified = finish.finished(), None
