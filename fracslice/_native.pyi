@@ -14,8 +14,8 @@ from .kernel.machine import Function
 
 Point = tuple[float, float, float]
 Loop = tuple[Function, NDArray[Any], NDArray[Any]] | Callable[..., None]
-"""A compiled loop, its parameters and its frame, in its precision; or a function of the rows it reads, [6,
-n], the rows it writes, and for an iterative loop the number of steps.
+"""A compiled loop, its parameters and its frame, in its precision; or a function of the rows it reads,
+[6, n], the rows it writes, and for an iterative loop the number of steps.
 """
 
 def marching_cubes(
@@ -60,7 +60,7 @@ def marching_cubes(
     """
 
 def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
-    """Sign bits of samples float32 [n, 512], uint8 [n, 8, 8]: bit z of byte (x, y) is set for a sample < 0."""
+    """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) is set if < 0."""
 
 class RootLoops:
     """Compiled loops that locate crossings on grid edges; keeps its arguments alive.
@@ -255,7 +255,7 @@ class Grid:
         """Signed distance field of the same surface, by fast sweeping (Zhao, 2004). Raises ValueError."""
 
     def offset(self, distance: float) -> Grid:
-        """Signed distance field of the surface offset outwards by `distance`, scene units. Raises ValueError."""
+        """Signed distances of the surface, offset outwards by `distance`, scene units. Raises ValueError."""
 
     def surfaces(self) -> list[Grid]:
         """One grid per connected component of the surface, the largest first."""
@@ -304,7 +304,7 @@ def measures(
 def turned(
     vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64], threads: int = 0
 ) -> NDArray[int64]:
-    """Triangles, ascending, that degenerate or turn by 90 degrees or more when the vertices move to `points`."""
+    """Triangles, ascending, that degenerate or turn by at least 90 degrees if vertices move to `points`."""
 
 def pointed(
     vertices: NDArray[float64], triangles: NDArray[int32], sine: float, threads: int = 0
