@@ -28,9 +28,9 @@ MOST_ERRORS = 1 << 22
 
 VERTICES_A_BRICK = 40
 
-FLAT = 1e-6
-"""Vertices within this height of the bed, relative to the size of the mesh, are moved to the bed, which keeps
-a flat base flat.
+FLAT = 0.1
+"""Fraction of the minimum distance between vertices. Vertices within this height of the bed are moved to the
+bed, which keeps a flat base flat; a larger one would fold the small triangles around a lowest vertex.
 """
 
 
@@ -117,6 +117,7 @@ class Finish:
     ) -> None:
         from .mesh.certificate import Certificate
         from .mesh.components import choose
+        from .mesh.extract import minimum_edge_parameter
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
         self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
@@ -135,7 +136,7 @@ class Finish:
         self.volume += removed.bodies_mm3 - removed.filled_mm3
         grid = Certificate.of(surface.signs, 0)
         self._grid = replace(grid, planes=self.place.mm(grid.planes))
-        self._flat = FLAT * exact * float(np.ptp(rest, axis=0).max())
+        self._flat = FLAT * minimum_edge_parameter(surface.signs) * planned.voxel * exact
 
     def _box(self) -> Box:
         """Bounding box of the remaining bodies."""

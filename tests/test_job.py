@@ -17,6 +17,7 @@ from fracslice.formulas import (
     difference,
     intersection,
     julia,
+    mandelbulb,
     plane,
     sphere,
     torus,
@@ -210,3 +211,8 @@ def test_what_is_all_there_is_not_told():
     report = make_mesh(BALL, MeshJob(resolution=48)).report
     assert report.amount_mm3.off == 0 and report.notes == report.depths == ()
     assert report.amount_mm3.object == pytest.approx(4 / 3 * math.pi * 20**3, rel=0.01)
+
+
+def test_small_triangles_around_a_lowest_vertex_are_not_folded_onto_the_bed() -> None:
+    report = make_mesh(scene(mandelbulb(iterations=10), size="80mm"), MeshJob(resolution=256)).report
+    assert report.mesh.self_intersections == 0
