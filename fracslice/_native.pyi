@@ -27,10 +27,10 @@ def marching_cubes(
     minimum_edge_parameter: float,
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[int32]]:
-    """Surface between samples < 0 and the others, by marching cubes: closed, an oriented 2-manifold, free of
-    self-intersections.
+    """Surface between samples < 0 and the others.
 
-    Lorensen and Cline (1987), with a table derived by `make_cases.py`.
+    The surface is a closed, oriented 2-manifold without self-intersections: marching cubes (Lorensen and
+    Cline, 1987) with a table derived by `make_cases.py`.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ class Contouring:
             for an inside grid point.
         to_means : ndarray of float32, shape (n - count, 3)
             Vector from each feature vertex to the mean of the crossings around it, voxels; zero where the
-            axes' planes meet in it.
+            tangent planes are axis-aligned.
 
         Raises
         ------

@@ -15,8 +15,9 @@ class BorderError(ValueError):
     """The solid reaches the border of the lattice."""
 
 class ProbeBounds:
-    """Bounds for block probing: a block is decided if |f| at its centre exceeds a bound times the distance to
-    its farthest sample.
+    """Bounds for block probing.
+
+    A block is decided if |f| at its centre exceeds a bound times the distance to its farthest sample.
 
     Parameters
     ----------
@@ -47,8 +48,9 @@ class Memory:
     """Memory of finished slabs, reused by later ones."""
 
 class Slab:
-    """Samples of neighbouring layers, one layer at a time, on a lattice of ny x nx points at (x0 + dx i, y0 +
-    dy j).
+    """Samples of neighbouring layers, one layer at a time.
+
+    The lattice has ny x nx points at (x0 + dx i, y0 + dy j).
 
     A layer must be read before the next one is sampled; otherwise ValueError is raised.
 

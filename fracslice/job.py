@@ -293,7 +293,7 @@ class _Job:
 
         def timed() -> Iterator[Mesh]:
             for mesh in tips_last(meshes, tips) if len(tips) else meshes:
-                with self.clock("writing"):  # time between pieces
+                with self.clock("writing"):  # the consumer writes during the yield
                     yield mesh
 
         assert self.path is not None

@@ -14,14 +14,16 @@ COARSEST, FINEST = 8, 16384
 """Limits of the voxels along the longest side."""
 
 DUST = 1e-5
-"""Default volume of dust, relative to the whole object. Dust comes off the rim of a fractal of finite depth.
+"""Default maximum volume of dust, relative to the whole object: crumbs at the rim of a fractal of finite
+depth.
 """
 
 
 @dataclass(frozen=True)
 class MeshJob:
-    """Parameters of a mesh. Lengths are numbers in mm, or text with a unit, for example "0.5mm"; the fields
-    hold mm.
+    """Parameters of a mesh.
+
+    Lengths are numbers in mm, or text with a unit, for example "0.5mm"; the fields hold mm.
 
     Attributes
     ----------

@@ -83,19 +83,9 @@ class SurfaceToMesh:
 
 @dataclass(frozen=True)
 class Amount:
-    """Volume of the object, estimated from its field at random points, against the volume of its samples.
+    """Volumes of the object and of its mesh or layers.
 
-    Attributes
-    ----------
-    object : float
-        Volume of the object, mm3.
-    error : float
-        Its standard error, mm3.
-    made : float
-        Volume of the mesh or layers, removed bodies included, mm3.
-    off : float
-        Relative excess of `made`, negative if volume is missing; 0 if it is below a hundredth or not
-        significant.
+    The volume of the object is estimated from its field at random points.
     """
 
     object: float

@@ -213,7 +213,7 @@ def best(caps: list[Cap], gain: float, mesh: Mesh, fit: Fit, voxel: float) -> Ca
     caps : list of Cap
         Candidates.
     gain : float
-        Distance of the tip from the mesh.
+        Height of the tip above the nearest vertex.
     mesh : Mesh
         The mesh.
     fit : Fit

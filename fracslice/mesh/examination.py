@@ -1,6 +1,4 @@
-"""Verification of a simplification: distances, self-intersections and orientation of shells; repeated only
-where something changed.
-"""
+"""Verification of a simplification: distances, self-intersections and orientation of shells."""
 
 from __future__ import annotations
 
@@ -158,7 +156,7 @@ class _Shells:
         self.outside = self._volumes(mesh) >= 0
 
     def turned(self, mesh: Mesh) -> NDArray[np.bool_]:
-        """Triangles of shells that are inside out: crumbs that collapsed under fewer triangles."""
+        """Triangles of shells that are inside out: crumbs that fewer triangles cannot represent."""
         found: NDArray[np.bool_] = (self.outside != (self._volumes(mesh) >= 0))[self.of[mesh.triangles[:, 0]]]
         return found
 

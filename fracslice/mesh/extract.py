@@ -193,8 +193,8 @@ def _trust_regions(
     which: np.ndarray,
     inside: np.ndarray,
 ) -> TrustRegions:
-    """Trust regions of feature vertices: the interior of their cell or face, and the direction to its nearest
-    corner of the other sign. Crossings determine the surface around them.
+    """Trust regions of feature vertices: the interior of their cell or face, its nearest corner of the other
+    sign, and the mean of the crossings around them.
     """
     origin, voxel, margin = np.array(bricks.origin)[:, None], bricks.voxel, minimum_edge_parameter(bricks)
     there = np.ascontiguousarray(features[which].T)

@@ -118,8 +118,9 @@ class Mesh(Exchange):
         return self.measures_from((x, y, z), threads)
 
     def measures_from(self, point: tuple[float, float, float], threads: int = 1) -> tuple[float, float, int]:
-        """`measures` with the signed volume between the triangles and a point; those of the pieces of a mesh
-        add up.
+        """`measures`, with the signed volume between the triangles and a point.
+
+        The volumes of the parts of a closed mesh add up to its volume.
 
         Parameters
         ----------

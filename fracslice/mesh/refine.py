@@ -29,7 +29,7 @@ than a voxel the fraction decreases. Refinement would not follow a rough edge.
 """
 
 WORTH = 10
-"""Refinement goes on as long as one edge is split for at most this many triangles out of tolerance."""
+"""Refinement stops when fewer than one edge is split per this many triangles out of tolerance."""
 
 UPRIGHT = np.cos(np.radians(29))
 """Minimum cosine between the normals of a new triangle and of the field."""
@@ -88,9 +88,9 @@ def refine(
 ) -> tuple[Mesh, Refined]:
     """Split edges until no triangle is farther than `chord` from the surface.
 
-    New vertices are projected to the surface, and at sharp edges to these. Edges are then flipped to improve
-    the normals of triangles. Old vertices do not move. The surface stays closed and free of
-    self-intersections: a split that would cause one is refused.
+    New vertices lie on the surface, and on sharp edges that a mesh edge follows or crosses. Edges are then
+    flipped to improve the normals of triangles. Old vertices do not move. The surface stays closed and free
+    of self-intersections: a split that would cause one is refused.
 
     Parameters
     ----------

@@ -11,7 +11,9 @@ from fracslice.scene import parse_length
 from fracslice.work import Work
 
 ROUNDS, PATIENT = 200, 40
-"""Maximum rounds of undo, and rounds after which other collapses may be tried at the faulty triangles."""
+"""Maximum rounds of verification and undo, and number of the first rounds in which new collapses may replace
+the undone ones.
+"""
 
 AIM = 0.95
 """Fraction of the tolerance for vertices; the triangles between them need the rest."""

@@ -61,7 +61,7 @@ class _Survey:
         low, high = _boxes(mesh.vertices, mesh.vertices, of_vertex, count)
         whole = not np.isfinite([self.end, end]).any()
         areas = np.zeros((count, 3)) if whole else _areas(mesh, local, count)
-        # Cones over a component's first corner, moved to the corner of its box: exact even for small bodies.
+        # Cones over a component's first corner, moved to the corner of its box: precise even for dust.
         first = np.searchsorted(np.maximum.accumulate(local), np.arange(count))
         tips = mesh.vertices[mesh.triangles[first, 0]]
         cones, sizes = component_sizes(mesh.vertices, mesh.triangles, local, count, self.threads)
@@ -149,7 +149,7 @@ class WholeShells:
         return np.stack([self.low[which].min(axis=0), self.high[which].max(axis=0)])
 
     def nested(self, pieces: Pieces, threads: int = 0) -> tuple[Shells, int]:
-        """Nesting of the shells.
+        """Nesting of the shells, by rays.
 
         The ray of each shell starts at its point of least x. This point lies within a cell, so that a ray
         across x stays in one piece.

@@ -67,8 +67,9 @@ def edge_topology(triangles: NDArray[np.int32], vertices: int, threads: int = 0)
 
 
 def edge_ends(triangles: NDArray[np.int32], counted: NDArray[np.bool_], threads: int = 0) -> EdgeTopology:
-    """Counts of `edge_topology` at some vertices. Edges are counted by their ends at these: twice if both
-    ends count.
+    """Counts of `edge_topology` at some vertices; edges are counted by their ends.
+
+    An edge with both ends at these vertices counts twice.
 
     Parameters
     ----------
