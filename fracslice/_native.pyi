@@ -1,8 +1,7 @@
-"""C++ parts of fracslice: marching cubes on bricks, questions about triangle meshes, and OpenVDB. Callers use
-`fracslice.mesh` and `fracslice.volume.grid`.
+"""C++ parts of fracslice: marching cubes on bricks, triangle meshes, and OpenVDB. Call `fracslice.mesh` and
+`fracslice.volume.grid` instead.
 
-Arrays are C-contiguous and as `fracslice.volume.bricks.Bricks` describes them. Long calls let other threads
-run.
+Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Long calls release the GIL.
 """
 
 from collections.abc import Callable
@@ -15,8 +14,9 @@ from .kernel.machine import Function
 
 Point = tuple[float, float, float]
 Loop = tuple[Function, NDArray[Any], NDArray[Any]] | Callable[..., None]
-"""A compiled loop, its parameters and its frame, in its precision; or a function of the rows that it reads,
-[6, n], those that it writes, and where it takes steps their number."""
+"""A compiled loop, its parameters and its frame, in its precision; or a function of the rows it reads,
+[6, n], the rows it writes, and for an iterative loop the number of steps.
+"""
 
 def marching_cubes(
     ijk: NDArray[int32],
@@ -27,29 +27,60 @@ def marching_cubes(
     minimum_edge_parameter: float,
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[int32]]:
-    """The surface between the samples < 0 and the others: closed, an oriented 2-manifold, free of
-    self-crossings.
+    """Surface between samples < 0 and the others.
 
-    minimum_edge_parameter: how near a grid point a vertex may come, as a share of the edge. threads: 0 for
-    all cores; the result is the same for any number.
+    The surface is a closed, oriented 2-manifold without self-intersections: marching cubes (Lorensen and
+    Cline, 1987) with a table derived by `make_cases.py`.
 
-    Returns vertices float64 [n, 3] at origin + voxel * (grid position); triangles int32 [m, 3],
-    counter-clockwise seen from outside. Marching cubes after Lorensen and Cline (1987), with a table that
-    `make_cases.py` derives.
+    Parameters
+    ----------
+    ijk, values, index : ndarray
+        Samples, as in `fracslice.volume.bricks.Bricks`.
+    origin : tuple of float
+        Position of the grid's origin.
+    voxel : float
+        Spacing of the grid.
+    minimum_edge_parameter : float
+        Minimum distance of a vertex from a grid point, as a fraction of the edge.
+    threads : int, optional
+        Threads; 0 for all cores. The result does not depend on it.
 
-    Raises ValueError if a sign change leaves the samples or the arrays contradict each other, and for a
-    surface of more than 2^31 vertices or triangles.
+    Returns
+    -------
+    vertices : ndarray of float64, shape (n, 3)
+        Positions, origin + voxel * (grid position).
+    triangles : ndarray of int32, shape (m, 3)
+        Triangles, counter-clockwise seen from outside.
+
+    Raises
+    ------
+    ValueError
+        If the surface leaves the samples, for inconsistent arrays, or for more than 2^31 vertices or
+        triangles.
     """
 
 def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
-    """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) set where < 0."""
+    """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) is set if < 0."""
 
 class RootLoops:
-    """The loops of `fracslice.volume.root_loops` that find crossings: `find` in float32 and in float64, and
-    `polish`. field: the same float64 field, `CpuKernel.entry` or a function of points [3, n] and of [1, n]
-    for their values. Holds all of them. lanes: segments and points come in multiples of it. batch: how many
-    segments are worth a call. steps: that all segments are given, and those that then are left. sure: a root
-    is exact where it moved less."""
+    """Compiled loops that locate crossings on grid edges; keeps its arguments alive.
+
+    Parameters
+    ----------
+    lanes : int
+        Segments and points come in multiples of it.
+    batch : int
+        Minimum segments of an efficient call.
+    guess, find, polish : Loop
+        Loops of `fracslice.volume.root_loops`: `find` in float32, `find` in float64, and `polish`.
+    field : tuple or callable
+        The same float64 field: `CpuKernel.entry`, or a function of points [3, n] and of values [1, n] to be
+        written.
+    steps : tuple of int
+        Steps for all segments, and for those that have not converged by then.
+    sure : float
+        A root that `polish` moves less than this is exact.
+    """
 
     def __init__(
         self,
@@ -64,23 +95,46 @@ class RootLoops:
     ) -> None: ...
 
 class Cells:
-    """The grid cells that a surface passes, numbered once, to be meshed as a whole or in pieces.
+    """Numbered grid cells of a surface, to be meshed as a whole or in pieces.
 
-    A piece is the layers of bricks `first` to `last - 1` along x; layers past both ends are allowed: cells of
-    the surface may lie beside the samples. Raises ValueError if a sign change leaves the samples, the arrays
-    contradict each other or the bricks are not in order, and for more than 2^31 crossings.
+    A piece is the layers of bricks `first` to `last` - 1 along x. Layers beyond both ends are allowed: cells
+    of the surface may lie beside the samples.
+
+    Raises
+    ------
+    ValueError
+        If the surface leaves the samples, for inconsistent arrays or unordered bricks, or for more than 2^31
+        crossings.
     """
 
     def __init__(
         self, ijk: NDArray[int32], signs: NDArray[uint8], index: NDArray[int32], threads: int = 0
     ) -> None: ...
     def crossings_before(self, layer: int) -> int:
-        """How many crossings the bricks before a layer number."""
+        """Number of crossings in the bricks before a layer."""
 
     def segments(self, begin: int, end: int, origin: Point, voxel: float) -> NDArray[float64]:
-        """The grid edges that the surface crosses, numbers `begin` to `end` - 1 in the order of the vertices
-        of `marching_cubes`: float64 [6, n], where each starts and from there to its end, scene units. Raises
-        ValueError where there are no such crossings."""
+        """Grid edges that the surface crosses.
+
+        Parameters
+        ----------
+        begin, end : int
+            Crossings `begin` to `end` - 1, in the order of the vertices of `marching_cubes`.
+        origin : tuple of float
+            Position of the grid's origin, scene units.
+        voxel : float
+            Spacing of the grid, scene units.
+
+        Returns
+        -------
+        ndarray of float64, shape (6, n)
+            Start of each edge and the vector to its end, scene units.
+
+        Raises
+        ------
+        ValueError
+            For crossings that do not exist.
+        """
 
     def find_crossings(
         self,
@@ -92,13 +146,30 @@ class Cells:
         t: NDArray[float64],
         normals: NDArray[float32],
     ) -> None:
-        """Writes where on these edges, all of their bricks', the surface is, as shares of them, to t, [n];
-        and its unit normals there to normals, [3, n], each row contiguous. Raises ValueError as `segments`,
-        or for arrays of another length, and whatever Python functions raise."""
+        """Locate the surface on the grid edges of whole bricks.
+
+        Parameters
+        ----------
+        begin, end, origin, voxel
+            As in `segments`.
+        loops : RootLoops
+            Compiled loops over the field.
+        t : ndarray of float64, shape (n,)
+            Written: edge parameters of the crossings.
+        normals : ndarray of float32, shape (3, n)
+            Written: unit normals at the crossings; each row is contiguous.
+
+        Raises
+        ------
+        ValueError
+            For crossings that do not exist, or arrays of another length. Exceptions of Python functions pass
+            through.
+        """
 
 class Contouring:
-    """The surface of `marching_cubes` in some layers of cells, through exact crossings, its edges and corners
-    kept: made layer by layer, from the one before `first` to `last`. Raises ValueError for more than 2^31
+    """Surface of `marching_cubes` through exact crossings, with sharp edges and corners, in layers of cells.
+
+    Layers are added in order, from the one before `first` to `last`. Raises ValueError for more than 2^31
     vertices or triangles.
     """
 
@@ -112,50 +183,82 @@ class Contouring:
         minimum_edge_parameter: float,
     ) -> None: ...
     def advance(self, end: int, first: int, t: NDArray[float64], normals: NDArray[float32]) -> None:
-        """Goes on to the layer before `end`. t: where on its edge the surface crosses each of those numbered
-        from `first` on, [n]; normals: unit, outward, [3, n], each row contiguous: all of these layers and of
-        the layer `end`, or ValueError is raised."""
+        """Add the layers before `end`.
+
+        Parameters
+        ----------
+        end : int
+            First layer that is not added.
+        first : int
+            Number of the first given crossing.
+        t : ndarray of float64, shape (n,)
+            Edge parameters of the crossings of these layers and of layer `end`.
+        normals : ndarray of float32, shape (3, n)
+            Unit outward normals at the crossings; each row is contiguous.
+
+        Raises
+        ------
+        ValueError
+            If crossings are missing.
+        """
 
     def finish(self) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8], NDArray[float32]]:
-        """Vertices and triangles as `marching_cubes`, how many vertices are crossings (the first: those of
-        the layers `first` to `last`), and for each of the others, in faces and cells, the case of its cell,
-        of the upper one at a face: bit dx + 2 dy + 4 dz set for an inside grid point; and the way from it to
-        the mean of the crossings around it, [3] in voxels, zero where the axes' planes meet in it. Raises
-        ValueError while layers are left."""
+        """Finished surface.
+
+        Returns
+        -------
+        vertices : ndarray of float64, shape (n, 3)
+            Crossings of layers `first` to `last`, then feature vertices in faces and cells.
+        triangles : ndarray of int32, shape (m, 3)
+            Triangles, counter-clockwise seen from outside.
+        count : int
+            Number of crossings.
+        cases : ndarray of uint8, shape (n - count,)
+            Case of the cell of each feature vertex, at a face of the upper cell: bit dx + 2 dy + 4 dz is set
+            for an inside grid point.
+        to_means : ndarray of float32, shape (n - count, 3)
+            Vector from each feature vertex to the mean of the crossings around it, voxels; zero where the
+            tangent planes are axis-aligned.
+
+        Raises
+        ------
+        ValueError
+            If layers are missing.
+        """
 
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:
-    """How many grid edges with a sign change touch a point without a sample: 0 if the surface is closed."""
+    """Number of grid edges with a sign change at a point without a sample: 0 for a closed surface."""
 
 class Grid:
-    """A sparse OpenVDB level set."""
+    """Sparse OpenVDB level set."""
 
     @staticmethod
     def from_bricks(
         ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32], origin: Point, voxel: float
     ) -> Grid:
-        """Active where sampled; the background is the largest sample, negative inside."""
+        """Grid of samples: active at samples; the background is the largest sample, negative inside."""
 
     @staticmethod
     def read(path: str, name: str = "") -> Grid:
-        """The float grid of that name in a .vdb file, or the first one. Raises RuntimeError."""
+        """Read the named float grid of a .vdb file, or the first one. Raises RuntimeError."""
 
     def write(self, path: str, metadata: dict[str, str]) -> None:
-        """Writes a .vdb file. Raises RuntimeError if not all of it could be written."""
+        """Write a .vdb file. Raises RuntimeError if it cannot be written completely."""
 
     def to_bricks(self) -> tuple[list[float], float, NDArray[int32], NDArray[float32], NDArray[int32]]:
-        """origin, voxel, ijk, values, index. Raises ValueError unless voxels are axis-aligned cubes."""
+        """Origin, voxel, ijk, values and index. Raises ValueError unless voxels are axis-aligned cubes."""
 
     def mesh(self, adaptivity: float = 0.0) -> tuple[NDArray[float32], NDArray[uint32], NDArray[uint32]]:
-        """OpenVDB's own surface (dual contouring): points [n, 3], triangles [m, 3], quads [k, 4]."""
+        """Dual contouring by OpenVDB: points [n, 3], triangles [m, 3], quads [k, 4]."""
 
     def redistance(self) -> Grid:
-        """The same surface in a field of distances, by fast sweeping (Zhao, 2004). Raises ValueError."""
+        """Signed distance field of the same surface, by fast sweeping (Zhao, 2004). Raises ValueError."""
 
     def offset(self, distance: float) -> Grid:
-        """The surface of a field of distances moved outwards, in scene units. Raises ValueError."""
+        """Signed distances of the surface, offset outwards by `distance`, scene units. Raises ValueError."""
 
     def surfaces(self) -> list[Grid]:
-        """One grid for each connected piece of the surface, the largest first."""
+        """One grid per connected component of the surface, the largest first."""
 
     name: str
     @property
@@ -168,15 +271,15 @@ class Grid:
     def leaves(self) -> int: ...
     @property
     def memory(self) -> int:
-        """Bytes."""
+        """Memory in bytes."""
 
-# On triangle meshes: vertices [n, 3], triangles [m, 3]. All raise ValueError for an index out of range and
-# for arrays that contradict each other; results are the same for any number of threads.
+# Triangle meshes: vertices [n, 3], triangles [m, 3]. All functions raise ValueError for an index out of range
+# or inconsistent arrays. Results do not depend on the number of threads.
 
 def edge_topology(
     triangles: NDArray[int32], counted: NDArray[bool_], threads: int = 0
 ) -> tuple[int, int, int, int, int]:
-    """`fracslice.mesh.links.edge_ends`."""
+    """See `fracslice.mesh.topology.edge_ends`."""
 
 def corners_by_vertex(
     triangles: NDArray[int32], vertices: int, threads: int = 0
@@ -191,53 +294,52 @@ def component_sizes(
     count: int,
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[float64]]:
-    """`fracslice.mesh.links.component_sizes`."""
+    """See `fracslice.mesh.topology.component_sizes`."""
 
 def measures(
     vertices: NDArray[float64], triangles: NDArray[int32], point: Point, threads: int = 0
 ) -> tuple[float, float, int]:
-    """The triangles' area, the signed volume between them and a point, and how many have no area."""
+    """Area of triangles, signed volume between them and a point, and number of triangles without area."""
 
 def turned(
     vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64], threads: int = 0
 ) -> NDArray[int64]:
-    """The triangles, ascending, that are flat or turn by a right angle or more when the vertices move to
-    `points`."""
+    """Triangles, ascending, that degenerate or turn by at least 90 degrees if vertices move to `points`."""
 
 def pointed(
     vertices: NDArray[float64], triangles: NDArray[int32], sine: float, threads: int = 0
 ) -> NDArray[int64]:
-    """The vertices, ascending, from which all edges fall off, at an angle of at least that sine."""
+    """Vertices, ascending, from which all edges descend, at an angle of at least that sine."""
 
 def bounds(points: NDArray[float64], threads: int = 0) -> tuple[Point, Point]:
-    """Low and high corner of the box around points, float64 [n, 3]. Raises ValueError if there are none."""
+    """Low and high corner of the bounding box of points, float64 [n, 3]. Raises ValueError without points."""
 
 def quantise(
     points: NDArray[float64], planes: NDArray[float64], threads: int = 0
 ) -> tuple[NDArray[float64], NDArray[bool_]]:
-    """`fracslice.mesh.rounding.quantise`. Raises ValueError for a coordinate that is not finite."""
+    """See `fracslice.mesh.quantisation.quantise`. Raises ValueError for a coordinate that is not finite."""
 
 def selected(
     vertices: NDArray[float64], triangles: NDArray[int32], keep: NDArray[bool_], threads: int = 0
 ) -> tuple[NDArray[float64], NDArray[int32]] | None:
-    """`fracslice.mesh.model.Mesh.selected`; None if nothing goes."""
+    """See `fracslice.mesh.model.Mesh.selected`; None if nothing is removed."""
 
 def touching(triangles: NDArray[int32], vertices: NDArray[bool_], threads: int = 0) -> NDArray[int64]:
-    """The triangles, ascending, with a corner among some vertices, bool [n]."""
+    """Triangles, ascending, with a corner among some vertices, bool [n]."""
 
 def surroundings(
     vertices: NDArray[float64], triangles: NDArray[int32], of: NDArray[bool_], threads: int = 0
 ) -> NDArray[int64]:
-    """The triangles, ascending, that may meet one of some, bool [m], and these."""
+    """Triangles, ascending, that may meet one of some triangles, bool [m]; these are included."""
 
 def stl(vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0) -> NDArray[uint8]:
-    """The triangles as binary STL holds them, uint8 [m, 50]."""
+    """Records of a binary STL, uint8 [m, 50]."""
 
 def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]: ...
 def tree(
     vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0
 ) -> tuple[NDArray[int64], NDArray[float64], NDArray[float64]]:
-    """`fracslice.mesh.tree.Tree`."""
+    """See `fracslice.mesh.tree.Tree`."""
 
 def self_intersecting_triangles(
     vertices: NDArray[float64],
@@ -250,24 +352,25 @@ def self_intersecting_triangles(
 ) -> NDArray[bool_]: ...
 
 class Reduction:
-    """`fracslice.mesh.collapse.Collapse`; it looks into these arrays as long as it lives."""
+    """See `fracslice.mesh.collapse.Collapse`. Refers to the arrays during its lifetime."""
 
     def __init__(self, vertices: NDArray[float64], triangles: NDArray[int32], tolerance: float) -> None: ...
     def renew(self) -> None:
-        """All vertices are looked at by the next sweeps."""
+        """Mark all vertices for the next sweeps."""
 
     def sweep(self, first: int, last: int, share: float) -> int:
-        """Takes out such of the vertices first to last - 1 as can go with an error of a share of the
-        tolerance, and returns how many; a sweep begins with first = 0."""
+        """Remove vertices of `first` to `last` - 1 within a fraction of the tolerance; returns their number.
+        A sweep begins with `first` = 0.
+        """
 
     def undo(self, faulty: NDArray[bool_]) -> None: ...
     def state(
         self,
     ) -> tuple[NDArray[int32], NDArray[bool_], NDArray[int32], NDArray[bool_], NDArray[int32]]:
-        """`fracslice.mesh.collapse.Collapsed`."""
+        """See `fracslice.mesh.collapse.Collapsed`."""
 
 class Nearest:
-    """`fracslice.mesh.nearest.Nearest`; it looks into these arrays as long as it lives."""
+    """See `fracslice.mesh.nearest.Nearest`. Refers to the arrays during its lifetime."""
 
     def __init__(
         self,
@@ -303,7 +406,7 @@ def nesting(
     first: NDArray[int64],
     threads: int = 0,
 ) -> tuple[NDArray[int64], NDArray[int64]]:
-    """winding, parent."""
+    """Winding numbers and parents; see `fracslice.mesh.nesting.nesting`."""
 
 def side_of_line(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int: ...
 def side_of_plane(a: Point, b: Point, c: Point, d: Point) -> int: ...

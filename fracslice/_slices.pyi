@@ -1,7 +1,7 @@
-"""C++ parts of fracslice: the samples around the contours of a few neighbouring layers, marching squares on
-them, and pictures. Callers use `fracslice.slicing`.
+"""C++ parts of fracslice: samples around the contours of neighbouring layers, marching squares on them, and
+images. Call `fracslice.slicing` instead.
 
-Long calls let other threads run.
+Long calls release the GIL.
 """
 
 from collections.abc import Callable
@@ -12,17 +12,26 @@ from numpy.typing import NDArray
 from .kernel.machine import Function
 
 class BorderError(ValueError):
-    """The solid reaches the rim of the lattice."""
+    """The solid reaches the border of the lattice."""
 
 class ProbeBounds:
-    """How far values reach: a block is decided where |f| exceeds a bound times the distance from its middle
-    to its farthest sample.
+    """Bounds for block probing.
 
-    proven: for blocks over all layers. outside, inside: for finer ones, by the sign of the middle.
-    stop_outside, stop_inside: blocks of so many pixels are not cut any more. escape_time_only: inside values
-    are of another scale than outside ones, but of one everywhere, so that a part of the crossings tells for
-    all, and the bound outside follows the steepness of the field, from `outside` up to `proven`. In other
-    fields every crossing is projected to the surface, and so are corners within pixels.
+    A block is decided if |f| at its centre exceeds a bound times the distance to its farthest sample.
+
+    Parameters
+    ----------
+    proven : float
+        Bound for blocks over all layers.
+    outside, inside : float
+        Bounds for smaller blocks, by the sign at the centre.
+    stop_outside, stop_inside : int
+        Size of blocks that are not subdivided further, pixels.
+    escape_time_only : bool
+        True for a field of escape-time fractals alone. Its inside values differ from outside ones by one
+        scale factor, so that a sample of the crossings represents all; the bound outside follows the slope of
+        the field, from `outside` up to `proven`. In other fields every crossing is projected to the surface,
+        and so are corners within pixels.
     """
 
     def __init__(
@@ -36,14 +45,29 @@ class ProbeBounds:
     ) -> None: ...
 
 class Memory:
-    """Of slabs that are gone, for those to come."""
+    """Memory of finished slabs, reused by later ones."""
 
 class Slab:
-    """The samples of one layer after the other, on a lattice of ny x nx points at (x0 + dx i, y0 + dy j).
+    """Samples of neighbouring layers, one layer at a time.
 
-    memory: shared by slabs of one job. entry: of the field's float32 kernel (`Kernel.entry`). frame: (x0,
-    y0, dx, dy). z: heights of neighbouring layers. All in scene units. What is read of a layer is read before
-    the next one is sampled; a ValueError else.
+    The lattice has ny x nx points at (x0 + dx i, y0 + dy j).
+
+    A layer must be read before the next one is sampled; otherwise ValueError is raised.
+
+    Parameters
+    ----------
+    memory : Memory
+        Memory shared by the slabs of one job.
+    entry : tuple or callable
+        Float32 kernel of the field (`Kernel.entry`).
+    bounds : ProbeBounds
+        Bounds for block probing.
+    frame : tuple of float
+        (x0, y0, dx, dy), scene units.
+    z : list of float
+        Heights of the layers, scene units.
+    ny, nx : int
+        Lattice points.
     """
 
     def __init__(
@@ -57,27 +81,51 @@ class Slab:
         nx: int,
     ) -> None: ...
     def sample(self, layer: int) -> None:
-        """Finds the samples around the contours of a layer, closed: every edge that a contour crosses has two
-        evaluated ends. They do not depend on which layers were sampled before. Raises BorderError.
+        """Sample a layer around its contours; every edge that a contour crosses has two evaluated ends.
+
+        The samples do not depend on the layers sampled before. Raises BorderError.
         """
 
     @property
     def evaluations(self) -> int:
-        """Of the field, so far."""
+        """Evaluations of the field so far."""
 
     def paint(self, layer: int, image: NDArray[uint8]) -> tuple[float, int]:
-        """Writes the coverage of a layer's pixels to a zeroed image of any strides, 255 wholly inside, row 0
-        lowest.
+        """Write the coverage of a layer's pixels to an image.
 
-        Returns the inside area in pixels, before it is rounded, and the number of pixels that the contour
-        cuts.
+        Parameters
+        ----------
+        layer : int
+            The sampled layer.
+        image : ndarray of uint8, shape (rows, columns)
+            Zeroed image of any strides; 255 is completely inside, row 0 is the lowest.
+
+        Returns
+        -------
+        area : float
+            Inside area before rounding, pixels.
+        cut : int
+            Pixels that the contour crosses.
         """
 
     def runs(self, layer: int, shape: tuple[int, int]) -> tuple[NDArray[int32], NDArray[int32], float, int]:
-        """A layer's solid pixels, those of which at least half is inside, in time linear in its tiles.
+        """Runs of a layer's solid pixels, those at least half inside, in time linear in its tiles.
 
-        Row y has the runs ``rows[y]:rows[y + 1]``, rows int32 [ny + 1]; each is its first pixel and the one
-        after its last, int32 [n, 2]. And what `paint` returns.
+        Parameters
+        ----------
+        layer : int
+            The sampled layer.
+        shape : tuple of int
+            Rows and columns of the layer.
+
+        Returns
+        -------
+        rows : ndarray of int32, shape (ny + 1,)
+            Row y has the runs ``rows[y]:rows[y + 1]``.
+        runs : ndarray of int32, shape (n, 2)
+            First pixel of each run, and the pixel after its last.
+        area, cut
+            As from `paint`.
         """
 
     def picture(
@@ -90,22 +138,43 @@ class Slab:
         shape: tuple[int, int],
         levels: bytes,
     ) -> tuple[bytes, float, int]:
-        """A layer's coverage as a screen shows it, see `fracslice.slicing.layers.View`: the rows of pixels,
-        each after a byte 0, as a zlib stream; and what `paint` returns.
+        """Coverage of a layer as shown on a screen; see `fracslice.slicing.layers.ScreenView`.
 
-        pixels: rows and columns of the screen. shape: of the layer.
+        Parameters
+        ----------
+        layer : int
+            The sampled layer.
+        pixels : tuple of int
+            Rows and columns of the screen.
+        transposed, backwards, at, levels
+            As in `ScreenView`.
+        shape : tuple of int
+            Rows and columns of the layer.
+
+        Returns
+        -------
+        stream : bytes
+            Rows of pixels, each after a byte 0, as a zlib stream.
+        area, cut
+            As from `paint`.
         """
 
     def crossings(self, layer: int) -> tuple[NDArray[int32], NDArray[float64]]:
-        """The crossed edges of a layer, row by row of tiles: int32 [n, 4], column, row and direction (0
-        right, 1 up) of each and the number of the one that follows on its contour, the inside to the left;
-        and the values at both ends, float64 [n, 2].
+        """Crossed lattice edges of a layer, by rows of tiles.
+
+        Returns
+        -------
+        edges : ndarray of int32, shape (n, 4)
+            Column, row and direction (0 right, 1 up) of each edge, and the index of the next edge on its
+            contour, with the inside to the left.
+        values : ndarray of float64, shape (n, 2)
+            Values at both ends.
         """
 
     def signs(self) -> tuple[NDArray[uint8], NDArray[uint8]]:
-        """Which samples are inside, and which were evaluated: 0 or 1, uint8 [rows, columns], both rounded up
-        to whole tiles of 8.
+        """Inside samples and evaluated samples: 0 or 1, uint8 [rows, columns], both rounded up to whole tiles
+        of 8.
         """
 
 def deflated(image: NDArray[uint8]) -> bytes:
-    """The rows of an image of any strides, each after a byte 0, as a zlib stream."""
+    """Rows of an image of any strides, each after a byte 0, as a zlib stream."""

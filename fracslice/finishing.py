@@ -1,4 +1,6 @@
-"""From a surface in scene units to finished triangles in mm, and what is told of them."""
+"""Placement, selection of bodies, cleaning and checking: from a surface in scene units to finished triangles
+in mm.
+"""
 
 from __future__ import annotations
 
@@ -22,39 +24,86 @@ if TYPE_CHECKING:
     from .surfaces import Surface
 
 MOST_ERRORS = 1 << 22
-"""Vertices whose distance from the surface is measured, about, evenly spread over it."""
+"""Approximate maximum of vertices whose distance from the surface is measured, evenly distributed over it."""
 
 VERTICES_A_BRICK = 40
 
 FLAT = 0.1
-"""Share of the least distance between vertices: what is lower than this above the bed is put on it, so that a
-flat base is flat. More would fold the small triangles around a lowest vertex."""
+"""Fraction of the minimum distance between vertices. Vertices within this height of the bed are moved to the
+bed, which keeps a flat base flat; a larger one would fold the small triangles around a lowest vertex.
+"""
 
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the scene is in print space: ``mm = scale * scene units + offset``."""
+    """Map from the scene to print space: ``mm = scale * scene units + offset``.
+
+    Attributes
+    ----------
+    scale : float
+        mm per scene unit.
+    offset : tuple of float
+        Translation, mm.
+    """
 
     scale: float
     offset: tuple[float, float, float]
 
     def mm(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points in print space, [n, 3]."""
+        """Transform points from the scene to print space.
+
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 3)
+            Points, scene units.
+
+        Returns
+        -------
+        ndarray of float64, shape (n, 3)
+            Points, mm.
+        """
         found: NDArray[np.float64] = points * self.scale + np.array(self.offset)
         return found
 
     def units(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points of print space in the scene, [n, 3]."""
+        """Transform points from print space to the scene.
+
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 3)
+            Points, mm.
+
+        Returns
+        -------
+        ndarray of float64, shape (n, 3)
+            Points, scene units.
+        """
         found: NDArray[np.float64] = (points - np.array(self.offset)) / self.scale
         return found
 
 
 class Finish:
-    """The bodies of a surface that stay, and their place: decided once, for all pieces.
+    """Selection of bodies and placement of a surface, decided once for all pieces.
 
-    how: which bodies and cavities stay. dust: the volume below which a body goes, mm3, from the whole's.
-    size: mm, the longest side of what stays; scale: mm per scene unit, if that is known. Raises `MeshError`
-    if nothing would stay.
+    Parameters
+    ----------
+    surface : Surface
+        Labelled surface.
+    how : Print
+        Choice of bodies and cavities.
+    dust : callable
+        Maps the volume of the object to the volume below which a body is removed, mm3.
+    size : float
+        Longest side of the remaining bodies, mm.
+    scale : float or None
+        mm per scene unit; None to derive it from the size.
+    clock : Clock
+        Threads, progress, cancellation and timing.
+
+    Raises
+    ------
+    MeshError
+        If no body would remain.
     """
 
     def __init__(
@@ -83,37 +132,44 @@ class Finish:
         self.place = Placement(exact, (-exact * x, -exact * y, -exact * float(rest[0, 2])))
         self.removed: Removed = removed
         self.volume = float(nested.volumes[self.stays].sum()) * exact**3
-        """mm3, of all bodies, those that were dropped included."""
+        """Volume of all bodies, removed ones included, mm3."""
         self.volume += removed.bodies_mm3 - removed.filled_mm3
         grid = Certificate.of(surface.signs, 0)
         self._grid = replace(grid, planes=self.place.mm(grid.planes))
         self._flat = FLAT * minimum_edge_parameter(surface.signs) * planned.voxel * exact
 
     def _box(self) -> Box:
+        """Bounding box of the remaining bodies."""
         from .volume.rest import box_of_the_rest
 
         whole, rest = self.shells.bounds(), self.shells.bounds(self.stays)
         return box_of_the_rest(self.planned, whole, rest, self._outermost, self.clock.work)
 
     def _outermost(self) -> NDArray[np.float64]:
-        """The outermost vertices of what stays, of each piece."""
+        """Extreme vertices of the remaining triangles, of each piece."""
         from .volume.rest import outermost
 
         kept = map(self._kept, range(len(self.pieces)))
         return np.concatenate([outermost(mesh.vertices) for mesh in kept if len(mesh.vertices)])
 
     def _stay(self, number: int) -> NDArray[np.bool_]:
-        """Which triangles of a piece stay, bool [m]."""
+        """Mask of the remaining triangles of a piece, bool [m]."""
         found: NDArray[np.bool_] = self.stays[self.shells.of_label[self.pieces.labels(number)]]
         return found
 
     def _kept(self, number: int) -> Mesh:
-        """What stays of a piece, scene units."""
+        """Remaining triangles of a piece, scene units."""
         mesh = self.pieces.mesh(number)
         return mesh if self.stays.all() else mesh.selected(self._stay(number), self.clock.work.threads)
 
     def finished(self) -> Iterator[Finished]:
-        """What is finished by each piece, mm; pieces held in memory are let go."""
+        """Place and clean the pieces, mm. Pieces held in memory are released.
+
+        Yields
+        ------
+        Finished
+            Triangles that are finished with each piece.
+        """
         from .mesh.window import Window
 
         voxel, threads = self.planned.voxel * self.place.scale, self.clock.work.threads
@@ -125,25 +181,35 @@ class Finish:
                 self.pieces.drop(number)
                 end = self.place.scale * self.pieces.ends[number] + self.place.offset[0]
                 made = window.add(mesh, end, known)
-                del mesh  # it would stay while what was made of it is checked
+                del mesh  # free it before the checks of the caller
             self.clock.work.progress("finishing", (number + 1) / count)
             yield made
 
     def _placed(self, number: int) -> tuple[Mesh, Certificate]:
-        """What stays of a piece, mm, and what is certified of it: nothing of what is moved to the bed."""
+        """Remaining triangles of a piece, mm, and their certificate. Triangles moved to the bed are not
+        certified.
+        """
         mesh = self._kept(number)
         points = self.place.mm(mesh.vertices)
         points[points[:, 2] < self._flat, 2] = 0
         stay = self._stay(number)
         holds = (np.arange(len(stay)) < len(stay) - self.pieces.fresh[number])[stay]
         planes = self._grid.planes[:, 2]
-        if ((planes >= 0) & (planes < self._flat)).any():  # some vertices are below it now
+        if ((planes >= 0) & (planes < self._flat)).any():  # the plane is above some vertices now
             holds &= (points[:, 2] > 0)[mesh.triangles].all(axis=1)
         return replace(mesh, vertices=points), replace(self._grid, holds=holds)
 
 
 class Check:
-    """What is told of finished triangles as they pass."""
+    """Checks finished triangles as they pass.
+
+    Parameters
+    ----------
+    finish : Finish
+        Selection and placement.
+    bricks : int
+        Bricks of samples.
+    """
 
     def __init__(self, finish: Finish, bricks: int) -> None:
         from .mesh.window import Tally
@@ -153,7 +219,18 @@ class Check:
         self._errors: list[NDArray[np.float64]] = []
 
     def passing(self, pieces: Iterable[Finished]) -> Iterator[Mesh]:
-        """The finished triangles, piece after piece."""
+        """Check pieces and pass them on.
+
+        Parameters
+        ----------
+        pieces : iterable of Finished
+            Finished pieces.
+
+        Yields
+        ------
+        Mesh
+            Finished triangles of each piece, mm.
+        """
         for piece in pieces:
             with self._finish.clock("checking"):
                 self._tally.add(piece)
@@ -162,6 +239,7 @@ class Check:
             yield passed
 
     def _off(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances of vertices in mm from the surface, scene units."""
         from .volume.accuracy import surface_error
 
         planned, place = self._finish.planned, self._finish.place
@@ -169,7 +247,7 @@ class Check:
 
     @property
     def mesh(self) -> MeshReport:
-        """The whole mesh, once all of it has passed."""
+        """Report on the whole mesh, after all pieces have passed."""
         hollow, stays = self._finish.shells.volumes < 0, self._finish.stays
         bodies, cavities = int((stays & ~hollow).sum()), int((stays & hollow).sum())
         return self._tally.report(bodies, cavities, self._finish.misplaced)

@@ -1,4 +1,4 @@
-"""The main job, from a scene to a printable mesh with the numbers that prove it."""
+"""The mesh job: from a scene to a checked, printable mesh."""
 
 from __future__ import annotations
 
@@ -33,8 +33,20 @@ STL = ".stl"
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """A mesh that was made, and what is told of it. place: the map from the scene to the mesh. planned: what
-    was sampled. whole: the mesh, unless it is larger than memory and only in the file.
+    """Result of `make_mesh`.
+
+    Attributes
+    ----------
+    report : Report
+        Measures, checks and costs.
+    place : Placement
+        Map from the scene to the mesh.
+    planned : Plan
+        Sampled field.
+    whole : Mesh or None
+        The mesh; None if it is larger than memory and only in the file.
+    work : Work
+        Threads, progress and cancellation of the job.
     """
 
     report: Report
@@ -45,9 +57,12 @@ class Result:
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh in mm, standing on z = 0, coordinates as a file holds them.
+        """The mesh in mm, standing on z = 0, quantised to float32.
 
-        Raises `TooLargeError` for one that was written piece after piece.
+        Raises
+        ------
+        TooLargeError
+            If the mesh was written in pieces.
         """
         if self.whole is None:
             raise TooLargeError("the mesh does not fit in memory; it is in the file that was written")
@@ -55,19 +70,19 @@ class Result:
 
     @property
     def root(self) -> Field:
-        """The field that was meshed."""
+        """Field that was meshed."""
         return self.planned.root
 
     @cached_property
     def bricks(self) -> Bricks:
-        """Samples of the field where the mesh was made, scene units; taken when first asked for."""
+        """Samples of the field around the surface, scene units; computed on first access."""
         from .volume import sample_scene
 
         return sample_scene(self.planned, self.work)
 
     @property
     def bricks_mm(self) -> Bricks:
-        """The samples in the mesh's space: position and values in mm."""
+        """Samples in print space: positions and values in mm."""
         scale, (x, y, z) = self.place.scale, self.bricks.origin
         dx, dy, dz = self.place.offset
         return replace(
@@ -85,25 +100,26 @@ def make_mesh(
 
     Parameters
     ----------
-    scene
-        The scene to mesh.
-    what, work
-        What to make of it, and how.
-    path
-        The file to write, of the kind that its name ends in. An .stl file may be larger than memory: it is
-        then made piece after piece, and its folder must have room for it twice.
+    scene : Scene
+        Scene to mesh.
+    what : MeshJob, optional
+        Size, resolution and changes of the mesh.
+    work : Work, optional
+        Threads, progress and cancellation.
+    path : str or Path, optional
+        File to write; the extension selects the format. An .stl file may be larger than memory: it is then
+        written in pieces, and its folder needs twice its size of free space.
 
     Returns
     -------
     Result
-        The mesh and its report. A mesh that would not print as it is is returned all the same; its report
-        says what is wrong.
+        The mesh and its report. A mesh that is not printable is returned, too; its report lists the problems.
 
     Raises
     ------
     SceneError, VolumeError, MeshError, ExportError, Cancelled
-        For a scene or job that cannot be meshed or a file that cannot be written; nothing is left of a file
-        that is not whole. `TooLargeError`, a `VolumeError`, for a mesh that needs more memory than there is.
+        For a scene or job that cannot be meshed, or a file that cannot be written; no incomplete file is
+        left. `TooLargeError`, a `VolumeError`, for a mesh that needs more memory than is available.
     """
     job = _Job(scene, what or MeshJob(), Clock(work or Work()), None if path is None else Path(path))
     job.refuse()
@@ -113,7 +129,7 @@ def make_mesh(
 
 @dataclass(frozen=True)
 class _Sized:
-    """A plan; mm per scene unit, if that is known; and what is left to choose among its bodies."""
+    """A plan, its scale in mm per scene unit (None if not yet known), and the remaining choice of bodies."""
 
     planned: Plan
     scale: float | None
@@ -122,7 +138,7 @@ class _Sized:
 
 @dataclass(frozen=True)
 class _Job:
-    """The stages of a job."""
+    """Stages of a job."""
 
     scene: Scene
     what: MeshJob
@@ -130,7 +146,7 @@ class _Job:
     path: Path | None
 
     def refuse(self) -> None:
-        """Raise an error for what cannot be done, before any of it is."""
+        """Raise the errors of invalid arguments before any work is done."""
         self.what.voxels(self.scene)
         if self.path is not None:
             from .export import check_format, check_target
@@ -140,7 +156,9 @@ class _Job:
 
     @contextmanager
     def aside(self) -> Iterator[Callable[[], Path] | None]:
-        """Yields what makes a folder for pieces beside the file, or None where the file takes no pieces."""
+        """Yield a function that makes a folder for pieces beside the file; None if the format does not
+        support pieces.
+        """
         if self.path is None or self.path.suffix.lower() != STL:
             yield None
             return
@@ -153,7 +171,7 @@ class _Job:
             )
 
     def planned(self) -> _Sized:
-        """The field to be meshed, edited if it is to be."""
+        """Field to be meshed, with its edits."""
         from .volume import plan
 
         how = self.what.how(self.scene)
@@ -162,30 +180,30 @@ class _Job:
         return _Sized(planned, None, how) if how.whole else self.edited(planned)
 
     def edited(self, planned: Plan) -> _Sized:
-        """The field with all edits that make it printable."""
+        """Field with all edits for printing."""
         from .printing import printable
 
         how = self.what.how(self.scene)
         with self.clock("changing"):
             made, scale = printable(planned, self.what.size(self.scene), how, self.clock.work)
-        # Of walls thinner than a voxel a mesh has crumbs only: bodies are chosen in the field where it tells.
+        # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.
         keep = how.keep if planned.root.bounds.exterior_only else "all"
-        # A hollow is a cavity, too.
+        # Keep cavities: the hollow is one.
         return _Sized(made, scale, Print(keep=keep, cavities=how.cavities if how.whole else "keep"))
 
     def surface(self, aside: Callable[[], Path] | None) -> tuple[_Sized, Surface, str]:
-        """The surface of what stays; and a note on walls that are thinner than a voxel."""
+        """Surface of the remaining bodies, and a note on walls thinner than a voxel."""
         sized = self.planned()
         surface = self.meshed(sized, aside)
         thin, how = surface.thin, self.what.how(self.scene)
-        if thin and how.whole and how.sorts:  # what is one body only the field tells
+        if thin and how.whole and how.sorts:  # only the field can tell bodies apart
             sized = self.edited(sized.planned)
             surface = self.meshed(sized, aside)
             thin = surface.thin
         return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, surface, thin
 
     def meshed(self, sized: _Sized, aside: Callable[[], Path] | None) -> Surface:
-        """The surface, in one piece if it fits in memory."""
+        """Surface, in one piece if it fits in memory."""
         signs = surfaces.sampled(sized.planned, self.clock)
         most, voxel = len(signs), self.what.size(self.scene) / self.what.voxels(self.scene)
         try:
@@ -201,7 +219,7 @@ class _Job:
         return surfaces.made(sized.planned, signs, most, folder, self.clock)
 
     def result(self, sized: _Sized, surface: Surface, thin: str) -> Result:
-        """The finished mesh, and what is told of it."""
+        """Finished mesh and report."""
         from .mesh.missed import surface_to_mesh
         from .shown import mesh_amount
 
@@ -246,7 +264,7 @@ class _Job:
     def written(
         self, finish: Finish, check: Check, tips: np.ndarray
     ) -> tuple[Mesh | None, Simplified | None]:
-        """The mesh, if it is one piece, and what was done to have fewer triangles; the file is written."""
+        """Write the file. Returns the mesh, if in one piece, and the result of its simplification, if any."""
         from .export import write
 
         finished, simplified = finish.finished(), None
@@ -268,14 +286,14 @@ class _Job:
         return mesh, simplified
 
     def streamed(self, meshes: Iterator[Mesh], tips: np.ndarray) -> None:
-        """Write an STL piece after piece."""
+        """Write an STL in pieces."""
         from .export import application, replacing
         from .export.stl import write_pieces
         from .mesh.window import tips_last
 
         def timed() -> Iterator[Mesh]:
             for mesh in tips_last(meshes, tips) if len(tips) else meshes:
-                with self.clock("writing"):  # what is done between pieces
+                with self.clock("writing"):  # the consumer writes during the yield
                     yield mesh
 
         assert self.path is not None
@@ -284,5 +302,16 @@ class _Job:
 
 
 def metadata(scene: Scene) -> dict[str, str]:
-    """What files say of the scene that they were made of."""
+    """Metadata of files made from a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        Title and hash.
+    """
     return {"Title": scene.name, "scene_hash": scene.hash}

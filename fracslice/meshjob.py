@@ -1,4 +1,4 @@
-"""What to make of a scene as a mesh."""
+"""Parameters of a mesh job."""
 
 from __future__ import annotations
 
@@ -11,22 +11,41 @@ from .scene.lengths import Length
 
 RESOLUTION = 256.0
 COARSEST, FINEST = 8, 16384
-"""Voxels along the longest side."""
+"""Limits of the voxels along the longest side."""
 
 DUST = 1e-5
-"""The share of the whole below which a body is dust, as it comes off the rim of a fractal of finite depth."""
+"""Default maximum volume of dust, relative to the whole object: crumbs at the rim of a fractal of finite
+depth.
+"""
 
 
 @dataclass(frozen=True)
 class MeshJob:
-    """What to make of a scene. Lengths are numbers of mm, or text such as "0.5mm"; the fields hold mm.
+    """Parameters of a mesh.
 
-    size_mm: the longest side, if not what the scene says. voxel_mm or resolution (voxels along the longest
-    side): how fine; 256 along the longest side if neither is given. dust_mm3: bodies with less material are
-    dropped; if not given, those under 1e-5 of the whole. printing: what makes it printable, if not what the
-    scene says. chord_mm: more triangles where a smooth surface is farther than this from them. simplify_mm:
-    fewer triangles, nowhere farther than this from all of them. Raises `SceneError` for values that cannot
-    be.
+    Lengths are numbers in mm, or text with a unit, for example "0.5mm"; the fields hold mm.
+
+    Attributes
+    ----------
+    size_mm : float, optional
+        Longest side; by default that of the scene.
+    voxel_mm : float, optional
+        Voxel; excludes `resolution`.
+    resolution : float, optional
+        Voxels along the longest side; 256 by default.
+    dust_mm3 : float, optional
+        Bodies of less material are removed, mm3; by default those below 1e-5 of the whole.
+    printing : Print, optional
+        Changes that make the object printable; by default those of the scene.
+    chord_mm : float, optional
+        Refine smooth surfaces until no triangle is farther from them than this.
+    simplify_mm : float, optional
+        Simplify the mesh within this tolerance.
+
+    Raises
+    ------
+    SceneError
+        For invalid values.
     """
 
     size_mm: float | None = None
@@ -43,22 +62,76 @@ class MeshJob:
         validate(self, _KINDS, SceneError)
 
     def size(self, scene: Scene) -> float:
-        """The longest side in mm."""
+        """Longest side.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to mesh.
+
+        Returns
+        -------
+        float
+            Length, mm.
+        """
         return scene.size_mm if self.size_mm is None else self.size_mm
 
     def how(self, scene: Scene) -> Print:
-        """What makes it printable."""
+        """Changes for printing.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to mesh.
+
+        Returns
+        -------
+        Print
+            Those of the job, or else of the scene.
+        """
         return scene.printing if self.printing is None else self.printing
 
     def dust(self, volume: float) -> float:
-        """The volume below which a body of an object of `volume` is dropped, mm3."""
+        """Volume below which a body is removed.
+
+        Parameters
+        ----------
+        volume : float
+            Volume of the object, mm3.
+
+        Returns
+        -------
+        float
+            Limit, mm3.
+
+        Raises
+        ------
+        SceneError
+            If the limit exceeds the volume of the object.
+        """
         dust = DUST * volume if self.dust_mm3 is None else self.dust_mm3
         if dust > volume:
             raise SceneError(f"dust {dust:.4g}mm3: expected at most the object's volume, {volume:.4g}mm3")
         return dust
 
     def voxels(self, scene: Scene) -> float:
-        """Voxels along the longest side."""
+        """Voxels along the longest side.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to mesh.
+
+        Returns
+        -------
+        float
+            Voxels.
+
+        Raises
+        ------
+        SceneError
+            If the voxel is too coarse or too fine for the size.
+        """
         if self.voxel_mm is None:
             return RESOLUTION if self.resolution is None else self.resolution
         size = self.size(scene)

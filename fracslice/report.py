@@ -1,4 +1,4 @@
-"""What a job tells about its result."""
+"""Report of a mesh job."""
 
 from __future__ import annotations
 
@@ -19,7 +19,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SurfaceError:
-    """How far the mesh's vertices are from the true surface, in mm."""
+    """Distances of the mesh's vertices from the true surface.
+
+    Attributes
+    ----------
+    mean, p99, max : float
+        Mean, 99th percentile and maximum, mm.
+    """
 
     mean: float
     p99: float
@@ -27,13 +33,32 @@ class SurfaceError:
 
     @classmethod
     def of(cls, mm: NDArray[np.float64]) -> SurfaceError:
-        """Of the distances that were measured."""
+        """Summarise distances.
+
+        Parameters
+        ----------
+        mm : ndarray of float64
+            Distances, mm.
+
+        Returns
+        -------
+        SurfaceError
+            Summary.
+        """
         return cls(float(mm.mean()), float(np.quantile(mm, 0.99)), float(mm.max()))
 
 
 @dataclass(frozen=True)
 class SurfaceToMesh:
-    """How far points of the true surface, found without the mesh, are from the mesh, in mm."""
+    """Distances from points on the true surface, located without the mesh, to the mesh.
+
+    Attributes
+    ----------
+    mean, max : float
+        Mean and maximum, mm.
+    points : int
+        Number of points.
+    """
 
     mean: float
     max: float
@@ -41,15 +66,26 @@ class SurfaceToMesh:
 
     @classmethod
     def of(cls, mm: NDArray[np.float64]) -> SurfaceToMesh:
-        """Of the distances that were measured."""
+        """Summarise distances.
+
+        Parameters
+        ----------
+        mm : ndarray of float64
+            Distances, mm.
+
+        Returns
+        -------
+        SurfaceToMesh
+            Summary.
+        """
         return cls(float(mm.mean()), float(mm.max()), len(mm))
 
 
 @dataclass(frozen=True)
 class Amount:
-    """The volume of the object itself, by its field at random points, its standard error, and the volume that
-    was made of it, bodies that were dropped included: mm3. off: what was made more, or, negative, less, as a
-    share; 0 where that is not sure, or less than a hundredth.
+    """Volumes of the object and of its mesh or layers.
+
+    The volume of the object is estimated from its field at random points.
     """
 
     object: float
@@ -60,8 +96,42 @@ class Amount:
 
 @dataclass(frozen=True)
 class Report:
-    """What was made, how good it is and what it took. seconds: of each stage, and in total. amount_mm3:
-    whether that is all of it. notes: what the voxel was too large for, in words. depths: automatic ones.
+    """Report of a mesh job: the mesh, its accuracy and the costs.
+
+    Attributes
+    ----------
+    scene, scene_hash : str
+        Name and hash of the scene.
+    version : str
+        Version of fracslice.
+    size_mm, voxel_mm : float
+        Longest side and voxel, mm.
+    mesh : MeshReport
+        Measures and defects of the mesh.
+    removed : Removed
+        Removed bodies and cavities.
+    surface_error_mm : SurfaceError
+        Distances of vertices from the true surface.
+    surface_to_mesh_mm : SurfaceToMesh
+        Distances from the true surface to the mesh.
+    evaluations : int
+        Field evaluations for sampling.
+    bricks : int
+        Bricks of samples.
+    seconds : mapping
+        Seconds of each stage, and in total.
+    peak_rss_mb : float
+        Peak memory of the process, MB.
+    amount_mm3 : Amount, optional
+        Volume of the object against that of the mesh.
+    refined : Refined, optional
+        Result of the refinement.
+    simplified : Simplified, optional
+        Result of the simplification.
+    notes : tuple of str
+        Features that the voxel is too large for.
+    depths : tuple of str
+        Automatic depths of fractals.
     """
 
     scene: str
@@ -88,24 +158,36 @@ class Report:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Why the mesh would not print as it is; empty if it would."""
+        """Defects that make the mesh unprintable, tuple of str; empty if there are none."""
         return self.mesh.problems
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON, the mesh's numbers beside the others."""
+        """Report as plain JSON; the fields of the mesh are merged with the others.
+
+        Returns
+        -------
+        dict
+            All fields.
+        """
         own = {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name != "mesh"}
         return {**own, **self.mesh.as_dict()}
 
 
 def _plain(value: Any) -> Any:
-    """A record or a mapping as a dictionary."""
+    """Convert a dataclass or mapping to a dictionary."""
     if isinstance(value, Mapping):
         return dict(value)
     return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
 
 
 def version() -> str:
-    """The installed version of fracslice."""
+    """Installed version of fracslice.
+
+    Returns
+    -------
+    str
+        Version, or "not installed".
+    """
     from importlib.metadata import PackageNotFoundError
     from importlib.metadata import version as installed
 

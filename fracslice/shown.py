@@ -1,4 +1,4 @@
-"""Whether what was made is all of the object: its volume against that of the field."""
+"""Completeness of a mesh or stack of layers: its volume against that of the field."""
 
 from __future__ import annotations
 
@@ -20,16 +20,39 @@ if TYPE_CHECKING:
     from .slicing import Stack
 
 Grid = tuple[Triple, Triple, Callable[[float], str]]
-"""Origin and spacing of samples, scene units, and what to call those of a share of the spacing."""
+"""Origin and spacing of the samples, scene units, and a function that names samples of a fraction of the
+spacing.
+"""
 
 SLABS = 6
-"""How many of a stack are measured, evenly spread."""
+"""Slabs of a stack that are measured, evenly distributed."""
 
 
 def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[Amount, tuple[str, ...]]:
-    """The volume of what a mesh was made of, and a line if that is another.
+    """Compare the volume of a mesh with that of its field.
 
-    made: the mesh's volume, mm3, with what was dropped of it. scale: mm per scene unit. Raises `Cancelled`.
+    Parameters
+    ----------
+    planned : Plan
+        Sampled field.
+    made : float
+        Volume of the mesh, removed bodies included, mm3.
+    scale : float
+        mm per scene unit.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    Amount
+        Both volumes.
+    tuple of str
+        A note if they differ.
+
+    Raises
+    ------
+    Cancelled
+        If the work is cancelled.
     """
     lattice = Lattice.around(planned.outer, planned.voxel)
 
@@ -41,7 +64,27 @@ def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[A
 
 
 def layers_amount(stack: Stack, work: Work) -> tuple[Amount, tuple[str, ...]]:
-    """As `mesh_amount`, of some of a stack's slabs. Raises `SliceError`, `Cancelled`."""
+    """Compare the volume of some slabs of a stack with that of its field.
+
+    Parameters
+    ----------
+    stack : Stack
+        The stack.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    Amount
+        Both volumes.
+    tuple of str
+        A note if they differ.
+
+    Raises
+    ------
+    SliceError, Cancelled
+        If a layer cannot be sampled, or the work is cancelled.
+    """
     from .slicing import SLAB, Slicer
 
     starts = np.arange(0, len(stack.z), SLAB)
@@ -70,7 +113,7 @@ def _compared(
     grid: Grid,
     work: Work,
 ) -> tuple[Amount, tuple[str, ...]]:
-    """What is in boxes against what was made of it, mm3."""
+    """Compare the volume of the field in boxes, scene units, with `made`, mm3."""
     found = amount(root, boxes, work)
     off, unit = found.off(made / scale**3), scale**3
     told = Amount(found.volume * unit, found.error * unit, made, off)

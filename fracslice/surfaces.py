@@ -1,4 +1,4 @@
-"""The surface of a planned scene, in as many pieces as memory asks for."""
+"""Surface of a planned scene, in one piece or in pieces that fit in memory."""
 
 from __future__ import annotations
 
@@ -21,17 +21,31 @@ if TYPE_CHECKING:
     from .volume import Plan, SignBricks
 
 BYTES_A_BRICK = 30_000
-"""Peak memory for each brick of samples, its triangles in all their stages included; measured."""
+"""Peak memory per brick of samples, its triangles at all stages included, bytes; measured."""
 
 BRICKS = 1 << 13
-"""In a piece of a mesh that does not fit in memory, and in one that always does: 256 voxels along the longest
-side."""
+"""Bricks per piece of a mesh that does not fit in memory, and of a mesh that always fits: 256 voxels along
+the longest side.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """The exact surface of a field, scene units. signs: its samples. tips: those that it was mended at,
-    float64 [k, 3]."""
+    """Exact surface of a field, scene units.
+
+    Attributes
+    ----------
+    planned : Plan
+        Sampled field.
+    signs : SignBricks
+        Its samples.
+    pieces : Pieces
+        Labelled pieces of the mesh.
+    shells : WholeShells
+        Shells of the mesh.
+    tips : ndarray of float64, shape (k, 3)
+        Tips that were added.
+    """
 
     planned: Plan
     signs: SignBricks
@@ -41,12 +55,25 @@ class Surface:
 
     @property
     def thin(self) -> str:
-        """What walls came to that are thinner than a voxel, in words; empty where all are thicker."""
+        """Note on walls thinner than a voxel; empty if there are none."""
         return self.shells.thin_walls(self.planned.voxel)
 
 
 def sampled(planned: Plan, clock: Clock) -> SignBricks:
-    """The signs of a planned scene around its surface."""
+    """Sample the signs of a planned scene around its surface.
+
+    Parameters
+    ----------
+    planned : Plan
+        Field and voxel.
+    clock : Clock
+        Threads, progress, cancellation and timing.
+
+    Returns
+    -------
+    SignBricks
+        Signs.
+    """
     from .volume import sample_scene_signs
 
     with clock("sampling"):
@@ -54,10 +81,22 @@ def sampled(planned: Plan, clock: Clock) -> SignBricks:
 
 
 def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:
-    """Raise `TooLargeError`, naming a voxel that fits, for a surface that takes more memory than there is.
+    """Raise an error for a surface that needs more memory than is available.
 
-    voxel: mm. The number of bricks grows like a power of the resolution, the surface's dimension by counting
-    boxes of one and of two bricks.
+    The number of bricks grows with a power of the resolution: the box-counting dimension of the surface,
+    estimated from boxes of one and of two bricks.
+
+    Parameters
+    ----------
+    signs : SignBricks
+        Samples of the surface.
+    voxel : float
+        Voxel, mm.
+
+    Raises
+    ------
+    TooLargeError
+        With a voxel that fits.
     """
     needed, free = len(signs) * BYTES_A_BRICK, available_bytes()
     if len(signs) <= BRICKS or needed <= free:
@@ -72,9 +111,25 @@ def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:
 
 
 def made(planned: Plan, signs: SignBricks, most: int, folder: Path | None, clock: Clock) -> Surface:
-    """The surface through some samples, in pieces of about `most` bricks.
+    """Mesh the surface of samples, in pieces of about `most` bricks.
 
-    folder: where pieces are laid aside, if they are more than one.
+    Parameters
+    ----------
+    planned : Plan
+        Sampled field.
+    signs : SignBricks
+        Its samples.
+    most : int
+        Approximate bricks per piece.
+    folder : Path or None
+        Folder for the pieces, if there are several.
+    clock : Clock
+        Threads, progress, cancellation and timing.
+
+    Returns
+    -------
+    Surface
+        The surface with tips, labelled.
     """
     from .mesh.extract import Piece, contour, contour_pieces
     from .mesh.pieces import Pieces
@@ -97,7 +152,24 @@ def made(planned: Plan, signs: SignBricks, most: int, folder: Path | None, clock
 
 
 def refined(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refined]:
-    """A surface of one piece with more triangles, nowhere farther off than a chord, scene units."""
+    """Refine a surface in one piece.
+
+    Parameters
+    ----------
+    surface : Surface
+        The surface.
+    chord : float
+        Maximum distance of triangles from the exact surface, scene units.
+    clock : Clock
+        Threads, progress, cancellation and timing.
+
+    Returns
+    -------
+    Surface
+        Refined surface.
+    Refined
+        Result, with lengths in scene units.
+    """
     from .mesh.extract import Piece
     from .mesh.pieces import Pieces
     from .mesh.refine import refine

@@ -1,4 +1,4 @@
-"""From bricks to a printable solid: extraction, solids, components and checks."""
+"""Mesh extraction, connected components, cleaning, checks and solids."""
 
 from fracslice.mesh.model import Mesh
 

@@ -1,4 +1,4 @@
-"""The triangles that a tip replaces: disks of a mesh, and the fans in their place."""
+"""Caps: the disks of triangles that a tip replaces, and the triangle fans that replace them."""
 
 from __future__ import annotations
 
@@ -13,43 +13,91 @@ from .pieces import rows
 from .topology import corners_by_vertex
 
 ANGLES = 0.6, 0.3, 0.1
-"""Sines of angles at which a tip is above the planes of triangles that it replaces, at least."""
+"""Minimum sines of the elevation of a tip above the planes of the triangles it replaces."""
 
 THIN = 0.01
-"""Voxels: the height of new triangles, at least: rounding turns none over."""
+"""Minimum height of a new triangle, voxels: rounding cannot turn it over."""
 
 MOST = 64
-"""Triangles that a tip replaces."""
+"""Maximum number of triangles that a tip replaces."""
 
 
 class Cap(NamedTuple):
-    """Triangles, by number, int64 [k], and the corners of the fan in their place, float64 [e, 3, 3]: the tip
-    is the last one of each."""
+    """A disk of triangles and the fan that replaces it.
+
+    Attributes
+    ----------
+    old : ndarray of int64, shape (k,)
+        Indices of the replaced triangles.
+    fan : ndarray of float64, shape (e, 3, 3)
+        Corners of the new triangles; the tip is the last corner of each.
+    """
 
     old: NDArray[np.int64]
     fan: NDArray[np.float64]
 
 
 class Rings:
-    """A mesh, and the triangles around its vertices."""
+    """One-ring neighbourhoods of the vertices of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    """
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self._start, self._corner = corners_by_vertex(mesh.triangles, len(mesh.vertices))
 
     def at(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The vertices at points, [n, 3], where there is one each."""
+        """Look up vertices by position.
+
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 3)
+            Positions of vertices; each position has exactly one vertex.
+
+        Returns
+        -------
+        ndarray of int64, shape (n,)
+            Vertex indices.
+        """
         once, which = np.unique(rows(points), return_inverse=True)
         found = np.intersect1d(rows(self.mesh.vertices), once, return_indices=True)[1]
         return np.asarray(found[which])
 
     def around(self, vertices: NDArray[np.integer]) -> NDArray[np.int64]:
-        """The triangles at some vertices, ascending."""
+        """Triangles incident to any of some vertices.
+
+        Parameters
+        ----------
+        vertices : ndarray of integers, shape (n,)
+            Vertex indices.
+
+        Returns
+        -------
+        ndarray of int64, shape (k,)
+            Triangle indices, ascending.
+        """
         corners = [self._corner[self._start[v] : self._start[v + 1]] for v in vertices]
         return np.unique(np.concatenate(corners) // 3)
 
     def nearest(self, vertices: NDArray[np.integer], points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The vertices near points that ways over nearer and nearer ones lead to."""
+        """Vertices close to points, by greedy descent along edges.
+
+        Parameters
+        ----------
+        vertices : ndarray of integers, shape (n,)
+            Start vertices.
+        points : ndarray of float64, shape (n, 3)
+            Target points.
+
+        Returns
+        -------
+        ndarray of int64, shape (n,)
+            For each point the vertex at which no neighbour is nearer to it.
+        """
         found = np.empty(len(points), np.int64)
         for k, (best, point) in enumerate(zip(vertices, points, strict=True)):
             last = -1
@@ -60,16 +108,54 @@ class Rings:
         return found
 
     def middles(self, vertices: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Of the vertices around each, and itself."""
+        """Centroid of each vertex and its neighbours.
+
+        Parameters
+        ----------
+        vertices : ndarray of integers, shape (n,)
+            Vertex indices.
+
+        Returns
+        -------
+        ndarray of float64, shape (n, 3)
+            Centroids.
+        """
         return np.array([self.mesh.vertices[self.ring(v)].mean(axis=0) for v in vertices]).reshape(-1, 3)
 
     def ring(self, vertex: int) -> NDArray[np.int32]:
-        """The vertices around one, and itself."""
+        """Neighbours of a vertex, the vertex included.
+
+        Parameters
+        ----------
+        vertex : int
+            Vertex index.
+
+        Returns
+        -------
+        ndarray of int32, shape (k,)
+            Vertex indices, ascending.
+        """
         return np.unique(self.mesh.triangles[self.around(np.array([vertex]))])
 
     def caps(self, vertex: int, tip: NDArray[np.float64]) -> list[Cap]:
-        """Disks of triangles near a vertex that a tip sees from above, at several angles; with all of those
-        around the vertex, with those around its neighbours too, and without."""
+        """Candidate caps of a tip.
+
+        A cap is a disk of triangles near the vertex that face the tip. Each angle in `ANGLES` has three
+        candidates: grown from nothing, from the triangles around the vertex, and from those around its
+        neighbours too.
+
+        Parameters
+        ----------
+        vertex : int
+            Vertex near the tip.
+        tip : ndarray of float64, shape (3,)
+            Position of the tip.
+
+        Returns
+        -------
+        list of Cap
+            Distinct candidates.
+        """
         own = self.around(np.array([vertex]))
         seeds = own[:0], own, self.around(self.ring(vertex))
         disks = (self._disk(seed, vertex, tip, sine) for sine in ANGLES for seed in seeds)
@@ -78,6 +164,9 @@ class Rings:
     def _disk(
         self, seed: NDArray[np.int64], vertex: int, tip: NDArray[np.float64], sine: float
     ) -> Cap | None:
+        """Grow a disk from the seed by adjacent triangles that face the tip; None if it is too large or no
+        disk.
+        """
         seen, near = seed, self.around(np.array([vertex]))
         while len(seen) <= MOST:
             corners = self.mesh.vertices[self.mesh.triangles[near]]
@@ -92,12 +181,13 @@ class Rings:
         return None
 
     def _fan(self, rim: NDArray[np.int32], tip: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Triangles from the edges of the rim to the tip."""
         ends = self.mesh.vertices[rim]
         return np.concatenate([ends, np.broadcast_to(tip, (len(rim), 1, 3))], axis=1)
 
 
 def _rim(triangles: NDArray[np.int32]) -> NDArray[np.int32] | None:
-    """The edges around triangles, in turn; None if these are no disk."""
+    """Boundary edges of triangles, in order; None if the triangles do not form a disk."""
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     known = set(map(tuple, sides.tolist()))
     following = {a: b for a, b in sides.tolist() if (b, a) not in known}
@@ -112,8 +202,30 @@ def _rim(triangles: NDArray[np.int32]) -> NDArray[np.int32] | None:
 
 
 def best(caps: list[Cap], gain: float, mesh: Mesh, fit: Fit, voxel: float) -> Cap | None:
-    """The one that is nearest to the surface, if it is nowhere farther than what it replaces, or than the tip
-    was; and nowhere thin or turned away."""
+    """Choose the cap whose fan is closest to the surface.
+
+    A fan qualifies if its greatest distance from the surface is at most that of the triangles it replaces, or
+    at most `gain` and the fit's reach. None of its triangles may be thin or face away from the field's
+    normal.
+
+    Parameters
+    ----------
+    caps : list of Cap
+        Candidates.
+    gain : float
+        Height of the tip above the nearest vertex.
+    mesh : Mesh
+        The mesh.
+    fit : Fit
+        Distances to the surface.
+    voxel : float
+        Voxel, in the units of the mesh.
+
+    Returns
+    -------
+    Cap or None
+        The best cap; None if none qualifies.
+    """
     if not caps:
         return None
     old = fit.triangles(mesh.vertices[mesh.triangles[np.concatenate([cap.old for cap in caps])]])
@@ -128,7 +240,7 @@ def best(caps: list[Cap], gain: float, mesh: Mesh, fit: Fit, voxel: float) -> Ca
 
 
 def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The least height of triangles, [m]."""
+    """Smallest height of each triangle, float64 [m]."""
     sides = corners - np.roll(corners, 1, axis=1)
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     found: NDArray[np.float64] = area / np.linalg.norm(sides, axis=2).max(axis=1)
@@ -136,7 +248,20 @@ def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def apart(caps: list[Cap], count: int) -> list[Cap]:
-    """Those of which no two have a triangle in common, the first ones first."""
+    """Select caps without common triangles, in order of preference.
+
+    Parameters
+    ----------
+    caps : list of Cap
+        Caps, the preferred ones first.
+    count : int
+        Triangles of the mesh.
+
+    Returns
+    -------
+    list of Cap
+        Disjoint caps.
+    """
     taken, kept = np.zeros(count, bool), []
     for cap in caps:
         if not taken[cap.old].any():
@@ -146,7 +271,20 @@ def apart(caps: list[Cap], count: int) -> list[Cap]:
 
 
 def capped(mesh: Mesh, caps: list[Cap]) -> Mesh:
-    """The mesh with caps: the other triangles first, then the fans in turn."""
+    """Replace triangles by the fans of caps.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    caps : list of Cap
+        Disjoint caps.
+
+    Returns
+    -------
+    Mesh
+        The remaining triangles in order, then the fans in order.
+    """
     gone = np.concatenate([cap.old for cap in caps])
     keep = np.ones(len(mesh.triangles), bool)
     keep[gone] = False

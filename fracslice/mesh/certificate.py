@@ -1,4 +1,4 @@
-"""What is known of a mesh before it is looked at: triangles as contouring laid them do not intersect."""
+"""Certificate of a mesh: triangles unchanged since contouring are free of self-intersections."""
 
 from __future__ import annotations
 
@@ -13,13 +13,17 @@ from ..volume.lattice import BRICK
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """Which triangles of a mesh lie in grid cells as contouring laid them there.
+    """The triangles of a mesh that are unchanged since contouring.
 
-    No two of them intersect (`fracslice/native/mesh/contour.h`), also once their vertices are quantised, as
-    long as each stays in its place between the planes (`quantise.h`).
+    No two of them intersect (`fracslice/native/mesh/contour.h`). This also holds after quantisation if no
+    vertex changes its position relative to the planes of the grid (`quantise.h`).
 
-    planes: the grid's, across each axis, in the space of the mesh, float64 [k, 3], ascending; none if nothing
-    is known. holds: bool [m].
+    Attributes
+    ----------
+    planes : ndarray of float64, shape (k, 3)
+        Planes of the grid across each axis, ascending, in the space of the mesh; empty without a certificate.
+    holds : ndarray of bool, shape (m,)
+        True for each certified triangle.
     """
 
     planes: NDArray[np.float64]
@@ -27,23 +31,80 @@ class Certificate:
 
     @classmethod
     def none(cls, triangles: int) -> Certificate:
-        """Of a mesh of which nothing is known."""
+        """Empty certificate.
+
+        Parameters
+        ----------
+        triangles : int
+            Triangles of the mesh.
+
+        Returns
+        -------
+        Certificate
+            Certifies no triangle.
+        """
         return cls(np.empty((0, 3)), np.zeros(triangles, bool))
 
     @classmethod
     def of(cls, bricks: Bricks | SignBricks, triangles: int) -> Certificate:
-        """Of the mesh that `contour` makes of these samples, scene units."""
+        """Certificate of a mesh as `contour` makes it.
+
+        Parameters
+        ----------
+        bricks : Bricks or SignBricks
+            Samples that were contoured.
+        triangles : int
+            Triangles of the mesh.
+
+        Returns
+        -------
+        Certificate
+            Certifies all triangles; planes in scene units.
+        """
         steps = np.arange(-BRICK, BRICK * (max(bricks.index.shape) + 1) + 1)
         return cls(np.array(bricks.origin) + bricks.voxel * steps[:, None], np.ones(triangles, bool))
 
     def scaled(self, factor: float) -> Certificate:
-        """As `Mesh.scaled`."""
+        """Certificate of the scaled mesh; see `Mesh.scaled`.
+
+        Parameters
+        ----------
+        factor : float
+            Scale factor.
+
+        Returns
+        -------
+        Certificate
+            Its planes scaled.
+        """
         return replace(self, planes=self.planes * factor)
 
     def translated(self, offset: NDArray[np.float64]) -> Certificate:
-        """As `Mesh.translated`."""
+        """Certificate of the translated mesh; see `Mesh.translated`.
+
+        Parameters
+        ----------
+        offset : ndarray of float64, shape (3,)
+            Translation.
+
+        Returns
+        -------
+        Certificate
+            Its planes translated.
+        """
         return replace(self, planes=self.planes + offset)
 
     def selected(self, keep: NDArray[np.bool_]) -> Certificate:
-        """As `Mesh.selected`."""
+        """Certificate of selected triangles; see `Mesh.selected`.
+
+        Parameters
+        ----------
+        keep : ndarray of bool, shape (m,)
+            True for each triangle that stays.
+
+        Returns
+        -------
+        Certificate
+            Restricted to these triangles.
+        """
         return replace(self, holds=self.holds[keep])

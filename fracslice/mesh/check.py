@@ -1,4 +1,4 @@
-"""Would this mesh print? A verdict with the numbers that prove it."""
+"""Printability check of a mesh: counts of defects, and a verdict."""
 
 from __future__ import annotations
 
@@ -15,14 +15,48 @@ from fracslice.mesh.quantisation import quantised
 
 @dataclass(frozen=True)
 class MeshReport:
-    """What `check` found; every field is plain JSON. Counts of defects are zero on a good solid.
+    """Result of `check_mesh`; every field is plain JSON. Counts of defects are zero for a printable solid.
 
-    watertight: every edge has two or more triangles; manifold: exactly two, and each vertex one fan;
-    oriented: neighbours run the same way round and every shell looks out of the material. self_intersections
-    counts the triangles that cut, touch or cover another; it was looked for at `searched_triangles`, and at
-    the others it is excluded by construction. components counts outer bodies, cavities sealed shells inside
-    them. genus is the sum over all shells, None where the surface is not a closed 2-manifold. bbox_mm is (low
-    corner, high corner).
+    Attributes
+    ----------
+    triangles, vertices : int
+        Triangles and vertices of the quantised mesh.
+    watertight : bool
+        True if every edge joins at least two triangles.
+    manifold : bool
+        True if every edge joins exactly two triangles and the triangles at every vertex form one fan.
+    oriented : bool
+        True if adjacent triangles have the same orientation and every shell faces out of the material.
+    self_intersections : int
+        Triangles that cut, touch or cover another one.
+    searched_triangles : int
+        Triangles searched for self-intersections; at the others they are excluded by construction.
+    degenerate_triangles : int
+        Triangles without area.
+    duplicate_triangles : int
+        Triangles with the corners of an earlier one.
+    open_edges : int
+        Edges of one triangle.
+    nonmanifold_edges : int
+        Edges of more than two triangles.
+    nonmanifold_vertices : int
+        Vertices whose triangles form more than one fan.
+    misoriented_edges : int
+        Edges whose triangles face opposite ways.
+    misplaced_shells : int
+        Shells that are inside out or inside another body.
+    components : int
+        Outer bodies.
+    cavities : int
+        Sealed shells inside bodies.
+    genus : int or None
+        Sum over all shells; None if the surface is not a closed 2-manifold.
+    volume_mm3 : float
+        Signed volume, mm3.
+    area_mm2 : float
+        Surface area, mm2.
+    bbox_mm : tuple
+        Low and high corner of the bounding box, mm.
     """
 
     triangles: int
@@ -48,7 +82,7 @@ class MeshReport:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What is wrong, in plain words; empty for a mesh that prints."""
+        """Defects in plain words, tuple of str; empty for a printable mesh."""
         counts = (
             (self.open_edges, "open edges (a hole in the surface)"),
             (self.nonmanifold_edges, "edges with more than two triangles"),
@@ -64,19 +98,41 @@ class MeshReport:
 
     @property
     def printable(self) -> bool:
-        """Whether slicers take it as it is: closed, manifold, oriented, no crossings, positive volume."""
+        """True if the mesh is a closed, oriented manifold of positive volume without self-intersections."""
         return not self.problems
 
     def as_dict(self) -> dict[str, Any]:
-        """The report for JSON, verdict included."""
+        """Report as plain JSON, with the verdict.
+
+        Returns
+        -------
+        dict
+            All fields, `printable` and `problems`.
+        """
         return asdict(self) | {"printable": self.printable, "problems": list(self.problems)}
 
 
 def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
-    """Examine a mesh as its file will be read: rounded to float32, equal positions welded, nothing repaired.
+    """Check a mesh as a slicer reads its file: rounded to float32, equal positions welded, nothing repaired.
 
-    All counts are exact. Self-intersections take most of the time. Raises MeshError for a mesh without
-    triangles, with an index out of range or a coordinate that is not finite.
+    All counts are exact. The search for self-intersections takes most of the time.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    threads : int, optional
+        Threads; all cores by default.
+
+    Returns
+    -------
+    MeshReport
+        Counts of defects, and measures.
+
+    Raises
+    ------
+    MeshError
+        For a mesh without triangles, an index out of range or a coordinate that is not finite.
     """
     if not len(mesh.triangles):
         raise MeshError("the mesh has no triangles")
@@ -84,10 +140,26 @@ def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
 
 
 def check_quantised(mesh: Mesh, proved: NDArray[np.bool_] | None = None, threads: int = 0) -> MeshReport:
-    """Examine a mesh that is quantised and welded, as `clean` makes it.
+    """Check a quantised, welded mesh, as `clean` returns it.
 
-    proved: triangles of which no two intersect, bool [m]; none if nothing is known. Self-intersections are
-    searched for at the others. Raises MeshError if no triangle has an area.
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    proved : ndarray of bool, shape (m,), optional
+        Triangles of which no two intersect. Only the others are searched for self-intersections.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    MeshReport
+        Counts of defects, and measures.
+
+    Raises
+    ------
+    MeshError
+        If no triangle has an area.
     """
     from fracslice.mesh.self_intersections import self_intersecting_triangles
     from fracslice.mesh.topology import component_sizes, connected_components, edge_topology
@@ -135,22 +207,34 @@ def check_quantised(mesh: Mesh, proved: NDArray[np.bool_] | None = None, threads
 
 
 def _misplaced(mesh: Mesh, labels: NDArray[np.int32], volumes: NDArray[np.float64], threads: int) -> int:
-    """Shells whose outside is not empty space, or, for a cavity, not the material of one body."""
+    """Shells whose outside is neither empty space nor, for a cavity, the material of one body."""
     from fracslice.mesh.nesting import nesting
 
     return int((nesting(mesh, labels, volumes, threads=threads).winding != (volumes < 0)).sum())
 
 
 def duplicates(triangles: NDArray[np.int32]) -> int:
-    """How many triangles have the three corners of an earlier one, in whatever order."""
+    """Count triangles with the three corners of an earlier one, in any order.
+
+    Parameters
+    ----------
+    triangles : ndarray of int32, shape (m, 3)
+        Triangles.
+
+    Returns
+    -------
+    int
+        Duplicates.
+    """
     return len(triangles) - len(np.unique(np.sort(triangles, axis=1), axis=0))
 
 
 def _genus(mesh: Mesh, edges: int, shells: int) -> int:
-    """Handles of all shells together, by Euler's formula."""
+    """Sum of the genera of all shells, by Euler's formula."""
     return shells - (len(mesh.vertices) - edges + len(mesh.triangles)) // 2
 
 
 def _box(mesh: Mesh) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Low and high corner of the bounding box, as tuples."""
     (x0, y0, z0), (x1, y1, z1) = mesh.bounds.tolist()
     return (x0, y0, z0), (x1, y1, z1)

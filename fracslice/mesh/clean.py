@@ -1,4 +1,4 @@
-"""Triangles that rounding to float32 flattens or turns over: taken out, with the surface kept closed."""
+"""Removal of triangles that rounding to float32 flattens or turns over; the surface stays closed."""
 
 from __future__ import annotations
 
@@ -18,21 +18,46 @@ PASSES = 8
 
 
 def clean(mesh: Mesh) -> Mesh:
-    """Round a closed, oriented manifold to float32 and take out the triangles this flattens or turns over.
+    """Round a closed, oriented manifold to float32 and remove the triangles that this flattens or turns over.
 
-    A triangle whose corners lie on a line gives its middle corner to the neighbour across its longest edge (a
-    flip, which changes no shape); one with two corners in the same place, or where no flip is possible, is
-    collapsed along its shortest edge. Neither is done where it would pinch the surface or turn a neighbour
-    over (the link condition of Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge contraction",
-    1999). What cannot be helped stays, for `check` to report. Equal positions are welded last. Raises
-    MeshError as `quantised` does.
+    A triangle with collinear corners gives its middle corner to the neighbour across its longest edge: an
+    edge flip, which does not change the shape. A triangle with two coincident corners, or without a possible
+    flip, is removed by collapsing its shortest edge. Neither is done where it would pinch the surface or turn
+    a neighbour over (the link condition of Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge
+    contraction", 1999). Triangles that cannot be removed stay, and `check_mesh` reports them. Equal positions
+    are welded last.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Closed, oriented manifold, mm.
+
+    Returns
+    -------
+    Mesh
+        Quantised and welded.
+
+    Raises
+    ------
+    MeshError
+        If a coordinate is not finite or an index is out of range.
     """
     return cleaned(mesh, Certificate.none(len(mesh.triangles))).mesh
 
 
 class Cleaned(NamedTuple):
-    """mesh: quantised and welded. proved: which of its triangles do not intersect one another, bool [m].
-    exact: the same triangles before, with what is certified of them.
+    """Result of `cleaned`.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Quantised and welded.
+    proved : ndarray of bool, shape (m,)
+        Triangles of which no two intersect.
+    exact : Mesh
+        The same triangles before quantisation.
+    certificate : Certificate
+        Certificate of `exact`.
     """
 
     mesh: Mesh
@@ -44,16 +69,35 @@ class Cleaned(NamedTuple):
 def cleaned(
     mesh: Mesh, certificate: Certificate, low: float = -np.inf, high: float = np.inf, threads: int = 0
 ) -> Cleaned:
-    """Does what `clean` does, and keeps account of what is proved.
+    """Clean a mesh, or a piece of one, and update its certificate.
 
-    Only triangles whose largest x is in [low, high) are taken out: elsewhere the surface may be cut open.
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    certificate : Certificate
+        Certificate of its triangles.
+    low, high : float, optional
+        Only triangles whose largest x is in [low, high) are removed: elsewhere the surface may be cut open.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    Cleaned
+        The cleaned mesh, and the same triangles before quantisation.
+
+    Raises
+    ------
+    MeshError
+        If a coordinate is not finite or an index is out of range.
     """
     points, displaced = quantise(mesh, certificate.planes, threads)
     if not certificate.holds.all():
         displaced[mesh.triangles[~certificate.holds]] = True
     exact, certificate = _mended(mesh, points, certificate, low, high, threads)
     proved, final = certificate.holds, Mesh(points, exact.triangles)
-    if not displaced.any():  # only such a vertex can be where another one is
+    if not displaced.any():  # only displaced vertices can coincide with others
         return Cleaned(final.selected(np.ones(len(proved), bool), threads), proved, exact, certificate)
     proved = proved & ~displaced[exact.triangles].any(axis=1)
     return Cleaned(welded(final, threads), proved, exact, certificate)
@@ -67,7 +111,7 @@ def _mended(
     high: float,
     threads: int,
 ) -> tuple[Mesh, Certificate]:
-    """Takes out triangles that are flattened or turned over where the vertices move to `points`."""
+    """Remove triangles that are flattened or turned over when the vertices move to `points`."""
     suspects = turned(mesh.vertices, mesh.triangles, points, threads)
     top = mesh.vertices[mesh.triangles[suspects], 0].max(axis=1, initial=-np.inf)
     bad = set(suspects[(low <= top) & (top < high)].tolist())
@@ -84,8 +128,8 @@ def _mended(
 
 
 class _Surface:
-    """A mesh edited in few places: of each vertex at a bad triangle, and next to one, the triangles around it
-    are known.
+    """A mesh under local edits. The triangles around a vertex are known near bad triangles only: at their
+    corners and at the neighbours of these.
     """
 
     def __init__(
@@ -116,11 +160,12 @@ class _Surface:
         return around - {vertex}
 
     def normal(self, corners: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Normal of a triangle, of twice its area."""
         a, b, c = self.points[corners]
         return np.cross(b - a, c - a)
 
     def mend(self, triangle: int) -> None:
-        """Take out a bad triangle, if it still is bad and that is possible now."""
+        """Remove a bad triangle if it is still bad and an edit is possible."""
         if triangle not in self.bad:
             return
         a, b, c = (int(v) for v in self.triangles[triangle])
@@ -130,10 +175,11 @@ class _Surface:
         any(self.collapse(*edge) or self.collapse(*edge[::-1]) for edge in by_length)
 
     def length(self, a: int, b: int) -> float:
+        """Length of an edge."""
         return length(self.points[a] - self.points[b])
 
     def flip(self, triangle: int, a: int, c: int) -> bool:
-        """Replace the triangle a b c and its neighbour over the edge a c, with d, by two that share b d."""
+        """Replace the triangle (a, b, c) and its neighbour (a, c, d) by two that share the edge (b, d)."""
         shared = self.star(a) & self.star(c)
         if len(shared) != 2:
             return False
@@ -143,7 +189,7 @@ class _Surface:
         if b == d or d in self.ring(b):
             return False
         old = self.normal(self.triangles[other])
-        first = _with(self.triangles[other], c, b)  # a, b, d the way round the neighbour runs
+        first = _with(self.triangles[other], c, b)  # a, b, d in the neighbour's orientation
         second = _with(self.triangles[other], a, b)
         if min(dot(self.normal(first), old), dot(self.normal(second), old)) <= 0:
             return False
@@ -157,7 +203,7 @@ class _Surface:
         return True
 
     def collapse(self, kept: int, gone: int) -> bool:
-        """Draw one vertex into another."""
+        """Collapse an edge: merge the vertex `gone` into `kept`."""
         shared = self.star(kept) & self.star(gone)
         common = self.ring(kept) & self.ring(gone)
         if len(shared) != 2 or len(common) != 2:
@@ -165,7 +211,7 @@ class _Surface:
         moved = self.star(gone) - shared
         new = {triangle: _with(self.triangles[triangle], gone, kept) for triangle in moved}
         if any(common <= set(corners.tolist()) for corners in new.values()):
-            return False  # they are the last of a tetrahedron
+            return False  # the rest of a tetrahedron
         opened = set()
         for triangle, corners in new.items():
             normal, old = self.normal(corners), self.normal(self.triangles[triangle])
@@ -187,9 +233,11 @@ class _Surface:
 
 
 def _third(corners: NDArray[np.int32], a: int, b: int) -> int:
+    """The corner of a triangle besides a and b."""
     (vertex,) = set(corners.tolist()) - {a, b}
     return int(vertex)
 
 
 def _with(corners: NDArray[np.int32], old: int, new: int) -> NDArray[np.int32]:
+    """Corners of a triangle with one vertex replaced."""
     return np.where(corners == old, np.int32(new), corners)

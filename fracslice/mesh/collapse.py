@@ -1,9 +1,8 @@
-"""Vertices taken out of a closed mesh as long as it stays near them, and put back where that was too much.
+"""Half-edge collapses of a closed mesh under error control, with undo.
 
-Half-edge collapses under error control (Klein, Liebich and Strasser, "Mesh Reduction with Error Control",
-1996): each original vertex is kept with a triangle near it, and a collapse that would leave one of them
-farther off than the tolerance is not done. Neighbours are found in a corner table (Rossignac, 2001), which
-remembers what was done.
+Klein, Liebich and Strasser, "Mesh Reduction with Error Control", 1996: each original vertex is assigned to a
+triangle near it, and a collapse is refused if it would leave one of them farther off than the tolerance.
+Adjacency is a corner table (Rossignac, 2001) with a history.
 """
 
 from __future__ import annotations
@@ -18,20 +17,31 @@ from fracslice.mesh.model import Mesh
 from fracslice.work import Work, chunks
 
 STAGES = (1e-3, 0.25, 0.5, 0.75, 1.0)
-"""Shares of the tolerance, in the order in which they are spent: cheap collapses first."""
+"""Fractions of the tolerance, in the order in which they are spent: cheap collapses first."""
 
 FIRST = 0.3
-"""About how much of all the work the first run is."""
+"""Approximate fraction of all the work that the first run takes."""
 
 CHUNK = 1 << 16
-"""Vertices between two looks at whether to stop."""
+"""Vertices between two checks for cancellation."""
 
 
 class Collapsed(NamedTuple):
-    """What the triangles of the original have become. triangles: int32 [m, 3], over its vertices. gone: bool
-    [m], those that are no more. step: int32 [m], from 1, what happened to it last; 0 for one that is as it
-    was. fresh: bool [m], to which something has happened since the time before. owner: int32 [n], of each
-    vertex a triangle that it is near."""
+    """State of a simplification, over the triangles and vertices of the original mesh.
+
+    Attributes
+    ----------
+    triangles : ndarray of int32, shape (m, 3)
+        Current corners of each triangle.
+    gone : ndarray of bool, shape (m,)
+        True for each removed triangle.
+    step : ndarray of int32, shape (m,)
+        Number, from 1, of the last collapse that changed each triangle; 0 for an unchanged one.
+    fresh : ndarray of bool, shape (m,)
+        True for each triangle that changed since the previous state.
+    owner : ndarray of int32, shape (n,)
+        A triangle near each vertex.
+    """
 
     triangles: NDArray[np.int32]
     gone: NDArray[np.bool_]
@@ -41,16 +51,23 @@ class Collapsed(NamedTuple):
 
     @property
     def changed(self) -> NDArray[np.bool_]:
-        """Those that are not as they were, bool [m]."""
+        """True for each changed triangle, bool [m]."""
         return self.step > 0
 
 
 class Collapse:
-    """As many vertices taken out as `tolerance` (mm) allows.
+    """Simplify a mesh by half-edge collapses within a tolerance.
 
-    mesh: closed, an oriented 2-manifold. It stays a manifold of the same topology (the link condition of Dey,
-    Edelsbrunner, Guha and Nekhayev, 1999). Every vertex is within the tolerance; the rest is likely to be,
-    and triangles may cross others.
+    The topology of the manifold is preserved (the link condition of Dey, Edelsbrunner, Guha and Nekhayev,
+    1999). Every original vertex stays within the tolerance; the points between them probably do, and
+    triangles may intersect.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Closed, oriented 2-manifold, mm.
+    tolerance : float
+        Maximum distance of the original vertices, mm.
     """
 
     def __init__(self, mesh: Mesh, tolerance: float) -> None:
@@ -58,7 +75,18 @@ class Collapse:
         self._stages: tuple[float, ...] = STAGES
 
     def run(self, work: Work) -> None:
-        """Takes out what can go: at first, and after `undo`. Raises `Cancelled`."""
+        """Collapse all edges that the tolerance allows, at first and after each `undo`.
+
+        Parameters
+        ----------
+        work : Work
+            Progress and cancellation.
+
+        Raises
+        ------
+        Cancelled
+            If the work is cancelled.
+        """
         for i, share in enumerate(self._stages):
             if len(self._stages) > 1:
                 work.progress("simplifying", FIRST * i / len(self._stages))
@@ -68,10 +96,17 @@ class Collapse:
         self._stages = STAGES[-1:]
 
     def found(self) -> Collapsed:
-        """What it has come to."""
+        """Current state.
+
+        Returns
+        -------
+        Collapsed
+            State of each triangle and vertex.
+        """
         return Collapsed(*self._native.state())
 
     def _sweep(self, share: float, work: Work) -> int:
+        """Sweep over all vertices at a fraction of the tolerance; returns the number of collapses."""
         done = 0
         for part in chunks(len(self._mesh.vertices), CHUNK):
             work.check()
@@ -79,6 +114,13 @@ class Collapse:
         return done
 
     def undo(self, faulty: NDArray[np.bool_]) -> None:
-        """Puts back what was done last at the triangles that are at fault, bool [m]; `run` does it again only
-        with a quarter of the tolerance, and the next time never."""
+        """Undo the last collapse at each faulty triangle.
+
+        `run` repeats such a collapse only within a quarter of the tolerance, and never after a second undo.
+
+        Parameters
+        ----------
+        faulty : ndarray of bool, shape (m,)
+            True for each faulty triangle.
+        """
         self._native.undo(faulty)

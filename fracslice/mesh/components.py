@@ -1,4 +1,4 @@
-"""The bodies of a mesh and the cavities inside them: keep, drop, fill."""
+"""Connected components of a mesh: bodies and the cavities inside them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,24 @@ from fracslice.errors import MeshError
 from fracslice.mesh.model import Mesh
 
 PIECES = 0.05
-"""The share of the material in bodies thinner than a voxel from which that is said."""
+"""Minimum fraction of the material in bodies thinner than a voxel for a note on thin walls."""
 
 
 @dataclass(frozen=True)
 class Removed:
-    """What `select` took away: bodies and their volume, cavities and the volume of those that were filled."""
+    """Bodies and cavities that `select` removed.
+
+    Attributes
+    ----------
+    bodies : int
+        Removed bodies.
+    bodies_mm3 : float
+        Their volume, mm3.
+    cavities : int
+        Removed cavities.
+    filled_mm3 : float
+        Volume of the filled ones, mm3.
+    """
 
     bodies: int = 0
     bodies_mm3: float = 0.0
@@ -27,10 +39,16 @@ class Removed:
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """The connected closed surfaces of a mesh.
+    """Shells of a mesh: its connected closed surfaces.
 
-    labels: int32 [m], the shell of each triangle; volumes: float64 [s], signed, negative for a cavity;
-    parent: int64 [s], the smallest shell around each: a body for a cavity, a cavity for a body, -1 for none.
+    Attributes
+    ----------
+    labels : ndarray of int32, shape (m,)
+        Shell of each triangle.
+    volumes : ndarray of float64, shape (s,)
+        Signed volumes, negative for cavities.
+    parent : ndarray of int64, shape (s,)
+        Smallest shell around each: a body for a cavity, a cavity for a body, -1 for none.
     """
 
     labels: NDArray[np.int32]
@@ -39,19 +57,37 @@ class Shells:
 
     @property
     def body(self) -> NDArray[np.int64]:
-        """The outer shell that each belongs to: itself, or for a cavity the body around it. int64 [s]."""
+        """Outer shell of each shell, int64 [s]: the shell itself, or for a cavity the body around it."""
         return np.where(self.volumes < 0, self.parent, np.arange(len(self.volumes)))
 
     @property
     def solid_volumes(self) -> NDArray[np.float64]:
-        """Volume of material of each shell's body, cavities taken off; zero at cavities. float64 [s]."""
+        """Volume of material of each body without its cavities, float64 [s]; zero for cavities."""
         volumes = np.zeros(len(self.volumes))
         np.add.at(volumes, self.body, self.volumes)
         return volumes
 
 
 def shells(mesh: Mesh, threads: int = 0) -> Shells:
-    """Find the shells of a closed, oriented mesh: triangles that share vertices, O(m)."""
+    """Shells of a closed, oriented mesh: triangles connected by vertices, in O(m).
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Closed, oriented mesh.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    Shells
+        The shells, numbered by first appearance.
+
+    Raises
+    ------
+    MeshError
+        If a shell is inside out.
+    """
     from fracslice.mesh.topology import component_sizes, connected_components
 
     labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
@@ -74,10 +110,34 @@ def select(
     dust_mm3: float = 0.0,
     cavities: Literal["keep", "fill"] = "keep",
 ) -> tuple[Mesh, Removed]:
-    """Keep all bodies or the largest, drop dust of less than `dust_mm3`, keep or fill sealed cavities.
+    """Select bodies and cavities of a mesh.
 
-    A cavity goes with its body, and a body in a cavity with the filling. Raises MeshError when nothing would
-    be left, or the mesh has a shell that is inside out.
+    A cavity is removed with its body, and a body inside a cavity with the filling.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Closed, oriented mesh, mm.
+    keep : {"all", "largest"}, optional
+        Bodies to keep.
+    dust_mm3 : float, optional
+        Bodies of less volume are removed, mm3.
+    cavities : {"keep", "fill"}, optional
+        Keep or fill sealed cavities.
+
+    Returns
+    -------
+    Mesh
+        The remaining shells.
+    Removed
+        What was removed.
+
+    Raises
+    ------
+    MeshError
+        If nothing would remain or a shell is inside out.
+    ValueError
+        For an unknown choice.
     """
     found = shells(mesh)
     staying, removed = choose(found, keep=keep, dust_mm3=dust_mm3, cavities=cavities)
@@ -87,13 +147,35 @@ def select(
 def choose(
     found: Shells, *, keep: str = "all", dust_mm3: float = 0.0, cavities: str = "keep"
 ) -> tuple[NDArray[np.bool_], Removed]:
-    """Which shells `select` would keep, bool [s]. Raises as it does."""
+    """Shells that `select` keeps.
+
+    Parameters
+    ----------
+    found : Shells
+        All shells; volumes in mm3.
+    keep, dust_mm3, cavities
+        As in `select`.
+
+    Returns
+    -------
+    ndarray of bool, shape (s,)
+        True for each shell that stays.
+    Removed
+        What is removed.
+
+    Raises
+    ------
+    MeshError
+        If nothing would remain.
+    ValueError
+        For an unknown choice.
+    """
     if keep not in ("all", "largest") or cavities not in ("keep", "fill"):
         raise ValueError(f"no such choice: keep={keep!r}, cavities={cavities!r}")
     hollow = found.volumes < 0
     material = found.volumes if cavities == "fill" else found.solid_volumes
     stays = ~hollow & (material >= dust_mm3)
-    if cavities == "fill":  # what floats in a cavity is swallowed
+    if cavities == "fill":  # the filling absorbs bodies inside cavities
         stays &= found.parent < 0
     if not stays.any():
         raise MeshError(f"nothing would be left: every body is smaller than {dust_mm3:g} mm3")

@@ -9,27 +9,44 @@ from .fit import Fit
 
 STEPS = 6
 NEAREST = 4e-3
-"""How near its edge a plane is looked for, as a share of the edge's length."""
+"""Minimum distance from the sharp edge at which planes are evaluated, relative to the length of the mesh
+edge.
+"""
 
 ANGLE = 0.05
-"""Planes that meet at a smaller sine are one."""
+"""Minimum sine between two planes; below it they count as one."""
 
 
 SAME = 0.95
-"""The cosine between the normals of one side, far from a sharp edge and near, at least."""
+"""Minimum cosine between the normals of one side, far from the sharp edge and near it."""
 
 REACH = 0.9
-"""How far the middle may move, as a share of its edge."""
+"""Maximum displacement of the midpoint, relative to the length of its edge."""
 
 
 def on_creases(
     fit: Fit, ends: NDArray[np.float64], starts: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Points of sharp edges beside the middles of edges, [n, 3], and whether they are such, [n].
+    """Points on sharp edges near the midpoints of mesh edges.
 
-    ends: float64 [n, 2, 3]. starts: a point on either side of the sharp edge, [n, 2, 3]. The planes that the
-    field has there are intersected, again and again, nearer and nearer to where they meet: Newton's method
-    for two equations.
+    The tangent planes of the field on both sides are intersected repeatedly, each time closer to their
+    intersection: Newton's method for two equations.
+
+    Parameters
+    ----------
+    fit : Fit
+        Tangent planes of the field.
+    ends : ndarray of float64, shape (n, 2, 3)
+        End points of the mesh edges.
+    starts : ndarray of float64, shape (n, 2, 3)
+        A point on either side of each sharp edge.
+
+    Returns
+    -------
+    ndarray of float64, shape (n, 3)
+        Points.
+    ndarray of bool, shape (n,)
+        True where the point is on a sharp edge.
     """
     middles = there = ends.mean(axis=1)
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
@@ -52,8 +69,9 @@ def on_creases(
 
 
 def _nearest(normals: NDArray[np.float64], off: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The shortest vectors from a point to where two planes meet that are so far off, or to the plane between
-    them."""
+    """Shortest vectors from points to the intersection of two planes at signed distances `off`, or, if these
+    are nearly parallel, to the plane midway.
+    """
     cosine = (normals[:, 0] * normals[:, 1]).sum(axis=1)
     square = 1 - cosine**2
     sharp = square > ANGLE**2

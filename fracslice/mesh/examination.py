@@ -1,4 +1,4 @@
-"""What a simplification is held to: distances, crossings, shells; looked at again where something changes."""
+"""Verification of a simplification: distances, self-intersections and orientation of shells."""
 
 from __future__ import annotations
 
@@ -15,12 +15,31 @@ from fracslice.work import Work
 
 
 class Examination:
-    """What is proved and found of each triangle, by the numbers of the original. It stands as long as nothing
-    changes that it depends on.
+    """Verify a simplification of a mesh within a tolerance.
 
-    bound: how far one of the original is from what is left, proved; beyond: what that depends on besides the
-    triangles near its corners, int32 [k, 2]. back: how far samples of what is left are from the original.
-    crossing: whether it crosses another that is left.
+    Results are stored per triangle of the original mesh and stay valid until something they depend on
+    changes.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Original mesh: a closed, oriented 2-manifold.
+    tolerance : float
+        Maximum distance, mm.
+    work : Work
+        Threads and cancellation.
+
+    Attributes
+    ----------
+    bound : ndarray of float64, shape (m,)
+        Proved bound on the distance of each original triangle from the simplified surface.
+    beyond : ndarray of int32, shape (k, 2)
+        Pairs of an original triangle and a simplified one that its bound depends on, besides those near its
+        corners.
+    back : ndarray of float64, shape (m,)
+        Greatest distance of the samples of each simplified triangle from the original mesh.
+    crossing : ndarray of bool, shape (m,)
+        True for each simplified triangle that intersects another one.
     """
 
     def __init__(self, mesh: Mesh, tolerance: float, work: Work) -> None:
@@ -34,7 +53,23 @@ class Examination:
         self.crossing, self.beyond = np.zeros(len(mesh.triangles), dtype=bool), np.empty((0, 2), np.int32)
 
     def faults(self, found: Collapsed) -> NDArray[np.bool_]:
-        """Triangles at which something has to be put back, bool [m]. Raises `Cancelled`."""
+        """Triangles whose last collapse has to be undone.
+
+        Parameters
+        ----------
+        found : Collapsed
+            Current state.
+
+        Returns
+        -------
+        ndarray of bool, shape (m,)
+            True for each faulty triangle.
+
+        Raises
+        ------
+        Cancelled
+            If the work is cancelled.
+        """
         left = _Left(self.mesh, found)
         faulty = self._there(left, found) | self._back(found)
         self.work.check()
@@ -43,12 +78,27 @@ class Examination:
         return faulty
 
     def distances(self, found: Collapsed) -> tuple[float, float]:
-        """The greatest distances of the original and back."""
+        """Greatest distances between the two surfaces.
+
+        Parameters
+        ----------
+        found : Collapsed
+            Current state.
+
+        Returns
+        -------
+        float
+            Proved bound on the distance from the original surface to the simplified one, mm.
+        float
+            Greatest sampled distance back, mm.
+        """
         there, back = self.bound[found.changed], self.back[found.changed & ~found.gone]
         return float(there.max(initial=0.0)), float(back.max(initial=0.0))
 
     def _there(self, left: _Left, found: Collapsed) -> NDArray[np.bool_]:
-        """Where originals are too far off: of the triangles near one, that which changed last."""
+        """Faulty triangles by the distance from the original: of the triangles near one that is too far off,
+        the one that changed last.
+        """
         lost = found.fresh | found.fresh[found.owner][self.mesh.triangles].any(axis=1)
         lost[self.beyond[found.fresh[self.beyond[:, 1]], 0]] = True
         which = np.flatnonzero(lost & found.changed)
@@ -65,7 +115,7 @@ class Examination:
         return faulty
 
     def _back(self, found: Collapsed) -> NDArray[np.bool_]:
-        """Which new triangles have samples too far from the original."""
+        """Changed triangles with samples too far from the original."""
         new = found.changed & ~found.gone
         fresh = new & found.fresh
         these = Mesh(self.mesh.vertices, found.triangles[fresh])
@@ -74,7 +124,7 @@ class Examination:
 
 
 class _Left:
-    """The triangles that are left, as a mesh. number: int32 [m], theirs in it."""
+    """The remaining triangles as a mesh. `number`, int32 [m], has their indices in it."""
 
     def __init__(self, mesh: Mesh, found: Collapsed) -> None:
         self.old = np.flatnonzero(~found.gone)
@@ -84,18 +134,20 @@ class _Left:
         self.nearest = Nearest(self.mesh, self.tree)
 
     def crossing(self, among: NDArray[np.bool_], work: Work) -> NDArray[np.bool_]:
-        """Those that cross, of which one at least is among these of the original."""
+        """Triangles that intersect another one; one triangle of each pair is in `among`. Bool [m], over the
+        original triangles.
+        """
         return self.all(self_intersecting_triangles(self.mesh, self.tree, work.threads, among[self.old]))
 
     def all(self, marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """The same marks by the numbers of the original."""
+        """Marks of the remaining triangles as marks of the original ones."""
         found = np.zeros(len(self.number), dtype=bool)
         found[self.old] = marks
         return found
 
 
 class _Shells:
-    """The shells of a mesh, for one that has the same."""
+    """Shells of the original mesh, to compare with the simplified one."""
 
     def __init__(self, mesh: Mesh) -> None:
         labels, self.count = connected_components(mesh.triangles, len(mesh.vertices))
@@ -104,15 +156,16 @@ class _Shells:
         self.outside = self._volumes(mesh) >= 0
 
     def turned(self, mesh: Mesh) -> NDArray[np.bool_]:
-        """The triangles of shells that are inside out: a crumb that fewer triangles cannot hold open."""
+        """Triangles of shells that are inside out: crumbs that fewer triangles cannot represent."""
         found: NDArray[np.bool_] = (self.outside != (self._volumes(mesh) >= 0))[self.of[mesh.triangles[:, 0]]]
         return found
 
     def _volumes(self, mesh: Mesh) -> NDArray[np.float64]:
+        """Signed volumes of the shells."""
         return shell_volumes(mesh.vertices, mesh.triangles, self.of[mesh.triangles[:, 0]], self.count)
 
 
 def _edge(mesh: Mesh) -> float:
-    """The median length of an edge."""
+    """Median edge length."""
     a, b = mesh.vertices[mesh.triangles[:, 0]], mesh.vertices[mesh.triangles[:, 1]]
     return float(np.median(np.linalg.norm(a - b, axis=1)))

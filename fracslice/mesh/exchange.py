@@ -1,4 +1,4 @@
-"""A mesh handed to others: files, trimesh, pyvista, and a look at it."""
+"""Export of a mesh: files, trimesh, pyvista and plots."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ CLAY = "#efe3d0"
 
 
 class Exchange:
-    """What `Mesh` inherits to leave this library."""
+    """Export methods of `Mesh`."""
 
     def export(self, path: str | Path, metadata: Mapping[str, str] | None = None) -> Path:
-        """Write the mesh to a file, whole or not at all.
+        """Write the mesh to a file atomically.
 
         Parameters
         ----------
         path : str or Path
-            Its ending names the format: .stl, .3mf, .ply, .obj or .glb.
+            File; the extension selects the format: .stl, .3mf, .ply, .obj or .glb.
         metadata : mapping, optional
-            Names and values that the format has room for, such as Title.
+            Names and values, as far as the format supports them, for example Title.
 
         Returns
         -------
@@ -38,21 +38,32 @@ class Exchange:
         Raises
         ------
         ExportError
-            For an empty mesh, an unknown ending, or what the file system refuses.
+            For an empty mesh, an unknown extension, or a file that cannot be written.
         """
-        from fracslice.export import write  # a method stands for the function of a layer above
+        from fracslice.export import write  # lazy: `export` is a layer above
 
         return write(cast("Mesh", self), path, metadata)
 
     def to_trimesh(self) -> trimesh.Trimesh:
-        """The mesh as a `trimesh.Trimesh`, its vertices and triangles as they are."""
+        """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.
+
+        Returns
+        -------
+        trimesh.Trimesh
+            The same vertices and triangles.
+        """
         import trimesh
 
         mesh = cast("Mesh", self)
         return trimesh.Trimesh(mesh.vertices.copy(), mesh.triangles.copy(), process=False)
 
     def to_pyvista(self) -> Any:
-        """The mesh as a `pyvista.PolyData`, its vertices and triangles as they are.
+        """Copy of the mesh as a `pyvista.PolyData`.
+
+        Returns
+        -------
+        pyvista.PolyData
+            The same vertices and triangles.
 
         Raises
         ------
@@ -68,17 +79,17 @@ class Exchange:
         return surface.from_regular_faces(mesh.vertices.copy(), mesh.triangles)
 
     def plot(self, **options: Any) -> Any:
-        """Show the mesh: in a window, or below the cell of a notebook.
+        """Show the mesh in a window, or in the output of a notebook cell.
 
         Parameters
         ----------
         **options
-            As of `pyvista.plot`, such as ``color`` or ``off_screen``.
+            Options of `pyvista.plot`, for example ``color`` or ``off_screen``.
 
         Returns
         -------
         object
-            What pyvista returns.
+            Result of `pyvista.plot`.
 
         Raises
         ------

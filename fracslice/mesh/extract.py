@@ -1,4 +1,4 @@
-"""From samples to triangles."""
+"""Extraction of triangle meshes from samples."""
 
 from __future__ import annotations
 
@@ -24,14 +24,28 @@ if TYPE_CHECKING:
 
 
 def extract(bricks: Bricks, threads: int = 0) -> Mesh:
-    """The surface of the sampled solid, in scene units, from the samples alone.
+    """Marching cubes of the samples, in scene units, without the field.
 
-    The mesh is closed, an oriented 2-manifold, and does not cross itself, whatever the samples; it stays so
-    when its coordinates are rounded to float32. threads: 0 for all cores; the mesh is the same for any
-    number. Marching cubes (Lorensen and Cline, 1987) with a table without holes or crossings;
-    `marching_cubes.h` has the proof.
+    The mesh is a closed, oriented 2-manifold without self-intersections for any samples, also after its
+    coordinates are rounded to float32. Marching cubes (Lorensen and Cline, 1987) with a table without holes
+    or self-intersections; `marching_cubes.h` has the proof.
 
-    Raises `MeshError` if the samples are not closed, or need more than 2^31 vertices or triangles.
+    Parameters
+    ----------
+    bricks : Bricks
+        Samples, scene units.
+    threads : int, optional
+        Threads; 0 for all cores. The mesh does not depend on it.
+
+    Returns
+    -------
+    Mesh
+        Surface, scene units.
+
+    Raises
+    ------
+    MeshError
+        If the surface leaves the samples, or has more than 2^31 vertices or triangles.
     """
     from .._native import marching_cubes
 
@@ -42,13 +56,33 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
 
 
 def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) -> Mesh:
-    """The exact surface of a scene, in scene units, its edges and corners sharp.
+    """Exact surface of a scene, with sharp edges and corners.
 
-    root: the scene that `bricks` were sampled from. Every vertex on a grid edge is moved along it to the zero
-    set of the float64 field; where the normals in a cell differ, a vertex is put where their planes meet,
-    and settled. Closed, an oriented 2-manifold, and free of crossings like `extract`; `contour.h` has the
-    proof. After Ho, Wu, Chen, Chuang and Ouhyoung 2005, "Cubical Marching Squares". Raises `MeshError` as
-    `extract`, and `Cancelled`.
+    Each vertex on a grid edge is moved along it to the zero set of the float64 field. Where the normals in a
+    cell differ, a vertex is placed at the intersection of the tangent planes and projected to the surface.
+    The mesh is a closed, oriented 2-manifold without self-intersections, like that of `extract`; `contour.h`
+    has the proof. After Ho, Wu, Chen, Chuang and Ouhyoung 2005, "Cubical Marching Squares".
+
+    Parameters
+    ----------
+    root : Field
+        Field that `bricks` were sampled from.
+    bricks : Bricks or SignBricks
+        Samples, scene units.
+    work : Work, optional
+        Threads, progress, cancellation and cache.
+
+    Returns
+    -------
+    Mesh
+        Surface, scene units.
+
+    Raises
+    ------
+    MeshError
+        If the surface leaves the samples, or has more than 2^31 vertices or triangles.
+    Cancelled
+        If the work is cancelled.
     """
     work, signs = work or Work(), bricks.signs if isinstance(bricks, Bricks) else bricks
 
@@ -62,10 +96,14 @@ def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """The part of a surface in some layers of bricks, scene units.
+    """Part of a surface in some layers of bricks.
 
-    mesh: open where the surface goes on; pieces in turn meet in equal points, bit by bit. end: the x where
-    this piece ends, infinite for the last one.
+    Attributes
+    ----------
+    mesh : Mesh
+        Triangles, scene units; open at the seams. Adjacent pieces have bitwise equal points at their seam.
+    end : float
+        x at which the piece ends; infinite for the last one.
     """
 
     mesh: Mesh
@@ -75,7 +113,29 @@ class Piece:
 def contour_pieces(
     root: Field, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
 ) -> Iterator[Piece]:
-    """The same surface, piece after piece along x, each of about `most` bricks: memory for one at a time."""
+    """Exact surface of a scene in pieces along x, with memory for one piece at a time.
+
+    Parameters
+    ----------
+    root : Field
+        Field that `bricks` were sampled from.
+    bricks : Bricks or SignBricks
+        Samples, scene units.
+    work : Work, optional
+        Threads and cancellation.
+    most : int, optional
+        Approximate bricks per piece.
+
+    Yields
+    ------
+    Piece
+        Pieces of the surface of `contour`, by ascending x.
+
+    Raises
+    ------
+    MeshError, Cancelled
+        As `contour`.
+    """
     from .._native import Cells, Contouring
 
     work = work or Work()
@@ -94,15 +154,16 @@ def contour_pieces(
         moved, places = project(root, features, trust_regions, signs.voxel, work)
         features[moved] = places
         mesh, border = Mesh(vertices, triangles), np.inf
-        if last < len(signs.index):  # The next piece has what this one numbers and does not use.
+        if last < len(signs.index):  # Unused vertices belong to the next piece.
             mesh = mesh.selected(np.ones(len(triangles), bool))
             border = signs.origin[0] + signs.voxel * BRICK * last
         yield Piece(mesh, border)
 
 
 def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[int, int]]:
-    """Layers first to last - 1 in parts of `least` crossings or little more, so that what is known of these
-    is still near when it is used: (begin, end) with end excluded."""
+    """Split layers first to last - 1 into ranges (begin, end), end excluded, of at least `least` crossings,
+    so that the crossings of a range are still in the cache when used.
+    """
     begin = first
     for end in range(first + 1, last + 1):
         if end == last or cells.crossings_before(end) - cells.crossings_before(begin) >= least:
@@ -111,8 +172,8 @@ def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[
 
 
 def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
-    """Which layers of bricks make a piece: (first, last) with last excluded; those without samples at both
-    ends, which may have cells of the surface, included.
+    """Split layers of bricks into pieces (first, last), last excluded. The pieces at both ends include the
+    layer beside the samples, which may have cells of the surface.
     """
     counts = np.bincount(bricks.ijk[:, 0] // BRICK, minlength=bricks.index.shape[0])
     cuts, size = [-1], 0
@@ -132,8 +193,8 @@ def _trust_regions(
     which: np.ndarray,
     inside: np.ndarray,
 ) -> TrustRegions:
-    """How far vertices within cells, or within cells' faces, may move: strictly inside these; or towards the
-    corner of theirs with the other sign. The surface around them is known by its crossings.
+    """Trust regions of feature vertices: the interior of their cell or face, its nearest corner of the other
+    sign, and the mean of the crossings around them.
     """
     origin, voxel, margin = np.array(bricks.origin)[:, None], bricks.voxel, minimum_edge_parameter(bricks)
     there = np.ascontiguousarray(features[which].T)
@@ -156,9 +217,10 @@ def _trust_regions(
 
 @lru_cache(maxsize=1)
 def _nearest_corners() -> np.ndarray:
-    """The corner of a cell, dx + 2 dy + 4 dz, to which the fewest edges lead, uint8 [4, 256, 8, 2]: by the
-    axis across the lower face that it shall be in (3: in any), the cell's case, the corner from which they
-    lead, and whether it shall be inside.
+    """Nearest corner of a cell by edges, dx + 2 dy + 4 dz, uint8 [4, 256, 8, 2].
+
+    Indices: the axis across the lower face that must contain the corner (3: any corner), the case of the
+    cell, the start corner, and whether the corner is inside.
     """
     corner, axis = np.arange(8), np.arange(3)
     away = ((corner[:, None] ^ corner)[..., None] >> axis & 1).sum(-1)
@@ -171,16 +233,31 @@ def _nearest_corners() -> np.ndarray:
 
 
 def _placement(bricks: Bricks | SignBricks) -> tuple[tuple[float, float, float], float, float]:
-    """origin, voxel and clamp, as plain numbers."""
+    """Origin, voxel and minimum edge parameter as plain numbers."""
     x, y, z = bricks.origin
     return (float(x), float(y), float(z)), float(bricks.voxel), minimum_edge_parameter(bricks)
 
 
 def minimum_edge_parameter(bricks: Bricks | SignBricks) -> float:
-    """How near a grid point a vertex may come, as a share of a voxel, so that no two are one in float32.
+    """Minimum distance of a vertex from a grid point, in voxels, that keeps vertices distinct in float32.
 
-    Vertices of one cell differ by at least that share along some axis; four float32 steps survive any
-    rounding. Raises `MeshError` where float32 has no such steps.
+    Vertices of one cell differ by at least this distance along some axis; four float32 steps survive any
+    rounding.
+
+    Parameters
+    ----------
+    bricks : Bricks or SignBricks
+        Samples.
+
+    Returns
+    -------
+    float
+        Minimum edge parameter.
+
+    Raises
+    ------
+    MeshError
+        If the voxel is too fine for float32 coordinates.
     """
     low = np.asarray(bricks.origin, dtype=np.float64)
     high = low + bricks.voxel * 8 * np.asarray(bricks.index.shape)
@@ -194,6 +271,7 @@ def minimum_edge_parameter(bricks: Bricks | SignBricks) -> float:
 
 
 def _called(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a native function; its `ValueError` becomes a `MeshError`."""
     try:
         return function(*arguments)
     except ValueError as error:

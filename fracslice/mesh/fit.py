@@ -1,5 +1,4 @@
-"""How well triangles fit the zero set that they stand for: how far they are from it, and how they turn
-away."""
+"""Fit of triangles to the zero set: distances of samples, and angles between normals."""
 
 from __future__ import annotations
 
@@ -15,17 +14,18 @@ from ..work import Work, chunks
 from .model import Mesh
 
 STEP = 1e-4
-"""Of central differences, in voxels."""
+"""Step of central differences, voxels."""
 
 _SIDES = [(2, 2, 0), (3, 1, 0), (1, 3, 0), (0, 2, 2), (0, 3, 1), (0, 1, 3), (2, 0, 2), (1, 0, 3), (3, 0, 1)]
 LATTICE = np.array([*_SIDES, (2, 1, 1), (1, 2, 1), (1, 1, 2)]) / 4
-"""Where triangles are looked at, barycentric: three places on each side, then three inside. The corners are
-on the surface."""
+"""Barycentric sample points of a triangle: three on each side, then three inside. The corners are on the
+surface.
+"""
 
 
 AROUND = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if np.count_nonzero(way) % 2])
 AROUND /= np.linalg.norm(AROUND, axis=1)[:, None]
-"""Along the axes and the diagonals of space."""
+"""Unit vectors along the axes and the space diagonals."""
 
 BEYOND = 1 + 1e-6
 
@@ -33,14 +33,37 @@ UPRIGHT, OFF = 3, 7
 
 
 class Fit:
-    """Distances and normals of a scene's field. Lengths are scene units; reach: what counts as near."""
+    """Distances and normals of a scene's field.
+
+    Parameters
+    ----------
+    root : Field
+        Field; evaluated in float64.
+    reach : float
+        Tolerance: distances below it are proved, scene units.
+    voxel : float
+        Voxel, scene units.
+    work : Work
+        Threads and cancellation.
+    """
 
     def __init__(self, root: Field, reach: float, voxel: float, work: Work) -> None:
         self._kernel = root.kernel("cpu", "float64")
         self.reach, self._voxel, self._work = reach, voxel, work
 
     def planes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """At each point, [n, 3], the unit gradient and the distance to the surface to first order, [n, 4]."""
+        """Tangent planes of the field.
+
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 3)
+            Points, scene units.
+
+        Returns
+        -------
+        ndarray of float64, shape (n, 4)
+            Unit gradient, and signed distance to the surface to first order.
+        """
 
         def look(p: NDArray[np.float64], found: NDArray[np.float64]) -> None:
             h = STEP * self._voxel
@@ -54,11 +77,23 @@ class Fit:
         return self._each(look, points, 4)
 
     def distances(self, points: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far points, [n, 3], are from the surface, [n]; ways: unit vectors across it.
+        """Distances of points from the surface.
 
-        A continuous field has a zero between two points of different signs. Where it changes its sign on the
-        way through a point, or else somewhere else in the ball around it, within the reach, the surface is
-        proved to be that near. Elsewhere the distance is one to first order, but no less than the reach.
+        A continuous field has a zero between two points of opposite signs. A sign change along the normal
+        through the point, or else within the ball of radius `reach` around it, proves that the surface is
+        within `reach`. Elsewhere the distance is a first-order estimate, and greater than `reach`.
+
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 3)
+            Points, scene units.
+        ways : ndarray of float64, shape (n, 3)
+            Unit normals of the surface.
+
+        Returns
+        -------
+        ndarray of float64, shape (n,)
+            Distances, scene units.
         """
 
         def look(rows: NDArray[np.float64], found: NDArray[np.float64]) -> None:
@@ -79,8 +114,19 @@ class Fit:
         return self._each(look, np.concatenate([points, ways], axis=1), 1)[:, 0]
 
     def triangles(self, corners: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The field's unit normals at the middles of triangles, corners [m, 3, 3]; the cosines between these
-        and their own; the greatest distances of their samples on each side and of all, [m, 8]."""
+        """Measure the fit of triangles.
+
+        Parameters
+        ----------
+        corners : ndarray of float64, shape (m, 3, 3)
+            Corners, scene units.
+
+        Returns
+        -------
+        ndarray of float64, shape (m, 8)
+            Unit normal of the field at the centroid (3 columns), its cosine with the triangle's normal,
+            greatest distance of the samples on each side (3 columns), and of all samples.
+        """
         ways = self.planes(corners.mean(axis=1))[:, :3]
         points = (LATTICE @ corners).reshape(-1, 3)
         found = self.distances(points, np.repeat(ways, len(LATTICE), axis=0)).reshape(-1, len(LATTICE))
@@ -93,6 +139,7 @@ class Fit:
         rows: NDArray[np.float64],
         width: int,
     ) -> NDArray[np.float64]:
+        """Apply a function to columns of the rows, in parallel; float64 [n, width]."""
         found = np.empty((len(rows), width))
 
         def task(part: slice) -> None:
@@ -104,7 +151,17 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A mesh, and what `Fit.triangles` tells of each triangle."""
+    """A mesh with the measures of `Fit.triangles`.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The mesh.
+    fit : Fit
+        The measuring fit.
+    measured : ndarray of float64, shape (m, 8)
+        Measures of each triangle.
+    """
 
     mesh: Mesh
     fit: Fit
@@ -112,38 +169,66 @@ class Fitted:
 
     @classmethod
     def of(cls, mesh: Mesh, fit: Fit) -> Fitted:
-        """What is known of a mesh."""
+        """Measure a mesh.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The mesh.
+        fit : Fit
+            The measuring fit.
+
+        Returns
+        -------
+        Fitted
+            The mesh with its measures.
+        """
         return cls(mesh, fit, fit.triangles(mesh.corners))
 
     def become(self, mesh: Mesh, parents: NDArray[np.int64], fresh: NDArray[np.bool_]) -> Fitted:
-        """Another mesh whose triangles are these, by number, but for fresh ones."""
+        """Measures of an edited mesh; only changed triangles are measured.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            Edited mesh.
+        parents : ndarray of int64, shape (k,)
+            Triangle of this mesh that each triangle of the edited one came from.
+        fresh : ndarray of bool, shape (k,)
+            True for each changed triangle.
+
+        Returns
+        -------
+        Fitted
+            The edited mesh with its measures.
+        """
         measured = self.measured[parents]
         measured[fresh] = self.fit.triangles(mesh.corners[fresh])
         return Fitted(mesh, self.fit, measured)
 
     @property
     def ways(self) -> NDArray[np.float64]:
-        """The field's unit normals at the triangles' middles, [m, 3]."""
+        """Unit normals of the field at the centroids, float64 [m, 3]."""
         return self.measured[:, :3]
 
     @property
     def upright(self) -> NDArray[np.float64]:
-        """The cosines between these and the triangles' own, [m]."""
+        """Cosines between the normals of the field and of the triangles, float64 [m]."""
         return self.measured[:, UPRIGHT]
 
     @property
     def sides(self) -> NDArray[np.float64]:
-        """How far the samples of each side are from the surface, [m, 3]."""
+        """Greatest distance of the samples on each side, float64 [m, 3]."""
         return self.measured[:, 4:7]
 
     @property
     def off(self) -> NDArray[np.float64]:
-        """How far those of the whole triangle are, [m]."""
+        """Greatest distance of all samples, float64 [m]."""
         return self.measured[:, OFF]
 
 
 def _cosines(corners: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The cosine between triangles' normals and unit vectors, [m]; -1 for triangles without area."""
+    """Cosine between normals of triangles and unit vectors, [m]; -1 for triangles without area."""
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(across, axis=1)
     cosine: NDArray[np.float64] = np.where(

@@ -1,4 +1,4 @@
-"""Edges flipped towards a Delaunay triangulation, as far as the field allows."""
+"""Edge flips towards a Delaunay triangulation, where the field permits."""
 
 from __future__ import annotations
 
@@ -12,38 +12,72 @@ from .model import Mesh
 from .subdivision import edges_of
 
 ROUNDS = 12
-"""Of flips that do not touch each other."""
+"""Maximum rounds of independent flips."""
 
 FINE = np.cos(np.radians(10))
-"""Triangles whose normals are that near to the field's may turn."""
+"""Cosine between the normals of a triangle and of the field down to which a flip may reduce it."""
 
 STEEP, BETTER = np.cos(np.radians(29)), 0.02
-"""Triangles whose normals are farther off than that turn where it makes the cosine of the worse one greater
-by so much."""
+"""Triangles with a smaller cosine than `STEEP` are flipped only if the smaller of both cosines grows by more
+than `BETTER`.
+"""
 
 OBTUSE = 1e-6
-"""How negative the sine of two opposite angles' sum has to be."""
+"""An edge is flipped if the sine of the sum of its opposite angles is below the negative of this."""
 
 
 class Flips(NamedTuple):
-    """Flips that could be done. old: int64 [k, 2], the two triangles at an edge. new: int32 [k, 2, 3], what
-    they would be. ends: int32 [k, 2], of the new edge."""
+    """Candidate flips.
+
+    Attributes
+    ----------
+    old : ndarray of int64, shape (k, 2)
+        The two triangles at each edge.
+    new : ndarray of int32, shape (k, 2, 3)
+        Corners of the triangles that replace them.
+    ends : ndarray of int32, shape (k, 2)
+        End points of the new edge, ascending.
+    """
 
     old: NDArray[np.int64]
     new: NDArray[np.int32]
     ends: NDArray[np.int32]
 
     def some(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Flips:
-        """Some of them."""
+        """Select flips.
+
+        Parameters
+        ----------
+        which : ndarray of bool, shape (k,), or of int64, shape (j,)
+            Mask or indices.
+
+        Returns
+        -------
+        Flips
+            Selected flips.
+        """
         return Flips(self.old[which], self.new[which], self.ends[which])
 
 
 def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool_]]:
-    """The mesh with edges flipped whose opposite angles sum up to more than a half turn, beginning at the
-    triangles that are due, bool [m]; and the triangles that are not as they were.
+    """Flip edges whose opposite angles sum up to more than 180 degrees.
 
-    An edge stays if a triangle's normal would be farther off, as at a sharp edge, or the triangle from the
-    surface.
+    An edge stays if the flip would increase the angle between a triangle's normal and the field's, for
+    example at a sharp edge, or the distance from the surface.
+
+    Parameters
+    ----------
+    state : Fitted
+        The mesh with its measures.
+    due : ndarray of bool, shape (m,)
+        Triangles to start at.
+
+    Returns
+    -------
+    Fitted
+        The mesh with flipped edges.
+    ndarray of bool, shape (m,)
+        True for each changed triangle.
     """
     triangles, measured = state.mesh.triangles.copy(), state.measured.copy()
     mesh = Mesh(state.mesh.vertices, triangles)
@@ -70,8 +104,9 @@ def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool
 def _candidates(
     mesh: Mesh, due: NDArray[np.bool_], steep: NDArray[np.bool_]
 ) -> tuple[Flips, NDArray[np.float64]]:
-    """The edges at triangles that are due whose opposite angles are too large together, or that steep ones
-    have; those of the least worth come first."""
+    """Candidate flips at due triangles and their worth: edges with too large opposite angles, and edges of
+    steep triangles. A smaller worth is better.
+    """
     near = np.zeros(len(mesh.vertices), bool)
     near[mesh.triangles[due]] = True
     some = np.flatnonzero(near[mesh.triangles].any(axis=1))
@@ -95,7 +130,7 @@ def _candidates(
 
 
 def _sine_of_sum(p: NDArray[np.float64], a, b, c, d) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
-    """The sine of the sum of the angles at c and d, opposite to an edge from a to b."""
+    """Sine of the sum of the angles at c and d, opposite to the edge (a, b)."""
     parts = []
     for tip in (c, d):
         u, v = p[a] - p[tip], p[b] - p[tip]
@@ -107,7 +142,7 @@ def _sine_of_sum(p: NDArray[np.float64], a, b, c, d) -> NDArray[np.float64]:  # 
 
 
 def _apart(flips: Flips, worth: NDArray[np.float64], count: int) -> NDArray[np.int64]:
-    """Flips of which no two have a triangle, or the new edge, in common: the worthiest of each triangle."""
+    """Independent flips: the best one of each triangle, with no triangle or new edge in common."""
     order = np.argsort(worth, kind="stable")
     rank = np.empty(len(order), np.int64)
     rank[order] = np.arange(len(order))

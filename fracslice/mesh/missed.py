@@ -1,4 +1,4 @@
-"""What a mesh lacks of the surface it stands for: from the surface to the mesh."""
+"""Distance from the surface to the mesh: parts of the surface that the mesh lacks."""
 
 from __future__ import annotations
 
@@ -15,20 +15,39 @@ from fracslice.volume.accuracy import NEAR, surface_error, surface_points
 from fracslice.work import Work
 
 POINTS = 256
-"""Of the field's own surface, besides its outermost ones."""
+"""Random points on the field's surface, besides its extreme points."""
 
 CELL = 3.0
-"""Voxels along a cell in which triangles near a point are looked for."""
+"""Size of a cell in the search for triangles near points, voxels."""
 
 
 def surface_to_mesh(
     planned: Plan, pieces: Callable[[], Iterable[Mesh]], scale: float, work: Work
 ) -> NDArray[np.float64]:
-    """Distances from the outermost points of a field, and from others found on its surface, to the mesh, mm.
+    """Distances from the extreme points of a field, and from other points on its surface, to the mesh.
 
-    pieces: of the mesh with all bodies, scene units, as often as asked for. scale: mm per scene unit.
+    Parameters
+    ----------
+    planned : Plan
+        Sampled field.
+    pieces : callable
+        Iterates over the pieces of the mesh with all bodies, scene units; called repeatedly.
+    scale : float
+        mm per scene unit.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Distances, mm.
+
+    Raises
+    ------
+    Cancelled
+        If the work is cancelled.
     """
-    tips = planned.tips.T  # without those that were cut off or built over
+    tips = planned.tips.T  # only extreme points that are still on the surface
     tips = tips[surface_error(planned.root, tips, planned.voxel, work) < NEAR * planned.voxel]
     found = surface_points(planned.root, planned.outer, planned.voxel, POINTS, work)
     return scale * distances(pieces, np.concatenate([tips, found]), planned.voxel, work)
@@ -37,15 +56,36 @@ def surface_to_mesh(
 def distances(
     pieces: Callable[[], Iterable[Mesh]], points: NDArray[np.float64], voxel: float, work: Work
 ) -> NDArray[np.float64]:
-    """How far points are from a mesh that was made of samples a voxel apart, float64 [n].
+    """Distances from points to a mesh.
 
-    pieces: of the mesh, as often as asked for. Of each the triangles around the points are looked at, and for
-    points that are not near any of these, all triangles. Raises `Cancelled`.
+    Only triangles in the cells around the points are searched at first. Points without a triangle nearby are
+    compared with all triangles.
+
+    Parameters
+    ----------
+    pieces : callable
+        Iterates over the pieces of the mesh; called repeatedly.
+    points : ndarray of float64, shape (n, 3)
+        Points, in the units of the mesh.
+    voxel : float
+        Spacing of the samples that the mesh was made from.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Distances.
+
+    Raises
+    ------
+    Cancelled
+        If the work is cancelled.
     """
     around = Around(points, CELL * voxel)
     near = (Mesh(mesh.vertices, mesh.triangles[around.triangles(mesh)]) for mesh in pieces())
     found = _least(near, points, work)
-    # Triangles lie within a grid cell: one nearer than this has a corner that was seen.
+    # Triangles lie within a grid cell: the corners of any nearer one are in the searched cells.
     far = np.flatnonzero(found > (CELL - np.sqrt(3)) * voxel)
     if len(far):
         found[far] = _least(pieces(), points[far], work)
@@ -53,7 +93,7 @@ def distances(
 
 
 def _least(meshes: Iterable[Mesh], points: NDArray[np.float64], work: Work) -> NDArray[np.float64]:
-    """The distances of points to the nearest of some meshes; infinite without triangles."""
+    """Distance from each point to the nearest of several meshes; infinite without triangles."""
     numbers = np.arange(len(points), dtype=np.int32)
     spots, found = Mesh(points, np.stack([numbers] * 3, 1)), np.full(len(points), np.inf)
     for mesh in meshes:

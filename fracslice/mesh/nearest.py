@@ -1,4 +1,4 @@
-"""How far other meshes are from one: proved, or sampled."""
+"""Distances of other meshes from a mesh: proved bounds, or samples."""
 
 from __future__ import annotations
 
@@ -11,16 +11,27 @@ from fracslice.mesh.tree import Tree, build
 from fracslice.work import Work, chunks
 
 CHUNK = 1 << 17
-"""Triangles between two looks at whether to stop."""
+"""Triangles between two checks for cancellation."""
 
 UNKNOWN = np.empty((0, 3), np.int32)
 
 
 class Nearest:
-    """A mesh that tells how far others are from it.
+    """Distance queries to a mesh.
 
-    tree: built if None. closed: the mesh is a closed, oriented 2-manifold, on which near things are found
-    faster. Raises ValueError for indices out of range, the tree of another mesh, or no triangles.
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    tree : Tree, optional
+        Its tree of boxes; built by default.
+    closed : bool, optional
+        True if the mesh is a closed, oriented 2-manifold; searches are then faster.
+
+    Raises
+    ------
+    ValueError
+        For indices out of range, the tree of another mesh, or no triangles.
     """
 
     def __init__(self, mesh: Mesh, tree: Tree | None = None, closed: bool = False) -> None:
@@ -29,14 +40,34 @@ class Nearest:
     def bounds(
         self, mesh: Mesh, tolerance: float, work: Work, hints: NDArray[np.int32] = UNKNOWN
     ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-        """For each triangle of `mesh` a proved bound on how far its points are, float64 [m].
+        """Proved bounds on the distances of triangles from this mesh.
 
-        Infinite where a point is farther than `tolerance`, or that could not be excluded. hints: int32
-        [m, 3], for each corner a triangle here that may be near it. What a bound depends on besides comes
-        second: int32 [k, 2], a triangle of `mesh` and one here. The distance to one triangle is a convex
-        function: a piece whose corners all are within a distance of the same triangle is so as a whole; other
-        pieces are cut (the idea of Tang, Lee and Kim, "Interactive Hausdorff distance computation for general
-        polygonal models", 2009). Raises `Cancelled`.
+        The distance to one triangle is a convex function: a piece whose corners are all within a distance of
+        the same triangle lies within it as a whole. Other pieces are subdivided (the idea of Tang, Lee and
+        Kim, "Interactive Hausdorff distance computation for general polygonal models", 2009).
+
+        Parameters
+        ----------
+        mesh : Mesh
+            Triangles to bound.
+        tolerance : float
+            Greatest distance of interest.
+        work : Work
+            Threads and cancellation.
+        hints : ndarray of int32, shape (m, 3), optional
+            For each corner a triangle of this mesh that may be near it.
+
+        Returns
+        -------
+        ndarray of float64, shape (m,)
+            Bounds; infinite where a point is, or may be, farther than the tolerance.
+        ndarray of int32, shape (k, 2)
+            Further dependencies of the bounds: a triangle of `mesh` and one of this mesh.
+
+        Raises
+        ------
+        Cancelled
+            If the work is cancelled.
         """
         found, beyond = np.empty(len(mesh.triangles)), [UNKNOWN[:, :2]]
         for part in chunks(len(found), CHUNK):
@@ -48,11 +79,31 @@ class Nearest:
         return found, np.concatenate(beyond)
 
     def samples(self, mesh: Mesh, spacing: float, work: Work, enough: float = 0.0) -> NDArray[np.float64]:
-        """For each triangle of `mesh` the greatest distance of its samples, float64 [m].
+        """Greatest distance of the samples of each triangle from this mesh.
 
-        Samples are `spacing` apart, corners and edges included, so that no point is more than
-        spacing / sqrt(3) farther. No distance is too small; one below `enough` may be too great, but not
-        above it. Raises `Cancelled`.
+        Samples are `spacing` apart and include corners and edges: no point is more than spacing / sqrt(3)
+        farther. No distance is underestimated; one below `enough` may be overestimated, up to `enough`.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            Triangles to sample.
+        spacing : float
+            Spacing of the samples.
+        work : Work
+            Threads and cancellation.
+        enough : float, optional
+            Distance below which accuracy does not matter.
+
+        Returns
+        -------
+        ndarray of float64, shape (m,)
+            Distances.
+
+        Raises
+        ------
+        Cancelled
+            If the work is cancelled.
         """
         found = np.empty(len(mesh.triangles))
         for part in chunks(len(found), CHUNK):

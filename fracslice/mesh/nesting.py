@@ -1,4 +1,4 @@
-"""Which shell of a mesh lies inside which: rays straight up, decided by exact predicates."""
+"""Nesting of the shells of a mesh, by vertical rays and exact predicates."""
 
 from __future__ import annotations
 
@@ -12,7 +12,15 @@ from fracslice.mesh.model import Mesh
 
 
 class Nesting(NamedTuple):
-    """winding: int64 [s], how often others surround each shell; parent: int64 [s], the smallest, or -1."""
+    """Position of each shell among the others.
+
+    Attributes
+    ----------
+    winding : ndarray of int64, shape (s,)
+        Winding number of the other shells around each shell.
+    parent : ndarray of int64, shape (s,)
+        Smallest surrounding shell, or -1.
+    """
 
     winding: NDArray[np.int64]
     parent: NDArray[np.int64]
@@ -25,13 +33,33 @@ def nesting(
     first: NDArray[np.int64] | None = None,
     threads: int = 0,
 ) -> Nesting:
-    """Where each closed shell of a mesh lies.
+    """Find the shells around each closed shell of a mesh.
 
-    labels: int32 [m], the shell of each triangle; volumes: float64 [s], signed. A ray from one vertex of each
-    shell goes up and adds the winding of every triangle it passes; edges and vertices on the ray count once
-    (half-open edges). first: int64 [s], that vertex, if it matters which; -1 for a shell not to be looked at.
-    The mesh need only be whole where these rays pass. Raises ValueError for arrays that contradict each
-    other.
+    A ray from one vertex of each shell goes up and adds the winding of every triangle it passes; edges and
+    vertices on the ray count once (half-open edges). The mesh need only be complete along these rays.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    labels : ndarray of int32, shape (m,)
+        Shell of each triangle.
+    volumes : ndarray of float64, shape (s,)
+        Signed volumes.
+    first : ndarray of int64, shape (s,), optional
+        Start vertex of each shell's ray; -1 to skip a shell. Any vertex by default.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    Nesting
+        Winding numbers and parents.
+
+    Raises
+    ------
+    ValueError
+        For inconsistent arrays.
     """
     count = len(volumes)
     if count < 2:

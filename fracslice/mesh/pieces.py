@@ -1,4 +1,4 @@
-"""A surface in pieces along x, one in memory at a time."""
+"""Surface in pieces along x, one in memory at a time."""
 
 from __future__ import annotations
 
@@ -16,11 +16,21 @@ NOTHING = Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))
 
 
 class Pieces:
-    """Pieces of a surface in turn, scene units, each with the labels of its triangles.
+    """Pieces of a surface, in order, with labels of their triangles; scene units.
 
-    They are held in memory if there is no folder, else in its files. ends: the x where each ends, infinite
-    for the last one. starts: the number of each one's first triangle. fresh: how many of each one's last
-    triangles contouring did not lay.
+    Parameters
+    ----------
+    folder : Path, optional
+        Folder for the pieces; they are held in memory by default.
+
+    Attributes
+    ----------
+    ends : list of float
+        x at which each piece ends; infinite for the last one.
+    starts : list of int
+        Index of the first triangle of each piece.
+    fresh : list of int
+        Trailing triangles of each piece that were not made by contouring.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -33,7 +43,15 @@ class Pieces:
         return len(self.ends)
 
     def add(self, piece: Piece, fresh: int = 0) -> None:
-        """Append a piece. fresh: how many of its last triangles contouring did not lay."""
+        """Append a piece.
+
+        Parameters
+        ----------
+        piece : Piece
+            The piece.
+        fresh : int, optional
+            Its trailing triangles that were not made by contouring.
+        """
         self._put(f"mesh{len(self)}", vertices=piece.mesh.vertices, triangles=piece.mesh.triangles)
         self.ends.append(piece.end)
         self.starts.append(self._count)
@@ -41,34 +59,94 @@ class Pieces:
         self._count += len(piece.mesh.triangles)
 
     def label(self, number: int, labels: NDArray[np.int64]) -> None:
-        """Set the label of each triangle of a piece, int64 [m]."""
+        """Store the labels of a piece.
+
+        Parameters
+        ----------
+        number : int
+            Index of the piece.
+        labels : ndarray of int64, shape (m,)
+            Label of each triangle.
+        """
         self._put(f"labels{number}", labels=labels)
 
     def mesh(self, number: int) -> Mesh:
-        """The triangles of a piece."""
+        """Load a piece.
+
+        Parameters
+        ----------
+        number : int
+            Index of the piece.
+
+        Returns
+        -------
+        Mesh
+            Its triangles, scene units.
+        """
         return Mesh(**self._get(f"mesh{number}"))
 
     def labels(self, number: int) -> NDArray[np.int64]:
-        """Their labels, int64 [m]."""
+        """Load the labels of a piece.
+
+        Parameters
+        ----------
+        number : int
+            Index of the piece.
+
+        Returns
+        -------
+        ndarray of int64, shape (m,)
+            Label of each triangle.
+        """
         return self._get(f"labels{number}")["labels"]
 
     def meshes(self) -> Iterator[Mesh]:
-        """All pieces in turn."""
+        """Iterate over the pieces.
+
+        Returns
+        -------
+        iterator of Mesh
+            Pieces, by ascending x.
+        """
         return (self.mesh(number) for number in range(len(self)))
 
     def labelled(self) -> Iterator[tuple[Mesh, NDArray[np.int64]]]:
-        """All pieces in turn, with their labels."""
+        """Iterate over the pieces and their labels.
+
+        Returns
+        -------
+        iterator of (Mesh, ndarray of int64)
+            Pieces, by ascending x.
+        """
         return ((self.mesh(number), self.labels(number)) for number in range(len(self)))
 
     def drop(self, number: int) -> None:
-        """Let go of a piece that is not needed any more."""
+        """Release a piece that is held in memory.
+
+        Parameters
+        ----------
+        number : int
+            Index of the piece.
+        """
         for name in ("mesh", "labels"):
             self._held.pop(f"{name}{number}", None)
 
     def near(self, points: NDArray[np.float64], reach: float) -> tuple[Mesh, NDArray[np.int64]]:
-        """The triangles with a corner near points, as one mesh, and their numbers, int64 [k], ascending.
+        """Triangles with a corner near points, as one mesh.
 
-        All corners within `reach` along each axis are near. Triangles are numbered from the first piece on.
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 3)
+            Points, scene units.
+        reach : float
+            All corners within this distance along each axis are near.
+
+        Returns
+        -------
+        Mesh
+            The triangles.
+        ndarray of int64, shape (k,)
+            Their indices, ascending, counted from the first piece on.
         """
         around, parts, numbers = Around(points, reach), NOTHING, list[NDArray[np.int64]]()
         for number, mesh in enumerate(self.meshes()):
@@ -79,19 +157,34 @@ class Pieces:
         return parts, np.concatenate(numbers)
 
     def together(self, first: int, last: int, seam: float) -> Mesh:
-        """Pieces first to last - 1 as one mesh. seam: half the width in which vertices meet."""
+        """Join consecutive pieces to one mesh.
+
+        Parameters
+        ----------
+        first, last : int
+            Pieces `first` to `last` - 1.
+        seam : float
+            Maximum distance from the seam of vertices to be joined, scene units.
+
+        Returns
+        -------
+        Mesh
+            The joined mesh.
+        """
         mesh = self.mesh(first)
         for number in range(first + 1, last):
             mesh = joined(mesh, self.mesh(number), self.ends[number - 1], seam)
         return mesh
 
     def _put(self, name: str, **arrays: NDArray[np.generic]) -> None:
+        """Store arrays in memory or in the folder."""
         if self.folder is None:
             self._held[name] = arrays
         else:
             np.savez(self.folder / f"{name}.npz", **arrays)  # type: ignore[arg-type]
 
     def _get(self, name: str) -> Arrays:
+        """Load arrays from memory or from the folder."""
         if self.folder is None:
             return self._held[name]
         with np.load(self.folder / f"{name}.npz") as arrays:
@@ -99,7 +192,15 @@ class Pieces:
 
 
 class Around:
-    """The cells of some size around points: their own and all next to it."""
+    """Cells of a grid that contain given points, and their neighbours.
+
+    Parameters
+    ----------
+    points : ndarray of float64, shape (n, 3)
+        Points.
+    size : float
+        Minimum size of a cell.
+    """
 
     def __init__(self, points: NDArray[np.float64], size: float) -> None:
         self.low = points.min(axis=0) - 2 * size
@@ -110,12 +211,34 @@ class Around:
             self.near[tuple((own + step).T - 1)] = True
 
     def cells(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The cell of each point, int64 [n, 3]."""
+        """Cells of points.
+
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 3)
+            Points.
+
+        Returns
+        -------
+        ndarray of int64, shape (n, 3)
+            Grid coordinates of their cells.
+        """
         found: NDArray[np.int64] = np.floor((points - self.low) / self.size).astype(np.int64)
         return found
 
     def triangles(self, mesh: Mesh) -> NDArray[np.bool_]:
-        """Whether each triangle has a corner in these cells, bool [m]."""
+        """Triangles with a corner in these cells.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The mesh.
+
+        Returns
+        -------
+        ndarray of bool, shape (m,)
+            True for each of them.
+        """
         cells = np.clip(self.cells(mesh.vertices), 0, np.array(self.near.shape) - 1)
         seen = self.near[tuple(cells.T)]
         found: NDArray[np.bool_] = seen[mesh.triangles].any(axis=1)
@@ -123,7 +246,22 @@ class Around:
 
 
 def joined(one: Mesh, other: Mesh, seam: float, near: float) -> Mesh:
-    """Two meshes as one: vertices near the plane x = seam that are equal, bit by bit, become one."""
+    """Join two meshes: bitwise equal vertices near the plane x = `seam` become one.
+
+    Parameters
+    ----------
+    one, other : Mesh
+        Meshes; the triangles of `one` come first.
+    seam : float
+        x of the plane.
+    near : float
+        Maximum distance of a joined vertex from the plane.
+
+    Returns
+    -------
+    Mesh
+        The joined mesh.
+    """
     vertices = np.concatenate([one.vertices, other.vertices])
     triangles = np.concatenate([one.triangles, other.triangles + np.int32(len(one.vertices))])
     close = np.flatnonzero(np.abs(vertices[:, 0] - seam) < near)
@@ -134,5 +272,16 @@ def joined(one: Mesh, other: Mesh, seam: float, near: float) -> Mesh:
 
 
 def rows(points: NDArray[np.float64]) -> NDArray[np.void]:
-    """Points, [n, 3], as values that are equal if all their bits are, [n]."""
+    """View points as scalars, for bitwise comparison.
+
+    Parameters
+    ----------
+    points : ndarray of float64, shape (n, 3)
+        Points.
+
+    Returns
+    -------
+    ndarray of void, shape (n,)
+        One value per point.
+    """
     return np.ascontiguousarray(points).view("V24").ravel()

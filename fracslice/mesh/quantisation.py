@@ -1,4 +1,4 @@
-"""The coordinates that a file can hold."""
+"""Quantisation of coordinates to float32, and welding."""
 
 from __future__ import annotations
 
@@ -12,10 +12,27 @@ NO_PLANES = np.empty((0, 3))
 
 
 def quantised(mesh: Mesh, threads: int = 0) -> Mesh:
-    """The mesh as a reader of its STL will see it: rounded to float32, equal positions made one vertex.
+    """Quantise and weld a mesh, as a reader of its STL does.
 
-    Keeps every triangle, in order; unused vertices go. Do it once, before the check and the export, so that
-    both speak of the same object. Raises MeshError if a coordinate is not finite or an index is out of range.
+    Every triangle is kept, in order; unused vertices are removed. Quantise once, before the check and the
+    export, so that both treat the same mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    Mesh
+        Coordinates rounded to float32, equal positions welded.
+
+    Raises
+    ------
+    MeshError
+        If a coordinate is not finite or an index is out of range.
     """
     points, _ = quantise(mesh, NO_PLANES, threads)
     return welded(Mesh(points, mesh.triangles), threads)
@@ -24,11 +41,29 @@ def quantised(mesh: Mesh, threads: int = 0) -> Mesh:
 def quantise(
     mesh: Mesh, planes: NDArray[np.float64] = NO_PLANES, threads: int = 0
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The vertices rounded to float32, without negative zeros, float64 [n, 3], and which are displaced.
+    """Round vertices to float32, without negative zeros.
 
-    A vertex is displaced, bool [n], if it is not in the same planes and strictly between the same ones as
-    before. planes: of a grid, across each axis, float64 [k, 3], ascending; without them, all vertices are.
-    Raises MeshError as `quantised` does.
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    planes : ndarray of float64, shape (k, 3), optional
+        Planes of a grid across each axis, ascending.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    ndarray of float64, shape (n, 3)
+        Rounded vertices.
+    ndarray of bool, shape (n,)
+        True for each displaced vertex: one that is no longer in the same planes and strictly between the same
+        ones. Without planes all vertices are displaced.
+
+    Raises
+    ------
+    MeshError
+        If a coordinate is not finite or an index is out of range.
     """
     from fracslice._native import quantise
 
@@ -41,7 +76,20 @@ def quantise(
 
 
 def welded(mesh: Mesh, threads: int = 0) -> Mesh:
-    """A mesh of float32 coordinates with equal positions made one vertex, and no others than are used."""
+    """Weld equal positions and remove unused vertices.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh with float32 coordinates.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    Mesh
+        The welded mesh.
+    """
     from fracslice.mesh.weld import weld
 
     first, labels = weld(mesh.vertices.astype(np.float32))

@@ -1,4 +1,4 @@
-"""Model files in: STL, 3MF, PLY, OBJ, GLB, as a slicer would see them, nothing repaired."""
+"""Readers of mesh files: STL, 3MF, PLY, OBJ and GLB, welded like in a slicer, nothing repaired."""
 
 from __future__ import annotations
 
@@ -28,17 +28,32 @@ MILLIMETRES = {
     "meter": 1000.0,
 }
 DEEPEST, LARGEST = 32, 1 << 28
-"""Of a 3MF file: how deep components may be nested, how many triangles and parts it may build. A few lines
-can ask for any number.
+"""Limits for a 3MF file: nesting depth of components, and number of triangles and components that the build
+may expand to. A few lines could ask for any number.
 """
 MODEL_RELATION = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 
 
 def read_mesh(path: str | Path) -> Mesh:
-    """Read a model in mm: coordinates as float32, equal positions welded, every triangle kept.
+    """Read a mesh file, in mm.
 
-    STL, PLY and OBJ have no unit and count as mm; 3MF and GLB say theirs. Raises MeshError with one line for
-    a file that is missing, of an unknown kind, cut off or otherwise broken.
+    STL, PLY and OBJ have no unit: mm are assumed. 3MF and GLB have one. Coordinates are rounded to float32,
+    equal positions welded, and every triangle is kept.
+
+    Parameters
+    ----------
+    path : str or Path
+        File; the extension selects the format.
+
+    Returns
+    -------
+    Mesh
+        Quantised mesh, mm.
+
+    Raises
+    ------
+    MeshError
+        For a missing, unknown, truncated or otherwise invalid file.
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
@@ -58,6 +73,7 @@ def read_mesh(path: str | Path) -> Mesh:
 
 
 def _read_stl(path: Path) -> Mesh:
+    """Binary or ASCII STL."""
     data = path.read_bytes()
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
     if len(data) >= 84 and len(data) == 84 + STL_TRIANGLE.itemsize * count:
@@ -72,7 +88,7 @@ def _read_stl(path: Path) -> Mesh:
 
 
 def _wrong_length(count: int, size: int) -> str:
-    """Why so many triangles do not have so many bytes."""
+    """Message for a binary STL whose size does not match its count of triangles."""
     there = size // STL_TRIANGLE.itemsize
     if there >= count:
         extra = size - count * STL_TRIANGLE.itemsize
@@ -81,6 +97,7 @@ def _wrong_length(count: int, size: int) -> str:
 
 
 def _ascii_corners(data: bytes) -> NDArray[np.float32]:
+    """Corners of an ASCII STL."""
     words = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
     if b"endsolid" not in data[-1024:] or len(words) != 3 * data.count(b"endfacet"):
         raise MeshError("not a whole STL file: the text has no end; the file is cut short")
@@ -91,6 +108,7 @@ def _ascii_corners(data: bytes) -> NDArray[np.float32]:
 
 
 def _read_3mf(path: Path) -> Mesh:
+    """3MF: the model of a ZIP package."""
     try:
         with zipfile.ZipFile(path) as archive:
             relations, package = _Relations(), _Package()
@@ -106,7 +124,7 @@ def _read_3mf(path: Path) -> Mesh:
 
 
 def _parse(part: IO[bytes], start: Any, end: Any = None) -> None:
-    """Stream XML through handlers; no document type, hence no entities."""
+    """Stream XML through handlers. A document type, and hence entities, is refused."""
     parser = expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.StartDoctypeDeclHandler = _refuse
@@ -114,11 +132,12 @@ def _parse(part: IO[bytes], start: Any, end: Any = None) -> None:
 
 
 def _refuse(*_: Any) -> None:
+    """Refuse a document type."""
     raise MeshError("not a valid 3MF file: it has a document type")
 
 
 class _Relations:
-    """Finds the part that the package's relations call its 3D model."""
+    """Finds the 3D model in the relationships of the package."""
 
     model = ""
 
@@ -128,7 +147,7 @@ class _Relations:
 
 
 class _Package:
-    """Gathers the meshes of a 3MF model while its XML streams by, then lays out what the build asks for."""
+    """Collects the meshes of a 3MF model from its XML stream, then expands its build."""
 
     def __init__(self) -> None:
         self.meshes: dict[str, Mesh] = {}
@@ -138,6 +157,7 @@ class _Package:
         self.vertices, self.triangles = array("d"), array("q")
 
     def start(self, name: str, get: dict[str, str]) -> None:
+        """Handle the start of an element."""
         match name.rpartition(":")[2]:
             case "triangle":
                 self.triangles.extend((int(get["v1"]), int(get["v2"]), int(get["v3"])))
@@ -154,12 +174,13 @@ class _Package:
                 self.unit = get.get("unit", self.unit)
 
     def end(self, name: str) -> None:
+        """Handle the end of an element."""
         if name.rpartition(":")[2] == "object":
             self.meshes[self.object] = _indexed(self.vertices, self.triangles)
             self.vertices, self.triangles = array("d"), array("q")
 
     def laid_out(self) -> Mesh:
-        """What the build asks for, in mm."""
+        """All build items as one mesh, mm."""
         if self.unit not in MILLIMETRES:
             raise MeshError(f"not a valid 3MF file: no such unit: {self.unit}")
         if not self.build:
@@ -170,7 +191,7 @@ class _Package:
         return joined([self.placed(*item) for item in self.build]).scaled(MILLIMETRES[self.unit])
 
     def size(self, name: str, known: dict[str, int], depth: int = 0) -> int:
-        """How many triangles and parts an object comes to, its components and theirs laid out."""
+        """Triangles and objects of an expanded object, its components included."""
         self.check(name, depth)
         if name not in known:
             inner = sum(self.size(part, known, depth + 1) for part, _ in self.parts[name])
@@ -178,11 +199,12 @@ class _Package:
         return known[name]
 
     def check(self, name: str, depth: int) -> None:
+        """Refuse an unknown object, or components nested too deep."""
         if name not in self.meshes or depth > DEEPEST:
             raise MeshError(f"not a valid 3MF file: no such object: {name}")
 
     def placed(self, name: str, matrix: NDArray[np.float64], depth: int = 0) -> Mesh:
-        """An object and its components in the frame of the build."""
+        """An object with its components, in the frame of the build."""
         self.check(name, depth)
         inner = [self.placed(part, at, depth + 1) for part, at in self.parts[name]]
         whole = joined([self.meshes[name], *inner])
@@ -192,7 +214,7 @@ class _Package:
 
 
 def _matrix(text: str | None) -> NDArray[np.float64]:
-    """A 3MF transform: four rows of three numbers, applied to row vectors. Raises ValueError."""
+    """3MF transform: four rows of three numbers, applied to row vectors. Raises ValueError."""
     if text is None:
         return np.vstack([np.eye(3), np.zeros(3)])
     matrix = np.array(text.split(), dtype=np.float64).reshape(4, 3)
@@ -202,6 +224,7 @@ def _matrix(text: str | None) -> NDArray[np.float64]:
 
 
 def _indexed(vertices: array[float], triangles: array[int]) -> Mesh:
+    """Validated mesh of an object."""
     corners = np.array(vertices, dtype=np.float64).reshape(-1, 3)
     indices = np.array(triangles, dtype=np.int64).reshape(-1, 3)
     if not np.isfinite(corners).all():
@@ -214,14 +237,25 @@ def _indexed(vertices: array[float], triangles: array[int]) -> Mesh:
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
-    """Several meshes as one, side by side."""
+    """Concatenate meshes without welding.
+
+    Parameters
+    ----------
+    meshes : list of Mesh
+        Meshes.
+
+    Returns
+    -------
+    Mesh
+        All their triangles, in order.
+    """
     offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     triangles = [mesh.triangles + np.int32(offset) for mesh, offset in zip(meshes, offsets, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))
 
 
 def _read_by_trimesh(path: Path) -> Mesh:
-    """PLY, OBJ and GLB. trimesh raises whatever its parsers run into; all of it means a broken file."""
+    """PLY, OBJ and GLB, by trimesh. Any exception of its parsers means an invalid file."""
     import trimesh
 
     with path.open("rb") as file:
@@ -239,7 +273,7 @@ def _read_by_trimesh(path: Path) -> Mesh:
 
 
 def _read_glb(path: Path) -> Mesh:
-    """glTF counts in metres and its y axis goes up."""
+    """GLB, converted from metres to mm and from y up to z up."""
     model = _read_by_trimesh(path)
     x, y, z = model.vertices.T * 1000
     return Mesh(np.stack([x, -z, y], axis=1), model.triangles)

@@ -1,4 +1,4 @@
-"""More triangles where the surface bends away from them, until none is farther off than a chord."""
+"""Adaptive refinement: triangles are subdivided until none is farther from the surface than a chord."""
 
 from __future__ import annotations
 
@@ -19,28 +19,41 @@ from .subdivision import Edges, cut, edges_of, with_needles
 
 PASSES = 12
 AIM = 0.9
-"""The share of the chord that samples may have. A distance of second order that is zero at the corners is at
-most 1.07 times what `LATTICE` sees of it."""
+"""Fraction of the chord that samples may reach. A second-order distance that is zero at the corners is at
+most 1.07 times its maximum over `LATTICE`.
+"""
 
 ROUGH = 0.12
-"""A middle that is off by more than this share of its edge, and less and less where edges are shorter than
-voxels, is at a rough place: more triangles would not follow it."""
+"""An edge is rough if the distance of its midpoint exceeds this fraction of its length; for edges shorter
+than a voxel the fraction decreases. Refinement would not follow a rough edge.
+"""
 
 WORTH = 10
-"""As long as one edge is split for so many triangles that are too far off, it goes on."""
+"""Refinement stops when fewer than one edge is split per this many triangles out of tolerance."""
 
 UPRIGHT = np.cos(np.radians(29))
-"""No new triangle's normal is farther from the field's."""
+"""Minimum cosine between the normals of a new triangle and of the field."""
 
 CREASED = 0.9
-"""The cosine between the field's normals on both sides of a sharp edge, at most."""
+"""Maximum cosine between the field's normals on both sides of a sharp edge."""
 
 
 @dataclass(frozen=True)
 class Refined:
-    """What a refinement did. from_triangles: how many there were. off_mm: no sample of the triangles, a
-    quarter of a side apart, is farther from the surface. left: how many triangles have one that is farther
-    off than the chord allows; they are at rough places, or more triangles there would turn over or cross."""
+    """Result of a refinement.
+
+    Attributes
+    ----------
+    chord_mm : float
+        Maximum distance of a triangle from the surface.
+    from_triangles : int
+        Triangles before the refinement.
+    off_mm : float
+        Greatest distance of the samples of the triangles, a quarter of a side apart.
+    left : int
+        Triangles with a sample out of tolerance: in rough places, or where smaller triangles would turn over
+        or intersect.
+    """
 
     chord_mm: float
     from_triangles: int
@@ -49,26 +62,60 @@ class Refined:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What did not succeed, in words."""
+        """Note on triangles out of tolerance, tuple of str; empty if there are none."""
         chord = f"the chord of {self.chord_mm:.3g} mm"
         far = f"{self.left:,} triangles are farther off than {chord}, up to {self.off_mm:.2g} mm"
         return (far,) if self.left else ()
 
     def scaled(self, scale: float) -> Refined:
-        """In other units."""
+        """Convert the lengths to other units.
+
+        Parameters
+        ----------
+        scale : float
+            New units per old unit.
+
+        Returns
+        -------
+        Refined
+            Converted result.
+        """
         return replace(self, chord_mm=scale * self.chord_mm, off_mm=scale * self.off_mm)
 
 
 def refine(
     root: Field, mesh: Mesh, chord: float, voxel: float, work: Work | None = None
 ) -> tuple[Mesh, Refined]:
-    """Splits edges until no triangle is farther than `chord` from the surface.
+    """Split edges until no triangle is farther than `chord` from the surface.
 
-    mesh: closed, scene units, its vertices on the zero set of root's field; chord, voxel: scene units. New
-    vertices are on the surface, and on sharp edges where an edge is one. Then edges are flipped where that
-    makes triangles better, so that none has a normal that the field has not. The surface stays closed, and
-    does not cross itself: what would make it is not done. Old vertices stay where they are. Returns the mesh,
-    and what was done, in scene units. Raises `Cancelled`.
+    New vertices lie on the surface, and on sharp edges that a mesh edge follows or crosses. Edges are then
+    flipped to improve the normals of triangles. Old vertices do not move. The surface stays closed and free
+    of self-intersections: a split that would cause one is refused.
+
+    Parameters
+    ----------
+    root : Field
+        Field of the scene.
+    mesh : Mesh
+        Closed mesh with vertices on the zero set of the field, scene units.
+    chord : float
+        Maximum distance, scene units.
+    voxel : float
+        Voxel, scene units.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    Mesh
+        Refined mesh, scene units.
+    Refined
+        Result, with lengths in scene units.
+
+    Raises
+    ------
+    Cancelled
+        If the work is cancelled.
     """
     work, count = work or Work(), len(mesh.triangles)
     state = Fitted.of(mesh, Fit(root, AIM * chord, voxel, work))
@@ -89,7 +136,7 @@ def refine(
 
 
 def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The numbers that come more than once."""
+    """Values that occur more than once."""
     found, counts = np.unique(keys, return_counts=True)
     return found[counts > 1]
 
@@ -97,8 +144,9 @@ def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:
 def _wanted(
     root: Field, state: Fitted, edges: Edges, free: NDArray[np.bool_], voxel: float, work: Work
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """The edges to be split: those that are too far off, or the longest ones of triangles that are; and
-    where."""
+    """Edges to split, bool [e], and the new vertices: edges out of tolerance, or the longest edges of
+    triangles out of tolerance.
+    """
     sides, ends = edges.sides, state.mesh.vertices[edges.ends]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     off = np.zeros(len(free))
@@ -124,7 +172,9 @@ def _wanted(
 def _creased(
     state: Fitted, edges: Edges, which: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Points of sharp edges that some edges run across or along, [k, 3], and which do, [k]."""
+    """Points on the sharp edges across or along some mesh edges, [k, 3], and whether there is a sharp edge,
+    [k].
+    """
     ends = state.mesh.vertices[edges.ends[which]]
     beside = edges.beside[which]
     middles, along = ends.mean(axis=1), ends[:, 1] - ends[:, 0]
@@ -147,8 +197,11 @@ def _creased(
 def _split(
     state: Fitted, edges: Edges, split: NDArray[np.bool_], there: NDArray[np.float64], work: Work
 ) -> tuple[Fitted, NDArray[np.int64]]:
-    """The mesh with edges split and others flipped; and edges that are left, for a triangle would turn away
-    from the surface, or cross others. there: of all that shall be split."""
+    """Split edges, then flip edges of the new triangles.
+
+    Splits that would turn a triangle away from the surface or cause a self-intersection are refused; the
+    refused edges are returned. `there` has the new vertices of all edges to split.
+    """
     old, chosen = state.mesh, np.flatnonzero(split)
     keep = np.ones(len(chosen), bool)
     while keep.any():
@@ -167,8 +220,9 @@ def _split(
 
 
 def _blamed(state: Fitted, fresh: NDArray[np.bool_], first: int, work: Work) -> NDArray[np.bool_]:
-    """Which of the vertices from `first` on are corners of triangles that turn away or cross, or next to
-    such."""
+    """New vertices, from index `first` on, at or next to triangles that turn away from the surface or
+    intersect others.
+    """
     mesh = state.mesh
     crossing = self_intersecting_triangles(mesh, threads=work.threads, among=fresh)
     away = fresh & (state.upright < UPRIGHT) & (mesh.triangles >= first).any(axis=1)

@@ -1,8 +1,8 @@
-"""Which triangles of a mesh cut, touch or cover others: exact, coplanar overlaps included.
+"""Self-intersections of a mesh, exact, coplanar overlaps included.
 
-Pairs come from a tree of boxes, each pair is decided by the signs of exact predicates alone (the idea of
-Guigue and Devillers, "Fast and Robust Triangle-Triangle Overlap Test Using Orientation Predicates", 2003).
-Neighbours may share what their shared vertices span and nothing else.
+Candidate pairs come from a tree of boxes; each pair is decided by the signs of exact predicates alone (the
+idea of Guigue and Devillers, "Fast and Robust Triangle-Triangle Overlap Test Using Orientation Predicates",
+2003). Adjacent triangles may meet only in the span of their shared vertices.
 """
 
 from __future__ import annotations
@@ -22,11 +22,30 @@ def self_intersecting_triangles(
     threads: int | None = None,
     among: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
-    """Which triangles meet another one in more than the vertices both have by index, bool [m].
+    """Triangles that meet another one in more than their shared vertices and edges.
 
-    Triangles without area are passed over. Vertices must be finite, with equal positions welded to one index.
-    threads: all cores if None; the result is the same for any number. among: bool [m], only pairs with one of
-    these are looked at. Raises ValueError for indices out of range and for the tree of another mesh.
+    Triangles without area are skipped. Vertices are shared by index.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh with finite vertices, equal positions welded.
+    tree : Tree, optional
+        Its tree of boxes; built by default.
+    threads : int, optional
+        Threads; all cores by default. The result does not depend on it.
+    among : ndarray of bool, shape (m,), optional
+        Search only pairs with one of these triangles.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+        True for each self-intersecting triangle.
+
+    Raises
+    ------
+    ValueError
+        For indices out of range, or the tree of another mesh.
     """
     vertices, triangles, threads = mesh.vertices, mesh.triangles, threads or 0
     if among is None or tree is not None:

@@ -1,4 +1,4 @@
-"""Fewer triangles, within a tolerance that is proved."""
+"""Mesh simplification within a proved tolerance."""
 
 from __future__ import annotations
 
@@ -11,17 +11,31 @@ from fracslice.scene import parse_length
 from fracslice.work import Work
 
 ROUNDS, PATIENT = 200, 40
-"""How often what is at fault is put back, and how often of these something else may be tried there."""
+"""Maximum rounds of verification and undo, and number of the first rounds in which new collapses may replace
+the undone ones.
+"""
 
 AIM = 0.95
-"""The share of the tolerance that vertices may spend; triangles between them need the rest."""
+"""Fraction of the tolerance for vertices; the triangles between them need the rest."""
 
 
 @dataclass(frozen=True)
 class Simplified:
-    """What a simplification did. from_triangles: how many there were. bound_mm: every point of the original
-    is within it of the simplified surface, proved. back_mm: no sample of the simplified surface is farther
-    from the original. Both are at most tolerance_mm."""
+    """Result of a simplification.
+
+    Attributes
+    ----------
+    tolerance_mm : float
+        Tolerance.
+    from_triangles : int
+        Triangles of the original mesh.
+    bound_mm : float
+        Proved bound on the distance of all points of the original surface from the simplified one; at most
+        the tolerance.
+    back_mm : float
+        Greatest distance of the samples of the simplified surface from the original one; at most the
+        tolerance.
+    """
 
     tolerance_mm: float
     from_triangles: int
@@ -30,14 +44,35 @@ class Simplified:
 
 
 def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Mesh, Simplified]:
-    """The mesh with fewer triangles, nowhere farther than `tolerance` (mm, or such as "0.02mm") from the
-    original.
+    """Simplify a mesh within a tolerance.
 
-    mesh: a closed, oriented 2-manifold without crossings. The result is one too, of the same topology; its
-    vertices are some of the original's, so that they stay on the surface and on sharp edges. What is done is
-    checked: a bound on the distance of every original triangle, the distance back at samples half an edge
-    apart, crossings, and that no shell is inside out. What fails is put back. Raises `MeshError` for a mesh
-    that is not a closed manifold, or if that comes to no end, and `Cancelled`.
+    The vertices of the result are vertices of the original, and so stay on the surface and on sharp edges.
+    The result is verified: a bound on the distance of every original triangle, the distance back at samples
+    half an edge apart, self-intersections, and the orientation of the shells. Collapses that fail are undone.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Closed, oriented 2-manifold without self-intersections, mm.
+    tolerance : float or str
+        Maximum distance between both surfaces: mm, or a length with a unit, for example "0.02mm".
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    Mesh
+        Simplified mesh: a closed, oriented 2-manifold of the same topology, without self-intersections.
+    Simplified
+        Distances.
+
+    Raises
+    ------
+    MeshError
+        For an invalid tolerance or a mesh that is not a closed manifold, or if faults remain after all
+        rounds.
+    Cancelled
+        If the work is cancelled.
     """
     from fracslice.mesh.collapse import FIRST, Collapse
     from fracslice.mesh.examination import Examination

@@ -1,4 +1,4 @@
-"""Meshes as solids: proof by manifold3d."""
+"""Solids of manifold3d."""
 
 from __future__ import annotations
 
@@ -22,9 +22,22 @@ _REASONS = {
 
 
 def to_manifold(mesh: Mesh) -> Manifold:
-    """The mesh as a manifold3d solid, taken as it is, in double precision.
+    """Convert a mesh to a manifold3d solid, in double precision, without repair.
 
-    Raises MeshError in plain words when manifold3d is not installed or refuses it, or it has no triangles.
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        The solid.
+
+    Raises
+    ------
+    MeshError
+        If manifold3d is not installed or refuses the mesh, or the mesh has no triangles.
     """
     if reason := lacking("manifold3d", "solids need"):
         raise MeshError(reason)
@@ -32,7 +45,7 @@ def to_manifold(mesh: Mesh) -> Manifold:
 
     if not len(mesh.triangles):
         raise MeshError("the mesh has no triangles")
-    corners = np.array(mesh.vertices, np.float64)  # a copy: manifold3d takes none that is read-only
+    corners = np.array(mesh.vertices, np.float64)  # copy: manifold3d needs a writeable array
     solid = manifold3d.Manifold(manifold3d.Mesh64(corners, mesh.triangles.astype(np.uint64)))
     status = solid.status().name
     if status != "NoError":

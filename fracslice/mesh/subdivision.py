@@ -1,7 +1,7 @@
-"""Triangles cut at the middles of their sides, so that the surface stays closed.
+"""Subdivision of triangles at the midpoints of edges; the surface stays closed.
 
-Red and green refinement (Bank, Sherman and Weiser 1983, "Some refinement algorithms and data structures for
-regular local mesh refinement"): where an edge is split, so are both triangles at it.
+Red-green refinement (Bank, Sherman and Weiser 1983, "Some refinement algorithms and data structures for
+regular local mesh refinement"): both triangles at a split edge are split.
 """
 
 from __future__ import annotations
@@ -14,31 +14,50 @@ from numpy.typing import NDArray
 from .model import Mesh
 
 NEEDLE = 0.3
-"""A triangle whose shortest side is a smaller share of its longest is cut at both of its long ones, or at
-none."""
+"""Maximum ratio of the shortest to the longest side of a needle. A needle is split at both of its long sides
+or at none.
+"""
 
 
 class Edges(NamedTuple):
-    """Of a closed mesh. ends: int64 [e, 2], the lower vertex first. sides: int64 [m, 3], those of each
-    triangle: side k runs from corner k to the next."""
+    """Edges of a closed mesh.
+
+    Attributes
+    ----------
+    ends : ndarray of int64, shape (e, 2)
+        End points, the lower index first.
+    sides : ndarray of int64, shape (m, 3)
+        Edges of each triangle; side k runs from corner k to the next.
+    """
 
     ends: NDArray[np.int64]
     sides: NDArray[np.int64]
 
     @property
     def keys(self) -> NDArray[np.int64]:
-        """A number for each that does not depend on the others."""
+        """Unique key of each edge, made of its end points, int64 [e]."""
         found: NDArray[np.int64] = self.ends[:, 0] << 32 | self.ends[:, 1]
         return found
 
     @property
     def beside(self) -> NDArray[np.int64]:
-        """The two triangles at each, int64 [e, 2]."""
+        """The two triangles at each edge, int64 [e, 2]."""
         return np.argsort(self.sides.ravel(), kind="stable").reshape(-1, 2) // 3
 
 
 def edges_of(triangles: NDArray[np.int32]) -> Edges:
-    """The edges of a closed mesh."""
+    """Edges of a closed mesh.
+
+    Parameters
+    ----------
+    triangles : ndarray of int32, shape (m, 3)
+        Triangles.
+
+    Returns
+    -------
+    Edges
+        Edges, by ascending key.
+    """
     ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).astype(np.int64)
     ends.sort(axis=2)
     keys, sides = np.unique(ends[..., 0] << 32 | ends[..., 1], return_inverse=True)
@@ -48,7 +67,22 @@ def edges_of(triangles: NDArray[np.int32]) -> Edges:
 def with_needles(
     split: NDArray[np.bool_], sides: NDArray[np.int64], lengths: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """`split` and what has to go with it: half a needle would be a triangle of three points in a row."""
+    """Add the other long side of needles with a split side. Half a needle would be nearly degenerate.
+
+    Parameters
+    ----------
+    split : ndarray of bool, shape (e,)
+        True for each split edge.
+    sides : ndarray of int64, shape (m, 3)
+        Edges of each triangle.
+    lengths : ndarray of float64, shape (e,)
+        Lengths of the edges.
+
+    Returns
+    -------
+    ndarray of bool, shape (e,)
+        Split edges with the added ones.
+    """
     own = lengths[sides]
     longest = own.max(axis=1, keepdims=True)
     needles = np.flatnonzero(own.min(axis=1) < NEEDLE * longest[:, 0])
@@ -64,8 +98,26 @@ def with_needles(
 def cut(
     mesh: Mesh, sides: NDArray[np.int64], split: NDArray[np.bool_], there: NDArray[np.float64]
 ) -> tuple[Mesh, NDArray[np.int64]]:
-    """The mesh with new vertices, `there`, in split edges, and the triangle that each of its triangles came
-    from: first those that are as they were."""
+    """Split edges of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Closed mesh.
+    sides : ndarray of int64, shape (m, 3)
+        Edges of each triangle.
+    split : ndarray of bool, shape (e,)
+        True for each edge to split.
+    there : ndarray of float64, shape (k, 3)
+        New vertices of these edges.
+
+    Returns
+    -------
+    Mesh
+        The mesh with the new vertices; unchanged triangles come first.
+    ndarray of int64, shape (j,)
+        Parent triangle of each triangle.
+    """
     number = np.full(len(split), -1, np.int32)
     number[split] = len(mesh.vertices) + np.arange(split.sum(), dtype=np.int32)
     vertices = np.concatenate([mesh.vertices, there])
@@ -82,8 +134,8 @@ def cut(
 def _cut(
     triangles: NDArray[np.int32], middles: NDArray[np.int32], count: int, vertices: NDArray[np.float64]
 ) -> list[NDArray[np.int32]]:
-    """Triangles cut at the middles of `count` of their sides, int32 [m, 3], -1 where a side is whole."""
-    # Turned so that the cut side is the first, or the whole one the last.
+    """Triangles split at `count` of their sides. Midpoint vertices int32 [m, 3]; -1 for a whole side."""
+    # Rotated so that the split side comes first, or the whole one last.
     first = np.argmax(middles >= 0, axis=1) if count == 1 else (np.argmin(middles, axis=1) + 1) % 3
     turn = (first[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(triangles, turn, axis=1).T

@@ -1,4 +1,4 @@
-"""The shells of a surface in pieces, found with one piece in memory at a time."""
+"""Shells of a surface in pieces, with one piece in memory at a time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,24 @@ from .pieces import Pieces, rows
 
 
 def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
-    """The shells of a surface, and the labels of its pieces: each connected component of a piece has one."""
+    """Find the shells of a surface in pieces, and label the pieces.
+
+    Each connected component of a piece has one label.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        Pieces of a closed surface; their labels are stored.
+    voxel : float
+        Voxel, in the units of the pieces.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    WholeShells
+        The shells.
+    """
     found = _Survey(voxel, threads)
     for number, mesh in enumerate(pieces.meshes()):
         pieces.label(number, found.add(mesh, pieces.ends[number]))
@@ -22,7 +39,7 @@ def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
 
 
 class _Survey:
-    """Sums over pieces, in turn. Labels are numbered from the first piece on."""
+    """Sums over the components of pieces, in order. Labels count from the first piece on."""
 
     def __init__(self, voxel: float, threads: int) -> None:
         self.voxel, self.threads, self.count, self.end = voxel, threads, 0, -np.inf
@@ -35,7 +52,7 @@ class _Survey:
         self.border: tuple[NDArray[np.void], NDArray[np.int64]] = rows(np.empty((0, 3))), np.empty(0, int)
 
     def add(self, mesh: Mesh, end: float) -> NDArray[np.int64]:
-        """Take in a piece; return the label of each of its triangles, int64 [m]."""
+        """Add a piece that ends at x = `end`; returns the label of each of its triangles, int64 [m]."""
         from .topology import component_sizes, connected_components
 
         local, count = connected_components(mesh.triangles, len(mesh.vertices), self.threads)
@@ -44,7 +61,7 @@ class _Survey:
         low, high = _boxes(mesh.vertices, mesh.vertices, of_vertex, count)
         whole = not np.isfinite([self.end, end]).any()
         areas = np.zeros((count, 3)) if whole else _areas(mesh, local, count)
-        # Cones over the first corner of a component, moved to the corner of its box: dust keeps its digits.
+        # Cones over a component's first corner, moved to the corner of its box: precise even for dust.
         first = np.searchsorted(np.maximum.accumulate(local), np.arange(count))
         tips = mesh.vertices[mesh.triangles[first, 0]]
         cones, sizes = component_sizes(mesh.vertices, mesh.triangles, local, count, self.threads)
@@ -58,7 +75,9 @@ class _Survey:
         return local + np.int64(self.count - count)
 
     def _join_to_last(self, mesh: Mesh, labels: NDArray[np.int64], end: float) -> None:
-        """Components that share a vertex with the piece before are one: no surface passes a seam without."""
+        """Unite components that share a vertex with the previous piece: no surface crosses a seam without
+        one.
+        """
         x = mesh.vertices[:, 0]
         here, there = (np.flatnonzero(np.abs(x - seam) < self.voxel / 2) for seam in (self.end, end))
         points, before = self.border
@@ -69,18 +88,18 @@ class _Survey:
         self.end = end
 
     def shells(self) -> WholeShells:
-        """What all pieces together are made of."""
+        """Shells of all pieces together."""
         of_label, count = self._united()
         lows, areas = np.concatenate(self.low), np.concatenate(self.areas)
         low, high = _boxes(lows, np.concatenate(self.high), of_label, count)
-        # Cones over the corner of a component, moved to the corner of its shell.
+        # Cones over the corner of a component's box, moved to the corner of its shell's box.
         cones = np.concatenate(self.cones) + np.einsum("ij,ij->i", lows - low[of_label], areas) / 3
         volumes = np.bincount(of_label, cones, minlength=count).astype(np.float64)
         sizes = np.bincount(of_label, np.concatenate(self.sizes), minlength=count).astype(np.float64)
         return WholeShells(of_label, volumes, sizes, low, high)
 
     def _united(self) -> tuple[NDArray[np.int32], int]:
-        """The shell of each label."""
+        """Shell of each label, and the number of shells."""
         from .topology import unite
 
         parent: NDArray[np.int64] = np.arange(self.count)
@@ -94,10 +113,18 @@ class _Survey:
 
 @dataclass(frozen=True, eq=False)
 class WholeShells:
-    """The shells of all pieces together.
+    """Shells of all pieces together.
 
-    of_label: int32, the shell of each label. volumes: float64 [s], signed. areas: float64 [s]. low, high:
-    float64 [s, 3], the corners of their bounding boxes.
+    Attributes
+    ----------
+    of_label : ndarray of int32, shape (l,)
+        Shell of each label.
+    volumes : ndarray of float64, shape (s,)
+        Signed volumes, negative for cavities.
+    areas : ndarray of float64, shape (s,)
+        Areas.
+    low, high : ndarray of float64, shape (s, 3)
+        Corners of the bounding boxes.
     """
 
     of_label: NDArray[np.int32]
@@ -107,14 +134,44 @@ class WholeShells:
     high: NDArray[np.float64]
 
     def bounds(self, which: NDArray[np.bool_] | slice = slice(None)) -> NDArray[np.float64]:
-        """The box around some shells, or all of them, [2, 3]."""
+        """Bounding box of some or all shells.
+
+        Parameters
+        ----------
+        which : ndarray of bool, shape (s,), or slice, optional
+            Shells; all by default.
+
+        Returns
+        -------
+        ndarray of float64, shape (2, 3)
+            Low and high corner.
+        """
         return np.stack([self.low[which].min(axis=0), self.high[which].max(axis=0)])
 
     def nested(self, pieces: Pieces, threads: int = 0) -> tuple[Shells, int]:
-        """Which shell is in which, and how many are where they should not be.
+        """Nesting of the shells, by rays.
 
-        Each shell is looked up from where its x is least: that point lies within a cell, so that a ray across
-        x from it stays in one piece. Raises `MeshError` for a cavity that no body is around.
+        The ray of each shell starts at its point of least x. This point lies within a cell, so that a ray
+        across x stays in one piece.
+
+        Parameters
+        ----------
+        pieces : Pieces
+            Labelled pieces.
+        threads : int, optional
+            Threads; 0 for all cores.
+
+        Returns
+        -------
+        Shells
+            Volumes and parents of the shells, without labels of triangles.
+        int
+            Number of misplaced shells.
+
+        Raises
+        ------
+        MeshError
+            For a cavity without a body around it.
         """
         from .nesting import nesting
 
@@ -136,11 +193,21 @@ class WholeShells:
         return Shells(np.empty(0, np.int32), self.volumes, parent), int((winding != hollow).sum())
 
     def thin_walls(self, voxel: float) -> str:
-        """What walls came to that are thinner than a voxel, in words; empty where all are thicker.
+        """Note on walls thinner than a voxel; empty if there are none.
 
-        Between samples such walls are missed: they have holes, or fall to pieces. A body counts if on average
-        it is thinner than a voxel; the dust around a fractal is such, too, but less than `PIECES` of the
+        Such walls fall between samples: they have holes or break into pieces. A body counts if its average
+        thickness is below a voxel. The dust around a fractal also counts, but is less than `PIECES` of the
         material.
+
+        Parameters
+        ----------
+        voxel : float
+            Voxel, in the units of the shells.
+
+        Returns
+        -------
+        str
+            The note.
         """
         whole, bodies = self.volumes.sum(), self.volumes > 0
         thin = bodies & (2 * self.volumes < voxel * self.areas)
@@ -152,15 +219,15 @@ class WholeShells:
 def _boxes(
     lows: NDArray[np.float64], highs: NDArray[np.float64], group: NDArray[np.integer], count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The low and high corners of groups of boxes, float64 [count, 3] each."""
+    """Bounding boxes of groups of boxes: low and high corners, float64 [count, 3] each."""
     low, high = np.full((3, count), np.inf), np.full((3, count), -np.inf)
-    for k in range(3):  # one axis after the other: NumPy is quick at one dimension only
+    for k in range(3):  # axis by axis: `ufunc.at` is fast in one dimension only
         np.minimum.at(low[k], group, lows[:, k])
         np.maximum.at(high[k], group, highs[:, k])
     return low.T.copy(), high.T.copy()
 
 
 def _areas(mesh: Mesh, labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
-    """The sum of the normals of each component, each as long as its triangle's area, float64 [count, 3]."""
+    """Vector area of each component, float64 [count, 3]: the sum of the vector areas of its triangles."""
     normals = mesh.normals / 2
     return np.stack([np.bincount(labels, normals[:, k], minlength=count) for k in range(3)], axis=1)

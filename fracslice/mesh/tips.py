@@ -1,4 +1,4 @@
-"""The tips that lie beyond the last samples: a mesh of samples is blunt there."""
+"""Sharp tips of a solid beyond its last samples, where the sampled mesh is blunt."""
 
 from __future__ import annotations
 
@@ -23,36 +23,52 @@ from .quantisation import quantise
 from .self_intersections import self_intersecting_triangles
 
 POINTED = 0.15
-"""The sine of the angle by which all edges at a pointed vertex fall off, at least."""
+"""Minimum sine of the angle by which all edges descend from a pointed vertex."""
 
 MANY, MOST_TIPS = 512, 64
-"""Pointed vertices at most: else the surface is rough, and has no end of tips. Tips that are looked at."""
+"""Maximum number of pointed vertices (a rough surface has any number of tips), and of tips that are added."""
 
 ABOVE, STEP = 0.002, 0.25
-"""Voxels above a triangle where the solid goes on; the first steps from there outwards."""
+"""Height of a start point above its triangle, and first step of the climb, voxels."""
 
 ASIDE = np.array([(*way, -POINTED) for way in product((-1, 0, 1), repeat=2) if any(way)]).T
-"""From a tip: no way there stays in the solid. Along the rim of a disk, or a ridge, some do."""
+"""Sideways and downward steps from a tip. At a tip all of them leave the solid; along the rim of a disk, or a
+ridge, some do not.
+"""
 
 ROUGHLY, EXACT = 0.03, 1e-7
-"""Voxels: the last step of the first ways outwards; of the mesh's size: that of the last ones."""
+"""Last step of the first climbs, voxels, and of the last climbs, relative to the size of the object."""
 
 SAME = 0.05
-"""Voxels: a mesh that ends so near a tip reaches it."""
+"""Minimum distance of a tip from the mesh, voxels."""
 
 REACH = 8.0
-"""Voxels around pointed vertices and tips: triangles that are looked at."""
+"""Radius around pointed vertices and tips within which triangles are examined, voxels."""
 
 
 class Pointed:
-    """The pointed vertices of a surface that comes in pieces."""
+    """Collects the pointed vertices of a surface in pieces.
+
+    Parameters
+    ----------
+    voxel : float
+        Voxel, in the units of the pieces.
+    threads : int, optional
+        Threads; 0 for all cores.
+    """
 
     def __init__(self, voxel: float, threads: int = 0) -> None:
         self._voxel, self._threads, self._points = voxel, threads, list[NDArray[np.float64]]()
         self._near, self._seam = NOTHING, -np.inf
 
     def add(self, piece: Piece) -> None:
-        """Take in a piece: vertices near its end are looked at with the next one."""
+        """Add a piece. Vertices near its end are examined with the next one.
+
+        Parameters
+        ----------
+        piece : Piece
+            Pieces, by ascending x.
+        """
         mesh, voxel = piece.mesh, self._voxel
         if len(self._near.triangles):
             mesh = joined(self._near, mesh, self._seam, voxel / 2)
@@ -66,7 +82,7 @@ class Pointed:
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Where they are, [n, 3]; none of a rough surface."""
+        """Pointed vertices, float64 [n, 3]; none for a rough surface."""
         found = np.concatenate(self._points)
         return found if len(found) <= MANY else found[:0]
 
@@ -74,14 +90,36 @@ class Pointed:
 def with_tips(
     planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work
 ) -> tuple[Pieces, NDArray[np.float64]]:
-    """The surface with the solid's own tips in place of blunt ends; and these, [k, 3].
+    """Replace blunt ends of a surface by the tips of the solid.
 
-    pieces: of a closed, oriented 2-manifold, its vertices on the zero set of the plan's field, a voxel apart.
-    points: its pointed vertices. Where the solid goes on above a triangle at one, its farthest point is
-    looked for, and what that sees from above is replaced by a fan around it, if the fan is nowhere farther
-    from the surface than what it replaces. The surface stays closed, and does not cross itself. A rough
-    surface, as of a fractal, stays as it is. The fans are the last triangles of their pieces; pieces that a
-    fan spans become one. Raises `Cancelled`.
+    If the solid continues above a triangle at a pointed vertex, its farthest point is located. The triangles
+    that face this tip are replaced by a fan around it, if the fan is nowhere farther from the surface than
+    they are. The surface stays closed and free of self-intersections. A rough surface, for example of a
+    fractal, is not changed. The fans are the last triangles of their pieces; pieces that a fan spans are
+    joined.
+
+    Parameters
+    ----------
+    planned : Plan
+        Sampled field.
+    pieces : Pieces
+        Pieces of a closed, oriented 2-manifold with vertices on the zero set of the field, scene units.
+    points : ndarray of float64, shape (n, 3)
+        Its pointed vertices.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    Pieces
+        The surface with tips.
+    ndarray of float64, shape (k, 3)
+        The tips, scene units.
+
+    Raises
+    ------
+    Cancelled
+        If the work is cancelled.
     """
     caps = _caps(planned, pieces, points, work) if len(points) else []
     if not caps:
@@ -96,7 +134,7 @@ def with_tips(
 
 
 def _caps(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work) -> list[Cap]:
-    """What is replaced, by the numbers of triangles from the first piece on."""
+    """Caps of all tips; triangle indices count from the first piece on."""
     root, voxel = planned.root, planned.voxel
     tips = _found(planned, pieces, points, work)
     if not tips:
@@ -119,7 +157,7 @@ def _caps(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work
 
 
 def _crossing(mesh: Mesh, caps: list[Cap], work: Work) -> set[int]:
-    """The caps whose fans cross others or the mesh, as a file holds them."""
+    """Caps whose fans intersect each other or the mesh after quantisation."""
     made = capped(mesh, caps)
     of_cap = np.repeat(np.arange(len(caps)), [len(cap.fan) for cap in caps])
     of_cap = np.concatenate([np.full(len(made.triangles) - len(of_cap), -1), of_cap])
@@ -129,7 +167,7 @@ def _crossing(mesh: Mesh, caps: list[Cap], work: Work) -> set[int]:
 
 
 def _spans(caps: list[Cap], pieces: Pieces, near: float) -> Iterator[tuple[int, int]]:
-    """Which pieces, first to last - 1, become one: those that a fan, or what it replaces, spans."""
+    """Pieces first to last - 1 that are joined: those that a fan, or the triangles it replaces, spans."""
     x = np.array([(cap.fan[..., 0].min() - near, cap.fan[..., 0].max() + near) for cap in caps])
     old = np.array([(cap.old.min(), cap.old.max()) for cap in caps])
     own = np.searchsorted(pieces.ends, x), np.searchsorted(pieces.starts, old, side="right") - 1
@@ -142,7 +180,17 @@ def _spans(caps: list[Cap], pieces: Pieces, near: float) -> Iterator[tuple[int, 
 
 
 class Tip(NamedTuple):
-    """A tip beyond the mesh: how far it is from the nearest vertex, that, and where the tip is."""
+    """A tip beyond the mesh.
+
+    Attributes
+    ----------
+    gain : float
+        Height of the tip above the nearest vertex.
+    end : ndarray of float64, shape (3,)
+        Nearest vertex.
+    place : ndarray of float64, shape (3,)
+        Position of the tip.
+    """
 
     gain: float
     end: NDArray[np.float64]
@@ -150,7 +198,7 @@ class Tip(NamedTuple):
 
 
 def _found(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work) -> list[Tip]:
-    """Tips beyond pointed vertices, the farthest one first."""
+    """Tips beyond pointed vertices, the highest one first."""
     kernel, voxel = planned.root.kernel("cpu", "float64"), planned.voxel
     exact = EXACT * max(planned.box.size)
 
@@ -182,7 +230,9 @@ def _found(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Wor
 def _above(
     pieces: Pieces, points: NDArray[np.float64], voxel: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Of the triangles at some vertices, [n, 3] each: a corner, a point just above, and what is upwards."""
+    """A corner, a point just above the triangle and its unit normal, [n, 3] each, for each triangle at some
+    vertices.
+    """
     mesh, _ = pieces.near(points, REACH * voxel)
     rings = Rings(mesh)
     seats = mesh.corners[rings.around(rings.at(points))]
@@ -193,8 +243,9 @@ def _above(
 def _nearest(
     pieces: Pieces, ends: NDArray[np.float64], tips: NDArray[np.float64], voxel: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """The vertices near tips that ways from `ends` lead to, each once, with the highest of its tips; and what
-    is upwards there."""
+    """Vertices near tips, reached from `ends` along edges, each once, with the highest of its tips and the
+    upward direction.
+    """
     mesh, _ = pieces.near(_between(ends, tips, REACH * voxel), REACH * voxel)
     rings = Rings(mesh)
     found = rings.nearest(rings.at(ends), tips)
@@ -203,7 +254,7 @@ def _nearest(
 
 
 def _between(starts: NDArray[np.float64], ends: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    """Points on the ways between others, no farther apart than a step."""
+    """Points on the segments between start and end points, at most a step apart."""
     count = 2 + int(np.linalg.norm(ends - starts, axis=1).max() / step)
     return np.linspace(starts, ends, count).reshape(-1, 3)
 
@@ -211,7 +262,7 @@ def _between(starts: NDArray[np.float64], ends: NDArray[np.float64], step: float
 def _highest(
     ends: NDArray[np.int64], tips: NDArray[np.float64], ups: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Each end once, with the highest of its tips, and what is upwards there."""
+    """Distinct ends, the highest tip of each, and the upward direction there."""
     once, which = np.unique(ends, return_inverse=True)
     up = np.zeros((len(once), 3))
     np.add.at(up, which, ups)
@@ -222,12 +273,13 @@ def _highest(
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Normalised vectors."""
     found: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None]
     return found
 
 
 def _frames(ups: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations that turn z to unit vectors, [n, 3, 3]."""
+    """Rotations from the z axis to unit vectors, [n, 3, 3]."""
     aside = np.eye(3)[np.abs(ups).argmin(axis=1)]
     first = _unit(np.cross(aside, ups))
     return np.stack([first, np.cross(ups, first), ups], axis=2)

@@ -1,4 +1,4 @@
-"""How triangles hang together: the edges and fans around every vertex, and the parts they form."""
+"""Topology of triangles: edges, fans around vertices, and connected components."""
 
 from __future__ import annotations
 
@@ -14,7 +14,21 @@ from fracslice._native import edge_topology as _edge_topology
 
 
 class EdgeTopology(NamedTuple):
-    """Counts over a mesh; all but `edges` are zero for a closed, oriented 2-manifold."""
+    """Counts of edges and vertices of a mesh; all but `edges` are zero for a closed, oriented 2-manifold.
+
+    Attributes
+    ----------
+    edges : int
+        Edges.
+    open_edges : int
+        Edges of one triangle.
+    non_manifold_edges : int
+        Edges of more than two triangles.
+    misoriented_edges : int
+        Edges of two triangles that traverse them in the same direction.
+    non_manifold_vertices : int
+        Vertices that join several fans.
+    """
 
     edges: int
     open_edges: int
@@ -24,10 +38,28 @@ class EdgeTopology(NamedTuple):
 
 
 def edge_topology(triangles: NDArray[np.int32], vertices: int, threads: int = 0) -> EdgeTopology:
-    """Edges of one triangle, of more than two, of two that run the same way; vertices that join fans.
+    """Count open, non-manifold and misoriented edges, and non-manifold vertices.
 
-    triangles: int32 [m, 3], each with three different indices below `vertices`. O(m), or O(m log d) at
-    vertices of degree d. Raises ValueError for other indices, as everything here does.
+    O(m), or O(m log d) at vertices of degree d.
+
+    Parameters
+    ----------
+    triangles : ndarray of int32, shape (m, 3)
+        Triangles; the three indices of each differ and are below `vertices`.
+    vertices : int
+        Number of vertices.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    EdgeTopology
+        Counts.
+
+    Raises
+    ------
+    ValueError
+        For other indices, as all functions of this module.
     """
     ends = edge_ends(triangles, np.ones(vertices, dtype=np.bool_), threads)
     edges, opened, non_manifold, misoriented = (n // 2 for n in ends[:4])
@@ -35,23 +67,71 @@ def edge_topology(triangles: NDArray[np.int32], vertices: int, threads: int = 0)
 
 
 def edge_ends(triangles: NDArray[np.int32], counted: NDArray[np.bool_], threads: int = 0) -> EdgeTopology:
-    """The same counts at some vertices only, bool [vertices]; of edges, their ends there."""
+    """Counts of `edge_topology` at some vertices; edges are counted by their ends.
+
+    An edge with both ends at these vertices counts twice.
+
+    Parameters
+    ----------
+    triangles : ndarray of int32, shape (m, 3)
+        Triangles.
+    counted : ndarray of bool, shape (n,)
+        True for each counted vertex.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    EdgeTopology
+        Counts of edge ends and of non-manifold vertices.
+    """
     return EdgeTopology(*_edge_topology(triangles, counted, threads))
 
 
 def corners_by_vertex(
     triangles: NDArray[np.int32], vertices: int, threads: int = 0
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Corners, 3 t + k for corner k of triangle t, by vertex: start int64 [n + 1], corner int64 [3 m]."""
+    """Corners of triangles grouped by vertex. Corner k of triangle t has the number 3 t + k.
+
+    Parameters
+    ----------
+    triangles : ndarray of int32, shape (m, 3)
+        Triangles.
+    vertices : int
+        Number of vertices.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    start : ndarray of int64, shape (n + 1,)
+        Index of the first corner of each vertex.
+    corner : ndarray of int64, shape (3 m,)
+        Corners.
+    """
     return _corners_by_vertex(triangles, vertices, threads)
 
 
 def connected_components(
     triangles: NDArray[np.int32], vertices: int, threads: int = 0
 ) -> tuple[NDArray[np.int32], int]:
-    """The connected part of each triangle (int32 [m], numbered by first appearance), and how many there are.
+    """Connected components of a mesh. Triangles with a common vertex are connected.
 
-    Triangles with a common vertex are connected.
+    Parameters
+    ----------
+    triangles : ndarray of int32, shape (m, 3)
+        Triangles.
+    vertices : int
+        Number of vertices.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    ndarray of int32, shape (m,)
+        Component of each triangle, numbered by first appearance.
+    int
+        Number of components.
     """
     return _connected_components(triangles, vertices, threads)
 
@@ -63,9 +143,29 @@ def component_sizes(
     count: int,
     threads: int = 0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Signed volume and area of each part, float64 [count].
+    """Signed volumes and areas of connected components.
 
-    Volumes are measured from a vertex of the part's own: dust keeps its digits.
+    Volumes are measured from a vertex of the component, which keeps the precision of small ones.
+
+    Parameters
+    ----------
+    vertices : ndarray of float64, shape (n, 3)
+        Vertices.
+    triangles : ndarray of int32, shape (m, 3)
+        Triangles.
+    labels : ndarray of int32, shape (m,)
+        Component of each triangle.
+    count : int
+        Number of components.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    volumes : ndarray of float64, shape (count,)
+        Signed volumes.
+    areas : ndarray of float64, shape (count,)
+        Areas.
     """
     return _component_sizes(vertices, triangles, labels, count, threads)
 
@@ -73,12 +173,31 @@ def component_sizes(
 def shell_volumes(
     vertices: NDArray[np.float64], triangles: NDArray[np.int32], labels: NDArray[np.int32], count: int
 ) -> NDArray[np.float64]:
-    """The first of these."""
+    """Signed volumes of connected components; see `component_sizes`.
+
+    Parameters
+    ----------
+    vertices, triangles, labels, count
+        As in `component_sizes`.
+
+    Returns
+    -------
+    ndarray of float64, shape (count,)
+        Signed volumes.
+    """
     return component_sizes(vertices, triangles, labels, count)[0]
 
 
 def unite(parent: NDArray[np.int64], a: int, b: int) -> None:
-    """Join the sets of a and b in a forest where parents have lower indices, halving paths."""
+    """Unite the sets of a and b in a disjoint-set forest, with path halving. Parents have lower indices.
+
+    Parameters
+    ----------
+    parent : ndarray of int64, shape (n,)
+        Parent of each element; modified in place.
+    a, b : int
+        Elements.
+    """
     roots = []
     for node in (a, b):
         while parent[node] != node:

@@ -1,7 +1,7 @@
-"""A tree of boxes over the triangles of a mesh, for questions about neighbours in space.
+"""Tree of bounding boxes over the triangles of a mesh, for spatial queries.
 
-Triangles are put in Morton order (G. M. Morton, 1966) and cut into runs of `LEAF`; a complete binary tree of
-boxes stands on the runs, stored as a heap: node i has the children 2i and 2i + 1.
+Triangles are sorted in Morton order (G. M. Morton, 1966) and split into runs of `LEAF`. A complete binary
+tree of boxes over the runs is stored as a heap: node i has the children 2i and 2i + 1.
 """
 
 from __future__ import annotations
@@ -15,11 +15,19 @@ from fracslice._native import tree as _tree
 from fracslice.mesh.model import Mesh
 
 LEAF = 8
-"""As in `fracslice/native/mesh/triangles.h`."""
+"""Triangles per leaf; equal to the constant in `fracslice/native/mesh/triangles.h`."""
 
 
 class Tree(NamedTuple):
-    """order: int64 [m], triangles in Morton order; low, high: float64 [nodes, 3], boxes; 1 is the root."""
+    """Tree of bounding boxes; node 1 is the root.
+
+    Attributes
+    ----------
+    order : ndarray of int64, shape (m,)
+        Triangles in Morton order.
+    low, high : ndarray of float64, shape (nodes, 3)
+        Corners of the boxes.
+    """
 
     order: NDArray[np.int64]
     low: NDArray[np.float64]
@@ -27,5 +35,18 @@ class Tree(NamedTuple):
 
 
 def build(mesh: Mesh, threads: int = 0) -> Tree:
-    """The tree of a mesh with at least one triangle; O(m)."""
+    """Build the tree of a mesh, in O(m).
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh with at least one triangle.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    Tree
+        The tree.
+    """
     return Tree(*_tree(mesh.vertices, mesh.triangles, threads))

@@ -1,4 +1,4 @@
-"""Equal corners made one vertex, bit by bit, as a slicer does with the loose triangles of an STL."""
+"""Welding of bitwise equal points, as slicers weld the triangles of an STL."""
 
 from __future__ import annotations
 
@@ -9,9 +9,23 @@ from fracslice._native import weld as _weld
 
 
 def weld(points: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Find equal points: float32 [n, 3], finite, without negative zeros.
+    """Group equal points, in O(n), by hashing.
 
-    Returns the first of each set of equal points (int64 [k], ascending) and the set of each point (int32
-    [n]). O(n), by hashing. Raises ValueError for more than 2^31 points.
+    Parameters
+    ----------
+    points : ndarray of float32, shape (n, 3)
+        Finite points without negative zeros.
+
+    Returns
+    -------
+    first : ndarray of int64, shape (k,)
+        First point of each group, ascending.
+    labels : ndarray of int32, shape (n,)
+        Group of each point.
+
+    Raises
+    ------
+    ValueError
+        For more than 2^31 points.
     """
     return _weld(points)

@@ -1,7 +1,7 @@
-"""A surface that passes by in pieces, or in one: cleaned and counted as `clean` and `check` do.
+"""Cleaning and checking of a surface in pieces, with the same result as `clean` and `check_mesh`.
 
-What a piece leaves near its end waits for the next one, so that whatever is mended, looked at or handed on
-has its surroundings with it.
+The triangles near the end of a piece wait for the next one, so that triangles have all their neighbours when
+they are cleaned, checked and handed on.
 """
 
 from __future__ import annotations
@@ -19,18 +19,26 @@ from .model import Mesh
 from .pieces import NOTHING, joined
 
 WAITS, COUNTS, MENDS = 7.5, 4.0, 3.0
-"""Voxels before the end of a piece: triangles beyond wait for the next; vertices up to there are counted now;
-triangles up to there mended now. What is mended reaches three voxels at most: it never meets what is gone.
+"""Distances from the end of a piece, voxels. Triangles with a vertex beyond the first wait for the next
+piece; vertices are counted up to the second; triangles are cleaned up to the third. An edit reaches three
+voxels at most, so that it never meets triangles that are gone.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Finished:
-    """Triangles as a file holds them, mm, amid others around them.
+    """Finished triangles as a file holds them, among neighbouring ones.
 
-    done: bool [m], which triangles are finished with this piece: in the order of the pieces', none of them
-    twice. counted: bool [n], the vertices whose triangles are all here, each of them once. proved: bool [m],
-    triangles of which no two intersect.
+    Attributes
+    ----------
+    mesh : Mesh
+        Finished triangles and neighbours, mm, quantised.
+    proved : ndarray of bool, shape (m,)
+        Triangles of which no two intersect.
+    done : ndarray of bool, shape (m,)
+        Triangles finished with this piece. Each triangle is finished once, in the order of the pieces.
+    counted : ndarray of bool, shape (n,)
+        Vertices with all their triangles in `mesh`. Each vertex is counted once.
     """
 
     mesh: Mesh
@@ -40,28 +48,61 @@ class Finished:
 
     @classmethod
     def whole(cls, mesh: Mesh, proved: NDArray[np.bool_] | None = None) -> Finished:
-        """All of a mesh."""
+        """A whole mesh as one piece.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            Quantised mesh, mm.
+        proved : ndarray of bool, shape (m,), optional
+            Triangles of which no two intersect; none by default.
+
+        Returns
+        -------
+        Finished
+            All triangles and vertices of the mesh.
+        """
         count = len(mesh.triangles)
         known = np.zeros(count, bool) if proved is None else proved
         return cls(mesh, known, np.ones(count, bool), np.ones(len(mesh.vertices), bool))
 
     @property
     def passed(self) -> Mesh:
-        """The finished triangles; their edges to those of other pieces are open."""
+        """The finished triangles alone; open where neighbours belong to other pieces."""
         return self.mesh if self.done.all() else self.mesh.selected(self.done)
 
 
 class Window:
-    """Pieces of a mesh in mm go in, in turn along x; finished triangles come out, in the same order."""
+    """Sliding window over the pieces of a mesh along x; finished triangles keep their order.
+
+    Parameters
+    ----------
+    voxel : float
+        Voxel, mm.
+    threads : int, optional
+        Threads; 0 for all cores.
+    """
 
     def __init__(self, voxel: float, threads: int = 0) -> None:
         self._voxel, self._threads = voxel, threads
         self._waiting, self._holds, self._end = NOTHING, np.zeros(0, bool), -np.inf
 
     def add(self, piece: Mesh, end: float, known: Certificate | None = None) -> Finished:
-        """Take in the piece that ends at x = `end`, infinity for the last; return what is finished by it.
+        """Add a piece.
 
-        known: what is certified of the piece; all pieces are of one grid.
+        Parameters
+        ----------
+        piece : Mesh
+            The piece, mm.
+        end : float
+            x at which it ends; infinite for the last one.
+        known : Certificate, optional
+            Certificate of the piece. All pieces have the same grid.
+
+        Returns
+        -------
+        Finished
+            Triangles that are finished with this piece.
         """
         before, self._end, voxel = self._end, end, self._voxel
         known, whole = known or Certificate.none(len(piece.triangles)), piece
@@ -82,7 +123,7 @@ class Window:
 
 @dataclass
 class Tally:
-    """Sums over finished pieces, as `MeshReport` has them, but of edges their ends: twice as many."""
+    """Sums over finished pieces; fields as in `MeshReport`, but edges count by their ends, twice each."""
 
     threads: int = 0
     triangles: int = 0
@@ -101,7 +142,13 @@ class Tally:
     high: tuple[float, ...] = (-np.inf,) * 3
 
     def add(self, piece: Finished) -> None:
-        """Count a piece."""
+        """Add a piece.
+
+        Parameters
+        ----------
+        piece : Finished
+            The piece.
+        """
         from .self_intersections import self_intersecting_triangles
         from .topology import edge_ends
 
@@ -130,7 +177,18 @@ class Tally:
             self.high = tuple(np.maximum(self.high, high).tolist())
 
     def report(self, bodies: int, cavities: int, misplaced: int) -> MeshReport:
-        """What `check` would say of the whole; the shells are counted elsewhere."""
+        """Report on the whole mesh, as `check_mesh` returns it.
+
+        Parameters
+        ----------
+        bodies, cavities, misplaced : int
+            Counts of shells.
+
+        Returns
+        -------
+        MeshReport
+            The report.
+        """
         manifold = not (self.open_edges or self.nonmanifold_edges or self.nonmanifold_vertices)
         shells, euler = bodies + cavities, self.vertices - self.triangles // 2
         (x0, y0, z0), (x1, y1, z1) = self.low, self.high
@@ -159,9 +217,19 @@ class Tally:
 
 
 def tips_last(meshes: Iterable[Mesh], tips: NDArray[np.float64]) -> Iterator[Mesh]:
-    """The same triangles, those at tips last, tip after tip, as they are where all is one piece.
+    """Move the triangles at tips to the end, tip after tip, in the order of a mesh in one piece.
 
-    tips: [k, 3], mm, not rounded.
+    Parameters
+    ----------
+    meshes : iterable of Mesh
+        Pieces, mm, quantised.
+    tips : ndarray of float64, shape (k, 3)
+        Tips, mm, not rounded.
+
+    Yields
+    ------
+    Mesh
+        The pieces without triangles at tips, then these triangles.
     """
     places = {tuple(tip): number for number, tip in enumerate(tips.astype(np.float32).tolist())}
     late: list[tuple[int, NDArray[np.float64]]] = []
