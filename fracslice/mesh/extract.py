@@ -13,11 +13,11 @@ from ..errors import MeshError
 from ..kernel import Field
 from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
-from ..volume.crossings import Refiner
 from ..volume.lattice import BRICK
-from ..volume.projection import TrustRegions, project
 from ..work import Work
+from .crossings import Refiner
 from .model import Mesh
+from .projection import TrustRegions, project
 
 if TYPE_CHECKING:
     from .._native import Cells

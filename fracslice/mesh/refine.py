@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel import Field
-from ..volume.projection import anywhere, project
 from ..work import Work
 from .creases import on_creases
 from .fit import Fit, Fitted
 from .flips import flip
 from .model import Mesh
+from .projection import anywhere, project
 from .self_intersections import self_intersecting_triangles
 from .subdivision import Edges, cut, edges_of, with_needles
 

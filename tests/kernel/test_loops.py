@@ -21,8 +21,8 @@ from fracslice.kernel.intrinsics import load, store
 from fracslice.kernel.linker import Linked
 from fracslice.kernel.loop_linker import loop_source
 from fracslice.kernel.loops import Loop, loop
+from fracslice.mesh import roots
 from fracslice.rendering import packets
-from fracslice.volume import roots
 
 STEP = 3
 NOTHING = Linked("", np.zeros(1))

@@ -18,7 +18,7 @@ from fracslice._slices import Memory, ProbeBounds, Slab
 from fracslice.formulas import box, sphere
 from fracslice.kernel import CpuKernel, link
 from fracslice.kernel.loops import bricks, points
-from fracslice.volume.roots import Roots
+from fracslice.mesh.roots import Roots
 
 
 def slab_of(entry: Any) -> Slab:

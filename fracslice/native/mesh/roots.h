@@ -6,7 +6,7 @@
 
 namespace fracslice::mesh {
 
-// The loops of fracslice.volume.root_loops over one field, on arrays of n segments, a multiple of `lanes`, that follow each
+// The loops of fracslice.mesh.root_loops over one field, on arrays of n segments, a multiple of `lanes`, that follow each
 // other in one array; the field itself on three rows of n coordinates; and how many segments are worth a call.
 struct RootLoops {
     size_t lanes, batch;

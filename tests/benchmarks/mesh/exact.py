@@ -16,10 +16,10 @@ import numpy as np
 
 from fracslice._native import Cells, Contouring
 from fracslice.formulas import Node
+from fracslice.mesh.crossings import Crossings, Refiner
 from fracslice.mesh.extract import contour, extract, minimum_edge_parameter
 from fracslice.scene.reader import read
 from fracslice.volume import plan, sample_scene
-from fracslice.volume.crossings import Crossings, Refiner
 
 SCENES = Path(__file__).parents[3] / "scenes"
 RUNS = 5

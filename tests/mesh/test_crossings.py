@@ -8,8 +8,8 @@ import pytest
 from fracslice._native import Cells
 from fracslice.formulas import box, difference, sphere, torus, transform, union
 from fracslice.kernel import reference
+from fracslice.mesh.crossings import Refiner
 from fracslice.volume import Bricks, plan, sample_scene
-from fracslice.volume.crossings import Refiner
 
 
 def cells_of(bricks: Bricks) -> Cells:

@@ -7,8 +7,8 @@ import pytest
 
 from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
 from fracslice.kernel import compile_scene
+from fracslice.mesh.projection import TrustRegions, project
 from fracslice.volume.accuracy import surface_error
-from fracslice.volume.projection import TrustRegions, project
 
 
 def projected(
