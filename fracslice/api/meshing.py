@@ -43,6 +43,12 @@ class Result(Mesh):
     def __init__(self, made: Made) -> None:
         object.__setattr__(self, "made", made)
 
+    def __repr__(self) -> str:
+        if self.made.whole is not None:
+            return super().__repr__()
+        made = self.report.mesh
+        return f"<Result of {made.triangles} triangles, {made.vertices} vertices, only in its file>"
+
     @property
     def mesh(self) -> Mesh:
         """The mesh without its report."""
