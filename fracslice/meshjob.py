@@ -10,12 +10,14 @@ from .scene import Print, Scene
 from .scene.lengths import Length
 
 RESOLUTION = 256.0
+"""Default number of voxels along the longest side."""
+
 COARSEST, FINEST = 8, 16384
 """Limits of the voxels along the longest side."""
 
 DUST = 1e-5
 """Default maximum volume of dust, relative to the whole object: crumbs at the rim of a fractal of finite
-depth.
+depth. No strut is built to dust either.
 """
 
 

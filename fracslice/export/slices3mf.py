@@ -17,6 +17,7 @@ from fracslice.mesh import Mesh
 from fracslice.mesh.clean import clean
 from fracslice.mesh.components import select
 from fracslice.mesh.extract import contour
+from fracslice.meshjob import DUST, RESOLUTION
 from fracslice.slicing import Layer
 
 LEVEL = 1
@@ -28,11 +29,6 @@ HEAD = (
     '<metadata name="Application">fracslice</metadata>\n<resources>\n<s:slicestack id="1" zbottom="0">\n'
 )
 OBJECT = '</s:slicestack>\n<object id="2" type="model" s:slicestackid="1" s:meshresolution="fullres">'
-ALONG = 256
-"""Maximum number of voxels along the longest side of the mesh: the default resolution of a mesh job."""
-
-DUST = 1e-5
-"""Connected components below this fraction of the total volume are dropped, as by default in a mesh job."""
 
 
 def write_3mf(run: SliceRun, path: str | Path) -> Path:
@@ -104,7 +100,7 @@ def _mesh(run: SliceRun) -> Mesh:
 
     stack, longest = run.stack, max(run.stack.size)
     finest = max(*stack.pixel, float(stack.heights.max()))
-    samples = min(longest / finest, ALONG)
+    samples = min(longest / finest, RESOLUTION)
     bricks = shown(stack.root, stack.outer, longest / stack.scale, samples, run.work)
     run.work.progress("meshing", 0.0)
     found = contour(stack.root, bricks, run.work)

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import VolumeError
 from ..formulas import Box, Node, box, cylinder, plane, transform, union
 from ..kernel import Field
+from ..meshjob import DUST
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
 from ..volume.grid import from_grid, to_grid
@@ -31,9 +32,6 @@ COARSE, FINE = 128, 640
 
 SHARP = 6
 """Samples across a length to thicken, close or keep, as far as `FINE` permits."""
-
-DUST = 1e-5
-"""Fraction of the solid's volume below which a body is dust: it is dropped, not joined by a strut."""
 
 POCKET = 0.1
 """Fraction of the largest hollow's volume below which another hollow stays solid instead of being drained."""
