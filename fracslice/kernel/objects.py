@@ -11,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import BinaryIO
 
+from ..errors import ExportError
 from ..files import Kept, users_folder
 from ..formulas import vocabulary
 from ..keys import key, texts
@@ -57,7 +58,7 @@ def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) ->
 
         code = compile_object(linked, Target(bits, width, REGISTERS, *host()), loops)
         sealed = hashlib.sha256(code).digest() + code
-        with suppress(OSError):
+        with suppress(ExportError):
             kept.put(name, lambda file: file.write(sealed))
     return code
 
