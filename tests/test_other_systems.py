@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 HIDDEN = """
-import os, sys, types
+import os, subprocess, sys, types
 for name in ("grp", "pwd", "fcntl", "resource"):
     sys.modules[name] = None
 for name in "geteuid fchmod sysconf O_NOFOLLOW O_NONBLOCK O_DIRECTORY O_CLOEXEC".split():
