@@ -147,8 +147,7 @@ def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
     Cancelled
         When the work is cancelled.
     """
-    turned = _turned(root, job.up, work)
-    planned = plan(turned, job.size / min(job.pixel), work)
+    planned = plan(turned(root, job.up, work), job.size / min(job.pixel), work)
     planned, scale = printable(planned, job.size, job.printing, work)
     found, outer = planned.box, planned.outer
     mm = tuple(s * scale for s in found.size)
@@ -181,8 +180,23 @@ def _rounded(height: float, made: float) -> tuple[str, ...]:
     return (f"whole layers are {made:.4g} mm high, the object {height:.4g} mm; expected lower layers",)
 
 
-def _turned(root: Node, up: tuple[float, float, float], work: Work | None) -> Node:
-    """The scene rotated by the shortest way so that `up` is along z, with the depths of the unrotated one."""
+def turned(root: Node, up: tuple[float, float, float], work: Work | None) -> Node:
+    """Rotate a scene by the shortest way so that a direction points along z.
+
+    Parameters
+    ----------
+    root : Node
+        The scene.
+    up : three numbers
+        Direction.
+    work : Work, optional
+        Threads and cancellation.
+
+    Returns
+    -------
+    Node
+        The rotated scene, with the depths of the unrotated one.
+    """
     direction = np.asarray(up, float) / length(np.asarray(up, float))
     axis = np.cross(direction, (0.0, 0.0, 1.0))
     angle = math.degrees(math.atan2(length(axis), float(direction[2])))
