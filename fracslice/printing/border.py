@@ -9,7 +9,7 @@ import numpy as np
 from ..compiled import compiled
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
-from .components import Connected
+from .components import Components
 from .samples import Samples
 
 FAR = 255
@@ -21,7 +21,7 @@ cannot cross.
 """
 
 
-def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
+def nearer(found: Components, these: np.ndarray, others: np.ndarray) -> Samples:
     """A field that is negative nearer to some components than to others.
 
     The value is half the difference of the grid steps to either, so the border lies midway between them. The
@@ -29,8 +29,8 @@ def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
 
     Parameters
     ----------
-    found : Connected
-        Samples of a solid and its components.
+    found : Components
+        Components of a sampled solid.
     these, others : int64 [k]
         Numbers of the components on the negative and on the positive side.
 
@@ -39,10 +39,9 @@ def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
     Samples
         The field in scene units, at most `REACH` voxels in magnitude, on bricks in and around `these`.
     """
-    solid, components = found.solid, found.components
-    rows, _ = components.samples(these)
-    near, index = _around(solid, rows, np.isin(components.tiles, these))
-    labels, ijk = components.labels[near], solid.ijk[near]
+    solid, (samples, tiles) = found.solid, found.masks(these)
+    near, index = _around(solid, np.any(samples, axis=1), tiles)
+    labels, ijk = found.labels[near], solid.ijk[near]
     to_these, to_others = (_steps(index, ijk, np.isin(labels, those)) for those in (these, others))
     half = np.clip((to_these.astype(np.float32) - to_others) / 2, -REACH, REACH)
     values = half * np.float32(solid.voxel)
