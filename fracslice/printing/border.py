@@ -82,10 +82,10 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
         for axis in range(3):
             shift = 6 - 3 * axis
             at = (s >> shift) & 7
-            for way in (-1, 1):
-                there, to = row, s + (way << shift)
-                if not 0 <= at + way < 8:
-                    there, to = beside(index, ijk, row, axis, way), to - (way << (shift + 3))
+            for sign in (-1, 1):
+                there, to = row, s + (sign << shift)
+                if not 0 <= at + sign < 8:
+                    there, to = beside(index, ijk, row, axis, sign), to - (sign << (shift + 3))
                 if there >= 0 and steps[there, to] == FAR and steps[row, s] + 1 < FAR:
                     steps[there, to] = steps[row, s] + 1
                     queue[last] = 512 * there + to
@@ -94,14 +94,14 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def beside(index, ijk, row, axis, way):  # type: ignore[no-untyped-def]
+def beside(index, ijk, row, axis, sign):  # type: ignore[no-untyped-def]
     """Row of the adjacent brick along an axis.
 
     Parameters
     ----------
     index, ijk : int32 [bx, by, bz], int32 [n, 3]
         As of `Bricks`.
-    row, axis, way : int
+    row, axis, sign : int
         Row of the brick, axis 0 to 2, and direction, -1 or 1.
 
     Returns
@@ -110,6 +110,6 @@ def beside(index, ijk, row, axis, way):  # type: ignore[no-untyped-def]
         Negative if the adjacent brick has no samples or does not exist.
     """
     x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
-    x, y, z = x + way * (axis == 0), y + way * (axis == 1), z + way * (axis == 2)
+    x, y, z = x + sign * (axis == 0), y + sign * (axis == 1), z + sign * (axis == 2)
     nx, ny, nz = index.shape
     return index[x, y, z] if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz else -1

@@ -73,17 +73,17 @@ def printable(planned: Plan, size: float, how: Print, work: Work | None = None) 
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
         if (length := getattr(how, name)) > size and (name != "drain" or how.hollow):
             raise VolumeError(f"{name} {length:g} mm: expected at most the object's size, {size:g} mm")
-    run = _Run(planned, size, how, work or Work())
-    for stage, change in run.changes():
-        run.work.check()
-        run.work.progress(stage, 0.0)
-        run.put(change())
-        run.work.progress(stage, 1.0)
-    return _standing(run.planned, how, run.scale), run.scale
+    job = _Preparation(planned, size, how, work or Work())
+    for stage, change in job.changes():
+        job.work.check()
+        job.work.progress(stage, 0.0)
+        job.put(change())
+        job.work.progress(stage, 1.0)
+    return _standing(job.planned, how, job.scale), job.scale
 
 
 @dataclass
-class _Run:
+class _Preparation:
     """The object during its edits."""
 
     planned: Plan
@@ -222,7 +222,7 @@ class _Run:
 
         solid = self.seen(self.how.gap)
         found = all_walls(self.thing, solid, self.how.gap / self.scale, self.work, gaps=True)
-        one = _apart(found.middle, solid.bricks.voxel)
+        one = _spaced(found.middle, solid.bricks.voxel)
         if not len(one):
             return self.thing
         radius = solid.bricks.voxel
@@ -242,7 +242,7 @@ class _Run:
 
         solid, least = self.seen(self.how.thickness), self.how.thickness / self.scale
         middle = all_walls(self.thing, solid, least, self.work).middle
-        middle = middle[_apart(middle, solid.bricks.voxel)]
+        middle = middle[_spaced(middle, solid.bricks.voxel)]
         if not len(middle):
             return self.thing
         balls = capsules(middle, middle, least / 2, solid.bricks)
@@ -300,7 +300,7 @@ class _Run:
         yield transform(cylinder(radius=radius, height=high - low), translate=(x, y, (low + high) / 2))
 
 
-def _apart(points: np.ndarray, voxel: float) -> np.ndarray:
+def _spaced(points: np.ndarray, voxel: float) -> np.ndarray:
     """Numbers of points, one in each occupied cell of a quarter voxel, ordered along x, then y, then z."""
     if not len(points):
         return np.empty(0, np.int64)

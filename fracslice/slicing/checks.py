@@ -234,8 +234,8 @@ def misfit(stack: Stack, printer: Printer) -> str:
     try:
         check_fits(stack, printer)
     except SliceError:
-        mine, room = (" x ".join(f"{s:.4g}" for s in size) for size in (stack.size, printer.room))
-        return f"does not fit the {printer.title}: {mine} mm, and it has {room} mm"
+        mine, most = (" x ".join(f"{s:.4g}" for s in size) for size in (stack.size, printer.build_volume))
+        return f"does not fit the {printer.title}: {mine} mm, and it has {most} mm"
     return ""
 
 
