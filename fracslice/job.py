@@ -33,8 +33,8 @@ STL = ".stl"
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
-    """Result of `make_mesh`.
+class MeshResult:
+    """MeshResult of `make_mesh`.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Result:
 
 def make_mesh(
     scene: Scene, what: MeshJob | None = None, work: Work | None = None, path: str | Path | None = None
-) -> Result:
+) -> MeshResult:
     """Sample, mesh, clean, scale and check a scene.
 
     Parameters
@@ -113,7 +113,7 @@ def make_mesh(
 
     Returns
     -------
-    Result
+    MeshResult
         The mesh and its report. A mesh that is not printable is returned, too; its report lists the problems.
 
     Raises
@@ -219,7 +219,7 @@ class _Job:
         folder = aside() if aside and most < len(signs) else None
         return surfaces.made(sized.planned, signs, most, folder, self.clock)
 
-    def result(self, sized: _Sized, surface: Surface, thin: str) -> Result:
+    def result(self, sized: _Sized, surface: Surface, thin: str) -> MeshResult:
         """Finished mesh and report."""
         from .mesh.missed import surface_to_mesh
         from .shown import mesh_amount
@@ -260,7 +260,7 @@ class _Job:
             notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
             depths=planned.depths,
         )
-        return Result(report, finish.place, planned, whole, clock.work)
+        return MeshResult(report, finish.place, planned, whole, clock.work)
 
     def written(
         self, finish: Finish, check: Check, tips: np.ndarray

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING, TypeVar
 
 from .errors import Cancelled, SceneError
@@ -21,8 +23,18 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
-_POOL = ThreadPoolExecutor(256, "fracslice")
+_HERE = threading.local()
+
+
+def _mark() -> None:
+    _HERE.is_worker = True
+
+
+_POOL = ThreadPoolExecutor(256, "fracslice", initializer=_mark)
 """Worker threads, started on demand and kept: starting a thread takes longer than many tasks."""
+
+_AHEAD = 2
+"""Results of `Work.ordered` in memory, times the number of threads."""
 
 
 def _silent(stage: str, done: float) -> None:
@@ -101,6 +113,63 @@ class Work:
 
         self.map(numbered, range(len(items)))
         return [found[index] for index in range(len(items))]
+
+    def ordered(self, task: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
+        """Yield the results of a task in the order of the items, computed a few items ahead.
+
+        Within a task of another job it computes in the thread of that task, so that workers never wait for
+        workers.
+
+        Parameters
+        ----------
+        task
+            Function of one item.
+        items
+            Items.
+
+        Yields
+        ------
+        R
+            Results in the order of the items.
+
+        Raises
+        ------
+        Cancelled
+            If `cancel` is set.
+        """
+        if self.threads == 1 or getattr(_HERE, "is_worker", False):
+            for item in items:
+                self.check()
+                yield task(item)
+            return
+        lock, waiting, ahead, running = threading.Lock(), iter(items), deque[Future[R]](), 0
+
+        def fill(ended: int = 0) -> None:
+            nonlocal running
+            with lock:
+                running -= ended
+                free = min(self.threads - running, _AHEAD * self.threads - len(ahead))
+                begun = [_POOL.submit(task, item) for item in islice(waiting, max(free, 0))]
+                running += len(begun)
+                ahead.extend(begun)
+            for future in begun:
+                future.add_done_callback(lambda _: fill(1))
+
+        try:
+            fill()
+            while ahead:
+                result = ahead[0].result()
+                ahead.popleft()
+                fill()
+                self.check()
+                yield result
+        except KeyboardInterrupt:
+            self.cancel.set()
+            raise
+        finally:
+            with lock:
+                waiting = iter(())
+            wait([future for future in ahead if not future.cancel()])
 
     def map(self, task: Callable[[T], None], items: Sequence[T]) -> None:
         """Run a task on every item, in this thread and in workers.
