@@ -65,8 +65,8 @@ def printer(context: click.Context, _: click.Parameter, name: str | None) -> Pri
     if name != "list":
         return None if name is None else printers.printer(name)
     for p in printers.PRINTERS.values():
-        room = " x ".join(f"{r:g}" for r in p.room)
-        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {room} mm")
+        volume = " x ".join(f"{r:g}" for r in p.build_volume)
+        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {volume} mm")
     context.exit()
 
 

@@ -31,7 +31,9 @@ def stack_mesh(scene: Scene, job: SliceJob, work: Work) -> Mesh:
         mm, standing on z = 0, centred. The voxel is a pixel, but at least 1/256 of the longest side; the mesh
         is simplified within a quarter of a pixel.
     """
-    upright = replace(scene, root=turned(scene.root, job.up, work))
+    root = turned(scene.root, job.up, work).tree
+    assert root is not None  # as that of a scene
+    upright = replace(scene, root=root)
     voxel = max(*job.pixel, job.size / RESOLUTION)
     what = MeshJob(
         size_mm=job.size,
