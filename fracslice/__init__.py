@@ -78,6 +78,7 @@ _WHERE = {
     "Scene": "scene",
     "Slices": "api.slices",
     "Work": "work",
+    "__version__": "version",
     "make_mesh": "api.meshing",
     "read": "scene",
     "reads": "scene",
@@ -90,8 +91,6 @@ _WHERE = {
 
 def __getattr__(name: str) -> Any:
     """Load a public name on first use, so that importing fracslice loads no other modules."""
-    if name == "__version__":
-        return import_module(".report", __name__).version()
     formulas: Any = import_module(".formulas", __name__) if name not in _WHERE else None
     if name == "__all__":
         return sorted([*_WHERE, *formulas.names()])

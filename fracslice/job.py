@@ -17,8 +17,9 @@ from .errors import SceneError, TooLargeError
 from .finishing import Check, Finish, Placement
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
-from .report import Report, SurfaceError, SurfaceToMesh, version
+from .report import Report, SurfaceError, SurfaceToMesh
 from .scene import Print, Scene
+from .version import __version__
 from .work import Clock, Work
 
 if TYPE_CHECKING:
@@ -242,7 +243,7 @@ class _Job:
         report = Report(
             scene=self.scene.name,
             scene_hash=self.scene.hash,
-            version=version(),
+            version=__version__,
             size_mm=size,
             voxel_mm=planned.voxel * scale,
             mesh=check.mesh,

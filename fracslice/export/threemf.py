@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
+from html import escape
 from typing import BinaryIO
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
@@ -68,7 +68,7 @@ def _model(mesh: Mesh, metadata: Mapping[str, str]) -> Iterator[bytes]:
     yield MODEL.encode()
     for key, value in metadata.items():
         name = key if key in CORE_NAMES else f"fracslice:{key}"
-        yield f"<metadata name={quoteattr(name)}>{escape(value)}</metadata>\n".encode()
+        yield f'<metadata name="{escape(name)}">{escape(value)}</metadata>\n'.encode()
     yield b'<resources><object id="1" type="model">'
     yield from mesh_element(mesh)
     yield b'</object></resources>\n<build><item objectid="1"/></build>\n</model>\n'

@@ -7,9 +7,10 @@ import os
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import BinaryIO
+
+import llvmlite
 
 from ..files import Kept, users_folder
 from ..formulas import vocabulary
@@ -74,7 +75,7 @@ def toolchain() -> str:
     from llvmlite.binding import llvm_version_info
 
     own = texts(*sorted(Path(__file__).parent.glob("*.py")), Path(vocabulary.__file__))
-    return key(own, host(), version("llvmlite"), llvm_version_info)
+    return key(own, host(), llvmlite.__version__, llvm_version_info)
 
 
 def _read(file: BinaryIO) -> bytes | None:
