@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .._slices import deflated
+from .._slices import Encoding, encoded
 from ..errors import SliceError
 from ..formulas.parameters import Number, validate
 from ..scene.lengths import Shift
@@ -85,8 +85,8 @@ class Screen:
         bed[mine.on_bed] = self._levels[bed[mine.on_bed]]
         return image
 
-    def deflated(self, layer: Layer) -> bytes:
-        """Image data of a PNG file with the picture of a layer.
+    def encoded(self, layer: Layer, encoding: Encoding) -> bytes:
+        """Encode the picture of a layer.
 
         Without compensation it is encoded from the layer's tiles, as runs of equal pixels, and the picture is
         never allocated.
@@ -95,13 +95,17 @@ class Screen:
         ----------
         layer : Layer
             A layer of the stack.
+        encoding : Encoding
+            Encoding of the picture.
 
         Returns
         -------
         bytes
-            A zlib stream of rows, each after a byte 0 for no filter.
+            Encoded picture.
         """
-        return deflated(self.picture(layer)) if self.compensation else layer.deflated(self._view)
+        if self.compensation:
+            return encoded(self.picture(layer), encoding)
+        return layer.encoded(self._view, encoding)
 
     @cached_property
     def _view(self) -> ScreenView:
