@@ -24,6 +24,7 @@ from fracslice.errors import (
     SliceError,
     VolumeError,
 )
+from fracslice.version import __version__
 
 from .bench import bench
 from .check import check
@@ -44,7 +45,7 @@ FAILED, USAGE, INTERRUPTED = 1, 2, 130
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-@click.version_option(package_name="fracslice", message="%(prog)s %(version)s")
+@click.version_option(__version__, message="%(prog)s %(version)s")
 @click.pass_context
 def commands(context: click.Context) -> None:
     """Fractals as signed distance fields, made into printable meshes, slices and pictures.
@@ -63,6 +64,8 @@ for command in (mesh, render, slice_, check, show, fly, formulas, scenes, bench)
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run one command and exit with its status."""
+    # The products of matrices here are small: threads of OpenBLAS would only take time to start.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(run(arguments))
 
 

@@ -50,7 +50,7 @@ class Work:
     threads
         Number of threads, at most 1024; default: all cores.
     progress
-        Called as ``progress(stage, fraction)`` from time to time.
+        Called as ``progress(stage, fraction)`` from time to time, from any thread.
     cancel
         Event that any thread may set; the job then raises `Cancelled` within a fraction of a second.
     store
@@ -223,6 +223,28 @@ class Work:
         self.check()
 
 
+def ahead(items: Iterator[T]) -> Iterator[T]:
+    """Compute each item in another thread while the consumer uses the one before.
+
+    Parameters
+    ----------
+    items
+        Items other than None.
+
+    Yields
+    ------
+    object
+        The same items.
+    """
+    coming = _POOL.submit(next, items, None)
+    try:
+        while (item := coming.result()) is not None:
+            coming = _POOL.submit(next, items, None)
+            yield item
+    finally:
+        wait([coming])
+
+
 def chunks(count: int, size: int) -> list[slice]:
     """Split a range of indices into slices.
 
@@ -250,11 +272,14 @@ class Clock:
     work
         Execution settings.
     seconds
-        Wall-clock time per stage, and "total", in seconds.
+        Wall-clock time per stage, and "total", in seconds. Stages may overlap.
+    begun
+        Time of the start, s.
     """
 
     work: Work
     seconds: dict[str, float] = field(default_factory=lambda: {"total": 0.0})
+    begun: float = field(default_factory=time.perf_counter)
 
     @contextmanager
     def __call__(self, stage: str) -> Iterator[None]:
@@ -274,7 +299,7 @@ class Clock:
         self.work.progress(stage, 0.0)
         started = time.perf_counter()
         yield
-        took = time.perf_counter() - started
-        for name in (stage, "total"):
-            self.seconds[name] = self.seconds.get(name, 0.0) + took
+        ended = time.perf_counter()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + ended - started
+        self.seconds["total"] = ended - self.begun
         self.work.progress(stage, 1.0)

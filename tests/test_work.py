@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
 
 import pytest
 
 from fracslice.errors import Cancelled
-from fracslice.work import Work
+from fracslice.work import Work, ahead
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7])
@@ -96,3 +97,41 @@ def test_cancelled_work_stops() -> None:
     with pytest.raises(Cancelled):
         work.map(task, range(1000))
     assert len(done) <= 2
+
+
+def test_the_next_item_is_computed_while_one_is_used() -> None:
+    used = threading.Event()
+
+    def items() -> Iterator[str]:
+        yield "first"
+        assert used.wait(10)
+        yield "last"
+
+    coming = ahead(items())
+    assert next(coming) == "first"
+    used.set()
+    assert list(coming) == ["last"]
+
+
+def test_an_error_of_the_next_item_reaches_the_consumer_of_the_first() -> None:
+    def items() -> Iterator[int]:
+        yield 1
+        raise Cancelled("stopped")
+
+    with pytest.raises(Cancelled):
+        list(ahead(items()))
+
+
+def test_an_error_of_the_consumer_waits_for_the_next_item() -> None:
+    done = list[str]()
+
+    def items() -> Iterator[int]:
+        yield 1
+        threading.Event().wait(0.05)
+        done.append("next")
+        yield 2
+
+    coming = ahead(items())
+    next(coming)
+    coming.close()  # type: ignore[attr-defined]
+    assert done == ["next"]

@@ -146,8 +146,7 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     Cancelled
         When the work is cancelled.
     """
-    turned = _turned(root, job.up, work)
-    planned = plan(turned, job.size / min(job.pixel), work)
+    planned = plan(turned(root, job.up, work), job.size / min(job.pixel), work)
     planned, scale = printable(planned, job.size, job.printing, work)
     found, outer = planned.box, planned.outer
     mm = tuple(s * scale for s in found.size)
@@ -180,8 +179,28 @@ def _rounded(height: float, made: float) -> tuple[str, ...]:
     return (f"whole layers are {made:.4g} mm high, the object {height:.4g} mm; expected lower layers",)
 
 
-def _turned(root: Field, up: tuple[float, float, float], work: Work | None) -> Field:
-    """The scene rotated by the least angle so that `up` is along z, with the depths of the unrotated one."""
+def turned(root: Field, up: tuple[float, float, float], work: Work | None) -> Field:
+    """Rotate a scene by the shortest way so that a direction points along z.
+
+    Parameters
+    ----------
+    root : Field
+        The scene.
+    up : three numbers
+        Direction.
+    work : Work, optional
+        Threads and cancellation.
+
+    Returns
+    -------
+    Field
+        The rotated scene, with the depths of the unrotated one.
+
+    Raises
+    ------
+    SliceError
+        If a field without a scene tree must be rotated.
+    """
     direction = np.asarray(up, float) / length(np.asarray(up, float))
     axis = np.cross(direction, (0.0, 0.0, 1.0))
     angle = math.degrees(math.atan2(length(axis), float(direction[2])))
