@@ -1,0 +1,231 @@
+"""Interactive window to fly through a scene while its picture refines and its file is edited."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+
+from fracslice.errors import ExportError
+from fracslice.export import replacing
+from fracslice.rendering.live import Live
+from fracslice.scene.view import Camera
+from fracslice.scene.writer import to_xml
+from fracslice.viewer.canvas import Canvas
+from fracslice.viewer.controls import Controls
+from fracslice.viewer.screen import need_screen
+from fracslice.work import Work
+
+FASTER = 1.25
+"""Factor of the wheel on the pace."""
+TICK = 20
+"""Timer interval, milliseconds."""
+PATIENCE = 0.2
+"""Time, in seconds, after which the making of a renderer is displayed."""
+NOTICE = 3.0
+"""Time, in seconds, for which a message is displayed."""
+EDGE = 0.1
+"""Margin of the window, as a fraction of its size, from which the pointer is put back to the middle."""
+HELP = """\
+W S A D R F: fly   Q E: roll   1 to 9, wheel: pace
+drag, arrows: look   M: mouse look   L: lock
+.: save the view   V: first view   Esc: close"""
+
+
+def fly(
+    path: str | Path,
+    settings: Sequence[str] = (),
+    size: tuple[int, int] = (960, 540),
+    work: Work | None = None,
+    device: str = "auto",
+) -> Camera:
+    """Open a window on a scene file.
+
+    Keys: W, S, A, D, R, F fly forward, back, left, right, up and down, more slowly near the surface; the
+    arrows and dragging turn the camera, Q and E roll it. 1 to 9 and the wheel choose the pace. M toggles
+    mouse look, L locks the camera, "." saves the view as a scene file in the current folder, V returns to the
+    first view, Escape closes. The file is read again whenever it is saved.
+
+    Parameters
+    ----------
+    path : str or Path
+        Scene file.
+    settings : sequence of str
+        Settings as in `Scene.with_values`.
+    size : tuple of int
+        Window width and height, pixels.
+    work : Work, optional
+        Threads, progress and cancellation.
+    device : {"cpu", "cuda", "auto"}
+        Device that traces the rays.
+
+    Returns
+    -------
+    Camera
+        Camera at the time the window was closed.
+
+    Raises
+    ------
+    RenderError
+        If pyvista or a screen is missing.
+    SceneError
+        If the scene cannot be rendered.
+    Cancelled
+        If the work was cancelled.
+    """
+    need_screen()
+    work = work or Work()
+    live = Live(path, settings, size, work, device)
+    try:
+        Viewer(live, size, work.cancel.is_set).open()
+    finally:
+        live.close()
+    work.check()
+    return live.camera
+
+
+class Viewer:
+    """Window of a live picture, with its controls.
+
+    Parameters
+    ----------
+    live : Live
+        The live picture.
+    size : tuple of int
+        Window width and height, pixels.
+    stopped : callable
+        Returns True when the window must close.
+    """
+
+    def __init__(self, live: Live, size: tuple[int, int], stopped: Callable[[], bool]) -> None:
+        self.live, self.stopped = live, stopped
+        self.controls = Controls()
+        self.canvas = Canvas(f"fracslice  {live.scene.name}", size, HELP)
+        self.message, self.since = "", 0.0
+        self.drawn: tuple[object, ...] = ()
+        self.actions: dict[str, Callable[[], None]] = {
+            "escape": self.canvas.close,
+            "v": self.reset,
+            "m": self.toggle_look,
+            "l": self.toggle_lock,
+            "period": self.save,
+        }
+
+    def open(self) -> None:
+        """Show the window until it is closed."""
+        interactor = self.canvas.interactor
+        for event, act in {
+            "TimerEvent": self.tick,
+            "KeyPressEvent": lambda: self.press(interactor.GetKeySym().lower()),
+            "KeyReleaseEvent": lambda: self.controls.release(interactor.GetKeySym().lower()),
+            "LeftButtonPressEvent": lambda: self.grasp(interactor.GetEventPosition()),
+            "LeftButtonReleaseEvent": lambda: self.grasp(None),
+            "MouseMoveEvent": lambda: self.move(interactor.GetEventPosition()),
+            "MouseWheelForwardEvent": lambda: self.hurry(FASTER),
+            "MouseWheelBackwardEvent": lambda: self.hurry(1 / FASTER),
+        }.items():
+            self.canvas.on(event, act)
+        self.canvas.open(TICK)
+
+    def tick(self) -> None:
+        """Steer by the keys that are held, and draw what has changed."""
+        if self.stopped() or not self.live.running:
+            self.canvas.close()
+        self.live.steer(self.controls.input)
+        self.live.resize(self.canvas.size)
+        now = self.live.shown, self.canvas.size, self.caption
+        if now != self.drawn:
+            self.drawn = now
+            self.canvas.draw(now[0].pixels, now[2])
+
+    @property
+    def caption(self) -> str:
+        """State of the picture and the controls, the last message and the file's error message."""
+        shown, making, now = self.live.shown, self.live.making, time.monotonic()
+        state = f"{shown.samples:.0f} samples per pixel" if shown.samples else "draft"
+        lines = [
+            f"{state}   surface at {shown.distance:.2g}   pace {self.controls.pace:.2g}",
+            *(["compiling ..."] if making and now - making > PATIENCE else []),
+            *(["camera locked"] if self.controls.locked else []),
+            *(["mouse look"] if self.controls.looking else []),
+            *([self.message] if now - self.since < NOTICE else []),
+            shown.problem,
+        ]
+        return "\n".join(filter(None, lines))
+
+    def press(self, key: str) -> None:
+        """Handle a key press, including key repeat.
+
+        Parameters
+        ----------
+        key : str
+            Key symbol, lower case.
+        """
+        self.controls.press(key)
+        if act := self.actions.get(key):
+            act()
+
+    def hurry(self, factor: float) -> None:
+        """Multiply the pace.
+
+        Parameters
+        ----------
+        factor : float
+            Factor on the pace.
+        """
+        self.controls.pace *= factor
+
+    def grasp(self, at: tuple[int, int] | None) -> None:
+        """Begin or end a drag; mouse look ends by its key only.
+
+        Parameters
+        ----------
+        at : tuple of int or None
+            Pointer position, pixels; None ends the drag.
+        """
+        if not self.controls.looking:
+            self.controls.grip = at
+
+    def move(self, to: tuple[int, int]) -> None:
+        """Follow the pointer; in mouse look, put it back to the middle before it leaves the window.
+
+        Parameters
+        ----------
+        to : tuple of int
+            Pointer position, pixels.
+        """
+        size = self.canvas.size
+        yaw, pitch = self.controls.turn(to, self.live.camera.fov / size[1])
+        if yaw or pitch:
+            self.live.turn(yaw, pitch)
+        if self.controls.looking and any(not EDGE < p / s < 1 - EDGE for p, s in zip(to, size, strict=True)):
+            self.canvas.window.SetCursorPosition(size[0] // 2, size[1] // 2)
+            self.controls.grip = None
+
+    def toggle_look(self) -> None:
+        """Begin or end mouse look."""
+        self.controls.looking, self.controls.grip = not self.controls.looking, None
+
+    def toggle_lock(self) -> None:
+        """Lock or release the camera."""
+        self.controls.locked = not self.controls.locked
+
+    def reset(self) -> None:
+        """Return to the first view, unless the camera is locked."""
+        if not self.controls.locked:
+            self.live.look(self.live.first)
+
+    def save(self) -> None:
+        """Save the view as a scene file in the current folder."""
+        scene, camera = self.live.scene, self.live.camera
+        view = replace(scene, view=replace(scene.view, camera=camera))
+        path = next(p for k in count(1) if not (p := Path(f"{scene.name}-view{k}.xml")).exists())
+        try:
+            with replacing(path) as file:
+                file.write(to_xml(view).encode())
+            self.message = f"saved {path}"
+        except ExportError as error:
+            self.message = str(error)
+        self.since = time.monotonic()
