@@ -64,6 +64,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from .version import __version__
+
 if TYPE_CHECKING:
     from .api.meshing import Result, make_mesh
     from .api.pictures import Picture, render
@@ -167,6 +169,7 @@ __all__ = [
     "Scene",
     "Slices",
     "Work",
+    "__version__",
     "bend",
     "bounds",
     "box",
@@ -202,8 +205,6 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Load a public name on first use, so that importing fracslice loads no other modules."""
-    if name == "__version__":
-        return import_module(".report", __name__).version()
     if name not in _WHERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f".{_WHERE[name]}", __name__), name)
