@@ -44,7 +44,7 @@ $(VENV)/.docs: docs/requirements.lock | $(VENV)/.locked
 	touch $@
 
 nightly: setup
-	$(BIN)/python -m tests.benchmarks.stability.random_scenes
+	$(BIN)/python -m tests.benchmarks stability.random_scenes
 
 # Memory and undefined behaviour, then races between threads.
 sanitize: setup
