@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from pathlib import Path
 
 from fracslice.errors import ExportError
@@ -57,7 +58,7 @@ class SliceRun:
     def __post_init__(self) -> None:
         validate(self, {"exposure": EXPOSURE}, ExportError)
 
-    @property
+    @cached_property
     def slicer(self) -> Slicer:
         """Slicer of the stack."""
         return Slicer(self.stack, self.work)
