@@ -188,11 +188,11 @@ def slice_(
         screen = Screen(stack, *how)
         about = {"Title": scene.name, "scene_hash": scene.hash}
         model = StackModel(scene, what, work)
-        made = SliceRun(stack, screen, work, resin, about, model.mesh, model.picture, created())
-        write_slices(made, output, form)
+        run = SliceRun(stack, screen, work, resin, about, model.mesh, model.picture, created())
+        write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
-        off = () if quiet else layers_amount(stack, work)[1]
+        off = () if quiet else layers_amount(run.slicer, work)[1]
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape

@@ -41,6 +41,5 @@ from .scene import reads as reads
 from .scene import to_xml as to_xml
 from .scene.view import Camera as Camera
 from .scene.view import Light as Light
+from .version import __version__ as __version__
 from .work import Work as Work
-
-__version__: str

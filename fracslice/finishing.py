@@ -62,8 +62,8 @@ class Placement:
         ndarray of float64, shape (n, 3)
             Points, mm.
         """
-        found: NDArray[np.float64] = points * self.scale + np.array(self.offset)
-        return found
+        placed: NDArray[np.float64] = points * self.scale + np.array(self.offset)
+        return placed
 
     def units(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transform points from print space to the scene.
@@ -78,8 +78,8 @@ class Placement:
         ndarray of float64, shape (n, 3)
             Points, scene units.
         """
-        found: NDArray[np.float64] = (points - np.array(self.offset)) / self.scale
-        return found
+        scene: NDArray[np.float64] = (points - np.array(self.offset)) / self.scale
+        return scene
 
 
 class Finish:
@@ -154,8 +154,8 @@ class Finish:
 
     def _stay(self, number: int) -> NDArray[np.bool_]:
         """Mask of the remaining triangles of a piece, bool [m]."""
-        found: NDArray[np.bool_] = self.stays[self.shells.of_label[self.pieces.labels(number)]]
-        return found
+        kept: NDArray[np.bool_] = self.stays[self.shells.of_label[self.pieces.labels(number)]]
+        return kept
 
     def _kept(self, number: int) -> Mesh:
         """Remaining triangles of a piece, scene units."""

@@ -106,13 +106,13 @@ class Work:
         Cancelled
             If `cancel` is set.
         """
-        found: dict[int, R] = {}
+        results: dict[int, R] = {}
 
         def numbered(index: int) -> None:
-            found[index] = task(items[index])
+            results[index] = task(items[index])
 
         self.map(numbered, range(len(items)))
-        return [found[index] for index in range(len(items))]
+        return [results[index] for index in range(len(items))]
 
     def ordered(self, task: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
         """Yield the results of a task in the order of the items, computed a few items ahead.

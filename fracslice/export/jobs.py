@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,7 @@ class SliceRun:
     picture: Callable[[int, int], NDArray[np.uint8]] | None = None
     created: datetime = EPOCH
 
-    @property
+    @cached_property
     def slicer(self) -> Slicer:
         """Slicer of the stack."""
         return Slicer(self.stack, self.work)
