@@ -84,7 +84,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = told
+            warnings.showwarning = show_warning
             return commands.main(arguments, prog_name="fracslice", standalone_mode=False) or 0
     except click.UsageError as error:
         hint = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
@@ -107,7 +107,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return say(f"{error.filename or 'error'}: {error.strerror or error}", FAILED)
 
 
-def told(
+def show_warning(
     message: Warning | str,
     category: type[Warning],
     filename: str,

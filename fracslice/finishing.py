@@ -62,8 +62,8 @@ class Placement:
         ndarray of float64, shape (n, 3)
             Points, mm.
         """
-        found: NDArray[np.float64] = points * self.scale + np.array(self.offset)
-        return found
+        placed: NDArray[np.float64] = points * self.scale + np.array(self.offset)
+        return placed
 
     def units(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transform points from print space to the scene.
@@ -78,8 +78,8 @@ class Placement:
         ndarray of float64, shape (n, 3)
             Points, scene units.
         """
-        found: NDArray[np.float64] = (points - np.array(self.offset)) / self.scale
-        return found
+        scene: NDArray[np.float64] = (points - np.array(self.offset)) / self.scale
+        return scene
 
 
 class Finish:
@@ -154,8 +154,8 @@ class Finish:
 
     def _stay(self, number: int) -> NDArray[np.bool_]:
         """Mask of the remaining triangles of a piece, bool [m]."""
-        found: NDArray[np.bool_] = self.stays[self.shells.of_label[self.pieces.labels(number)]]
-        return found
+        kept: NDArray[np.bool_] = self.stays[self.shells.of_label[self.pieces.labels(number)]]
+        return kept
 
     def _kept(self, number: int) -> Mesh:
         """Remaining triangles of a piece, scene units."""
@@ -219,7 +219,7 @@ class Check:
         self._errors: list[NDArray[np.float64]] = []
 
     def passing(self, pieces: Iterable[Finished]) -> Iterator[Mesh]:
-        """Check pieces and pass them on.
+        """Pass pieces on and check them.
 
         Parameters
         ----------
@@ -232,11 +232,11 @@ class Check:
             Finished triangles of each piece, mm.
         """
         for piece in pieces:
+            passed = piece.passed
+            yield passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
-                passed = piece.passed
                 self._errors.append(self._off(passed.vertices[:: self._stride]))
-            yield passed
 
     def _off(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances of vertices in mm from the surface, scene units."""

@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .errors import VolumeError
+from .errors import ExportError, VolumeError
 from .files import Kept
 from .kernel import Field
 from .kernel.objects import toolchain
@@ -57,14 +57,14 @@ class Store:
             If the folder cannot be written.
         """
         kept, name = Kept(self.folder), f"{key(program(), toolchain(), *made_of)}.npz"
-        found = kept.get(name, _read)
-        if found is not None:
-            return found
+        value = kept.get(name, _read)
+        if value is not None:
+            return value
         made = make()
         try:
             kept.put(name, partial(_write, made))
-        except OSError as error:
-            raise VolumeError(f"{self.folder}: {error.strerror or error}") from None
+        except ExportError as error:
+            raise VolumeError(str(error)) from None
         return made
 
 

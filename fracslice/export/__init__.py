@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 from fracslice.errors import ExportError
 from fracslice.export import glb, obj, ply, stl, threemf
-from fracslice.export.files import check_target, replacing
+from fracslice.files import check_target, replacing
 from fracslice.mesh.model import Mesh
 from fracslice.version import __version__
 

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 from isal.isal_zlib import crc32
 
-from fracslice._slices import deflated
+from fracslice._slices import Encoding, encoded
 from fracslice.slicing import Layer
 from fracslice.slicing.raster import Screen
 
@@ -26,7 +26,7 @@ def encode(image: np.ndarray) -> bytes:
     -------
     bytes
     """
-    return _file((image.shape[0], image.shape[1]), deflated(image))
+    return _file((image.shape[0], image.shape[1]), encoded(image, Encoding.PNG))
 
 
 def encode_layer(screen: Screen, layer: Layer) -> bytes:
@@ -43,7 +43,7 @@ def encode_layer(screen: Screen, layer: Layer) -> bytes:
     -------
     bytes
     """
-    return _file(screen.shape, screen.deflated(layer))
+    return _file(screen.shape, screen.encoded(layer, Encoding.PNG))
 
 
 def _file(shape: tuple[int, int], rows: bytes) -> bytes:
@@ -56,5 +56,6 @@ def _chunk(kind: bytes, data: bytes) -> tuple[bytes, bytes, bytes, bytes]:
 
 
 def is_whole(data: bytes) -> bool:
-    """True if the bytes begin and end like a PNG file."""
-    return data.startswith(SIGNATURE) and data.endswith(b"IEND\xaeB`\x82")
+    """True if the bytes are a complete file of `encode`: its last chunk is there, its image undamaged."""
+    image = data[len(SIGNATURE) + 25 : -12]  # after IHDR, before IEND
+    return data.endswith(b"IEND\xaeB`\x82") and crc32(image[4:-4]) == int.from_bytes(image[-4:])

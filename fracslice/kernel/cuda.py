@@ -26,7 +26,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..errors import KernelError
+from ..errors import ExportError, KernelError
 from ..extras import lacking
 from ..files import Kept
 from ..formulas.field import Kernel, Precision
@@ -356,7 +356,7 @@ def _kept(folder: Path, name: str, text: str) -> Path | None:
     """
     kept, file, whole = Kept(folder), f"{name}.py", text.encode()
     if kept.get(file, _read) != whole:
-        with suppress(OSError):
+        with suppress(ExportError):
             kept.put(file, lambda to: to.write(whole))
         if kept.get(file, _read) != whole:
             return None

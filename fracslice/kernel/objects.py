@@ -12,6 +12,7 @@ from typing import BinaryIO
 
 import llvmlite
 
+from ..errors import ExportError
 from ..files import Kept, users_folder
 from ..formulas import vocabulary
 from ..keys import key, texts
@@ -58,7 +59,7 @@ def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) ->
 
         code = compile_object(linked, Target(bits, width, REGISTERS, *host()), loops)
         sealed = hashlib.sha256(code).digest() + code
-        with suppress(OSError):
+        with suppress(ExportError):
             kept.put(name, lambda file: file.write(sealed))
     return code
 

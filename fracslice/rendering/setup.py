@@ -139,7 +139,7 @@ def surroundings(root: Node, camera: Camera, pixel: float) -> float:
 
 
 def _around_eye(root: Node, camera: Camera, detail: float) -> tuple[Node, float]:
-    """Tree resolved for a detail, or for the coarsest finer one outside of which the eye is; its clearance."""
+    """Tree resolved for a detail, or the coarsest finer one outside of which the eye lies; its clearance."""
     finest = ROUNDING["float64"] * max(map(abs, camera.eye))
     while True:
         known = resolve_depths(root, detail)

@@ -1,4 +1,4 @@
-"""A C++ program as a peer: `python -m tests.benchmarks.peers.program FORM WORKLOAD RESOLUTION OUTPUT`.
+"""A C++ program as a peer: `python -m tests.benchmarks.libraries.program FORM WORKLOAD RESOLUTION OUTPUT`.
 
 FORM is one of `FORMS`. The programs write counts, float32 points and triangles, and print a line of JSON with
 "wall_s", "cpu_s" and "evals", the medians of their warm runs.
@@ -16,7 +16,7 @@ import numpy as np
 from fracslice.export import write
 from fracslice.mesh import Mesh
 
-from ..programs import told
+from ..programs import output
 
 RUNS = 5
 WORKS = {"mandelbulb": "W1", "julia": "W2", "menger4": "W3", "sphere": "W4"}
@@ -28,18 +28,18 @@ FORMS: dict[str, tuple[str, ...]] = {
 
 
 def main() -> None:
-    form, workload, resolution, output = sys.argv[1:]
+    form, workload, resolution, path = sys.argv[1:]
     if workload not in WORKS:
         sys.exit(f"{form} does not have {workload}")
     with tempfile.TemporaryDirectory() as scratch:
         made = Path(scratch, "mesh.bin")
         name, *more = FORMS[form]
-        (spent,) = told(name, WORKS[workload], resolution, made, "--runs", RUNS, *more)
+        (spent,) = output(name, WORKS[workload], resolution, made, "--runs", RUNS, *more)
         data = made.read_bytes()
     count, faces = np.frombuffer(data, np.int64, 2)
     points = np.frombuffer(data, np.float32, 3 * count, 16).reshape(-1, 3)
     triangles = np.frombuffer(data, np.uint32, 3 * faces, 16 + 12 * count).reshape(-1, 3)
-    write(Mesh(points.astype(np.float64), triangles.astype(np.int32)), output)
+    write(Mesh(points.astype(np.float64), triangles.astype(np.int32)), path)
     kept = {"wall_s": spent["wall_s"], "cpu_s": spent["cpu_s"], "evaluations": spent["evals"]}
     print(json.dumps(kept | {"peak_mb": spent["worker_peak_mb"]}))
 

@@ -1,4 +1,4 @@
-"""A Python library as a peer: ``python -m tests.benchmarks.peers.mesher NAME WORKLOAD RESOLUTION OUTPUT``.
+"""A Python library as a peer: `python -m tests.benchmarks.libraries.mesher NAME WORKLOAD RESOLUTION OUTPUT`.
 
 Each is given our compiled field, so that what is compared is how it samples and meshes. Once warm, it writes
 a PLY file and prints its seconds and how often it evaluated the field.
@@ -7,13 +7,8 @@ a PLY file and prints its seconds and how often it evaluated the field.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
@@ -24,26 +19,13 @@ from fracslice.export import write
 from fracslice.mesh import Mesh
 from fracslice.work import Work
 
-SYSTEM_PYTHON = os.environ.get("OPENVDB_PYTHON", "/usr/bin/python3")
-"""OpenVDB's Python module is not on PyPI: a system's package, for the system's Python."""
+from ..runner import timed
 
-OPENVDB = """
-import json, sys, time, numpy, pyopenvdb
-values, out = numpy.load(sys.argv[1]), sys.argv[2]
-wall, cpu = time.perf_counter(), time.process_time()
-grid = pyopenvdb.FloatGrid(1.0)
-grid.copyFromArray(values)
-points, quads = grid.convertToQuads(0.0)
-told = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu}
-numpy.savez(out, points=points, quads=quads)
-print(json.dumps(told))
-"""
-
-Told = tuple[Mesh, int, dict[str, float]]
-"""A mesh in scene units, how often the field was evaluated, and seconds spent in another process."""
+Result = tuple[Mesh, int]
+"""A mesh in scene units, and how often the field was evaluated."""
 
 
-def by_sdf(what: Workload, resolution: int) -> Told:
+def by_sdf(what: Workload, resolution: int) -> Result:
     """sdf (Fogleman): batches skipped by |f|, which is taken for a distance: f / L is one."""
     import sdf
 
@@ -58,10 +40,10 @@ def by_sdf(what: Workload, resolution: int) -> Told:
     box = tuple(-x for x in reach), reach
     soup = np.array(sdf.generate(sdf.sdf3(lambda: field)(), what.voxel(resolution), box, verbose=False))
     points, corners = np.unique(soup, axis=0, return_inverse=True)
-    return Mesh(points, corners.reshape(-1, 3).astype(np.int32)), count, {}
+    return Mesh(points, corners.reshape(-1, 3).astype(np.int32)), count
 
 
-def by_isomesh(what: Workload, resolution: int) -> Told:
+def by_isomesh(what: Workload, resolution: int) -> Result:
     """isomesh (Seo): an octree, manifold dual contouring, vertices moved onto the surface.
 
     From a coarser start it finds nothing of the Menger sponge.
@@ -77,19 +59,19 @@ def by_isomesh(what: Workload, resolution: int) -> Told:
 
     box = {"bbox_min": (-what.half,) * 3, "bbox_max": (what.half,) * 3}
     points, triangles = isomesh.extract(field, **box, min_depth=depth - 1, max_depth=depth)
-    return Mesh(points, triangles.astype(np.int32)), count, {}
+    return Mesh(points, triangles.astype(np.int32)), count
 
 
-def by_mcubes(what: Workload, resolution: int) -> Told:
+def by_mcubes(what: Workload, resolution: int) -> Result:
     """PyMCubes: marching cubes on every point of the cube."""
     import mcubes
 
     values = grid(what, resolution, Work())
     points, triangles = mcubes.marching_cubes(values, 0.0)
-    return _placed(points, triangles, what, resolution), values.size, {}
+    return _placed(points, triangles, what, resolution), values.size
 
 
-def by_vtk(what: Workload, resolution: int) -> Told:
+def by_vtk(what: Workload, resolution: int) -> Result:
     """VTK's flying edges on every point of the cube, through pyvista."""
     import pyvista
 
@@ -97,21 +79,7 @@ def by_vtk(what: Workload, resolution: int) -> Told:
     image = pyvista.ImageData(dimensions=values.shape)
     image["f"] = values.ravel(order="F")
     found = image.contour([0.0], "f", method="flying_edges", compute_normals=False, compute_scalars=False)
-    return _placed(found.points, found.faces.reshape(-1, 4)[:, 1:], what, resolution), values.size, {}
-
-
-def by_openvdb(what: Workload, resolution: int) -> Told:
-    """OpenVDB's Python module: a grid from an array of every point of the cube, and its mesher."""
-    values = grid(what, resolution, Work())
-    with tempfile.TemporaryDirectory() as folder:
-        given, made = Path(folder, "f.npy"), Path(folder, "mesh.npz")
-        np.save(given, values)
-        words = [SYSTEM_PYTHON, "-c", OPENVDB, str(given), str(made)]
-        told = json.loads(subprocess.run(words, check=True, capture_output=True).stdout)
-        found = np.load(made)
-        points, quads = found["points"], found["quads"]
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return _placed(points, triangles, what, resolution), values.size, told
+    return _placed(found.points, found.faces.reshape(-1, 4)[:, 1:], what, resolution), values.size
 
 
 def _placed(points: np.ndarray, triangles: np.ndarray, what: Workload, resolution: int) -> Mesh:
@@ -120,12 +88,11 @@ def _placed(points: np.ndarray, triangles: np.ndarray, what: Workload, resolutio
     return Mesh(placed, np.ascontiguousarray(triangles, np.int32))
 
 
-MESHERS: dict[str, Callable[[Workload, int], Told]] = {
+MESHERS: dict[str, Callable[[Workload, int], Result]] = {
     "sdf": by_sdf,
     "isomesh": by_isomesh,
     "mcubes": by_mcubes,
     "pyvista": by_vtk,
-    "pyopenvdb": by_openvdb,
 }
 """By the name of the module that each needs."""
 
@@ -134,15 +101,13 @@ def main() -> None:
     name, workload, resolution, output = sys.argv[1:]
     make, what = MESHERS[name], WORKLOADS[workload]
     make(what, 1 << (WARM.bit_length() - 1))
-    wall, cpu = time.perf_counter(), time.process_time()
-    mesh, count, elsewhere = make(what, int(resolution))
-    told = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu, "evaluations": count}
-    if elsewhere:
-        told["cpu_s"] += elsewhere["cpu_s"]
+    made: list[Result] = []
+    spent = timed(lambda: made.append(make(what, int(resolution))))
+    mesh, count = made[0]
     if mesh.volume < 0:
         mesh = Mesh(mesh.vertices, np.ascontiguousarray(mesh.triangles[:, ::-1]))
     write(mesh, output)
-    print(json.dumps(told))
+    print(json.dumps({**spent, "evaluations": count}))
 
 
 if __name__ == "__main__":
