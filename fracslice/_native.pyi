@@ -248,7 +248,7 @@ def component_sizes(
     labels: NDArray[int32],
     count: int,
     threads: int = 0,
-) -> tuple[NDArray[float64], NDArray[float64]]:
+) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[int32]]:
     """See `fracslice.mesh.topology.component_sizes`."""
 
 def measures(
@@ -257,9 +257,9 @@ def measures(
     """Area of triangles, signed volume between them and a point, and number of triangles without area."""
 
 def turned(
-    vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64], threads: int = 0
+    vertices: NDArray[float64], triangles: NDArray[int32], frame: tuple[float, Point, float], threads: int = 0
 ) -> NDArray[int64]:
-    """Triangles, ascending, that degenerate or turn by at least 90 degrees if vertices move to `points`."""
+    """Triangles, ascending, that degenerate or turn by at least 90 degrees when they are quantised."""
 
 def pointed(
     vertices: NDArray[float64], triangles: NDArray[int32], sine: float, most: int, threads: int = 0
@@ -273,8 +273,16 @@ def bounds(points: NDArray[float64], threads: int = 0) -> tuple[Point, Point]:
     """Low and high corner of the bounding box of points, float64 [n, 3]. Raises ValueError without points."""
 
 def quantise(
-    points: NDArray[float64], planes: NDArray[float64], threads: int = 0
-) -> tuple[NDArray[float64], NDArray[bool_]]:
+    vertices: NDArray[float64],
+    triangles: NDArray[int32],
+    keep: NDArray[bool_],
+    displaced: NDArray[bool_],
+    rows: NDArray[int64],
+    corners: NDArray[int32],
+    planes: NDArray[float64],
+    frame: tuple[float, Point, float],
+    threads: int = 0,
+) -> tuple[NDArray[float64], NDArray[int32], NDArray[bool_], NDArray[int64]]:
     """See `fracslice.mesh.quantisation.quantise`. Raises ValueError for a coordinate that is not finite."""
 
 def selected(
