@@ -135,7 +135,8 @@ class _Language(ast.NodeTransformer):
         arguments = parameters(function)
         self.arguments = set(arguments)
         self.local = {*arguments, *stored_names(tree)}
-        self.points = point_names(tree, {a for a in arguments if a in ("x", "y", "z", "a", "b")})
+        points = {"w", "c"} if arguments[:2] == ["w", "c"] else {"x", "y", "z", "a", "b"}
+        self.points = point_names(tree, points & {*arguments})
 
     def fail(self, node: ast.AST, message: str) -> NoReturn:
         line = self.first + getattr(node, "lineno", 1) - 1
