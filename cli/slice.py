@@ -132,6 +132,12 @@ def printer_option(text: str) -> Callable[..., Any]:
     "--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default."
 )
 @click.option(
+    "--sections",
+    type=click.Choice(["1", "2", "4", "8"]),
+    default="1",
+    help="Sections per layer, for grey from z: the share of the layer's height that is inside; 1 by default.",
+)
+@click.option(
     "--exposure",
     nargs=2,
     type=NUMBER,
@@ -168,13 +174,15 @@ def slice_(
     An interrupted job resumes when it is started again.
     """
     from fracslice.export.jobs import SliceRun
-    from fracslice.export.slices import PRINTS, printers_file, slice_format, write_slices
+    from fracslice.export.slices import PICTURES, PRINTS, printers_file, slice_format, write_slices
     from fracslice.shown import layers_amount
     from fracslice.slicing import plan_stack
     from fracslice.slicing.raster import Screen
     from fracslice.stackmodel import StackModel
 
     kind, resin = slice_format(output, form), resin_of(options)
+    if options["sections"] != "1" and kind not in PICTURES:
+        raise click.UsageError(f"{output}: --sections is for pictures; contours are of one section per layer")
     if kind in PRINTS:
         refuse_what_no_print_has(output, kind, options, resin)
     preview = options["preview"]
@@ -189,7 +197,8 @@ def slice_(
         screen = Screen(stack, *how)
         about = {"Title": scene.name, "scene_hash": scene.hash}
         model = StackModel(scene, what, work)
-        run = SliceRun(stack, screen, work, resin, about, model.mesh, model.picture, created())
+        made = created(), int(options["sections"])
+        run = SliceRun(stack, screen, work, resin, about, model.mesh, model.picture, *made)
         write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice.errors import SliceError
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.files import put, replacing
@@ -21,6 +22,7 @@ from fracslice.keys import key, program
 from fracslice.mesh.model import Mesh
 from fracslice.slicing import Layer, Slicer, Stack
 from fracslice.slicing.raster import Screen
+from fracslice.slicing.sublayers import COUNTS, MeanSlicer
 from fracslice.work import Work
 
 EPOCH = datetime(1980, 1, 1)
@@ -49,6 +51,13 @@ class SliceRun:
         Renders the object for print files: from width and height in pixels, uint8 [height, width, 3], sRGB.
     created : datetime
         Date in print files, UTC.
+    sections : int
+        Sections per layer; the grey level of a pixel is the mean of their coverages.
+
+    Raises
+    ------
+    SliceError
+        For an invalid number of sections.
     """
 
     stack: Stack
@@ -59,11 +68,18 @@ class SliceRun:
     mesh: Callable[[], Mesh] | None = None
     picture: Callable[[int, int], NDArray[np.uint8]] | None = None
     created: datetime = EPOCH
+    sections: int = 1
+
+    def __post_init__(self) -> None:
+        if self.sections not in COUNTS:
+            raise SliceError(f"sections={self.sections}: expected one of {', '.join(map(str, COUNTS))}")
 
     @cached_property
     def slicer(self) -> Slicer:
         """Slicer of the stack."""
-        return Slicer(self.stack, self.work)
+        if self.sections == 1:
+            return Slicer(self.stack, self.work)
+        return MeanSlicer(self.stack, self.work, self.sections)
 
     @property
     def layers(self) -> int:
@@ -86,7 +102,8 @@ class SliceRun:
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
         field = self.stack.root.key
         return key(
-            program(), toolchain(), form, field, *stack, *screen, self.resin, sorted(self.metadata.items())
+            *(program(), toolchain(), form, field, *stack, *screen),
+            *(self.resin, self.sections, sorted(self.metadata.items())),
         )
 
     def describe(self) -> bytes:
