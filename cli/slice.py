@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from .cluster import cluster_options, pooled
 from .inputs import check_targets, load_scene
 from .options import (
     NAME,
@@ -141,6 +141,7 @@ def printer_option(text: str) -> Callable[..., Any]:
     help="Write a contact sheet (.png) or an animation (.webp) of the layers.",
 )
 @print_options
+@cluster_options
 @set_option
 @threads_option
 @quiet_option
@@ -157,12 +158,11 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
-    from fracslice.export.jobs import SliceRun
     from fracslice.export.slices import slice_format, write_slices
+    from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
-    from fracslice.slicing import plan_stack
-    from fracslice.slicing.raster import Screen
-    from fracslice.stackmesh import stack_mesh
+    from fracslice.slicerecipe import SliceRecipe
+    from fracslice.work import Work
 
     if slice_format(output, form) == "sl1":
         refuse_what_no_sl1_says(output, options)
@@ -171,14 +171,14 @@ def slice_(
         raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
     check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
-    with working(threads, quiet) as work:
-        what = job(scene, options)
-        stack = as_high_as_wanted(plan_stack(scene.root, what, work), options, work)
-        how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
-        screen = Screen(stack, *how)
-        about = {"Title": scene.name, "scene_hash": scene.hash}
-        mesh = partial(stack_mesh, scene, what, work)
-        write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about, mesh), output, form)
+    how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
+    layers = options["layer"][1], *how, tuple(options["exposure"])
+    recipe = SliceRecipe(to_xml(scene), scene.name, job(scene, options), *layers)
+    shared = (options[name] for name in ("cluster", "shard", "store"))
+    with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
+        run = recipe.run(work)
+        stack, screen = run.stack, run.screen
+        write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
         off = () if quiet else layers_amount(stack, work)[1]

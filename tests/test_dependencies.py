@@ -23,7 +23,8 @@ WITHIN = {"vtkmodules": "pyvista"}
 """Modules that come with a package, and no other way."""
 
 BLOCKED = (
-    "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx hypothesis shapely"
+    "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx hypothesis shapely "
+    "distributed dask fsspec"
 )
 
 
@@ -109,6 +110,11 @@ def test_the_main_job_needs_no_extra(ball_xml: Path) -> None:
     [
         ("pyvista", "mesh ball.xml -o b.stl --picture b.png", 'pictures of meshes need pyvista{} "pyvista"'),
         ("pyvista", "fly ball.xml", 'windows need pyvista{} "pyvista"'),
+        (
+            "distributed",
+            "slice ball.xml -o b.cli --cluster local",
+            'clusters need distributed{} "distributed"',
+        ),
         ("matplotlib", "bench", 'plots need matplotlib{} "matplotlib"'),
         (
             "numba_cuda",

@@ -9,13 +9,14 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from fracslice.errors import ExportError
+from fracslice.export.ranges import Encode, Recipe, encoded_layers, refuse_shards
 from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.files import put, replacing
 from fracslice.formulas.parameters import Vector, validate
 from fracslice.kernel.objects import toolchain
 from fracslice.keys import key, program
 from fracslice.mesh.model import Mesh
-from fracslice.slicing import Layer, Slicer, Stack
+from fracslice.slicing import Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 
@@ -40,6 +41,8 @@ class SliceRun:
         Names and values for the files, "scene_hash" among them.
     mesh : callable, optional
         Makes the mesh of the object for 3MF files, mm, standing on z = 0 and centred as the layers are.
+    recipe : Recipe, optional
+        Plans the same run in another process; a cluster needs it.
 
     Raises
     ------
@@ -53,6 +56,7 @@ class SliceRun:
     exposure: tuple[float, float] = (8.0, 35.0)
     metadata: dict[str, str] = field(default_factory=dict)
     mesh: Callable[[], Mesh] | None = None
+    recipe: Recipe | None = None
 
     def __post_init__(self) -> None:
         validate(self, {"exposure": EXPOSURE}, ExportError)
@@ -106,9 +110,7 @@ class SliceRun:
         return json.dumps(manifest, indent=1).encode()
 
     @contextmanager
-    def encoded(
-        self, path: str | Path, form: str | bytes, encode: Callable[[Layer], bytes]
-    ) -> Iterator[Journal]:
+    def encoded(self, path: str | Path, form: str | bytes, encode: Encode) -> Iterator[Journal]:
         """Encode all layers of a file; an interrupted job resumes.
 
         Parameters
@@ -130,12 +132,13 @@ class SliceRun:
         ExportError
             For an error of the file system.
         """
+        refuse_shards(self, encode)
         with journal(path, self.key(form)) as layers:
-            for data in self.slicer.map(encode, range(layers.count, self.layers)):
+            for data in encoded_layers(self, encode, layers.count):
                 layers.append(data)
             yield layers
 
-    def into_file(self, path: str | Path, head: bytes, encode: Callable[[Layer], bytes], tail: bytes) -> Path:
+    def into_file(self, path: str | Path, head: bytes, encode: Encode, tail: bytes) -> Path:
         """Write a head, the encoded layers and a tail to one file; an interrupted job resumes.
 
         Parameters
@@ -166,7 +169,7 @@ class SliceRun:
         self,
         path: str | Path,
         ending: str,
-        encode: Callable[[Layer], bytes],
+        encode: Encode,
         is_whole: Callable[[bytes], bool],
         also: Mapping[str, bytes],
     ) -> Path:
@@ -196,11 +199,11 @@ class SliceRun:
         ExportError
             For a folder with other files, or an error of the file system.
         """
+        refuse_shards(self, encode)
         folder, name = Path(path), f"{{:05d}}.{ending}".format
         with resumable_folder(folder, self.key(ending), name, is_whole) as start:
-            layers = range(start, self.layers)
-            for _ in self.slicer.map(lambda k: put(f"{folder}/{name(k.index)}", encode(k)), layers):
-                pass
+            for index, data in enumerate(encoded_layers(self, encode, start), start):
+                put(f"{folder}/{name(index)}", data)
             for other, data in also.items():
                 with replacing(folder / other) as file:
                     file.write(data)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import zipfile
-from functools import partial
 from pathlib import Path
 
 from fracslice.errors import ExportError
 from fracslice.export import png
 from fracslice.export.jobs import SliceRun
 from fracslice.files import replacing
+from fracslice.slicing import Layer
 
 MOST_MEMBERS = 65_535
 
@@ -36,8 +36,7 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
     ExportError
         For a folder with other files, or an error of the file system.
     """
-    encode = partial(png.encode_layer, run.screen)
-    return run.into_folder(path, "png", encode, png.is_whole, {"manifest.json": run.describe()})
+    return run.into_folder(path, "png", _picture, png.is_whole, {"manifest.json": run.describe()})
 
 
 def write_sl1(run: SliceRun, path: str | Path) -> Path:
@@ -76,7 +75,7 @@ def write_sl1(run: SliceRun, path: str | Path) -> Path:
         "prusaslicer.ini": _ini(_settings(run)),
     }
     with (
-        run.encoded(path, "png", partial(png.encode_layer, run.screen)) as layers,
+        run.encoded(path, "png", _picture) as layers,
         replacing(path) as file,
         zipfile.ZipFile(file, "w") as archive,
     ):
@@ -85,6 +84,10 @@ def write_sl1(run: SliceRun, path: str | Path) -> Path:
         for index, data in enumerate(layers):
             archive.writestr(zipfile.ZipInfo(f"{name}{index:05d}.png"), data)
     return Path(path)
+
+
+def _picture(run: SliceRun, layer: Layer) -> bytes:
+    return png.encode_layer(run.screen, layer)
 
 
 def _ini(values: dict[str, object]) -> bytes:
