@@ -21,7 +21,7 @@ from .options import (
     threads_option,
 )
 from .slice import check_print, heights, limits_of, printer_option, verdict
-from .summary import found, summary
+from .summary import figures, summary
 from .working import working
 
 OF_LAYERS = {"pixel", "machine", "picture"}
@@ -83,7 +83,7 @@ def check(
     if is_model(source):
         refuse_scene_options(context)
         checked = examined(load_model(source), threads=threads)
-        numbers, line, problems = checked.as_dict(), f"{source}: {found(checked)}", checked.problems
+        numbers, line, problems = checked.as_dict(), f"{source}: {figures(checked)}", checked.problems
         line += "" if problems else ", would print"
     else:
         refuse_options(context, OF_LAYERS, "only with --layer")

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import partial
+import tempfile
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
 
 from . import slicing
-from .export.jobs import SliceRun
+from .export.jobs import EPOCH, SliceRun
+from .export.resins import Resin
+from .export.slices import write_slices
 from .scene.reader import reads
 from .slicing.printers import Printer
 from .slicing.raster import Screen
+from .stackmodel import StackModel
 from .work import Work
 
 
 @dataclass(frozen=True)
 class SliceRecipe:
-    """A scene and all settings of its slicing: enough for any process to plan the same layers.
+    """A scene and all settings of its slicing: enough for any process to plan and encode the same layers.
 
     Attributes
     ----------
@@ -25,11 +30,13 @@ class SliceRecipe:
         Size, layers and pixels.
     most : float or None
         Greatest layer height of adaptive layers, mm.
+    file, form : str
+        Name and format of the file.
     printer : Printer or None
         Printer whose screen the layers are for.
     compensation, gamma, mirror
         As for `Screen`.
-    exposure : tuple of float
+    resin, created
         As for `SliceRun`.
     """
 
@@ -37,11 +44,14 @@ class SliceRecipe:
     name: str
     job: slicing.SliceJob
     most: float | None = None
+    file: str = "layers"
+    form: str = "png"
     printer: Printer | None = None
     compensation: float = 0.0
     gamma: float = 1.0
     mirror: bool | None = None
-    exposure: tuple[float, float] = (8.0, 35.0)
+    resin: Resin | None = None
+    created: datetime = EPOCH
 
     def run(self, work: Work) -> SliceRun:
         """Plan the layers.
@@ -57,16 +67,25 @@ class SliceRecipe:
 
         Raises
         ------
-        SceneError, SliceError, VolumeError, ExportError, Cancelled
+        SceneError, SliceError, VolumeError, Cancelled
             For a scene or settings that cannot be sliced.
         """
-        from .stackmesh import stack_mesh
-
         scene = reads(self.scene, self.name)
         stack = slicing.plan_stack(scene.root, self.job, work)
         if self.most is not None:
             stack = slicing.adapted(stack, self.most, work)
         screen = Screen(stack, self.printer, self.compensation, self.gamma, self.mirror)
         about = {"Title": self.name, "scene_hash": scene.hash}
-        mesh = partial(stack_mesh, scene, self.job, work)
-        return SliceRun(stack, screen, work, self.exposure, about, mesh, self)
+        model = StackModel(scene, self.job, replace(work, cluster=None))
+        files = about, model.mesh, model.picture, self.created
+        return SliceRun(stack, screen, work, self.resin, *files, self)
+
+    def write(self, run: SliceRun) -> None:
+        """Begin to write a run, so that its format shows how it encodes layers; see `ranges.Encoding`.
+
+        Parameters
+        ----------
+        run : SliceRun
+            The run.
+        """
+        write_slices(run, Path(tempfile.gettempdir()) / self.file, self.form)

@@ -75,7 +75,7 @@ class Work:
     cluster: Pool | None = None
 
     def __post_init__(self) -> None:
-        if self.cluster is not None and not hasattr(self.cluster, "results"):
+        if hasattr(self.cluster, "scheduler_info"):
             from .cluster import Workers
 
             object.__setattr__(self, "cluster", Workers.of(self.cluster))
@@ -114,13 +114,13 @@ class Work:
         Cancelled
             If `cancel` is set.
         """
-        found: dict[int, R] = {}
+        results: dict[int, R] = {}
 
         def numbered(index: int) -> None:
-            found[index] = task(items[index])
+            results[index] = task(items[index])
 
         self.map(numbered, range(len(items)))
-        return [found[index] for index in range(len(items))]
+        return [results[index] for index in range(len(items))]
 
     def ordered(self, task: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
         """Yield the results of a task in the order of the items, computed a few items ahead.

@@ -49,13 +49,6 @@ def _head(run: SliceRun, namespaces: str = "") -> str:
     )
 
 
-def _svg(run: SliceRun, layer: Layer) -> bytes:
-    rings = layer.contours
-    d = " ".join("M" + _pairs(_down(run, rings[i]), "%.4f,%.4f", " ") + "z" for i in range(len(rings)))
-    title = f"<title>top {layer.top:.6g} mm, height {layer.height:.6g} mm</title>"
-    return f'{_head(run)}{title}\n<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
-
-
 def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
     """Write a folder with an SVG file for each layer: one path with all contours, in mm.
 
@@ -78,17 +71,13 @@ def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
         For a folder with other files, or an error of the file system.
     """
 
-    return run.into_folder(path, "svg", _svg, lambda data: data.endswith(b"</svg>\n"), {})
+    def make(layer: Layer) -> bytes:
+        rings = layer.contours
+        d = " ".join("M" + _pairs(_down(run, rings[i]), "%.4f,%.4f", " ") + "z" for i in range(len(rings)))
+        title = f"<title>top {layer.top:.6g} mm, height {layer.height:.6g} mm</title>"
+        return f'{_head(run)}{title}\n<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
 
-
-def _slic3r(run: SliceRun, layer: Layer) -> bytes:
-    rings = layer.contours
-    lines = [f'<g id="layer{layer.index}" slic3r:z="{layer.top:.6g}">']
-    for i, hole in enumerate(_holes(rings)):
-        kind, fill = ("hole", "black") if hole else ("contour", "white")
-        points = _pairs(_down(run, rings[i]), "%.4f,%.4f", " ")
-        lines.append(f'<polygon slic3r:type="{kind}" points="{points}" style="fill: {fill}"/>')
-    return ("\n".join([*lines, "</g>"]) + "\n").encode()
+    return run.into_folder(path, "svg", make, lambda data: data.endswith(b"</svg>\n"), {})
 
 
 def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
@@ -111,8 +100,17 @@ def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
         For an error of the file system.
     """
 
+    def make(layer: Layer) -> bytes:
+        rings = layer.contours
+        lines = [f'<g id="layer{layer.index}" slic3r:z="{layer.top:.6g}">']
+        for i, hole in enumerate(_holes(rings)):
+            kind, fill = ("hole", "black") if hole else ("contour", "white")
+            points = _pairs(_down(run, rings[i]), "%.4f,%.4f", " ")
+            lines.append(f'<polygon slic3r:type="{kind}" points="{points}" style="fill: {fill}"/>')
+        return ("\n".join([*lines, "</g>"]) + "\n").encode()
+
     head = _head(run, ' xmlns:slic3r="http://slic3r.org/namespaces/slic3r"')
-    return run.into_file(path, head.encode(), _slic3r, b"</svg>\n")
+    return run.into_file(path, head.encode(), make, b"</svg>\n")
 
 
 # --- Common Layer Interface, version 2.0 (1994)
@@ -178,7 +176,7 @@ def _closed(points: np.ndarray) -> np.ndarray:
     return np.concatenate([points, points[:1]]) / MICRON
 
 
-def _cli_text(_: SliceRun, layer: Layer) -> bytes:
+def _cli_text(layer: Layer) -> bytes:
     rings = layer.contours
     lines = [f"$$LAYER/{layer.top / MICRON:.3f}"]
     for i, hole in enumerate(_holes(rings)):
@@ -187,7 +185,7 @@ def _cli_text(_: SliceRun, layer: Layer) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _cli_bytes(_: SliceRun, layer: Layer) -> bytes:
+def _cli_bytes(layer: Layer) -> bytes:
     rings = layer.contours
     commands = [struct.pack("<Hf", 127, layer.top / MICRON)]
     for i, hole in enumerate(_holes(rings)):
@@ -200,17 +198,6 @@ def _cli_bytes(_: SliceRun, layer: Layer) -> bytes:
 
 
 # --- JSON
-def _json(_: SliceRun, layer: Layer) -> bytes:
-    rings = layer.contours
-    polygons = ", ".join(
-        f'{{"parent": {parent}, "points": [{_pairs(rings[i], "[%.6g,%.6g]", ",")}]}}'
-        for i, parent in enumerate(rings.parent)
-    )
-    comma = "," if layer.index else ""
-    begin = f'{comma}\n{{"top": {layer.top:.6g}, "height": {layer.height:.6g}'
-    return f'{begin}, "contours": [{polygons}]}}'.encode()
-
-
 def write_json(run: SliceRun, path: str | Path) -> Path:
     """Write contours as JSON: for each layer its top, height and polygons with their parents, in mm.
 
@@ -234,7 +221,17 @@ def write_json(run: SliceRun, path: str | Path) -> Path:
     del head["layers"]
     opening = json.dumps(head)[:-1] + ', "unit": "mm", "layers": ['
 
-    return run.into_file(path, opening.encode(), _json, b"\n]}\n")
+    def make(layer: Layer) -> bytes:
+        rings = layer.contours
+        polygons = ", ".join(
+            f'{{"parent": {parent}, "points": [{_pairs(rings[i], "[%.6g,%.6g]", ",")}]}}'
+            for i, parent in enumerate(rings.parent)
+        )
+        comma = "," if layer.index else ""
+        begin = f'{comma}\n{{"top": {layer.top:.6g}, "height": {layer.height:.6g}'
+        return f'{begin}, "contours": [{polygons}]}}'.encode()
+
+    return run.into_file(path, opening.encode(), make, b"\n]}\n")
 
 
 WRITERS: dict[str, Callable[[SliceRun, str | Path], Path]] = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 import io
 import threading
 from collections.abc import Callable, Hashable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from fracslice.cluster import Shard
 from fracslice.errors import ClusterError, ExportError, SharedError
@@ -20,15 +20,19 @@ from fracslice.work import Work
 if TYPE_CHECKING:
     from fracslice.export.jobs import SliceRun
 
-Encode = Callable[["SliceRun", Layer], bytes]
-"""Function of a module that encodes a layer of a run."""
+Encode = Callable[[Layer], bytes]
+"""Encodes a layer."""
 
 PIXELS, MOST = 1 << 20, 64
 """Pixels along the longer side of all layers of a range, about two seconds; most ranges of a small stack."""
 
 
 class Recipe(Hashable, Protocol):
-    """Everything that a run is made from, without arrays; hashable, so that a worker plans it once."""
+    """Everything that a run is made from, without arrays; a worker plans it once."""
+
+    @property
+    def form(self) -> str:
+        """Format of the file."""
 
     def run(self, work: Work) -> SliceRun:
         """Plan the run.
@@ -44,6 +48,15 @@ class Recipe(Hashable, Protocol):
             The same in every process.
         """
 
+    def write(self, run: SliceRun) -> None:
+        """Write a run in its format, which calls `begin` before anything else.
+
+        Parameters
+        ----------
+        run : SliceRun
+            The run.
+        """
+
 
 @dataclass(frozen=True)
 class RangeTask:
@@ -53,8 +66,6 @@ class RangeTask:
     ----------
     recipe : Recipe
         The run.
-    encode : callable
-        Encodes a layer.
     job : str
         Key of the run and its encoding.
     first, end : int
@@ -62,7 +73,6 @@ class RangeTask:
     """
 
     recipe: Recipe
-    encode: Encode
     job: str
     first: int
     end: int
@@ -74,40 +84,73 @@ class RangeTask:
 
     def make(self, work: Work) -> bytes:
         """Records of the encoded layers; see `Task.make`."""
-        run = _planned(self.recipe)
-        if job_key(run, self.encode) != self.job:
+        planned = _planned(self.recipe)
+        if planned.job != self.job:
             raise ClusterError("the layers planned here are others than those of the job")
         file = io.BytesIO()
         journal = Journal(file)
-        for data in Slicer(run.stack, work).map(_bound(run, self.encode), range(self.first, self.end)):
+        for data in Slicer(planned.run.stack, work).map(planned.encode, range(self.first, self.end)):
             journal.append(data)
         return file.getvalue()
 
 
-def job_key(run: SliceRun, encode: Encode) -> str:
-    """Key of the encoded layers of a run.
+class Encoding(Exception):  # noqa: N818  no error: it ends the writing of a file that a worker does not write
+    """How a format encodes the layers of a run.
 
     Parameters
     ----------
     run : SliceRun
         The run.
+    job : str
+        Key of the encoded layers.
+    encode : callable
+        Encodes a layer.
+    """
+
+    def __init__(self, run: SliceRun, job: str, encode: Encode) -> None:
+        self.run, self.job, self.encode = run, job, encode
+
+
+class Asking:
+    """In the place of a pool: a run asks its format how it encodes layers."""
+
+
+def begin(run: SliceRun, form: str | bytes, encode: Encode) -> None:
+    """Begin to encode the layers of a run, before any file is touched.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The run.
+    form : str or bytes
+        File format.
     encode : callable
         Encodes a layer.
 
-    Returns
-    -------
-    str
+    Raises
+    ------
+    SharedError
+        For a shard that does not write the output, when its ranges are made.
+    Encoding
+        If the run asks.
     """
-    return key(run.key(f"{encode.__module__}.{encode.__qualname__}"))
+    pool: Any = run.work.cluster
+    if isinstance(pool, Asking):
+        raise Encoding(run, _key(run, form), encode)
+    if isinstance(pool, Shard) and not pool.first:
+        count = pool.share(_tasks(run, form, 0), run.work)
+        raise SharedError(f"{count} ranges of layers are made; shard 1 writes the file")
 
 
-def encoded_layers(run: SliceRun, encode: Encode, start: int) -> Iterator[bytes]:
+def encoded_layers(run: SliceRun, form: str | bytes, encode: Encode, start: int) -> Iterator[bytes]:
     """Encoded layers of a run in order, made by threads here or by the pool of its work.
 
     Parameters
     ----------
     run : SliceRun
         The run.
+    form : str or bytes
+        File format.
     encode : callable
         Encodes a layer.
     start : int
@@ -120,63 +163,47 @@ def encoded_layers(run: SliceRun, encode: Encode, start: int) -> Iterator[bytes]
     """
     pool = run.work.cluster
     if pool is None:
-        yield from run.slicer.map(_bound(run, encode), range(start, run.layers))
+        yield from run.slicer.map(encode, range(start, run.layers))
         return
-    tasks = _tasks(run, encode, start)
+    tasks = _tasks(run, form, start)
     for task, data in zip(tasks, pool.results(tasks, run.work, "slicing"), strict=True):
-        layers = Journal(io.BytesIO(data), task.end - task.first)
-        for index, layer in enumerate(layers, task.first):
+        for index, layer in enumerate(Journal(io.BytesIO(data), task.end - task.first), task.first):
             if index >= start:
                 yield layer
-    pool.finished(job_key(run, encode))
+    pool.finished(_key(run, form))
 
 
-def refuse_shards(run: SliceRun, encode: Encode) -> None:
-    """Make the ranges of a shard that does not write the output, and end.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The run.
-    encode : callable
-        Encodes a layer.
-
-    Raises
-    ------
-    SharedError
-        For such a shard, when its ranges are made.
-    """
-    pool = run.work.cluster
-    if isinstance(pool, Shard) and not pool.first:
-        count = pool.share(_tasks(run, encode, 0), run.work)
-        raise SharedError(f"{count} ranges of layers are made; shard 1 writes the file")
+def _key(run: SliceRun, form: str | bytes) -> str:
+    """Key of the encoded layers of a run; files of other formats may name theirs alike."""
+    return key(run.recipe.form if run.recipe else "", run.key(form))
 
 
-def _tasks(run: SliceRun, encode: Encode, start: int) -> list[RangeTask]:
+def _tasks(run: SliceRun, form: str | bytes, start: int) -> list[RangeTask]:
     """Ranges of layers from the one of `start` on, the same for any number of workers."""
     if run.recipe is None:
         raise ExportError("a cluster needs the scene of the layers; these are planned by hand")
     size = max(SLAB, min(PIXELS // max(run.stack.shape), run.layers // MOST) // SLAB * SLAB)
-    job = job_key(run, encode)
+    job = _key(run, form)
     return [
-        RangeTask(run.recipe, encode, job, first, min(first + size, run.layers))
+        RangeTask(run.recipe, job, first, min(first + size, run.layers))
         for first in range(start // size * size, run.layers, size)
     ]
-
-
-def _bound(run: SliceRun, encode: Encode) -> Callable[[Layer], bytes]:
-    return lambda layer: encode(run, layer)
 
 
 _PLANNING = threading.Lock()
 
 
-def _planned(recipe: Recipe) -> SliceRun:
-    """The run of a recipe, planned once in a process."""
+def _planned(recipe: Recipe) -> Encoding:
+    """The run of a recipe and its encoding, planned once in a process."""
     with _PLANNING:
         return _kept(recipe)
 
 
 @lru_cache(maxsize=2)
-def _kept(recipe: Recipe) -> SliceRun:
-    return recipe.run(Work(threads=1))
+def _kept(recipe: Recipe) -> Encoding:
+    run = recipe.run(Work(threads=1))
+    try:
+        recipe.write(replace(run, work=replace(run.work, cluster=Asking())))  # type: ignore[arg-type]
+    except Encoding as found:
+        return found
+    raise ExportError("this format has no layers of its own")

@@ -60,7 +60,7 @@ def write_3mf(run: SliceRun, path: str | Path) -> Path:
     return Path(path)
 
 
-def _slice(_: SliceRun, layer: Layer) -> bytes:
+def _slice(layer: Layer) -> bytes:
     rings = layer.contours
     texts = [f'<s:slice ztop="{layer.top:.6f}">\n'.encode()]
     if len(rings):

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import SceneError
 from ..nearest import hint
-from .parameters import REQUIRED, Axis, Choice, Count, Vector
+from . import vocabulary
+from .parameters import REQUIRED, Choice, Count, Vector
 
 if TYPE_CHECKING:
     from .registry import Formula
@@ -97,8 +98,6 @@ def annotation(parameter: Any) -> Any:
         case Vector(sizes=sizes, whole=whole):
             several = Sequence[int] if whole else Sequence[float]
             found = float | several if 1 in sizes else several
-        case Axis():
-            found = Literal["x", "y", "z"]
         case Choice(words=words):
             found = Literal[*words]
         case _:
@@ -124,22 +123,46 @@ _ELEMENTS = {True: "What it is applied to; several are a union.", False: "What i
 
 def stub() -> str:
     """Text of the stub file of `fracslice.formulas`: formulas as functions, all other names re-exported."""
-    from .registry import get, names
+    from .registry import get
 
     package = Path(__file__).with_name("__init__.py")
     imports = [
         n for n in ast.parse(package.read_text(encoding="utf-8")).body if isinstance(n, ast.ImportFrom)
     ]
-    formulas = [name for name in names() if get(name).function.__module__.startswith(__package__)]
     lines = [_HEAD]
     for node in imports:
-        kept = sorted(f"{a.name} as {a.name}" for a in node.names if a.name not in formulas)
-        lines += [f"from .{node.module} import {name}" for name in kept]
-    return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in formulas)]) + "\n"
+        exported = sorted(vocabulary.NAMES) if node.module == "vocabulary" else [a.name for a in node.names]
+        lines += [f"from .{node.module} import {name} as {name}" for name in exported if node.level]
+    return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in _shipped())]) + "\n"
 
 
-_HEAD = """\
-# Made from the registry of formulas by `python docs/generate.py`; do not edit.
+def _shipped() -> list[str]:
+    """Names of the formulas of this package."""
+    from .registry import get, names
+
+    return [name for name in names() if get(name).function.__module__.startswith(__package__)]
+
+
+def package_stub(modules: Mapping[str, str]) -> str:
+    """Text of the stub file of `fracslice`: its public names, and every formula.
+
+    Parameters
+    ----------
+    modules : mapping of str to str
+        Module of each public name, relative to the package.
+
+    Returns
+    -------
+    str
+    """
+    exported = {**modules, **dict.fromkeys(_shipped(), "formulas")}
+    lines = sorted(f"from .{module} import {name} as {name}" for name, module in exported.items())
+    return "\n".join([_MADE, *lines, ""])
+
+
+_MADE = "# Made from the registry of formulas by `python docs/generate.py`; do not edit."
+_HEAD = f"""\
+{_MADE}
 from collections.abc import Sequence
 from typing import Literal, Union
 """

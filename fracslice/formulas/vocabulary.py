@@ -36,7 +36,7 @@ def rsqrt(a: np.ndarray) -> np.ndarray:
     return found
 
 
-def ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def ratio(a: np.ndarray | float, b: np.ndarray) -> np.ndarray:
     """a/b for a normal, finite b whose inverse is normal, too; GPUs have an instruction for the inverse."""
     found: np.ndarray = a / b
     return found
@@ -56,3 +56,4 @@ def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
 
 _FUNCTIONS = ("where", "sqrt", "rsqrt", "ratio", "log", "exp", "sin", "cos", "atan2", "floor")
 NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))
+__all__ = sorted(NAMES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import operator
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 _ON_LANES: dict[type, Callable[[Vec, Vec], Vec]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
 }  # fmt: skip
 _INTRINSICS = {
     name: (getattr(lanes_math, name), count)
@@ -65,6 +67,10 @@ class Expressions:
     builder: Any
     names: dict[str, Value]
     blocks: dict[str, Any]
+
+    @abstractmethod
+    def joined(self, ends: Sequence[tuple[Any, dict[str, Value]]]) -> bool:
+        """Join blocks, each with the values of names there."""
 
     def value(self, node: ast.expr) -> Value:
         """Emit an expression; return its value."""
@@ -118,6 +124,10 @@ class Expressions:
         """Emit a unary operator."""
         if isinstance(op, ast.Not):
             return self.builder.not_(truth(self.builder, value))
+        if isinstance(op, ast.Invert):
+            if is_mask(value):
+                return value.each(self.builder.not_)
+            return self.builder.not_(truth(self.builder, value))
         if isinstance(value, Vec):
             return -self.lanes.vec(self.builder, value)
         if isinstance(value.type, ir.IntType):
@@ -155,26 +165,15 @@ class Expressions:
 
     def chosen(self, test: Any, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
         """Emit a choice between two values; only the chosen one is computed."""
-        ends = []
-        blocks = [self.builder.append_basic_block() for _ in range(2)]
+        blocks, names, ends = [self.builder.append_basic_block() for _ in range(2)], self.names, []
         self.builder.cbranch(test, *blocks)
         for block, way in zip(blocks, (yes, no), strict=True):
             self.builder.position_at_end(block)
             value = way()
-            ends.append((self.builder.block, value))
-        return self.merged(ends)
-
-    def merged(self, ends: Sequence[tuple[Any, Value]], into: Any = None) -> Value:
-        """Join blocks that each have a value; continue there with the joined value."""
-        kind = reduce(joined, (kind_of(value) for _, value in ends))
-        into = into or self.builder.append_basic_block()
-        rows = []
-        for block, value in ends:
-            self.builder.position_at_end(block)
-            rows.append((block, parts_of(as_kind(value, kind, self.lanes, self.builder))))
-            self.builder.branch(into)
-        self.builder.position_at_end(into)
-        return self.phis(kind, rows)
+            ends.append((self.builder.block, {"": value}))
+        self.joined(ends)
+        (value,), self.names = self.names.values(), names
+        return value
 
     def phis(self, kind: Kind, rows: Sequence[tuple[Any, Sequence[Any]]]) -> Value:
         """Emit phis for a value of a given kind, from its parts in each block."""

@@ -52,14 +52,8 @@ class Vec:
     @property
     def bits(self) -> int:
         """Width of an element: 1, 32 or 64."""
-        element = self.register.element
-        return (
-            element.width
-            if isinstance(element, ir.IntType)
-            else 32
-            if isinstance(element, ir.FloatType)
-            else 64
-        )
+        sizes = {ir.FloatType: 32, ir.DoubleType: 64}
+        return sizes.get(type(self.register.element)) or self.register.element.width
 
     @property
     def whole(self) -> ir.VectorType:
@@ -133,6 +127,9 @@ class Vec:
 
     def __eq__(self, other: object) -> Vec:  # type: ignore[override]
         return self._compare("==", other)  # type: ignore[arg-type]
+
+    def __ne__(self, other: object) -> Vec:  # type: ignore[override]
+        return self.each(partial(self.builder.fcmp_unordered, "!="), other)  # type: ignore[arg-type]
 
     def choose(self, yes: Vec | float, no: Vec | float) -> Vec:
         """Select `yes` where the mask self is set, else `no`; at least one of them is a vector."""

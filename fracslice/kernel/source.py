@@ -12,7 +12,7 @@ from typing import Any
 
 from . import language
 from .seen import seen
-from .syntax import stored_names
+from .syntax import Folding, stored_names
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.F
     tree = ast.parse(language.text(function)).body[0]
     assert isinstance(tree, ast.FunctionDef)
     tree.args.args = [a for a in tree.args.args if a.arg not in fixed]
-    pruned: ast.FunctionDef = _Prune().visit(_Substitute(fixed).visit(tree))
+    pruned: ast.FunctionDef = _Substitute(fixed).visit(tree)
     return pruned
 
 
@@ -142,7 +142,7 @@ def _plain(value: Any) -> Any:
     return int(value) if isinstance(value, int) else float(value)
 
 
-class _Substitute(ast.NodeTransformer):
+class _Substitute(Folding):
     """Replaces names by constants; unrolls loops over a constant tuple."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
@@ -150,36 +150,38 @@ class _Substitute(ast.NodeTransformer):
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         if isinstance(node.ctx, ast.Load) and node.id in self.values:
-            return ast.Constant(self.values[node.id])
+            return _literal(self.values[node.id])
         return node
 
     def visit_For(self, node: ast.For) -> Any:
-        name = node.iter.id if isinstance(node.iter, ast.Name) else None
-        values = self.values.get(name) if name else None
-        if not isinstance(values, tuple):
-            return self.generic_visit(node)
-        assert isinstance(node.target, ast.Name)
+        node.iter = self.visit(node.iter)
+        if not (isinstance(node.iter, ast.Tuple) and is_literal(node.iter)):
+            node.body = self.statements(node.body)
+            return node
+        names = node.target.elts if isinstance(node.target, ast.Tuple) else [node.target]
         unrolled: list[ast.stmt] = []
-        for value in values:
-            inner = _Substitute({**self.values, node.target.id: value})
-            unrolled += [inner.visit(ast.parse(ast.unparse(statement)).body[0]) for statement in node.body]
+        for value in ast.literal_eval(node.iter):
+            values = value if isinstance(node.target, ast.Tuple) else [value]
+            inner = dict(zip(map(ast.unparse, names), values, strict=True))
+            body = ast.parse(ast.unparse(ast.Module(node.body, []))).body
+            unrolled += _Substitute({**self.values, **inner}).statements(body)
         return unrolled
 
 
-class _Prune(ast.NodeTransformer):
-    """Replaces branches and choices on a constant by the one taken."""
+def is_literal(node: ast.expr) -> bool:
+    """Return True for a number, or a tuple of literals."""
+    if isinstance(node, ast.Tuple):
+        return all(map(is_literal, node.elts))
+    if isinstance(node, ast.UnaryOp):
+        node = node.operand
+    return isinstance(node, ast.Constant)
 
-    def visit_If(self, node: ast.If) -> Any:
-        self.generic_visit(node)
-        if isinstance(node.test, ast.Constant):
-            return node.body if node.test.value else node.orelse
-        return node
 
-    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
-        self.generic_visit(node)
-        if isinstance(node.test, ast.Constant):
-            return node.body if node.test.value else node.orelse
-        return node
+def _literal(value: Any) -> ast.expr:
+    """Syntax of a number or of a tuple."""
+    if isinstance(value, tuple):
+        return ast.Tuple([_literal(v) for v in value], ast.Load())
+    return ast.Constant(value)
 
 
 class _Forget(ast.NodeTransformer):

@@ -290,7 +290,7 @@ def _across(f, at, axis, share, normal):  # type: ignore[no-untyped-def]
 @compiled
 def _through(points, directions, limit, towards, grid, beside, width):  # type: ignore[no-untyped-def]
     """Write the distance along each ray to the opposite surface; twice the limit if it is farther."""
-    x0, y0, z0, voxel = grid.x0, grid.y0, grid.z0, grid.voxel
+    x0, y0, z0, voxel, _, index, values, bounds = grid
     for n in range(len(points)):
         x, y, z = (points[n, 0] - x0) / voxel, (points[n, 1] - y0) / voxel, (points[n, 2] - z0) / voxel
         s, before = FIRST, 0.0
@@ -298,8 +298,8 @@ def _through(points, directions, limit, towards, grid, beside, width):  # type: 
         while s < limit / voxel + 1:
             u, v, w = x + s * directions[n, 0], y + s * directions[n, 1], z + s * directions[n, 2]
             f = -1.0
-            if is_beside(u, v, w, grid, beside):
-                f = towards * between(u, v, w, grid)
+            if is_beside(u, v, w, index, beside):
+                f = towards * between(u, v, w, voxel, index, bounds, values)
             if f >= 0:
                 width[n] = voxel * (s - (STRIDE * f / (f - before) if before < 0 else 0.0))
                 break
