@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ from .options import (
 from .working import working
 
 if TYPE_CHECKING:
+    from fracslice.export.resins import Resin
     from fracslice.printing.checks import Limits
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Stack
@@ -83,13 +85,15 @@ def printer_option(text: str) -> Callable[..., Any]:
     type=NAME,
     required=True,
     metavar="OUT",
-    help="An .sl1, .3mf, .svg, .cli or .json file, or a folder of PNG pictures.",
+    help="A printer's file (.sl1, .goo, .ctb, .cbddlp, .pwmx, .nanodlp, ...), an .svg, .3mf, .cli or .json "
+    "file, or a folder of PNG pictures.",
 )
 @click.option(
     "--format",
     "form",
     metavar="NAME",
-    help="png, sl1, 3mf, svg, slic3r, cli, cli-binary or json; by default, what the ending of OUT says.",
+    help="png, sl1, goo, ctb, cbddlp, pwmx, nanodlp, 3mf, svg, slic3r, cli, cli-binary or json; by default, "
+    "that of the extension of OUT.",
 )
 @click.option(
     "--size",
@@ -130,9 +134,14 @@ def printer_option(text: str) -> Callable[..., Any]:
     "--exposure",
     nargs=2,
     type=NUMBER,
-    default=(8.0, 35.0),
     metavar="S S",
-    help="Exposure in an .sl1 file: seconds of each layer and of the first; 8 35 by default.",
+    help="Exposure in a printer's file: seconds of each layer and of a bottom layer; the resin's by default.",
+)
+@click.option(
+    "--resin",
+    type=NAME,
+    metavar="NAME|FILE",
+    help='A resin such as "Siraya Tech Fast Grey", or a file of its settings: .toml, or .ini of PrusaSlicer.',
 )
 @click.option(
     "--preview",
@@ -158,14 +167,15 @@ def slice_(
     An interrupted job resumes when it is started again.
     """
     from fracslice.export.jobs import SliceRun
-    from fracslice.export.slices import slice_format, write_slices
+    from fracslice.export.slices import PRINTS, slice_format, write_slices
     from fracslice.shown import layers_amount
     from fracslice.slicing import plan_stack
     from fracslice.slicing.raster import Screen
-    from fracslice.stackmesh import stack_mesh
+    from fracslice.stackmodel import StackModel
 
-    if slice_format(output, form) == "sl1":
-        refuse_what_no_sl1_says(output, options)
+    kind, resin = slice_format(output, form), resin_of(options)
+    if kind in PRINTS:
+        refuse_what_no_print_has(output, kind, options, resin)
     preview = options["preview"]
     if preview and Path(preview).suffix.lower() not in (".png", ".webp"):
         raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
@@ -177,11 +187,12 @@ def slice_(
         how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
         screen = Screen(stack, *how)
         about = {"Title": scene.name, "scene_hash": scene.hash}
-        mesh = partial(stack_mesh, scene, what, work)
-        write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about, mesh), output, form)
+        model = StackModel(scene, what, work)
+        run = SliceRun(stack, screen, work, resin, about, model.mesh, model.picture, created())
+        write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
-        off = () if quiet else layers_amount(stack, work)[1]
+        off = () if quiet else layers_amount(run.slicer, work)[1]
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape
@@ -191,15 +202,43 @@ def slice_(
     return 0
 
 
-def refuse_what_no_sl1_says(output: str, options: dict[str, Any]) -> None:
-    """Raise a usage error for options that an SL1 archive does not allow.
+def resin_of(options: dict[str, Any]) -> Resin | None:
+    """Exposure and motion of --resin, else of the printer's own; --exposure changes them. None if there is
+    neither.
+    """
+    from fracslice.export.resins import Resin, default_resin, resin
+
+    machine, layer = options["machine"], options["layer"][0]
+    found = default_resin(machine, layer) if machine else None
+    if options["resin"] is not None:
+        found = resin(options["resin"], machine, layer)
+    if options["exposure"] is None:
+        return found
+    exposure, bottom = options["exposure"]
+    return replace(found, exposure=exposure, bottom_exposure=bottom) if found else Resin(exposure, bottom)
+
+
+def refuse_what_no_print_has(output: str, kind: str, options: dict[str, Any], resin: Resin | None) -> None:
+    """Raise a usage error for options that a printer's file does not allow.
 
     This is checked before print preparation, which may take minutes.
     """
-    if options["machine"] is None:
-        raise click.UsageError(f'{output}: an SL1 archive needs --printer, such as sl1s; "list" shows all')
-    if options["layer"][1] is not None:
+    machine = options["machine"]
+    if machine is None:
+        raise click.UsageError(f'{output}: a .{kind} file needs --printer, such as sl1s; "list" shows all')
+    if resin is None:
+        raise click.UsageError(
+            f"{output}: no exposure is known for {machine.title}; expected --exposure S S or --resin"
+        )
+    if options["layer"][1] is not None and kind == "sl1":
         raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")
+
+
+def created() -> datetime:
+    """Date of print files, UTC: now, or of SOURCE_DATE_EPOCH."""
+    seconds = os.environ.get("SOURCE_DATE_EPOCH")
+    now = datetime.now(UTC)
+    return datetime.fromtimestamp(int(seconds), UTC) if seconds else now
 
 
 def job(scene: Scene, options: dict[str, Any]) -> SliceJob:

@@ -8,15 +8,19 @@ from .api.slices import slice_layers as slice_layers
 from .errors import FracsliceError as FracsliceError
 from .export import write as write
 from .formulas import Node as Node
+from .formulas import abox as abox
 from .formulas import bend as bend
 from .formulas import bounds as bounds
 from .formulas import box as box
+from .formulas import bristorbrot as bristorbrot
+from .formulas import burning_ship as burning_ship
 from .formulas import capsule as capsule
 from .formulas import cone as cone
 from .formulas import cylinder as cylinder
 from .formulas import difference as difference
 from .formulas import intersection as intersection
 from .formulas import julia as julia
+from .formulas import mandelbox as mandelbox
 from .formulas import mandelbulb as mandelbulb
 from .formulas import material as material
 from .formulas import menger as menger
@@ -24,6 +28,7 @@ from .formulas import mirror as mirror
 from .formulas import octahedron as octahedron
 from .formulas import offset as offset
 from .formulas import plane as plane
+from .formulas import quaternion_mandelbrot as quaternion_mandelbrot
 from .formulas import repeat as repeat
 from .formulas import shell as shell
 from .formulas import sphere as sphere

@@ -17,7 +17,7 @@ from .work import Work
 
 if TYPE_CHECKING:
     from .kernel import Field
-    from .slicing import Stack
+    from .slicing import Slicer
 
 Grid = tuple[Triple, Triple, Callable[[float], str]]
 """Origin and spacing of the samples, scene units, and a function that names samples of a fraction of the
@@ -63,13 +63,13 @@ def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[A
     return _compared(planned.root, [planned.outer], made, scale, (lattice.origin, spacing, sampling), work)
 
 
-def layers_amount(stack: Stack, work: Work) -> tuple[Amount, tuple[str, ...]]:
+def layers_amount(slicer: Slicer, work: Work) -> tuple[Amount, tuple[str, ...]]:
     """Compare the volume of some slabs of a stack with that of its field.
 
     Parameters
     ----------
-    stack : Stack
-        The stack.
+    slicer : Slicer
+        Slicer of the stack; layers that it has painted are not sampled again.
     work : Work
         Threads and cancellation.
 
@@ -85,13 +85,16 @@ def layers_amount(stack: Stack, work: Work) -> tuple[Amount, tuple[str, ...]]:
     SliceError, Cancelled
         If a layer cannot be sampled, or the work is cancelled.
     """
-    from .slicing import SLAB, Slicer
+    from .slicing import SLAB
 
+    stack = slicer.stack
     starts = np.arange(0, len(stack.z), SLAB)
     chosen = [s.tolist() for s in np.split(np.arange(len(stack.z)), starts[1:])]
     chosen = [chosen[k] for k in np.unique(np.linspace(0, len(starts) - 1, SLABS).round().astype(int))]
     layers = [layer for slab in chosen for layer in slab]
-    areas = np.array(list(Slicer(stack, work).map(lambda layer: layer.area, layers)))
+    for _ in slicer.map(lambda layer: layer.area, [k for k in layers if k not in slicer.areas]):
+        pass  # the slicer keeps the areas
+    areas = np.array([slicer.areas[k] for k in layers])
     (x0, y0, dx, dy), height = stack.frame.tolist(), stack.heights / stack.scale
     low, high = stack.z - height / 2, stack.z + height / 2
     (left, front, _), (right, back, _) = stack.outer.lo, stack.outer.hi

@@ -6,12 +6,16 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 
-from fracslice.errors import ExportError
+import numpy as np
+from numpy.typing import NDArray
+
+from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.files import put, replacing
-from fracslice.formulas.parameters import Vector, validate
 from fracslice.kernel.objects import toolchain
 from fracslice.keys import key, program
 from fracslice.mesh.model import Mesh
@@ -19,12 +23,13 @@ from fracslice.slicing import Layer, Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 
-EXPOSURE = Vector((8.0, 35.0), "seconds of each layer, and of the first", sizes=(2,), above=0)
+EPOCH = datetime(1980, 1, 1)
+"""Date of files by default, so that equal jobs give equal bytes."""
 
 
 @dataclass(frozen=True, eq=False)
 class SliceRun:
-    """A planned stack with the screen, exposure and metadata of its files.
+    """A planned stack with all that its files contain besides layers.
 
     Attributes
     ----------
@@ -34,30 +39,28 @@ class SliceRun:
         Conversion of layers to pictures.
     work : Work
         Threads, progress and cancellation.
-    exposure : (float, float)
-        Exposure of each layer and of the first, s.
+    resin : Resin, optional
+        Exposure and motion; print files need them.
     metadata : dict of str to str
         Names and values for the files, "scene_hash" among them.
     mesh : callable, optional
         Makes the mesh of the object for 3MF files, mm, standing on z = 0 and centred as the layers are.
-
-    Raises
-    ------
-    ExportError
-        For an invalid exposure.
+    picture : callable, optional
+        Renders the object for print files: from width and height in pixels, uint8 [height, width, 3], sRGB.
+    created : datetime
+        Date in print files, UTC.
     """
 
     stack: Stack
     screen: Screen
     work: Work = field(default_factory=Work)
-    exposure: tuple[float, float] = (8.0, 35.0)
+    resin: Resin | None = None
     metadata: dict[str, str] = field(default_factory=dict)
     mesh: Callable[[], Mesh] | None = None
+    picture: Callable[[int, int], NDArray[np.uint8]] | None = None
+    created: datetime = EPOCH
 
-    def __post_init__(self) -> None:
-        validate(self, {"exposure": EXPOSURE}, ExportError)
-
-    @property
+    @cached_property
     def slicer(self) -> Slicer:
         """Slicer of the stack."""
         return Slicer(self.stack, self.work)
@@ -68,7 +71,7 @@ class SliceRun:
         return len(self.stack.z)
 
     def key(self, form: str | bytes) -> str:
-        """Key of everything that determines the bytes of the layers.
+        """Key of everything that determines the bytes of encoded layers.
 
         Parameters
         ----------
@@ -83,7 +86,7 @@ class SliceRun:
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
         field = self.stack.root.key
         return key(
-            program(), toolchain(), form, field, *stack, *screen, self.exposure, sorted(self.metadata.items())
+            program(), toolchain(), form, field, *stack, *screen, self.resin, sorted(self.metadata.items())
         )
 
     def describe(self) -> bytes:

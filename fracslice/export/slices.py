@@ -6,20 +6,40 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fracslice.errors import ExportError
-from fracslice.export import outlines, pictures, slices3mf
+from fracslice.export import anycubic, archives, chitu, goo, outlines, pictures, slices3mf
 from fracslice.export.jobs import SliceRun
 from fracslice.files import check_target
 
+PRINTS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
+    "sl1": archives.write_sl1,
+    "goo": goo.write_goo,
+    "ctb": chitu.write_ctb,
+    "cbddlp": chitu.write_cbddlp,
+    "pwmx": anycubic.write_photon,
+    "nanodlp": archives.write_nanodlp,
+}
+"""Formats of printers; they need a printer and a resin."""
+
 FORMATS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
     "png": pictures.write_folder,
-    "sl1": pictures.write_sl1,
+    **PRINTS,
     "3mf": slices3mf.write_3mf,
     **outlines.WRITERS,
 }
 FOLDERS = {"png", "svg"}
+PHOTON = "pwmx pwmo pwms pmsq pwma pwmb pmx2 pm3 pm3m pm3r dlp dl2p"
+"""Extensions of one format, one for each model."""
+
 ENDINGS = {
     ".sl1": "sl1",
     ".sl1s": "sl1",
+    ".goo": "goo",
+    ".prz": "goo",
+    ".ctb": "ctb",
+    ".cbddlp": "cbddlp",
+    ".photon": "cbddlp",
+    **{f".{ending}": "pwmx" for ending in PHOTON.split()},
+    ".nanodlp": "nanodlp",
     ".3mf": "3mf",
     ".svg": "slic3r",
     ".cli": "cli",

@@ -3,6 +3,7 @@ from collections.abc import Sequence
 from typing import Literal, Union
 
 from .box import Box as Box
+from .orbits import orbit as orbit
 from .parameters import Axis as Axis
 from .parameters import Choice as Choice
 from .parameters import Count as Count
@@ -30,6 +31,31 @@ from .vocabulary import rsqrt as rsqrt
 from .vocabulary import sin as sin
 from .vocabulary import sqrt as sqrt
 from .vocabulary import where as where
+
+def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1.0, 0.7), angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The asymmetric Mandelbox, turned in each step (Rrrola and Knighty 2010, fractalforums.com).
+
+    With a third size of 1e6, z is never folded: the Amazing Surf (Kali 2011).
+
+    Parameters
+    ----------
+    scale : a number >= -10 and <= 10, default 2.0
+        how much each step enlarges; less than -1 or more than 1
+    inner : a number > 0 and <= 1, default 0.5
+        radius within which the ball's fold only scales
+    size : 3 numbers > 0 and <= 1e+06, default (1.0, 1.0, 0.7)
+        half sizes of the box that is folded into
+    angle : a number, default 0.0
+        rotation about the z axis in each step, degrees
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
 
 def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
     """The element bent: a straight axis becomes an arc (Barr 1984, "Global and Local Deformations of Solid
@@ -83,6 +109,38 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> Node:
         the three edge lengths
     round : a number >= 0, default 0.0
         radius of the rounded edges and corners, within the size
+
+    Returns
+    -------
+    Node
+    """
+
+def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Bristorbrot (Bristor 2009, fractalforums.com).
+
+    Parameters
+    ----------
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
+def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Mandelbulb of absolute coordinates, after Michelitsch and Roessler 1992, "The burning ship".
+
+    Parameters
+    ----------
+    power : a number >= 2 and <= 16, default 8.0
+        the exponent
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
 
     Returns
     -------
@@ -183,6 +241,25 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     bailout : a number > 1 and <= 1e+06, default 2.0
         the solid is where the last step is not larger than this
+
+    Returns
+    -------
+    Node
+    """
+
+def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Mandelbox (Lowe 2010, "What is a Mandelbox?").
+
+    Parameters
+    ----------
+    scale : a number >= -10 and <= 10, default 2.0
+        how much each step enlarges; less than -1 or more than 1
+    inner : a number > 0 and <= 1, default 0.5
+        radius within which the ball's fold only scales
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
 
     Returns
     -------
@@ -340,6 +417,23 @@ def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> Nod
         points out of the solid; any length
     offset : a number, default 0.0
         distance of the plane from the origin along the normal
+
+    Returns
+    -------
+    Node
+    """
+
+def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Mandelbrot set of q^2 + c in the quaternions, cut at k = 0 (Norton 1982).
+
+    It is the complex Mandelbrot set turned about the real axis.
+
+    Parameters
+    ----------
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
 
     Returns
     -------

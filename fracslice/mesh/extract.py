@@ -155,7 +155,7 @@ def contour_pieces(
         features[moved] = places
         mesh, border = Mesh(vertices, triangles), np.inf
         if last < len(signs.index):  # Unused vertices belong to the next piece.
-            mesh = mesh.selected(np.ones(len(triangles), bool))
+            mesh = mesh.compact()
             border = signs.origin[0] + signs.voxel * BRICK * last
         yield Piece(mesh, border)
 

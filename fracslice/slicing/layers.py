@@ -136,6 +136,11 @@ class Layer:
         return self.slab.paint(self.place, np.zeros(self.stack.shape, np.uint8))
 
     @property
+    def is_painted(self) -> bool:
+        """True if the area is known without further work."""
+        return "_painted" in vars(self)
+
+    @property
     def area(self) -> float:
         """Area in mm^2, from the coverage before rounding."""
         return self._painted[0] * self.stack.pixel[0] * self.stack.pixel[1]
@@ -161,10 +166,13 @@ class Slicer:
         The planned layers.
     work : Work
         Threads, progress and cancellation.
+    areas : dict of int to float
+        Area of each layer that has been sampled and painted, mm^2.
     """
 
     stack: Stack
     work: Work = field(default_factory=Work)
+    areas: dict[int, float] = field(default_factory=dict, init=False)
 
     def map(self, make: Callable[[Layer], T], layers: Sequence[int] | None = None) -> Iterator[T]:
         """Yield ``make(layer)`` for every layer, or for chosen ones.
@@ -206,7 +214,10 @@ class Slicer:
                 before = found.evaluations
                 sampler.sample(found, index - first)
                 spent = found.evaluations - before
-                made.append(make(Layer(self.stack, index, spent, found, index - first, exact)))
+                layer = Layer(self.stack, index, spent, found, index - first, exact)
+                made.append(make(layer))
+                if layer.is_painted:
+                    self.areas[index] = layer.area
             return made
 
         groups = [list(g) for _, g in groupby(chosen, lambda index: index // SLAB)]

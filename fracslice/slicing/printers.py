@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import dataclass
+from typing import Any
 
 from ..errors import SliceError
 
@@ -26,6 +27,12 @@ class Printer:
         The picture is mirrored along x.
     portrait : bool
         Rows of the picture run along x of the bed.
+    file : str
+        Extension of the files that it prints; "encrypted.ctb" for those that are not written.
+    version : int
+        Version of the format.
+    settings : tuple
+        Names and values of the resin settings of one's own profile.
     """
 
     name: str
@@ -35,6 +42,9 @@ class Printer:
     height: float
     mirror: bool = True
     portrait: bool = False
+    file: str = ""
+    version: int = 1
+    settings: tuple[tuple[str, Any], ...] = ()
 
     @property
     def pixel(self) -> tuple[float, float]:

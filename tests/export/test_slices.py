@@ -9,7 +9,6 @@ import xml.etree.ElementTree as ET
 import zipfile
 from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from PIL import Image
 from fracslice.errors import Cancelled, ExportError, FracsliceWarning
 from fracslice.export import png
 from fracslice.export.jobs import SliceRun
+from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal
 from fracslice.export.slices import FORMATS, slice_format, write_slices
 from fracslice.formulas import Node, difference, menger, sphere
@@ -27,7 +27,7 @@ from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.printers import Printer
 from fracslice.slicing.raster import Screen
-from fracslice.stackmesh import stack_mesh
+from fracslice.stackmodel import StackModel
 from fracslice.work import Work
 
 MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
@@ -38,8 +38,8 @@ def run(work: Work | None = None, layer: float = 0.5, root: Node = ROOT) -> Slic
     job = SliceJob(size=12, layer=layer, pixel=MACHINE.pixel)
     stack = plan_stack(root, job)
     how, work = Screen(stack, MACHINE), work or Work()
-    mesh = partial(stack_mesh, scene(root, size=12), job, Work())
-    return SliceRun(stack, how, work, metadata={"Title": "test"}, mesh=mesh)
+    mesh = StackModel(scene(root, size=12), job, Work()).mesh
+    return SliceRun(stack, how, work, Resin(2, 20), {"Title": "test"}, mesh)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_sl1(tmp_path: Path) -> None:
         assert archive.testzip() is None
         config = dict(line.split(" = ") for line in archive.read("config.ini").decode().splitlines())
         settings = dict(line.split(" = ") for line in archive.read("prusaslicer.ini").decode().splitlines())
-        pictures = [n for n in archive.namelist() if n.endswith(".png")]
+        pictures = [n for n in archive.namelist() if n.startswith("part")]
         assert config["layerHeight"] == "0.5"
         assert config["numFast"] == "24"
         assert config["jobDir"] == "part"
@@ -314,7 +314,7 @@ def test_a_job_is_known_by_all_that_its_layers_follow_from(monkeypatch: pytest.M
             {"notes": ("a",)},
         ],
         "screen": [{"gamma": 1.1}, {"compensation": 0.01}, {"mirror": True}, {"printer": None}],
-        "": [{"exposure": (8.0, 36.0)}, {"metadata": {"Title": "other"}}],
+        "": [{"resin": Resin(2, 21)}, {"metadata": {"Title": "other"}}],
     }
     jobs = [job]
     for part, values in changes.items():

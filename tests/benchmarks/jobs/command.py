@@ -12,4 +12,5 @@ import sys
 from pathlib import Path
 
 _BESIDE = Path(sys.executable).with_name("fracslice")
-COMMAND = shlex.split(os.environ.get("FRACSLICE_COMMAND", str(_BESIDE)))
+_OWN = str(_BESIDE) if _BESIDE.exists() else "fracslice"
+COMMAND = shlex.split(os.environ.get("FRACSLICE_COMMAND", _OWN))
