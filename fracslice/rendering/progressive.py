@@ -22,6 +22,7 @@ from .accumulator import COARSE, Accumulator, HostAccumulator
 from .cpu import BLOCK, CpuTracer
 from .linking import Frame, link_frame
 from .optics import optics
+from .sequence import Samples
 from .setup import RenderSetup, prepare
 
 STEPS, GROWTH, GROWN = 160, 10, 16
@@ -136,6 +137,8 @@ class Renderer:
         Threads, progress and cancellation.
     device : {"cpu", "cuda", "auto"}
         Device that traces the rays.
+    samples : Samples, optional
+        Part of the sample sequence; its begin, without a shift, by default.
 
     Raises
     ------
@@ -152,6 +155,7 @@ class Renderer:
         size: tuple[int, int] | None = None,
         work: Work | None = None,
         device: str = "auto",
+        samples: Samples | None = None,
     ) -> None:
         pixels = (view.film.width, view.film.height) if size is None else size
         self.width, self.height = validated("size", pixels, SIZE, RenderError)
@@ -161,6 +165,7 @@ class Renderer:
         self.dtype = np.dtype(self.setup.precision)
         tracer, self._kept = _machinery(self.device)
         self.tracer = tracer(self._frame(0), self.dtype, self.width, self.height)
+        self.tracer.samples = samples or self.tracer.samples
         self.accumulator = self._kept(self._empty)
         self._aimed: tuple[Node, bool] | None = None
         self._rate = 0.0
@@ -182,7 +187,7 @@ class Renderer:
         what: RenderSetup = self.setup
         frames = [self._frame(k).linked for k in range(len(what.roots))]
         parts = [part for frame in frames for part in (frame.source, frame.parameters)]
-        return key(program(), self.width, self.height, what.precision, *parts)
+        return key(program(), self.width, self.height, what.precision, self.tracer.samples, *parts)
 
     def look(self, camera: Camera, within: float | None = None) -> None:
         """Restart the picture from another camera; depths and precision are kept.
