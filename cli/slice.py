@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .cluster import cluster_options, pooled
 from .inputs import check_targets, load_scene
 from .options import (
     NAME,
@@ -150,6 +151,7 @@ def printer_option(text: str) -> Callable[..., Any]:
     metavar="FILE",
     help="Write a contact sheet (.png) or an animation (.webp) of the layers.",
 )
+@cluster_options
 @print_options
 @set_option
 @threads_option
@@ -167,12 +169,11 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
-    from fracslice.export.jobs import SliceRun
     from fracslice.export.slices import PRINTS, printers_file, slice_format, write_slices
+    from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
-    from fracslice.slicing import plan_stack
-    from fracslice.slicing.raster import Screen
-    from fracslice.stackmodel import StackModel
+    from fracslice.slicerecipe import SliceRecipe
+    from fracslice.work import Work
 
     kind, resin = slice_format(output, form), resin_of(options)
     if kind in PRINTS:
@@ -182,14 +183,24 @@ def slice_(
         raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
     check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
-    with working(threads, quiet) as work:
-        what = job(scene, options)
-        stack = as_high_as_wanted(plan_stack(scene.root, what, work), options, work)
-        how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
-        screen = Screen(stack, *how)
-        about = {"Title": scene.name, "scene_hash": scene.hash}
-        model = StackModel(scene, what, work)
-        run = SliceRun(stack, screen, work, resin, about, model.mesh, model.picture, created())
+    recipe = SliceRecipe(
+        to_xml(scene),
+        scene.name,
+        job(scene, options),
+        options["layer"][1],
+        Path(output).name,
+        kind,
+        options["machine"],
+        options["compensation"],
+        options["gamma"],
+        options["mirror"],
+        resin,
+        created(),
+    )
+    shared = (options[name] for name in ("cluster", "shard", "store"))
+    with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
+        run = recipe.run(work)
+        stack, screen = run.stack, run.screen
         write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
