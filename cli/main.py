@@ -27,6 +27,7 @@ from fracslice.errors import (
 )
 from fracslice.version import __version__
 
+from .animate import animate
 from .bench import bench
 from .check import check
 from .fly import fly
@@ -59,7 +60,7 @@ def commands(context: click.Context) -> None:
         context.exit(USAGE)
 
 
-for command in (mesh, render, slice_, check, show, fly, formulas, scenes, bench):
+for command in (mesh, render, animate, slice_, check, show, fly, formulas, scenes, bench):
     commands.add_command(command)
 
 

@@ -16,15 +16,20 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 
-MODULES = {"pillow": "PIL", "scikit-image": "skimage", "numba-cuda": "numba_cuda"}
+MODULES = {
+    "pillow": "PIL",
+    "scikit-image": "skimage",
+    "numba-cuda": "numba_cuda",
+    "imageio-ffmpeg": "imageio_ffmpeg",
+}
 """Of packages, where it has another name."""
 
 WITHIN = {"vtkmodules": "pyvista"}
 """Modules that come with a package, and no other way."""
 
 BLOCKED = (
-    "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx hypothesis shapely "
-    "distributed dask fsspec"
+    "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx "
+    "hypothesis shapely imageio_ffmpeg distributed dask fsspec"
 )
 
 

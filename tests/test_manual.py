@@ -101,6 +101,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "job.make_mesh",
         "slicing.plan_stack",
         "rendering.Renderer",
+        "animation.Timeline",
         "bench.runs.measure",
         "viewer.fly",
         "cluster.connected",

@@ -23,6 +23,7 @@ from .cpu import BLOCK, CpuTracer
 from .linking import Frame, link_frame
 from .optics import optics
 from .parts import PoolTracer
+from .sequence import Samples
 from .setup import RenderSetup, prepare
 
 STEPS, GROWTH, GROWN = 160, 10, 16
@@ -137,6 +138,8 @@ class Renderer:
         Threads, progress and cancellation.
     device : {"cpu", "cuda", "auto"}
         Device that traces the rays.
+    samples : Samples, optional
+        Part of the sample sequence; its begin, without a shift, by default.
 
     Raises
     ------
@@ -153,6 +156,7 @@ class Renderer:
         size: tuple[int, int] | None = None,
         work: Work | None = None,
         device: str = "auto",
+        samples: Samples | None = None,
     ) -> None:
         pixels = (view.film.width, view.film.height) if size is None else size
         self.width, self.height = validated("size", pixels, SIZE, RenderError)
@@ -162,6 +166,7 @@ class Renderer:
         self.dtype = np.dtype(self.setup.precision)
         tracer, self._kept = _machinery(self.device)
         self.tracer = tracer(self._frame(0), self.dtype, self.width, self.height)
+        self.tracer.samples = samples or self.tracer.samples
         if self.work.cluster is not None:
             self.tracer = PoolTracer(root, view, self.tracer)
         self.accumulator = self._kept(self._empty)
@@ -185,7 +190,7 @@ class Renderer:
         what: RenderSetup = self.setup
         frames = [self._frame(k).linked for k in range(len(what.roots))]
         parts = [part for frame in frames for part in (frame.source, frame.parameters)]
-        return key(program(), self.width, self.height, what.precision, *parts)
+        return key(program(), self.width, self.height, what.precision, self.tracer.samples, *parts)
 
     def look(self, camera: Camera, within: float | None = None) -> None:
         """Restart the picture from another camera; depths and precision are kept.
