@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
-from fracslice.rendering.live import CameraInput, Live
+from fracslice.rendering.live import Live
+from fracslice.rendering.steering import CameraInput
 from fracslice.scene.view import Camera
 from fracslice.work import Work
 
