@@ -21,6 +21,7 @@ from fracslice.errors import (
     FracsliceWarning,
     RenderError,
     SceneError,
+    SharedError,
     SliceError,
     VolumeError,
 )
@@ -94,6 +95,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return say(error.format_message(), error.exit_code)
     except StoppedError as error:
         return say(str(error), error.status)
+    except SharedError as error:
+        return say(str(error), 0)
     except FracsliceError as error:
         return say(str(error), USAGE if isinstance(error, BAD_INPUT) else FAILED)
     except (KeyboardInterrupt, click.Abort):

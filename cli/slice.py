@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .cluster import cluster_options, pooled
 from .inputs import check_targets, load_scene
 from .options import (
     NAME,
@@ -68,13 +69,14 @@ def printer(context: click.Context, _: click.Parameter, name: str | None) -> Pri
         return None if name is None else printers.printer(name)
     for p in printers.PRINTERS.values():
         volume = " x ".join(f"{r:g}" for r in p.build_volume)
-        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {volume} mm")
+        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {volume} mm, .{p.file}")
     context.exit()
 
 
 def printer_option(text: str) -> Callable[..., Any]:
     """Decorator that adds --printer, parsed before missing options are reported. text: its help."""
-    return click.option("--printer", "machine", callback=printer, is_eager=True, metavar="NAME", help=text)
+    names = "--printer", "machine"
+    return click.option(*names, callback=printer, is_eager=True, metavar="NAME|FILE", help=text)
 
 
 @click.command("slice")
@@ -111,7 +113,7 @@ def printer_option(text: str) -> Callable[..., Any]:
 @click.option(
     "--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's by default, or 0.05mm."
 )
-@printer_option('The printer whose screen the layers are for; "list" shows all.')
+@printer_option('The printer whose screen the layers are for, or a .toml file of it; "list" shows all.')
 @click.option(
     "--up",
     nargs=3,
@@ -149,6 +151,7 @@ def printer_option(text: str) -> Callable[..., Any]:
     metavar="FILE",
     help="Write a contact sheet (.png) or an animation (.webp) of the layers.",
 )
+@cluster_options
 @print_options
 @set_option
 @threads_option
@@ -166,12 +169,11 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
-    from fracslice.export.jobs import SliceRun
-    from fracslice.export.slices import PRINTS, slice_format, write_slices
+    from fracslice.export.slices import PRINTS, printers_file, slice_format, write_slices
+    from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
-    from fracslice.slicing import plan_stack
-    from fracslice.slicing.raster import Screen
-    from fracslice.stackmodel import StackModel
+    from fracslice.slicerecipe import SliceRecipe
+    from fracslice.work import Work
 
     kind, resin = slice_format(output, form), resin_of(options)
     if kind in PRINTS:
@@ -181,14 +183,24 @@ def slice_(
         raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
     check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
-    with working(threads, quiet) as work:
-        what = job(scene, options)
-        stack = as_high_as_wanted(plan_stack(scene.root, what, work), options, work)
-        how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
-        screen = Screen(stack, *how)
-        about = {"Title": scene.name, "scene_hash": scene.hash}
-        model = StackModel(scene, what, work)
-        run = SliceRun(stack, screen, work, resin, about, model.mesh, model.picture, created())
+    recipe = SliceRecipe(
+        to_xml(scene),
+        scene.name,
+        job(scene, options),
+        options["layer"][1],
+        Path(output).name,
+        kind,
+        options["machine"],
+        options["compensation"],
+        options["gamma"],
+        options["mirror"],
+        resin,
+        created(),
+    )
+    shared = (options[name] for name in ("cluster", "shard", "store"))
+    with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
+        run = recipe.run(work)
+        stack, screen = run.stack, run.screen
         write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
@@ -197,7 +209,8 @@ def slice_(
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape
         click.echo(f"{output}: {len(stack.z)} layers of {columns} x {rows} pixels, {size} mm")
-        for note in stack.notes + off:
+        other = printers_file(screen.printer, output) if screen.printer else ""
+        for note in stack.notes + off + ((other,) if other else ()):
             click.echo(note)
     return 0
 
@@ -206,7 +219,7 @@ def resin_of(options: dict[str, Any]) -> Resin | None:
     """Exposure and motion of --resin, else of the printer's own; --exposure changes them. None if there is
     neither.
     """
-    from fracslice.export.resins import Resin, default_resin, resin
+    from fracslice.export.resins import Resin, default_resin, moving, resin
 
     machine, layer = options["machine"], options["layer"][0]
     found = default_resin(machine, layer) if machine else None
@@ -215,7 +228,9 @@ def resin_of(options: dict[str, Any]) -> Resin | None:
     if options["exposure"] is None:
         return found
     exposure, bottom = options["exposure"]
-    return replace(found, exposure=exposure, bottom_exposure=bottom) if found else Resin(exposure, bottom)
+    if found is None:
+        return moving(Resin(exposure, bottom), machine)
+    return replace(found, exposure=exposure, bottom_exposure=bottom)
 
 
 def refuse_what_no_print_has(output: str, kind: str, options: dict[str, Any], resin: Resin | None) -> None:
@@ -223,9 +238,13 @@ def refuse_what_no_print_has(output: str, kind: str, options: dict[str, Any], re
 
     This is checked before print preparation, which may take minutes.
     """
+    from fracslice.export.slices import ENDINGS, printers_file
+
     machine = options["machine"]
     if machine is None:
         raise click.UsageError(f'{output}: a .{kind} file needs --printer, such as sl1s; "list" shows all')
+    if f".{machine.file}" in ENDINGS and (other := printers_file(machine, output)):
+        raise click.UsageError(f"{output}: {other}")
     if resin is None:
         raise click.UsageError(
             f"{output}: no exposure is known for {machine.title}; expected --exposure S S or --resin"

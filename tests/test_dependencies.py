@@ -29,7 +29,7 @@ WITHIN = {"vtkmodules": "pyvista"}
 
 BLOCKED = (
     "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx "
-    "hypothesis shapely imageio_ffmpeg"
+    "hypothesis shapely imageio_ffmpeg distributed dask fsspec"
 )
 
 
@@ -115,6 +115,11 @@ def test_the_main_job_needs_no_extra(ball_xml: Path) -> None:
     [
         ("pyvista", "mesh ball.xml -o b.stl --picture b.png", 'pictures of meshes need pyvista{} "pyvista"'),
         ("pyvista", "fly ball.xml", 'windows need pyvista{} "pyvista"'),
+        (
+            "distributed",
+            "slice ball.xml -o b.cli --cluster local",
+            'clusters need distributed{} "distributed"',
+        ),
         ("matplotlib", "bench", 'plots need matplotlib{} "matplotlib"'),
         (
             "numba_cuda",

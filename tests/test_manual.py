@@ -103,6 +103,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "animation.Timeline",
         "bench.runs.measure",
         "viewer.fly",
+        "cluster.connected",
     ):
         monkeypatch.setattr(f"fracslice.{work}", begin)
     monkeypatch.setattr("fracslice.viewer.show", begin)

@@ -62,8 +62,8 @@ def write_photon(run: SliceRun, path: str | Path) -> Path:
 
 def _before_pictures(job: Print) -> bytes:
     """All sections before the pictures, after their offsets."""
-    version = job.printer.version
-    wide = version == 516
+    wide = job.printer.version == 516
+    version = 516 if wide else 1
     header = _section("HEADER", _settings(job)) + bytes(4 * wide)
     preview = _preview(job, wide)
     table = _section("LAYERDEF", bytes(4 + _LAYER.size * job.layers))
@@ -119,5 +119,5 @@ def _motion(job: Print) -> bytes:
 
 def _machine(job: Print) -> bytes:
     size, name = (*job.printer.screen, job.printer.height), job.printer.title.encode("ascii", "replace")
-    contents = _MACHINE.pack(name[:95], b"pw0Img", *size, job.printer.version, BOARD)
+    contents = _MACHINE.pack(name[:95], b"pw0Img", *size, 516, BOARD)
     return _section("MACHINE", contents, 16)

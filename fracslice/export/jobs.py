@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice.export.ranges import Recipe, begin, encoded_layers
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.files import put, replacing
@@ -49,6 +50,8 @@ class SliceRun:
         Renders the object for print files: from width and height in pixels, uint8 [height, width, 3], sRGB.
     created : datetime
         Date in print files, UTC.
+    recipe : Recipe, optional
+        Plans the same run in another process; a cluster needs it.
     """
 
     stack: Stack
@@ -59,6 +62,7 @@ class SliceRun:
     mesh: Callable[[], Mesh] | None = None
     picture: Callable[[int, int], NDArray[np.uint8]] | None = None
     created: datetime = EPOCH
+    recipe: Recipe | None = None
 
     @cached_property
     def slicer(self) -> Slicer:
@@ -133,8 +137,9 @@ class SliceRun:
         ExportError
             For an error of the file system.
         """
+        begin(self, form, encode)
         with journal(path, self.key(form)) as layers:
-            for data in self.slicer.map(encode, range(layers.count, self.layers)):
+            for data in encoded_layers(self, form, encode, layers.count):
                 layers.append(data)
             yield layers
 
@@ -199,11 +204,11 @@ class SliceRun:
         ExportError
             For a folder with other files, or an error of the file system.
         """
+        begin(self, ending, encode)
         folder, name = Path(path), f"{{:05d}}.{ending}".format
         with resumable_folder(folder, self.key(ending), name, is_whole) as start:
-            layers = range(start, self.layers)
-            for _ in self.slicer.map(lambda k: put(f"{folder}/{name(k.index)}", encode(k)), layers):
-                pass
+            for index, data in enumerate(encoded_layers(self, ending, encode, start), start):
+                put(f"{folder}/{name(index)}", data)
             for other, data in also.items():
                 with replacing(folder / other) as file:
                     file.write(data)

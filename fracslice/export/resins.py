@@ -6,8 +6,8 @@ import csv
 import difflib
 import re
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -134,7 +134,7 @@ def resin(name: str, printer: Printer | None, layer: float) -> Resin:
         raise ExportError(f"resin {name!r}: unknown for {title}; {hint}")
     heights = known[name]
     exposure, bottom = heights[min(heights, key=lambda height: abs(height - layer))]
-    return Resin(exposure, bottom, name, bottom_layers=1, transition_layers=10)
+    return moving(Resin(exposure, bottom, name, bottom_layers=1, transition_layers=10), printer)
 
 
 def default_resin(printer: Printer, layer: float) -> Resin | None:
@@ -153,8 +153,32 @@ def default_resin(printer: Printer, layer: float) -> Resin | None:
         Settings for the nearest layer height; None if the maker publishes none.
     """
     if printer.settings:
-        return of_table(printer.name, dict(printer.settings))
+        return moving(of_table(printer.name, dict(printer.settings)), printer, printer.settings)
     return resin(MAKERS, printer, layer) if MAKERS in _table().get(printer.name, {}) else None
+
+
+def moving(resin: Resin, printer: Printer | None, but: Collection[tuple[str, Any]] = ()) -> Resin:
+    """Take the motion of a printer.
+
+    Parameters
+    ----------
+    resin : Resin
+        Settings.
+    printer : Printer or None
+        The printer.
+    but : collection of (str, value), optional
+        Settings that stay.
+
+    Returns
+    -------
+    Resin
+    """
+    if printer is None:
+        return resin
+    motion: dict[str, Any] = dict(
+        zip(("lift", "lift_speed", "retract_speed", "wait"), printer.motion, strict=True)
+    )
+    return replace(resin, **motion | dict(but))
 
 
 def of_table(where: str, values: Mapping[str, Any]) -> Resin:

@@ -22,6 +22,7 @@ from .accumulator import COARSE, Accumulator, HostAccumulator
 from .cpu import BLOCK, CpuTracer
 from .linking import Frame, link_frame
 from .optics import optics
+from .parts import PoolTracer
 from .sequence import Samples
 from .setup import RenderSetup, prepare
 
@@ -160,12 +161,14 @@ class Renderer:
         pixels = (view.film.width, view.film.height) if size is None else size
         self.width, self.height = validated("size", pixels, SIZE, RenderError)
         self.work = work or Work()
-        self.device = chosen(device)
+        self.device = chosen(device if self.work.cluster is None else "cpu")
         self.setup = prepare(root, view, (self.width, self.height))
         self.dtype = np.dtype(self.setup.precision)
         tracer, self._kept = _machinery(self.device)
         self.tracer = tracer(self._frame(0), self.dtype, self.width, self.height)
         self.tracer.samples = samples or self.tracer.samples
+        if self.work.cluster is not None:
+            self.tracer = PoolTracer(root, view, self.tracer)
         self.accumulator = self._kept(self._empty)
         self._aimed: tuple[Node, bool] | None = None
         self._rate = 0.0
@@ -280,14 +283,22 @@ class Renderer:
         number = self.accumulator.passes
         limit = STEPS + STEPS * (GROWTH - 1) * min(number, GROWN) // GROWN
         start = time.perf_counter()
-        self._aim(number, limit)
+        self.aim(number, limit)
         self.accumulator.receive(pixels, lambda sums: self.tracer.add(sums, pixels, number, limit, self.work))
         samples, error = self.accumulator.statistics()
         self._rate = count / (time.perf_counter() - start)
         return self._seen(samples, error, count, self._rate)
 
-    def _aim(self, number: int, limit: int) -> None:
-        """Load the tree of this pass into the tracer; run the cone prepass if a block holds several rays."""
+    def aim(self, number: int, limit: int) -> None:
+        """Load the tree of a pass into the tracer; run the cone prepass if a block holds several rays.
+
+        Parameters
+        ----------
+        number : int
+            Number of the pass, from 0.
+        limit : int
+            Steps per ray.
+        """
         ahead = number > 0 or self.accumulator.coarse < BLOCK
         aimed = self.setup.root(number), ahead
         if aimed != self._aimed:

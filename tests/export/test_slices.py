@@ -271,7 +271,7 @@ def contents(path: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("cut", [1, 50, 700, 2000])
-@pytest.mark.parametrize("form", ["sl1", "cli", "3mf"])
+@pytest.mark.parametrize("form", ["sl1", "goo", "cli", "3mf"])
 def test_a_truncated_remainder_goes_on_from_what_is_whole(form: str, cut: int, tmp_path: Path) -> None:
     target, part = tmp_path / "part.sl1", tmp_path / ".part.sl1.part"
     with pytest.raises(Cancelled):
@@ -279,6 +279,20 @@ def test_a_truncated_remainder_goes_on_from_what_is_whole(form: str, cut: int, t
     part.write_bytes(part.read_bytes()[:-cut])
     write_slices(run(), target, form)
     assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1"), form))
+
+
+@pytest.mark.parametrize("form", ["goo", "png"])
+def test_a_damaged_layer_is_made_again(form: str, tmp_path: Path) -> None:
+    """One bit of a layer that looks whole: as long as it was, with the same end."""
+    target = tmp_path / "part"
+    with pytest.raises(Cancelled):
+        write_slices(run(cancelled_after(16)), target, form)
+    layer = target / "00003.png" if form == "png" else tmp_path / ".part.part"
+    data = bytearray(layer.read_bytes())
+    data[len(data) // 2] ^= 1
+    layer.write_bytes(data)
+    write_slices(run(), target, form)
+    assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part"), form))
 
 
 SMALLER = difference(menger(level=1), sphere(radius=0.8))
