@@ -1,10 +1,9 @@
-"""fracslice slice and "fracslice check --layer": writing and checking the layers of a print."""
+"""fracslice slice: writing the layers of a print."""
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .cluster import cluster_options, pooled
 from .inputs import check_targets, load_scene
 from .options import (
     NAME,
@@ -28,10 +28,8 @@ from .working import working
 
 if TYPE_CHECKING:
     from fracslice.export.resins import Resin
-    from fracslice.printing.checks import Limits
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Stack
-    from fracslice.slicing.checks import PrintReport
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
 
@@ -156,6 +154,7 @@ def printer_option(text: str) -> Callable[..., Any]:
     metavar="FILE",
     help="Write a contact sheet (.png) or an animation (.webp) of the layers.",
 )
+@cluster_options
 @print_options
 @set_option
 @threads_option
@@ -173,12 +172,11 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
-    from fracslice.export.jobs import SliceRun
     from fracslice.export.slices import PICTURES, PRINTS, printers_file, slice_format, write_slices
+    from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
-    from fracslice.slicing import plan_stack
-    from fracslice.slicing.raster import Screen
-    from fracslice.stackmodel import StackModel
+    from fracslice.slicerecipe import SliceRecipe
+    from fracslice.work import Work
 
     kind, resin = slice_format(output, form), resin_of(options)
     if options["sections"] != "1" and kind not in PICTURES:
@@ -190,15 +188,25 @@ def slice_(
         raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
     check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
-    with working(threads, quiet) as work:
-        what = job(scene, options)
-        stack = as_high_as_wanted(plan_stack(scene.root, what, work), options, work)
-        how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
-        screen = Screen(stack, *how)
-        about = {"Title": scene.name, "scene_hash": scene.hash}
-        model = StackModel(scene, what, work)
-        made = created(), int(options["sections"])
-        run = SliceRun(stack, screen, work, resin, about, model.mesh, model.picture, *made)
+    recipe = SliceRecipe(
+        to_xml(scene),
+        scene.name,
+        job(scene, options),
+        options["layer"][1],
+        Path(output).name,
+        kind,
+        options["machine"],
+        options["compensation"],
+        options["gamma"],
+        options["mirror"],
+        resin,
+        created(),
+        int(options["sections"]),
+    )
+    shared = (options[name] for name in ("cluster", "shard", "store"))
+    with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
+        run = recipe.run(work)
+        stack, screen = run.stack, run.screen
         write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
@@ -271,13 +279,6 @@ def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
     return SliceJob(size, options["layer"][0], given, up, printing_of(scene, options))
 
 
-def stack_of(scene: Scene, options: dict[str, Any], work: Work) -> Stack:
-    """Plan layers of one height for the object after print preparation."""
-    from fracslice.slicing import plan_stack
-
-    return plan_stack(scene.root, job(scene, options), work)
-
-
 def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:
     """Adaptive layers if a range of heights is given; otherwise the stack itself."""
     from fracslice.slicing import adapted
@@ -293,52 +294,3 @@ def write_preview(stack: Stack, path: str, work: Work) -> None:
 
     with replacing(path) as file:
         (contact_sheet if path.lower().endswith(".png") else animation)(stack, file, work)
-
-
-def check_print(
-    source: str, settings: tuple[str, ...], as_json: bool, threads: int, quiet: bool, **options: Any
-) -> int:
-    """Check the layers of a scene, print the result and return the exit status."""
-    from fracslice.export import replacing
-    from fracslice.slicing.checks import check_layers, misfit
-    from fracslice.slicing.preview import worst_layers
-
-    if options["picture"] and Path(options["picture"]).suffix.lower() != ".png":
-        raise click.UsageError(f"{options['picture']}: expected a file name that ends in .png")
-    check_targets(source, options["picture"])
-    scene = load_scene(source, settings)
-    with working(threads, quiet) as work:
-        stack, machine = stack_of(scene, options, work), options["machine"]
-        if machine and (unfit := misfit(stack, machine)):
-            early = {"size": stack.size, "fits": False, "problems": [unfit]}
-            click.echo(json.dumps(early, indent=2) if as_json else f"{source}: would not print: {unfit}")
-            return 1
-        stack = as_high_as_wanted(stack, options, work)
-        report = check_layers(stack, limits_of(options), machine, work)
-        if options["picture"]:
-            with replacing(options["picture"]) as file:
-                worst_layers(stack, report.worst, file, work)
-    click.echo(json.dumps(report.as_dict(), indent=2) if as_json else told(source, report))
-    return 1 if report.problems else 0
-
-
-def limits_of(options: dict[str, Any]) -> Limits:
-    """Minimum thicknesses of walls and floors."""
-    from fracslice.printing.checks import Limits
-
-    return Limits(wall=options["wall"], floor=options["floor"])
-
-
-def told(source: str, report: PrintReport) -> str:
-    """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
-    size = " x ".join(f"{s:.2f}" for s in report.size)
-    first = (
-        f"{source}: {report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
-    )
-    said = f"{first}, {verdict(report.problems)}"
-    return os.linesep.join(filter(None, [said, report.solid.unseen]))
-
-
-def verdict(problems: Sequence[str]) -> str:
-    """Verdict on printability, with a line for each problem."""
-    return os.linesep.join(["would not print:", *(f"  {p}" for p in problems)]) if problems else "would print"

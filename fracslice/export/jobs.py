@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fracslice.errors import SliceError
+from fracslice.export.ranges import Recipe, begin, encoded_layers
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.files import put, replacing
@@ -53,6 +54,8 @@ class SliceRun:
         Date in print files, UTC.
     sections : int
         Sections per layer; the grey level of a pixel is the mean of their coverages.
+    recipe : Recipe, optional
+        Plans the same run in another process; a cluster needs it.
 
     Raises
     ------
@@ -69,6 +72,7 @@ class SliceRun:
     picture: Callable[[int, int], NDArray[np.uint8]] | None = None
     created: datetime = EPOCH
     sections: int = 1
+    recipe: Recipe | None = None
 
     def __post_init__(self) -> None:
         if self.sections not in COUNTS:
@@ -77,9 +81,21 @@ class SliceRun:
     @cached_property
     def slicer(self) -> Slicer:
         """Slicer of the stack."""
-        if self.sections == 1:
-            return Slicer(self.stack, self.work)
-        return MeanSlicer(self.stack, self.work, self.sections)
+        return self.slicer_with(self.work)
+
+    def slicer_with(self, work: Work) -> Slicer:
+        """Slicer of the stack with other threads.
+
+        Parameters
+        ----------
+        work : Work
+            Threads, progress and cancellation.
+
+        Returns
+        -------
+        Slicer
+        """
+        return Slicer(self.stack, work) if self.sections == 1 else MeanSlicer(self.stack, work, self.sections)
 
     @property
     def layers(self) -> int:
@@ -150,8 +166,9 @@ class SliceRun:
         ExportError
             For an error of the file system.
         """
+        begin(self, form, encode)
         with journal(path, self.key(form)) as layers:
-            for data in self.slicer.map(encode, range(layers.count, self.layers)):
+            for data in encoded_layers(self, form, encode, layers.count):
                 layers.append(data)
             yield layers
 
@@ -216,11 +233,11 @@ class SliceRun:
         ExportError
             For a folder with other files, or an error of the file system.
         """
+        begin(self, ending, encode)
         folder, name = Path(path), f"{{:05d}}.{ending}".format
         with resumable_folder(folder, self.key(ending), name, is_whole) as start:
-            layers = range(start, self.layers)
-            for _ in self.slicer.map(lambda k: put(f"{folder}/{name(k.index)}", encode(k)), layers):
-                pass
+            for index, data in enumerate(encoded_layers(self, ending, encode, start), start):
+                put(f"{folder}/{name(index)}", data)
             for other, data in also.items():
                 with replacing(folder / other) as file:
                     file.write(data)
