@@ -130,6 +130,12 @@ def printer_option(text: str) -> Callable[..., Any]:
     "--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default."
 )
 @click.option(
+    "--sections",
+    type=click.Choice(["1", "2", "4", "8"]),
+    default="1",
+    help="Sections per layer, for grey from z: the share of the layer's height that is inside; 1 by default.",
+)
+@click.option(
     "--exposure",
     nargs=2,
     type=NUMBER,
@@ -166,13 +172,15 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
-    from fracslice.export.slices import PRINTS, printers_file, slice_format, write_slices
+    from fracslice.export.slices import PICTURES, PRINTS, printers_file, slice_format, write_slices
     from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
     from fracslice.slicerecipe import SliceRecipe
     from fracslice.work import Work
 
     kind, resin = slice_format(output, form), resin_of(options)
+    if options["sections"] != "1" and kind not in PICTURES:
+        raise click.UsageError(f"{output}: --sections is for pictures; contours are of one section per layer")
     if kind in PRINTS:
         refuse_what_no_print_has(output, kind, options, resin)
     preview = options["preview"]
@@ -193,6 +201,7 @@ def slice_(
         options["mirror"],
         resin,
         created(),
+        int(options["sections"]),
     )
     shared = (options[name] for name in ("cluster", "shard", "store"))
     with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
