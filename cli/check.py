@@ -25,7 +25,7 @@ from .options import (
     threads_option,
 )
 from .slice import LAYER, PIXEL_MM, as_high_as_wanted, heights, printer_option
-from .summary import found, summary
+from .summary import figures, summary
 from .working import working
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def of_model(source: str, options: dict[str, Any], work: Work) -> Checked:
 
     mesh = load_model(source)
     report = check_mesh(mesh, threads=work.threads)
-    line, numbers = f"{source}: {found(report)}", report.as_dict()
+    line, numbers = f"{source}: {figures(report)}", report.as_dict()
     if not report.watertight:
         return numbers, [line], report.problems
     size = longest(mesh)

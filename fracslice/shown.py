@@ -56,11 +56,11 @@ def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[A
     """
     lattice = Lattice.around(planned.outer, planned.voxel)
 
-    def told(voxel: float) -> str:
+    def sampling(voxel: float) -> str:
         return f"a voxel of {voxel * planned.voxel * scale:.2g} mm"
 
     spacing = planned.voxel, planned.voxel, planned.voxel
-    return _compared(planned.root, [planned.outer], made, scale, (lattice.origin, spacing, told), work)
+    return _compared(planned.root, [planned.outer], made, scale, (lattice.origin, spacing, sampling), work)
 
 
 def layers_amount(slicer: Slicer, work: Work) -> tuple[Amount, tuple[str, ...]]:
@@ -101,10 +101,10 @@ def layers_amount(slicer: Slicer, work: Work) -> tuple[Amount, tuple[str, ...]]:
     boxes = [Box((left, front, low[s[0]]), (right, back, high[s[-1]])) for s in chosen]
     least = float(stack.heights.min())
 
-    def told(share: float) -> str:
+    def sampling(share: float) -> str:
         return f"pixels of {share * min(stack.pixel):.2g} mm and layers of {share * least:.2g} mm"
 
-    grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), told
+    grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), sampling
     return _compared(stack.root, boxes, dot(areas, stack.heights[layers]), stack.scale, grid, work)
 
 
@@ -117,14 +117,14 @@ def _compared(
     work: Work,
 ) -> tuple[Amount, tuple[str, ...]]:
     """Compare the volume of the field in boxes, scene units, with `made`, mm3."""
-    found = amount(root, boxes, work)
-    off, unit = found.off(made / scale**3), scale**3
-    told = Amount(found.volume * unit, found.error * unit, made, off)
+    true = amount(root, boxes, work)
+    off, unit = true.off(made / scale**3), scale**3
+    compared = Amount(true.volume * unit, true.error * unit, made, off)
     if off > 0:
-        return told, (f"{off:.1%} more volume than the object has: the samples are too coarse for it",)
+        return compared, (f"{off:.1%} more volume than the object has: the samples are too coarse for it",)
     if off == 0:
-        return told, ()
+        return compared, ()
     origin, spacing, name = grid
-    times = finer(root, found, off, origin, spacing, work)
+    times = finer(root, true, off, origin, spacing, work)
     would = f"{name(1 / times)} would show it" if times else f"{name(1 / FINER[-1])} would not show it either"
-    return told, (f"{-off:.1%} of the object's volume is finer than the samples and missing: {would}",)
+    return compared, (f"{-off:.1%} of the object's volume is finer than the samples and missing: {would}",)

@@ -6,13 +6,17 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 
-from fracslice.errors import ExportError
+import numpy as np
+from numpy.typing import NDArray
+
+from fracslice.export.ranges import Recipe, begin, encoded_layers
+from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.files import put, replacing
-from fracslice.formulas.parameters import Vector, validate
 from fracslice.kernel.objects import toolchain
 from fracslice.keys import key, program
 from fracslice.mesh.model import Mesh
@@ -20,12 +24,13 @@ from fracslice.slicing import Layer, Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 
-EXPOSURE = Vector((8.0, 35.0), "seconds of each layer, and of the first", sizes=(2,), above=0)
+EPOCH = datetime(1980, 1, 1)
+"""Date of files by default, so that equal jobs give equal bytes."""
 
 
 @dataclass(frozen=True, eq=False)
 class SliceRun:
-    """A planned stack with the screen, exposure and metadata of its files.
+    """A planned stack with all that its files contain besides layers.
 
     Attributes
     ----------
@@ -35,28 +40,29 @@ class SliceRun:
         Conversion of layers to pictures.
     work : Work
         Threads, progress and cancellation.
-    exposure : (float, float)
-        Exposure of each layer and of the first, s.
+    resin : Resin, optional
+        Exposure and motion; print files need them.
     metadata : dict of str to str
         Names and values for the files, "scene_hash" among them.
     mesh : callable, optional
         Makes the mesh of the object for 3MF files, mm, standing on z = 0 and centred as the layers are.
-
-    Raises
-    ------
-    ExportError
-        For an invalid exposure.
+    picture : callable, optional
+        Renders the object for print files: from width and height in pixels, uint8 [height, width, 3], sRGB.
+    created : datetime
+        Date in print files, UTC.
+    recipe : Recipe, optional
+        Plans the same run in another process; a cluster needs it.
     """
 
     stack: Stack
     screen: Screen
     work: Work = field(default_factory=Work)
-    exposure: tuple[float, float] = (8.0, 35.0)
+    resin: Resin | None = None
     metadata: dict[str, str] = field(default_factory=dict)
     mesh: Callable[[], Mesh] | None = None
-
-    def __post_init__(self) -> None:
-        validate(self, {"exposure": EXPOSURE}, ExportError)
+    picture: Callable[[int, int], NDArray[np.uint8]] | None = None
+    created: datetime = EPOCH
+    recipe: Recipe | None = None
 
     @cached_property
     def slicer(self) -> Slicer:
@@ -69,7 +75,7 @@ class SliceRun:
         return len(self.stack.z)
 
     def key(self, form: str | bytes) -> str:
-        """Key of everything that determines the bytes of the layers.
+        """Key of everything that determines the bytes of encoded layers.
 
         Parameters
         ----------
@@ -84,7 +90,7 @@ class SliceRun:
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
         field = self.stack.root.key
         return key(
-            program(), toolchain(), form, field, *stack, *screen, self.exposure, sorted(self.metadata.items())
+            program(), toolchain(), form, field, *stack, *screen, self.resin, sorted(self.metadata.items())
         )
 
     def describe(self) -> bytes:
@@ -131,8 +137,9 @@ class SliceRun:
         ExportError
             For an error of the file system.
         """
+        begin(self, form, encode)
         with journal(path, self.key(form)) as layers:
-            for data in self.slicer.map(encode, range(layers.count, self.layers)):
+            for data in encoded_layers(self, form, encode, layers.count):
                 layers.append(data)
             yield layers
 
@@ -197,11 +204,11 @@ class SliceRun:
         ExportError
             For a folder with other files, or an error of the file system.
         """
+        begin(self, ending, encode)
         folder, name = Path(path), f"{{:05d}}.{ending}".format
         with resumable_folder(folder, self.key(ending), name, is_whole) as start:
-            layers = range(start, self.layers)
-            for _ in self.slicer.map(lambda k: put(f"{folder}/{name(k.index)}", encode(k)), layers):
-                pass
+            for index, data in enumerate(encoded_layers(self, ending, encode, start), start):
+                put(f"{folder}/{name(index)}", data)
             for other, data in also.items():
                 with replacing(folder / other) as file:
                     file.write(data)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from .._slices import Slab
+from .._slices import Encoding, Slab
 from ..kernel import Kernel
 from ..work import Work
 from .contours import Contours, contours
@@ -89,22 +89,23 @@ class Layer:
         """Layer height, mm."""
         return float(self.stack.heights[self.index])
 
-    def deflated(self, view: ScreenView) -> bytes:
-        """Image data of a PNG file with the layer as a screen shows it.
+    def encoded(self, view: ScreenView, encoding: Encoding) -> bytes:
+        """Encode the layer as a screen shows it, from its tiles: the picture is never allocated.
 
         Parameters
         ----------
         view : ScreenView
             The screen.
+        encoding : Encoding
+            Encoding of the picture.
 
         Returns
         -------
         bytes
-            A zlib stream of rows, each after a byte 0.
+            Encoded picture.
         """
-        data, area, cut = self.slab.picture(
-            self.place, view.shape, view.transposed, view.backwards, view.at, self.stack.shape, view.levels
-        )
+        how = view.shape, view.transposed, view.backwards, view.at, self.stack.shape, view.levels
+        data, area, cut = self.slab.picture(self.place, *how, encoding)
         self._painted = area, cut
         return data
 

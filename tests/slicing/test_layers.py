@@ -87,7 +87,7 @@ def test_closed_and_equal_to_dense_sampling(name: str) -> None:
 @pytest.mark.parametrize("root", [mandelbulb(), julia(), mandelbulb(iterations=4)])
 def test_what_fractals_cost_and_what_is_lost(root: Node) -> None:
     """Little more than three evaluations per pixel that the contour cuts (under three where pictures are
-    larger: `tests.benchmarks.slices.peer`); samples of the wrong sign make up less than 0.1 % of the area.
+    larger: `tests.benchmarks slices.peer`); samples of the wrong sign make up less than 0.1 % of the area.
     """
     stack = stack_of(root, 512, 0.4)
     layers = range(len(stack.z) // 8 * 4, len(stack.z) // 8 * 4 + 8)
