@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import commands, run
 
+import fracslice.slicerecipe  # noqa: F401  before a test replaces what it imports
 from fracslice.export import write
 
 from .mesh import shapes

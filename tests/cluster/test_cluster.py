@@ -101,6 +101,22 @@ def test_a_killed_worker_and_a_late_one(
     late[0].wait()
 
 
+def test_a_worker_that_hangs(cluster: Cluster, expected: dict[str, bytes], tmp_path: Path) -> None:
+    """Its tasks are given to another one after a while without a result."""
+    hung, other = cluster.worker(), cluster.worker()
+
+    def progress(_: str, share: float) -> None:
+        hung.send_signal(signal.SIGSTOP)
+
+    with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+        pool.client.wait_for_workers(2, timeout=60)
+        quick = Workers(pool.client, pool.pieces, patience=0.5)
+        assert sliced(Work(1, progress=progress, cluster=quick), tmp_path) == expected["slice"]
+    for process in (hung, other):
+        process.kill()
+        process.wait()
+
+
 def test_the_client_dies_and_the_same_command_goes_on(
     cluster: Cluster, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
