@@ -19,7 +19,7 @@ from .options import (
     threads_option,
 )
 from .render import pixels
-from .working import working
+from .working import StoppedError, working
 
 SMALLER, FEWER = 4, 4
 """Of --preview: divisor of the size, and samples."""
@@ -112,9 +112,13 @@ def animate(
         with replacing(target) as file:
             file.write(to_xml(job.scene(chosen[0])).encode())
         return
-    with working(threads, quiet) as work:
-        paths = write_frames(job, chosen, folder, resume, work)
-        if ending:
-            encode(paths, target, rate)
+    try:
+        with working(threads, quiet) as work:
+            paths = write_frames(job, chosen, folder, resume, work)
+    except StoppedError as error:
+        error.args = (f"stopped; the frames in {folder} are whole, and --resume goes on",)
+        raise
+    if ending:
+        encode(paths, target, rate)
     if not quiet:
         click.echo(f"{output}: {len(paths)} frames of {width} x {height} pixels, {len(paths) / rate:.2f} s")

@@ -1,10 +1,9 @@
-"""fracslice slice and "fracslice check --layer": writing and checking the layers of a print."""
+"""fracslice slice: writing the layers of a print."""
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -29,10 +28,8 @@ from .working import working
 
 if TYPE_CHECKING:
     from fracslice.export.resins import Resin
-    from fracslice.printing.checks import Limits
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Stack
-    from fracslice.slicing.checks import PrintReport
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
 
@@ -133,6 +130,12 @@ def printer_option(text: str) -> Callable[..., Any]:
     "--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default."
 )
 @click.option(
+    "--sections",
+    type=click.Choice(["1", "2", "4", "8"]),
+    default="1",
+    help="Sections per layer, for grey from z: the share of the layer's height that is inside; 1 by default.",
+)
+@click.option(
     "--exposure",
     nargs=2,
     type=NUMBER,
@@ -169,13 +172,15 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
-    from fracslice.export.slices import PRINTS, printers_file, slice_format, write_slices
+    from fracslice.export.slices import PICTURES, PRINTS, printers_file, slice_format, write_slices
     from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
     from fracslice.slicerecipe import SliceRecipe
     from fracslice.work import Work
 
     kind, resin = slice_format(output, form), resin_of(options)
+    if options["sections"] != "1" and kind not in PICTURES:
+        raise click.UsageError(f"{output}: --sections is for pictures; contours are of one section per layer")
     if kind in PRINTS:
         refuse_what_no_print_has(output, kind, options, resin)
     preview = options["preview"]
@@ -196,6 +201,7 @@ def slice_(
         options["mirror"],
         resin,
         created(),
+        int(options["sections"]),
     )
     shared = (options[name] for name in ("cluster", "shard", "store"))
     with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
@@ -273,13 +279,6 @@ def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
     return SliceJob(size, options["layer"][0], given, up, printing_of(scene, options))
 
 
-def stack_of(scene: Scene, options: dict[str, Any], work: Work) -> Stack:
-    """Plan layers of one height for the object after print preparation."""
-    from fracslice.slicing import plan_stack
-
-    return plan_stack(scene.root, job(scene, options), work)
-
-
 def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:
     """Adaptive layers if a range of heights is given; otherwise the stack itself."""
     from fracslice.slicing import adapted
@@ -295,52 +294,3 @@ def write_preview(stack: Stack, path: str, work: Work) -> None:
 
     with replacing(path) as file:
         (contact_sheet if path.lower().endswith(".png") else animation)(stack, file, work)
-
-
-def check_print(
-    source: str, settings: tuple[str, ...], as_json: bool, threads: int, quiet: bool, **options: Any
-) -> int:
-    """Check the layers of a scene, print the result and return the exit status."""
-    from fracslice.export import replacing
-    from fracslice.slicing.checks import check_layers, misfit
-    from fracslice.slicing.preview import worst_layers
-
-    if options["picture"] and Path(options["picture"]).suffix.lower() != ".png":
-        raise click.UsageError(f"{options['picture']}: expected a file name that ends in .png")
-    check_targets(source, options["picture"])
-    scene = load_scene(source, settings)
-    with working(threads, quiet) as work:
-        stack, machine = stack_of(scene, options, work), options["machine"]
-        if machine and (unfit := misfit(stack, machine)):
-            early = {"size": stack.size, "fits": False, "problems": [unfit]}
-            click.echo(json.dumps(early, indent=2) if as_json else f"{source}: would not print: {unfit}")
-            return 1
-        stack = as_high_as_wanted(stack, options, work)
-        report = check_layers(stack, limits_of(options), machine, work)
-        if options["picture"]:
-            with replacing(options["picture"]) as file:
-                worst_layers(stack, report.worst, file, work)
-    click.echo(json.dumps(report.as_dict(), indent=2) if as_json else told(source, report))
-    return 1 if report.problems else 0
-
-
-def limits_of(options: dict[str, Any]) -> Limits:
-    """Minimum thicknesses of walls and floors."""
-    from fracslice.printing.checks import Limits
-
-    return Limits(wall=options["wall"], floor=options["floor"])
-
-
-def told(source: str, report: PrintReport) -> str:
-    """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
-    size = " x ".join(f"{s:.2f}" for s in report.size)
-    first = (
-        f"{source}: {report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
-    )
-    said = f"{first}, {verdict(report.problems)}"
-    return os.linesep.join(filter(None, [said, report.solid.unseen]))
-
-
-def verdict(problems: Sequence[str]) -> str:
-    """Verdict on printability, with a line for each problem."""
-    return os.linesep.join(["would not print:", *(f"  {p}" for p in problems)]) if problems else "would print"

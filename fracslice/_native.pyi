@@ -165,6 +165,22 @@ class Cells:
             through.
         """
 
+def trust_regions(
+    features: NDArray[float64],
+    cases: NDArray[uint8],
+    to_means: NDArray[float32],
+    which: NDArray[int64],
+    inside: NDArray[bool_],
+    origin: Point,
+    voxel: float,
+    minimum_edge_parameter: float,
+) -> NDArray[float64]:
+    """Trust regions of features, as `Contouring.finish` returns them, float64 [4, 3, n].
+
+    The interior of the cell or face of each feature, its nearest corner of the other sign, and the mean of
+    the crossings around it. Raises ValueError for arrays that do not fit.
+    """
+
 class Contouring:
     """Surface of `marching_cubes` through exact crossings, with sharp edges and corners, in layers of cells.
 

@@ -36,7 +36,7 @@ class SliceRecipe:
         Printer whose screen the layers are for.
     compensation, gamma, mirror
         As for `Screen`.
-    resin, created
+    resin, created, sections
         As for `SliceRun`.
     """
 
@@ -52,6 +52,7 @@ class SliceRecipe:
     mirror: bool | None = None
     resin: Resin | None = None
     created: datetime = EPOCH
+    sections: int = 1
 
     def run(self, work: Work) -> SliceRun:
         """Plan the layers.
@@ -78,7 +79,7 @@ class SliceRecipe:
         about = {"Title": self.name, "scene_hash": scene.hash}
         model = StackModel(scene, self.job, replace(work, cluster=None))
         files = about, model.mesh, model.picture, self.created
-        return SliceRun(stack, screen, work, self.resin, *files, self)
+        return SliceRun(stack, screen, work, self.resin, *files, self.sections, self)
 
     def write(self, run: SliceRun) -> None:
         """Begin to write a run, so that its format shows how it encodes layers; see `ranges.Encoding`.

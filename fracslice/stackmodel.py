@@ -80,6 +80,5 @@ class StackModel:
         """
         film = Film(width=width, height=height, samples=SAMPLES)
         renderer = Renderer(self._upright, View(film=film), work=self.work, device="cpu")
-        for seen in renderer.passes(SAMPLES):
-            shown = seen.shown
-        return np.asarray(shown)
+        *_, last = renderer.passes(SAMPLES)
+        return np.asarray(last.shown)

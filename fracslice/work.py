@@ -150,24 +150,24 @@ class Work:
                 self.check()
                 yield task(item)
             return
-        lock, waiting, ahead, running = threading.Lock(), iter(items), deque[Future[R]](), 0
+        lock, waiting, ahead = threading.Lock(), iter(items), deque[Future[R]]()
 
-        def fill(ended: int = 0) -> None:
-            nonlocal running
+        def fill(_: Future[R] | None = None) -> None:
             with lock:
-                running -= ended
+                # Callbacks come after `result`, late on a busy machine: ask the futures.
+                running = sum(not future.done() for future in ahead)
                 free = min(self.threads - running, _AHEAD * self.threads - len(ahead))
                 begun = [_POOL.submit(task, item) for item in islice(waiting, max(free, 0))]
-                running += len(begun)
                 ahead.extend(begun)
             for future in begun:
-                future.add_done_callback(lambda _: fill(1))
+                future.add_done_callback(fill)
 
         try:
             fill()
             while ahead:
                 result = ahead[0].result()
-                ahead.popleft()
+                with lock:
+                    ahead.popleft()
                 fill()
                 self.check()
                 yield result

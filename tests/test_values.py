@@ -22,7 +22,7 @@ from fracslice.formulas.parameters import AUTO, REQUIRED, Count, Number, Vector
 from fracslice.formulas.registry import Formula
 from fracslice.kernel.devices import chosen
 from fracslice.mesh.simplify import simplify
-from fracslice.printing.checks import Limits
+from fracslice.printing.limits import Limits
 from fracslice.rendering import Renderer
 from fracslice.scene import Print, parse_length, scene
 from fracslice.scene.view import PARTS, Camera, Film, View

@@ -176,9 +176,7 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
         if known == job.key:
             return
         if resume:
-            raise RenderError(
-                f"{folder}: expected frames of this film, found another's; without --resume, they go"
-            )
+            raise RenderError(f"{folder}: has frames of another film: expected those of this one, to resume")
         for path in folder.glob("frame?????.*"):
             path.unlink()
     elif folder.exists() and any(folder.iterdir()):

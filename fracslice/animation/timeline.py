@@ -82,9 +82,9 @@ class Timeline:
             raise track.fail(f"keys of {track.of}: expected {error}") from None
 
         def value(time: float) -> Any:
-            found = curve(eased(times, track.ease, time))
-            found = found + targets(time) if targets else found
-            return kind.check(found.tolist() if isinstance(kind, Vector) else float(found[0]))
+            numbers = curve(eased(times, track.ease, time))
+            numbers = numbers + targets(time) if targets else numbers
+            return kind.check(numbers.tolist() if isinstance(kind, Vector) else float(numbers[0]))
 
         return value
 

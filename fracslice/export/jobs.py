@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice.errors import SliceError
 from fracslice.export.ranges import Recipe, begin, encoded_layers
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
@@ -22,6 +23,7 @@ from fracslice.keys import key, program
 from fracslice.mesh.model import Mesh
 from fracslice.slicing import Layer, Slicer, Stack
 from fracslice.slicing.raster import Screen
+from fracslice.slicing.sublayers import COUNTS, MeanSlicer
 from fracslice.work import Work
 
 EPOCH = datetime(1980, 1, 1)
@@ -50,8 +52,15 @@ class SliceRun:
         Renders the object for print files: from width and height in pixels, uint8 [height, width, 3], sRGB.
     created : datetime
         Date in print files, UTC.
+    sections : int
+        Sections per layer; the grey level of a pixel is the mean of their coverages.
     recipe : Recipe, optional
         Plans the same run in another process; a cluster needs it.
+
+    Raises
+    ------
+    SliceError
+        For an invalid number of sections.
     """
 
     stack: Stack
@@ -62,12 +71,31 @@ class SliceRun:
     mesh: Callable[[], Mesh] | None = None
     picture: Callable[[int, int], NDArray[np.uint8]] | None = None
     created: datetime = EPOCH
+    sections: int = 1
     recipe: Recipe | None = None
+
+    def __post_init__(self) -> None:
+        if self.sections not in COUNTS:
+            raise SliceError(f"sections={self.sections}: expected one of {', '.join(map(str, COUNTS))}")
 
     @cached_property
     def slicer(self) -> Slicer:
         """Slicer of the stack."""
-        return Slicer(self.stack, self.work)
+        return self.slicer_with(self.work)
+
+    def slicer_with(self, work: Work) -> Slicer:
+        """Slicer of the stack with other threads.
+
+        Parameters
+        ----------
+        work : Work
+            Threads, progress and cancellation.
+
+        Returns
+        -------
+        Slicer
+        """
+        return Slicer(self.stack, work) if self.sections == 1 else MeanSlicer(self.stack, work, self.sections)
 
     @property
     def layers(self) -> int:
@@ -90,7 +118,8 @@ class SliceRun:
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
         field = self.stack.root.key
         return key(
-            program(), toolchain(), form, field, *stack, *screen, self.resin, sorted(self.metadata.items())
+            *(program(), toolchain(), form, field, *stack, *screen),
+            *(self.resin, self.sections, sorted(self.metadata.items())),
         )
 
     def describe(self) -> bytes:

@@ -13,7 +13,7 @@ from fracslice.cluster import Shard
 from fracslice.errors import ClusterError, ExportError, SharedError
 from fracslice.export.resuming import Journal
 from fracslice.keys import key
-from fracslice.slicing import Layer, Slicer
+from fracslice.slicing import Layer
 from fracslice.slicing.layers import SLAB
 from fracslice.work import Work
 
@@ -89,7 +89,7 @@ class RangeTask:
             raise ClusterError("the layers planned here are others than those of the job")
         file = io.BytesIO()
         journal = Journal(file)
-        for data in Slicer(planned.run.stack, work).map(planned.encode, range(self.first, self.end)):
+        for data in planned.run.slicer_with(work).map(planned.encode, range(self.first, self.end)):
             journal.append(data)
         return file.getvalue()
 

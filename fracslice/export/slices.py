@@ -27,6 +27,7 @@ FORMATS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
     "3mf": slices3mf.write_3mf,
     **outlines.WRITERS,
 }
+PICTURES = {"png", *PRINTS}
 FOLDERS = {"png", "svg"}
 PHOTON = "pwmx pwmo pwms pmsq pwma pwmb pmx2 pm3 pm3m pm3r dlp dl2p pw0 pwx"
 """Extensions of one format, one for each model."""
@@ -137,4 +138,7 @@ def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Pa
     Cancelled
         When the work is cancelled.
     """
-    return FORMATS[slice_format(path, name)](run, path)
+    form = slice_format(path, name)
+    if run.sections > 1 and form not in PICTURES:
+        raise ExportError(f"{path}: contours are of one section per layer")
+    return FORMATS[form](run, path)

@@ -83,7 +83,7 @@ def grown(node: Node) -> Any:
 
 
 def orbit_bounds(node: Node) -> Box:
-    return Box.centred(grown(node).reach)
+    return Box.centred(*grown(node).half)
 
 
 def orbit_arguments(node: Node) -> dict[str, object]:

@@ -23,8 +23,11 @@ from ..formulas.escape import CORE, potential_distance
 from .seen import seen
 from .steps import Step, traced
 
-DIRECTIONS, RADII, FARTHEST = 64, np.geomspace(1e-2, 1e4, 72), 1e6
+DIRECTIONS, RADII, FARTHEST = 64, np.geomspace(1e-2, 1e4, 72).round(4), 1e6
 """Samples of the search for the radius of escape."""
+
+MORE, LAYERS, MARGIN = 400, 24, 1.15
+"""Samples of the search for the box: directions, radii, and what is added to the largest coordinates."""
 
 STEPS = 100
 """Steps after which an orbit counts as bounded."""
@@ -175,13 +178,13 @@ class Growth:
         |w'| grows as this power of |w| far out, at least 1.
     escape
         Radius beyond which |w| grows with every step.
-    reach
-        Radius of the solid.
+    half
+        Half sizes of a box around the solid.
     """
 
     power: float
     escape: float
-    reach: float
+    half: tuple[float, float, float]
 
     @property
     def by_power(self) -> bool:
@@ -212,18 +215,22 @@ def growth(
         Power, radius of escape and radius of the solid; None if orbits do not escape.
     """
     step = _numpy(code, dict(values))
-    rays = _rays()
+    rays = _rays(DIRECTIONS)
     points = (rays[:, :, None] * RADII).reshape(3, -1)
     origin = np.zeros(3) if julia is None else np.array(julia)
     ends = [np.linalg.norm(step(rays * r, origin), axis=0) for r in (1e4, 1e5)]
-    rate = float(np.median(np.log10(ends[1] / ends[0])))
+    rate = round(float(np.median(np.log10(ends[1] / ends[0]))), 3)
     if not ends[1].min() > 1.02e5:
         return None
-    bounded = escape = _reach(step, points, julia, STEPS, FARTHEST)
+    bounded = escape = _radius(step, points, julia, STEPS, FARTHEST)
     for _ in range(2):  # thin tips of the solid fall between samples; that of a few steps has thicker ones
         escape = max(_escape(step, points, origin, 0.0 if julia else bounded), 0.0 if julia else bounded)
-        bounded = max(bounded, _reach(step, points, julia, FEW, escape))
-    return Growth(max(rate, 1.0), escape, _reach(step, points, julia, iterations, escape))
+        bounded = max(bounded, _radius(step, points, julia, FEW, escape))
+    radii = np.linspace(0, 1, LAYERS + 1)[1:] * _radius(step, points, julia, iterations, escape)
+    inside = _inside(step, (_rays(MORE)[:, :, None] * radii).reshape(3, -1), julia, iterations, escape)
+    extent = abs(inside).max(axis=1, initial=radii[0]) * MARGIN
+    x, y, z = (np.ceil(np.minimum(extent, radii[-1]) * 256) / 256).tolist()  # the same on every machine
+    return Growth(max(rate, 1.0), escape, (x, y, z))
 
 
 def _escape(step: Any, points: np.ndarray, origin: np.ndarray, against: float) -> float:
@@ -236,23 +243,26 @@ def _escape(step: Any, points: np.ndarray, origin: np.ndarray, against: float) -
     return float(RADII[min(stays.max(initial=0) + 1, len(RADII) - 1)])
 
 
-def _reach(step: Any, points: np.ndarray, julia: Any, steps: int, radius: float) -> float:
-    """Radius that encloses the points whose orbit is within a radius after some steps."""
-    w = c = points
-    constant = None if julia is None else np.array(julia)
-    start = np.linalg.norm(points, axis=0)
+def _inside(step: Any, points: np.ndarray, julia: Any, steps: int, radius: float) -> np.ndarray:
+    """Points whose orbit is within a radius after some steps."""
+    w, c, start = points, points if julia is None else np.array(julia), points
     for _ in range(steps):
-        w = step(w, c if constant is None else constant)
+        w = step(w, c)
         kept = np.linalg.norm(w, axis=0) < max(radius, FARTHEST)
-        w, c, start = w[:, kept], c[:, kept], start[kept]
-    inside = np.linalg.norm(w, axis=0) <= radius
-    return float(start[inside].max(initial=RADII[0]) * (RADII[1] / RADII[0]) * 1.02)
+        w, c, start = w[:, kept], c[:, kept] if julia is None else c, start[:, kept]
+    return start[:, np.linalg.norm(w, axis=0) <= radius]
 
 
-def _rays() -> np.ndarray:
+def _radius(step: Any, points: np.ndarray, julia: Any, steps: int, radius: float) -> float:
+    """Radius that encloses the points whose orbit is within a radius after some steps."""
+    inside = np.linalg.norm(_inside(step, points, julia, steps, radius), axis=0)
+    return float(inside.max(initial=RADII[0]) * (RADII[1] / RADII[0]) * 1.02)
+
+
+def _rays(count: int) -> np.ndarray:
     """Unit vectors [3, n]: to the corners, edges and faces of a cube, and at random."""
     lattice = np.array([v for v in product((-1, 0, 1), repeat=3) if any(v)], float).T
-    rays = np.hstack([lattice, np.random.default_rng(0).normal(size=(3, DIRECTIONS))])
+    rays = np.hstack([lattice, np.random.default_rng(0).normal(size=(3, count))])
     unit: np.ndarray = rays / np.linalg.norm(rays, axis=0)
     return unit
 

@@ -173,14 +173,16 @@ class Pieces:
             self._held[name] = arrays
         else:
             for part, array in arrays.items():
-                np.save(self.folder / f"{name}-{part}.npy", array)
+                path = self.folder / f"{name}-{part}.npy"
+                path.unlink(missing_ok=True)  # the array may be the mapped file itself
+                np.save(path, array)
 
     def _get(self, name: str) -> Arrays:
         """Load arrays from memory or from the folder."""
         if self.folder is None:
             return self._held[name]
         begin = len(name) + 1
-        return {path.stem[begin:]: np.load(path) for path in self.folder.glob(f"{name}-*.npy")}
+        return {path.stem[begin:]: np.load(path, "r") for path in self.folder.glob(f"{name}-*.npy")}
 
 
 def joined(one: Mesh, other: Mesh, seam: float, near: float) -> Mesh:
@@ -216,15 +218,15 @@ def seamed(one: Mesh, other: Mesh, seam: float, near: float) -> tuple[Mesh, NDAr
     Mesh
         The joined mesh.
     ndarray of int32, shape (n,)
-        The first vertex with the same position, for each vertex.
+        The first vertex with the same position, for each vertex; those of `other` come first.
     """
-    vertices = np.concatenate([one.vertices, other.vertices])
-    triangles = np.concatenate([one.triangles, other.triangles + np.int32(len(one.vertices))])
+    vertices = np.concatenate([other.vertices, one.vertices])
     close = beside(vertices, seam, near)
     _, first, which = np.unique(rows(vertices[close]), return_index=True, return_inverse=True)
     number = np.arange(len(vertices), dtype=np.int32)
     number[close] = close[first[which]]
-    return Mesh(vertices, number[triangles]), number
+    corners = number[one.triangles + np.int32(len(other.vertices))]
+    return Mesh(vertices, np.concatenate([corners, other.triangles])), number
 
 
 def beside(points: NDArray[np.float64], seam: float, near: float) -> NDArray[np.int64]:

@@ -69,6 +69,8 @@ class Pointed:
         piece : Piece
             Pieces, by ascending x.
         """
+        if sum(map(len, self._points)) > MANY:
+            return
         mesh, voxel = piece.mesh, self._voxel
         if len(self._near.triangles):
             mesh = joined(self._near, mesh, self._seam, voxel / 2)

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .._native import touching
+from .._native import bounds, touching
 from .check import MeshReport, duplicates
 from .clean import cleaned
 from .model import Mesh
@@ -72,11 +72,15 @@ class Finished:
 
     @cached_property
     def passed(self) -> Mesh:
-        """The finished triangles alone; open where neighbours belong to other pieces."""
+        """The finished triangles, among vertices of others too; open where their neighbours are."""
         mesh = self.mesh
-        if self.done == len(mesh.triangles):
-            return mesh
-        return Mesh(mesh.vertices, mesh.triangles[: self.done]).compact()
+        return mesh if self.done == len(mesh.triangles) else Mesh(mesh.vertices, mesh.triangles[: self.done])
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """The counted vertices, float64 [k, 3]."""
+        vertices = self.mesh.vertices
+        return vertices if self.counted.all() else vertices[self.counted]
 
 
 class Window:
@@ -102,7 +106,8 @@ class Window:
         threads: int = 0,
     ) -> None:
         self._voxel, self._planes, self._frame, self._threads = voxel, planes, frame, threads
-        self._waiting, self._fresh, self._end = NOTHING, NO_EDITS[0], -np.inf
+        self._waiting, self._end = NOTHING, -np.inf
+        self._fresh = self._edited = NO_EDITS[0]
 
     def add(
         self,
@@ -137,12 +142,12 @@ class Window:
         )
         if len(waiting.triangles):
             whole, number = seamed(waiting, piece, before, voxel / 2)
-            keep = np.concatenate([np.ones(len(waiting.vertices), bool), keep])
+            keep = np.concatenate([keep, np.ones(len(waiting.vertices), bool)])
             keep &= number == np.arange(len(number))
             fresh = np.concatenate([self._fresh, fresh + len(waiting.triangles)])
         between = before - MENDS * voxel, end - MENDS * voxel
         final, suspects, edits = cleaned(
-            whole, keep, fresh, self._planes, self._frame, between, self._threads
+            whole, keep, fresh, self._edited, self._planes, self._frame, between, self._threads
         )
         if -before == end == np.inf:
             return Finished.whole(final, suspects)
@@ -157,7 +162,7 @@ class Window:
         triangles[edits[0]] = edits[1]
         rest = np.flatnonzero(keep[triangles[:, 0]] & (triangles[:, 0] >= 0))[done:]
         self._waiting = Mesh(whole.vertices, triangles[rest]).compact()
-        self._fresh = np.flatnonzero(np.isin(rest, np.concatenate([fresh, edits[0]])))
+        self._fresh, self._edited = (np.flatnonzero(np.isin(rest, some)) for some in (fresh, edits[0]))
         return Finished(final, suspects, done, (x >= low) & (x < high))
 
 
@@ -202,7 +207,7 @@ class Tally:
             crossing = np.flatnonzero(found[: piece.done])
         area, volume, flat = passed.measures_from((0.0, 0.0, 0.0), self.threads)
         self.triangles += len(passed.triangles)
-        self.vertices += int(piece.counted.sum())
+        self.vertices += len(piece.points)
         self.open_edges += ends.open_edges
         self.nonmanifold_edges += ends.non_manifold_edges
         self.misoriented_edges += ends.misoriented_edges
@@ -213,8 +218,8 @@ class Tally:
         self.duplicate_triangles += duplicates(mesh.triangles[crossing])
         self.volume += volume
         self.area += area
-        if len(passed.vertices):
-            low, high = passed.bounds
+        if len(piece.points):
+            low, high = bounds(piece.points, self.threads)
             self.low = tuple(np.minimum(self.low, low).tolist())
             self.high = tuple(np.maximum(self.high, high).tolist())
 

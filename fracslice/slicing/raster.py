@@ -88,8 +88,8 @@ class Screen:
     def encoded(self, layer: Layer, encoding: Encoding, shown: np.ndarray | None = None) -> bytes:
         """Encode the picture of a layer.
 
-        Without compensation it is encoded from the layer's tiles, as runs of equal pixels, and the picture is
-        never allocated.
+        A section without compensation is encoded from the layer's tiles, as runs of equal pixels, and the
+        picture is never allocated.
 
         Parameters
         ----------
@@ -105,7 +105,7 @@ class Screen:
         bytes
             Encoded picture.
         """
-        if self.compensation:
+        if self.compensation or layer.mean is not None:
             image = self.picture(layer)
             return encoded(image if shown is None else shown[image], encoding)
         view = self._view

@@ -14,32 +14,32 @@ TIMES = np.array([0.0, 1.0, 1.5, 4.0])
 FINE = np.linspace(0, 4, 2001)
 
 
-def sampled(name: str, values: object) -> np.ndarray:
-    curve = CURVES[name](TIMES, np.array(values, float))
-    for time, value in zip(TIMES, np.array(values, float), strict=True):
+def sampled(name: str, keys: object) -> np.ndarray:
+    curve = CURVES[name](TIMES, np.array(keys, float))
+    for time, value in zip(TIMES, np.array(keys, float), strict=True):
         assert curve(time) == pytest.approx(value, abs=1e-9), "through every keyframe"
     return np.array([curve(time) for time in FINE])
 
 
 @pytest.mark.parametrize("name", ["smooth", "linear"])
 def test_numbers_do_not_overshoot(name: str) -> None:
-    found = sampled(name, [[0], [1], [1], [-2]])[:, 0]
-    assert found.max() <= 1 and found.min() >= -2
-    assert (np.diff(found)[FINE[:-1] > 1.5] <= 0).all() and (np.diff(found)[FINE[:-1] < 1] >= 0).all()
+    values = sampled(name, [[0], [1], [1], [-2]])[:, 0]
+    assert values.max() <= 1 and values.min() >= -2
+    assert (np.diff(values)[FINE[:-1] > 1.5] <= 0).all() and (np.diff(values)[FINE[:-1] < 1] >= 0).all()
 
 
 def test_a_logarithmic_zoom_has_equal_ratios_in_equal_times() -> None:
-    found = sampled("log", [[1], [1e-1], [10**-1.5], [1e-4]])[:, 0]
-    assert np.log10(found) == pytest.approx(-FINE, abs=1e-9)
+    values = sampled("log", [[1], [1e-1], [10**-1.5], [1e-4]])[:, 0]
+    assert np.log10(values) == pytest.approx(-FINE, abs=1e-9)
     with pytest.raises(ValueError, match="above zero"):
         sampled("log", [[1], [0], [1], [1]])
 
 
 def test_a_path_is_a_smooth_curve_at_a_pace_without_jumps() -> None:
     angle = np.array([0, 0.4, 1.0, 2.0])
-    found = sampled("path", np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]))
-    assert np.linalg.norm(found, axis=1) == pytest.approx(1, abs=0.02), "nearly the circle"
-    pace = np.linalg.norm(np.diff(found, axis=0), axis=1)
+    values = sampled("path", np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]))
+    assert np.linalg.norm(values, axis=1) == pytest.approx(1, abs=0.02), "nearly the circle"
+    pace = np.linalg.norm(np.diff(values, axis=0), axis=1)
     assert abs(np.diff(pace)).max() < 0.02 * pace.max(), "no jump of the pace"
     assert np.array_equal(sampled("path", [[1, 1, 1]] * 4), np.ones((2001, 3))), "a rest"
 
@@ -72,7 +72,7 @@ def test_easing_rests_at_its_ends_and_keeps_the_keyframes(ease: str, times: tupl
     for time in times:
         assert eased(times, ease, time) == time
     assert (eased(times, ease, -1), eased(times, ease, 9)) == (0, 4)
-    found = np.array([eased(times, ease, time) for time in FINE])
-    pace = np.diff(found) / np.diff(FINE)
+    values = np.array([eased(times, ease, time) for time in FINE])
+    pace = np.diff(values) / np.diff(FINE)
     assert (pace >= 0).all() and abs(np.diff(pace)).max() < 0.02, "no jump of the pace"
     assert (pace[0] < 0.01) == (ease in ("in", "both")) and (pace[-1] < 0.01) == (ease in ("out", "both"))

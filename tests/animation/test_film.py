@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -56,13 +58,31 @@ def test_a_film_that_stopped_goes_on_and_is_the_same(path: Path, tmp_path: Path)
     assert (whole / names[0]).read_bytes() != (whole / names[7]).read_bytes()
 
 
+def test_a_stopped_film_says_what_is_there(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    light = FilmJob.light
+
+    def interrupted(job: FilmJob, number: int, work: Work) -> np.ndarray:
+        if number == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+        return light(job, number, work)
+
+    monkeypatch.setattr(FilmJob, "light", interrupted)
+    assert animate(path, "-o", tmp_path / "film.gif") == 130
+    assert "film.frames are whole" in capsys.readouterr().err
+    frames = sorted(file.name for file in (tmp_path / "film.frames").iterdir())
+    assert frames == ["film.json", "frame00000.png", "frame00001.png", "frame00002.png"]
+    assert not (tmp_path / "film.gif").exists()
+
+
 def test_frames_of_another_film_are_not_mixed_in(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "frames"
     assert animate(path, "-o", folder, "--samples", 1) == 0
     assert animate(path, "-o", folder, "--samples", 2, "--frames", "0", "--resume") == 2
-    assert "another's" in capsys.readouterr().err and len(list(folder.iterdir())) == 9
+    assert "another film" in capsys.readouterr().err and len(list(folder.iterdir())) == 9
     assert animate(path, "-o", folder, "--samples", 2, "--frames", "0") == 0
     assert sorted(file.name for file in folder.iterdir()) == ["film.json", "frame00000.png"]
     (tmp_path / "mine").mkdir()

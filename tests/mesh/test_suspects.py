@@ -40,7 +40,7 @@ def both(
     mesh: Mesh, planes: np.ndarray, fresh: np.ndarray = NOTHING, threads: int = 2
 ) -> tuple[MeshReport, MeshReport]:
     """The report on a cleaned mesh by a search of its suspects, and by a search of all of it."""
-    found = cleaned(mesh, np.ones(len(mesh.vertices), bool), fresh, planes, threads=threads)
+    found = cleaned(mesh, np.ones(len(mesh.vertices), bool), fresh, planes=planes, threads=threads)
     whole, tally = check_mesh(found.mesh), Tally(threads)
     tally.add(Finished.whole(found.mesh, found.suspects))
     report = tally.report(whole.components, whole.cavities, whole.misplaced_shells)
@@ -106,6 +106,6 @@ def test_what_the_bed_moves_through_a_plane_is_searched() -> None:
         """By the height of the lowest vertices above a plane of the grid that is at z = 0."""
         down = planes[np.searchsorted(planes[:, 2], low) - 1, 2] - low + height
         frame = (1.0, (0.0, 0.0, float(down)), bed)
-        return len(cleaned(mesh, keep, NOTHING, planes + [0, 0, down], frame).suspects)
+        return len(cleaned(mesh, keep, planes=planes + [0, 0, down], frame=frame).suspects)
 
     assert suspects(0.3 * voxel, -np.inf) <= 12 < suspects(0.3 * voxel, 0.5 * voxel)
