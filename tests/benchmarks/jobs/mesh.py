@@ -54,8 +54,5 @@ def job_row(run: Run, folder: Path, name: str, resolution: int) -> Row:
         row[title] = measured.spread("fracslice", key)
     row["/ (C++ + copy)"] = measured.ratio("fracslice", ("C++", "copy"), "wall_s")
     row["CPU / (C++ + copy)"] = measured.ratio("fracslice", ("C++", "copy"), "cpu_s")
-    peak = [
-        f["peak_mb"] / c["worker_peak_mb"]
-        for f, c in zip(measured["fracslice"], measured["C++"], strict=True)
-    ]
-    return {**row, "memory / C++": Spread.of(peak), "leaves out": LEAVES_OUT}
+    memory = measured.ratio("fracslice", "C++", "peak_mb", "worker_peak_mb")
+    return {**row, "memory / C++": memory, "leaves out": LEAVES_OUT}
