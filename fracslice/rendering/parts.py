@@ -191,5 +191,5 @@ def _renderer(scene: str, size: tuple[int, int]) -> Renderer:
         read = reads(scene)
         _OWN.renderer = Renderer(read.root, read.view, size, Work(threads=1), "cpu")
         _OWN.of = scene, size
-    found: Renderer = _OWN.renderer
-    return found
+    renderer: Renderer = _OWN.renderer
+    return renderer

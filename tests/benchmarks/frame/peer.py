@@ -59,7 +59,7 @@ def rows(run: Run, width: int = 800, height: int = 600, samples: int = 16) -> It
             "fracslice": lambda: ours(of, pixels, samples, work),
             "C++": lambda: output("frame", *given)[0],
         }
-        found = run.interleaved(acts)
+        measured = run.interleaved(acts)
     for key, name in {"cpu_s": "first sample", "cpu16_s": f"{samples} samples"}.items():
-        ratio = found.ratio("fracslice", "C++", key)
-        yield {"": name, "CPU s": found.spread("fracslice", key), "/ C++": ratio}
+        ratio = measured.ratio("fracslice", "C++", key)
+        yield {"": name, "CPU s": measured.spread("fracslice", key), "/ C++": ratio}

@@ -67,13 +67,13 @@ def rows(run: Run) -> Iterator[Row]:
         "moved camera, 640 x 360, first pass": coarse,
         "moved camera, 640 x 360, every pixel": full,
     }
-    found = run.interleaved(acts)
+    measured = run.interleaved(acts)
     for name in acts:
-        ms = Spread.of([1e3 * figures["wall_s"] for figures in found[name]])
+        ms = Spread.of([1e3 * figures["wall_s"] for figures in measured[name]])
         yield {
             "": name,
             "ms": ms,
-            "/ tracing every pixel": found.ratio(name, "tracing every pixel", "wall_s"),
+            "/ tracing every pixel": measured.ratio(name, "tracing every pixel", "wall_s"),
         }
 
 
