@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fracslice.errors import SharedError
+
+from .cluster import cluster_options, pooled
 from .inputs import check_folder, check_targets, load_scene
 from .options import NAME, Whole, device_option, quiet_option, set_option, source_argument, threads_option
 from .working import working
@@ -86,6 +89,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     metavar="FILE.npz",
     help="Resume from this file if it exists, and save to it after every pass.",
 )
+@cluster_options
 @set_option
 @threads_option
 @quiet_option
@@ -99,6 +103,9 @@ def render(
     bits: str,
     pass_images: str | None,
     state: str | None,
+    cluster: str | None,
+    shard: str | None,
+    store: str | None,
     settings: tuple[str, ...],
     threads: int,
     quiet: bool,
@@ -106,14 +113,20 @@ def render(
     """Render a picture of SCENE, as its camera, lights and materials say."""
     from fracslice.export.images import check_image
     from fracslice.rendering import Renderer
+    from fracslice.work import Work
 
     check_image(output)
     check_targets(source, output, state)
     if pass_images:
         check_folder(Path(pass_images))
     scene, start = load_scene(source, settings), time.monotonic()
-    with working(threads, quiet) as work:
+    with (
+        pooled(output, threads, cluster, shard, store) as pool,
+        working(Work(threads, cluster=pool), quiet) as work,
+    ):
         renderer = Renderer(scene.root, scene.view, size, work, device)
+        aside = None if pool is None or state else pool.pieces.path(f"{renderer.key}.npz")
+        state, first = state or aside, pool is None or pool.first
         if state and Path(state).exists():
             renderer.resume(state)
         last = None
@@ -124,11 +137,15 @@ def render(
             if pass_images:
                 Path(pass_images).mkdir(exist_ok=True)
                 save(Path(pass_images) / f"pass{last.number:04}.png", last, scene, "8")
-            if state:
+            if state and first:
                 save_state(renderer, state)
+    if not first:
+        raise SharedError("the samples are made; shard 1 writes the file")
     if last is None:
         last = renderer.seen()
     save(output, last, scene, bits)
+    if aside:
+        Path(aside).unlink(missing_ok=True)
     if not quiet:
         click.echo(
             f"{output}: {renderer.width} x {renderer.height} pixels, {reached(last)}, "

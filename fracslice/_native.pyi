@@ -165,6 +165,22 @@ class Cells:
             through.
         """
 
+def trust_regions(
+    features: NDArray[float64],
+    cases: NDArray[uint8],
+    to_means: NDArray[float32],
+    which: NDArray[int64],
+    inside: NDArray[bool_],
+    origin: Point,
+    voxel: float,
+    minimum_edge_parameter: float,
+) -> NDArray[float64]:
+    """Trust regions of features, as `Contouring.finish` returns them, float64 [4, 3, n].
+
+    The interior of the cell or face of each feature, its nearest corner of the other sign, and the mean of
+    the crossings around it. Raises ValueError for arrays that do not fit.
+    """
+
 class Contouring:
     """Surface of `marching_cubes` through exact crossings, with sharp edges and corners, in layers of cells.
 
@@ -248,7 +264,7 @@ def component_sizes(
     labels: NDArray[int32],
     count: int,
     threads: int = 0,
-) -> tuple[NDArray[float64], NDArray[float64]]:
+) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[int32]]:
     """See `fracslice.mesh.topology.component_sizes`."""
 
 def measures(
@@ -257,9 +273,9 @@ def measures(
     """Area of triangles, signed volume between them and a point, and number of triangles without area."""
 
 def turned(
-    vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64], threads: int = 0
+    vertices: NDArray[float64], triangles: NDArray[int32], frame: tuple[float, Point, float], threads: int = 0
 ) -> NDArray[int64]:
-    """Triangles, ascending, that degenerate or turn by at least 90 degrees if vertices move to `points`."""
+    """Triangles, ascending, that degenerate or turn by at least 90 degrees when they are quantised."""
 
 def pointed(
     vertices: NDArray[float64], triangles: NDArray[int32], sine: float, most: int, threads: int = 0
@@ -273,8 +289,16 @@ def bounds(points: NDArray[float64], threads: int = 0) -> tuple[Point, Point]:
     """Low and high corner of the bounding box of points, float64 [n, 3]. Raises ValueError without points."""
 
 def quantise(
-    points: NDArray[float64], planes: NDArray[float64], threads: int = 0
-) -> tuple[NDArray[float64], NDArray[bool_]]:
+    vertices: NDArray[float64],
+    triangles: NDArray[int32],
+    keep: NDArray[bool_],
+    displaced: NDArray[bool_],
+    rows: NDArray[int64],
+    corners: NDArray[int32],
+    planes: NDArray[float64],
+    frame: tuple[float, Point, float],
+    threads: int = 0,
+) -> tuple[NDArray[float64], NDArray[int32], NDArray[bool_], NDArray[int64]]:
     """See `fracslice.mesh.quantisation.quantise`. Raises ValueError for a coordinate that is not finite."""
 
 def selected(

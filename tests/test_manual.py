@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import commands, run
 
+import fracslice.slicerecipe  # noqa: F401  before a test replaces what it imports
 from fracslice.export import write
 
 from .mesh import shapes
@@ -100,8 +101,10 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "job.make_mesh",
         "slicing.plan_stack",
         "rendering.Renderer",
+        "animation.Timeline",
         "bench.runs.measure",
         "viewer.fly",
+        "cluster.connected",
     ):
         monkeypatch.setattr(f"fracslice.{work}", begin)
     monkeypatch.setattr("fracslice.viewer.show", begin)

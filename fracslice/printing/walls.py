@@ -10,7 +10,7 @@ Rüegsegger 1997), and a plate is as thick at its rim as in its middle. This is 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -53,12 +53,15 @@ class Walls(Rows):
         Distance between them.
     area : float64 [n]
         Surface that each represents.
+    facing : float64 [n]
+        Cosine between the normals of the faces: -1 where they are parallel.
     """
 
     start: np.ndarray
     end: np.ndarray
     width: np.ndarray
     area: np.ndarray
+    facing: np.ndarray
 
     @property
     def middle(self) -> np.ndarray:
@@ -74,7 +77,7 @@ class Walls(Rows):
         Walls
             No walls.
         """
-        return cls(*np.empty((2, 0, 3)), *np.empty((2, 0)))
+        return cls(*np.empty((2, 0, 3)), *np.empty((3, 0)))
 
     def along(self, direction: Direction) -> Walls:
         """Walls whose faces look along a direction or against it, measured along it.
@@ -93,7 +96,7 @@ class Walls(Rows):
         share = (span * direction).sum(1) / np.linalg.norm(span, axis=1)
         width = self.width / np.maximum(np.abs(share), 1e-9)
         end = self.start + np.copysign(width, share)[:, None] * np.array(direction)
-        return Walls(self.start, end, width, self.area).chosen(np.abs(share) > -OPPOSITE)
+        return replace(self, end=end, width=width).chosen(np.abs(share) > -OPPOSITE)
 
 
 def walls(
@@ -144,8 +147,9 @@ def walls(
         thin = (width < limit) & (np.abs((normals * directions).sum(1)) > -OPPOSITE)
         ends = points + width[:, None] * directions
         opposite = slopes(exact, ends[thin].T, solid.bricks.voxel / 2, work)[1].T
-        thin[thin] = (opposite * normals[thin]).sum(1) < OPPOSITE
-        return Walls(points, ends, width, area).chosen(thin)
+        facing = np.ones(len(points))
+        facing[thin] = (opposite * normals[thin]).sum(1)
+        return Walls(points, ends, width, area, facing).chosen(facing < OPPOSITE)
 
     return gathered(look, len(solid.bricks), AT_ONCE, work)
 

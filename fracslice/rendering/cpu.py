@@ -13,7 +13,7 @@ from ..kernel.machine import constant
 from ..work import Work, chunks
 from .linking import Frame
 from .packets import Lane, loops, workspace
-from .sequence import points
+from .sequence import Samples
 
 TILE = 2048
 """Maximum rays per tile; their workspace stays in the cache."""
@@ -43,7 +43,7 @@ class CpuTracer:
         functions = load_functions(frame.linked, bits, self.lanes, loops(frame))
         self._tile, self._cones = functions["tile"], functions.get("cones")
         self._own = threading.local()
-        self._points = np.empty((0, frame.samples), np.int32)
+        self.samples, self._points = Samples(), np.empty((0, frame.samples), np.int32)
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
@@ -97,7 +97,7 @@ class CpuTracer:
             Threads and cancellation.
         """
         if len(self._points) <= most:
-            self._points = points(2 * most + 64, self.frame.samples)
+            self._points = self.samples.points(2 * most + 64, self.frame.samples)
 
         def task(part: np.ndarray) -> None:
             m, space = self._room(len(part))

@@ -12,7 +12,7 @@ from ..work import Work
 from .cpu import BLOCK
 from .cuda_loops import loops
 from .linking import Frame
-from .sequence import points
+from .sequence import Samples
 
 
 class CudaTracer:
@@ -38,7 +38,7 @@ class CudaTracer:
         self.dtype, self.width, self.height = dtype, width, height
         self._precision: Precision = "float32" if dtype == np.float32 else "float64"
         self._loops = load_loops(frame.linked, self._precision, loops(frame))
-        self._points = np.empty((0, frame.samples), np.int32)
+        self.samples, self._points = Samples(), np.empty((0, frame.samples), np.int32)
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
@@ -93,6 +93,6 @@ class CudaTracer:
         """
         work.check()
         if len(self._points) <= most:
-            self._points = self._cuda.to_device(points(2 * most + 64, self.frame.samples))
+            self._points = self._cuda.to_device(self.samples.points(2 * most + 64, self.frame.samples))
         film = (pixels, sums, self.width, self.dtype.type(limit), self.blocks)
         launched(self._loops.tile, pixels.size, self._parameters, self._points, self._starts, *film)

@@ -22,6 +22,8 @@ from .accumulator import COARSE, Accumulator, HostAccumulator
 from .cpu import BLOCK, CpuTracer
 from .linking import Frame, link_frame
 from .optics import optics
+from .parts import PoolTracer
+from .sequence import Samples
 from .setup import RenderSetup, prepare
 
 STEPS, GROWTH, GROWN = 160, 10, 16
@@ -136,6 +138,8 @@ class Renderer:
         Threads, progress and cancellation.
     device : {"cpu", "cuda", "auto"}
         Device that traces the rays.
+    samples : Samples, optional
+        Part of the sample sequence; its begin, without a shift, by default.
 
     Raises
     ------
@@ -152,15 +156,19 @@ class Renderer:
         size: tuple[int, int] | None = None,
         work: Work | None = None,
         device: str = "auto",
+        samples: Samples | None = None,
     ) -> None:
         pixels = (view.film.width, view.film.height) if size is None else size
         self.width, self.height = validated("size", pixels, SIZE, RenderError)
         self.work = work or Work()
-        self.device = chosen(device)
+        self.device = chosen(device if self.work.cluster is None else "cpu")
         self.setup = prepare(root, view, (self.width, self.height))
         self.dtype = np.dtype(self.setup.precision)
         tracer, self._kept = _machinery(self.device)
         self.tracer = tracer(self._frame(0), self.dtype, self.width, self.height)
+        self.tracer.samples = samples or self.tracer.samples
+        if self.work.cluster is not None:
+            self.tracer = PoolTracer(root, view, self.tracer)
         self.accumulator = self._kept(self._empty)
         self._aimed: tuple[Node, bool] | None = None
         self._rate = 0.0
@@ -182,7 +190,7 @@ class Renderer:
         what: RenderSetup = self.setup
         frames = [self._frame(k).linked for k in range(len(what.roots))]
         parts = [part for frame in frames for part in (frame.source, frame.parameters)]
-        return key(program(), self.width, self.height, what.precision, *parts)
+        return key(program(), self.width, self.height, what.precision, self.tracer.samples, *parts)
 
     def look(self, camera: Camera, within: float | None = None) -> None:
         """Restart the picture from another camera; depths and precision are kept.
@@ -275,14 +283,22 @@ class Renderer:
         number = self.accumulator.passes
         limit = STEPS + STEPS * (GROWTH - 1) * min(number, GROWN) // GROWN
         start = time.perf_counter()
-        self._aim(number, limit)
+        self.aim(number, limit)
         self.accumulator.receive(pixels, lambda sums: self.tracer.add(sums, pixels, number, limit, self.work))
         samples, error = self.accumulator.statistics()
         self._rate = count / (time.perf_counter() - start)
         return self._seen(samples, error, count, self._rate)
 
-    def _aim(self, number: int, limit: int) -> None:
-        """Load the tree of this pass into the tracer; run the cone prepass if a block holds several rays."""
+    def aim(self, number: int, limit: int) -> None:
+        """Load the tree of a pass into the tracer; run the cone prepass if a block holds several rays.
+
+        Parameters
+        ----------
+        number : int
+            Number of the pass, from 0.
+        limit : int
+            Steps per ray.
+        """
         ahead = number > 0 or self.accumulator.coarse < BLOCK
         aimed = self.setup.root(number), ahead
         if aimed != self._aimed:

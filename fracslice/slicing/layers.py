@@ -70,6 +70,8 @@ class Layer:
         Its number in the slab.
     exact : Kernel
         float64 kernel of the field.
+    mean : (uint8 [ny, nx], float) or None
+        Mean coverage and area of several sections, in place of those of the one sampled, pixels and mm^2.
     """
 
     stack: Stack
@@ -78,6 +80,7 @@ class Layer:
     slab: Slab
     place: int
     exact: Kernel
+    mean: tuple[np.ndarray, float] | None = None
 
     @property
     def top(self) -> float:
@@ -116,6 +119,8 @@ class Layer:
         It is the area cut off by the outline, which is straight between its crossings of the pixel's sides,
         with a corner where it turns.
         """
+        if self.mean is not None:
+            return self.mean[0]
         image = np.zeros(self.stack.shape, np.uint8)
         self._painted = self.slab.paint(self.place, image)
         return image
@@ -143,6 +148,8 @@ class Layer:
     @property
     def area(self) -> float:
         """Area in mm^2, from the coverage before rounding."""
+        if self.mean is not None:
+            return self.mean[1]
         return self._painted[0] * self.stack.pixel[0] * self.stack.pixel[1]
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -85,11 +85,11 @@ class Screen:
         bed[mine.on_bed] = self._levels[bed[mine.on_bed]]
         return image
 
-    def encoded(self, layer: Layer, encoding: Encoding) -> bytes:
+    def encoded(self, layer: Layer, encoding: Encoding, shown: np.ndarray | None = None) -> bytes:
         """Encode the picture of a layer.
 
-        Without compensation it is encoded from the layer's tiles, as runs of equal pixels, and the picture is
-        never allocated.
+        A section without compensation is encoded from the layer's tiles, as runs of equal pixels, and the
+        picture is never allocated.
 
         Parameters
         ----------
@@ -97,15 +97,21 @@ class Screen:
             A layer of the stack.
         encoding : Encoding
             Encoding of the picture.
+        shown : uint8 [256], optional
+            Level for each grey level of the picture, the first 0, the last 255.
 
         Returns
         -------
         bytes
             Encoded picture.
         """
-        if self.compensation:
-            return encoded(self.picture(layer), encoding)
-        return layer.encoded(self._view, encoding)
+        if self.compensation or layer.mean is not None:
+            image = self.picture(layer)
+            return encoded(image if shown is None else shown[image], encoding)
+        view = self._view
+        if shown is not None:
+            view = replace(view, levels=shown[self._levels].tobytes())
+        return layer.encoded(view, encoding)
 
     @cached_property
     def _view(self) -> ScreenView:

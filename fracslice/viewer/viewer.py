@@ -127,6 +127,7 @@ class Viewer:
             "MouseWheelBackwardEvent": lambda: self.hurry(1 / FASTER),
         }.items():
             self.canvas.on(event, act)
+        self.tick()
         self.canvas.open(TICK)
 
     def tick(self) -> None:

@@ -33,8 +33,8 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.printing import printable
-from fracslice.printing.checks import Limits, SolidReport, check_object
 from fracslice.printing.components import components_of
+from fracslice.printing.limits import Limits, SolidReport, check_object
 from fracslice.printing.samples import Samples
 from fracslice.printing.walls import walls
 from fracslice.printing.widths import Widths

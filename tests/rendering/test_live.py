@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
-from fracslice.rendering.live import CameraInput, Live
+from fracslice.rendering.live import Live
+from fracslice.rendering.steering import CameraInput
 from fracslice.scene.view import Camera
 from fracslice.work import Work
 
@@ -51,12 +52,12 @@ def sharp(live: Live, camera: Camera) -> np.ndarray:
 
 def test_a_flight_never_gets_there() -> None:
     camera, ahead = Camera(eye=(3, 0, 0), target=(0, 0, 0)), CameraInput(forward=1, pace=40)
-    ways = [3.0]
+    places = [3.0]
     for _ in range(30):
         camera = ahead.flown(camera, np.hypot.reduce(camera.eye) - 1, 0.1)
-        ways.append(camera.eye[0])
-    assert 1 < min(ways) < 1 + 1e-6
-    assert all(a > b for a, b in pairwise(ways))
+        places.append(camera.eye[0])
+    assert 1 < min(places) < 1 + 1e-6
+    assert all(a > b for a, b in pairwise(places))
     aside = CameraInput(1, 1, 1, pace=1e3).flown(Camera(eye=(3, 0, 0), target=(0, 0, 0)), 2.0, 1.0)
     assert np.hypot.reduce(np.subtract(aside.eye, (3, 0, 0))) == pytest.approx(1.0)
     assert CameraInput(pace=3).flown(camera, 1.0, 1.0) == camera

@@ -123,7 +123,7 @@ def test_wrong_sizes(size):
         (
             "<scene version='1'><box/></scene>",
             "f.xml:1: <box> cannot stand here; "
-            "expected <camera>, <film>, <fog>, <light>, <print>, <shading> or <solid>",
+            "expected <animation>, <camera>, <film>, <fog>, <light>, <print>, <shading>, <solid> or <track>",
         ),
         (
             "<scene version='1'><solid><box/></solid></scene>",
