@@ -11,13 +11,15 @@ from fracslice.mesh.solid import to_manifold
 from fracslice.scene import library, read, reads, to_xml
 from fracslice.scene.schema import PATH
 
+from .stability.random_scenes import FAMILIES
+
 NAMES = library.names()
 
 
 def test_there_are_at_least_ten_and_they_show_what_there_is():
     used = {node.formula.name for name in NAMES for node in read(library.path(name)).root.walk()}
     assert len(NAMES) >= 10
-    assert set(formula_names()) - used <= {"octahedron", "mirror", "offset", "material"}
+    assert set(formula_names()) - used <= {"octahedron", "mirror", "offset", "material", *FAMILIES}
 
 
 @pytest.mark.parametrize("name", NAMES)

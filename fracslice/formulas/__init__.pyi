@@ -35,7 +35,7 @@ from .vocabulary import where as where
 def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1.0, 0.7), angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
     """The asymmetric Mandelbox, turned in each step (Rrrola and Knighty 2010, fractalforums.com).
 
-    With a third size of 1e6, z is never folded: the Amazing Surf (Kali 2011).
+    With a third size of 1e6, z is never folded: the Amazing Surf (Kali 2011). L = 2 is measured.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> Node:
     """
 
 def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
-    """The Bristorbrot (Bristor 2009, fractalforums.com).
+    """The Bristorbrot (Bristor 2009, fractalforums.com). L = 2 is measured.
 
     Parameters
     ----------
@@ -132,6 +132,8 @@ def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequenc
 
 def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
     """The Mandelbulb of absolute coordinates, after Michelitsch and Roessler 1992, "The burning ship".
+
+    L = 2 is measured.
 
     Parameters
     ----------
@@ -249,7 +251,7 @@ def flake(solid: Literal['tetrahedron', 'octahedron', 'dodecahedron', 'icosahedr
 
 def gyroid(period: float = 1.0, thickness: float = 0.1) -> Node:
     """A wall along the gyroid (Schoen 1970, "Infinite periodic minimal surfaces without
-    self-intersections"). The gradient of its level function is at most sqrt(3).
+    self-intersections"). The gradient of its level function is at most sqrt(3): L = 1.
 
     Parameters
     ----------
@@ -280,7 +282,7 @@ def intersection(*elements: Node, smooth: float = 0.0) -> Node:
 
 def iwp(period: float = 1.0, thickness: float = 0.1) -> Node:
     """A wall along the surface I-WP of Schoen 1970. The gradient of its level function is at most
-    3 sqrt(3).
+    3 sqrt(3): L = 1.
 
     Parameters
     ----------
@@ -319,7 +321,7 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
 
 def lidinoid(period: float = 1.0, thickness: float = 0.1) -> Node:
     """A wall along the lidinoid (Lidin and Larsson 1990). The gradient of its level function is at most
-    1.5 sqrt(3).
+    1.5 sqrt(3): L = 1.
 
     Parameters
     ----------
@@ -334,7 +336,7 @@ def lidinoid(period: float = 1.0, thickness: float = 0.1) -> Node:
     """
 
 def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
-    """The Mandelbox (Lowe 2010, "What is a Mandelbox?").
+    """The Mandelbox (Lowe 2010, "What is a Mandelbox?"). L = 2 is measured.
 
     Parameters
     ----------
@@ -461,7 +463,7 @@ def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
     """
 
 def neovius(period: float = 1.0, thickness: float = 0.1) -> Node:
-    """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7.
+    """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7: L = 1.
 
     Parameters
     ----------
@@ -546,7 +548,7 @@ def prism(sides: int = 6, radius: float = 0.5, height: float = 1.0) -> Node:
 def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
     """The Mandelbrot set of q^2 + c in the quaternions, cut at k = 0 (Norton 1982).
 
-    It is the complex Mandelbrot set turned about the real axis.
+    It is the complex Mandelbrot set turned about the real axis. L = 2 is measured.
 
     Parameters
     ----------
@@ -582,7 +584,8 @@ def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 
     """
 
 def schwarz_d(period: float = 1.0, thickness: float = 0.1) -> Node:
-    """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most sqrt(3).
+    """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most
+    sqrt(3): L = 1.
 
     Parameters
     ----------
@@ -597,7 +600,8 @@ def schwarz_d(period: float = 1.0, thickness: float = 0.1) -> Node:
     """
 
 def schwarz_p(period: float = 1.0, thickness: float = 0.1) -> Node:
-    """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most sqrt(3).
+    """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most
+    sqrt(3): L = 1.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ INNER = Number(0.5, "radius within which the ball's fold only scales", above=0, 
 
 @orbit(scale=SCALE, inner=INNER)
 def mandelbox(w, c, scale, inner):  # type: ignore[no-untyped-def]
-    """The Mandelbox (Lowe 2010, "What is a Mandelbox?")."""
+    """The Mandelbox (Lowe 2010, "What is a Mandelbox?"). L = 2 is measured."""
     return scale * ball(fold(w, 1.0), inner) + c
 
 
@@ -25,6 +25,6 @@ def mandelbox(w, c, scale, inner):  # type: ignore[no-untyped-def]
 def abox(w, c, scale, inner, size, angle):  # type: ignore[no-untyped-def]
     """The asymmetric Mandelbox, turned in each step (Rrrola and Knighty 2010, fractalforums.com).
 
-    With a third size of 1e6, z is never folded: the Amazing Surf (Kali 2011).
+    With a third size of 1e6, z is never folded: the Amazing Surf (Kali 2011). L = 2 is measured.
     """
     return scale * turn(ball(fold_to(w, size), inner), (0.0, 0.0, 1.0), angle) + c

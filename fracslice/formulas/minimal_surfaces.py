@@ -23,7 +23,7 @@ WALL: dict[str, Any] = {
 @shape(**WALL)
 def gyroid(x, y, z, k, half):  # type: ignore[no-untyped-def]
     """A wall along the gyroid (Schoen 1970, "Infinite periodic minimal surfaces without
-    self-intersections"). The gradient of its level function is at most sqrt(3).
+    self-intersections"). The gradient of its level function is at most sqrt(3): L = 1.
     """
     x, y, z = k * x, k * y, k * z
     return absolute(sin(x) * cos(y) + sin(y) * cos(z) + sin(z) * cos(x)) / (1.7320509 * k) - half
@@ -31,13 +31,17 @@ def gyroid(x, y, z, k, half):  # type: ignore[no-untyped-def]
 
 @shape(**WALL)
 def schwarz_p(x, y, z, k, half):  # type: ignore[no-untyped-def]
-    """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most sqrt(3)."""
+    """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most
+    sqrt(3): L = 1.
+    """
     return absolute(cos(k * x) + cos(k * y) + cos(k * z)) / (1.7320509 * k) - half
 
 
 @shape(**WALL)
 def schwarz_d(x, y, z, k, half):  # type: ignore[no-untyped-def]
-    """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most sqrt(3)."""
+    """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most
+    sqrt(3): L = 1.
+    """
     x, y, z = k * x, k * y, k * z
     f = sin(x) * sin(y) * sin(z) + sin(x) * cos(y) * cos(z) + cos(x) * sin(y) * cos(z)
     return absolute(f + cos(x) * cos(y) * sin(z)) / (1.7320509 * k) - half
@@ -45,7 +49,7 @@ def schwarz_d(x, y, z, k, half):  # type: ignore[no-untyped-def]
 
 @shape(**WALL)
 def neovius(x, y, z, k, half):  # type: ignore[no-untyped-def]
-    """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7."""
+    """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7: L = 1."""
     x, y, z = cos(k * x), cos(k * y), cos(k * z)
     return absolute(3.0 * (x + y + z) + 4.0 * x * y * z) / (7.0 * k) - half
 
@@ -53,7 +57,7 @@ def neovius(x, y, z, k, half):  # type: ignore[no-untyped-def]
 @shape(**WALL)
 def iwp(x, y, z, k, half):  # type: ignore[no-untyped-def]
     """A wall along the surface I-WP of Schoen 1970. The gradient of its level function is at most
-    3 sqrt(3).
+    3 sqrt(3): L = 1.
     """
     x, y, z = cos(k * x), cos(k * y), cos(k * z)
     squares = 2.0 * (x * x + y * y + z * z) - 3.0
@@ -63,7 +67,7 @@ def iwp(x, y, z, k, half):  # type: ignore[no-untyped-def]
 @shape(**WALL)
 def lidinoid(x, y, z, k, half):  # type: ignore[no-untyped-def]
     """A wall along the lidinoid (Lidin and Larsson 1990). The gradient of its level function is at most
-    1.5 sqrt(3).
+    1.5 sqrt(3): L = 1.
     """
     x, y, z = k * x, k * y, k * z
     a, b, c = sin(2.0 * x), sin(2.0 * y), sin(2.0 * z)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import linecache
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 from typing import Any
@@ -19,17 +19,20 @@ from typing import Any
 import numpy as np
 
 from ..formulas import vocabulary
+from ..formulas.box import Box
 from ..formulas.escape import CORE, potential_distance
+from . import language
+from .cells import possible_cells
 from .seen import seen
 from .steps import Step, traced
 
-DIRECTIONS, RADII, FARTHEST = 64, np.geomspace(1e-2, 1e4, 72).round(4), 1e6
+DIRECTIONS, RADII, FARTHEST = 64, np.geomspace(1e-2, 1e4, 56).round(4), 1e6
 """Samples of the search for the radius of escape."""
 
-MORE, LAYERS, MARGIN = 400, 24, 1.15
-"""Samples of the search for the box: directions, radii, and what is added to the largest coordinates."""
+LIPSCHITZ, CELLS = 2.0, 1 << 15
+"""Lipschitz bound of the fields of orbits, and the most cells of the search for the box."""
 
-STEPS = 100
+STEPS = 60
 """Steps after which an orbit counts as bounded."""
 
 FEW = 8
@@ -215,7 +218,7 @@ def growth(
         Power, radius of escape and radius of the solid; None if orbits do not escape.
     """
     step = _numpy(code, dict(values))
-    rays = _rays(DIRECTIONS)
+    rays = _rays()
     points = (rays[:, :, None] * RADII).reshape(3, -1)
     origin = np.zeros(3) if julia is None else np.array(julia)
     ends = [np.linalg.norm(step(rays * r, origin), axis=0) for r in (1e4, 1e5)]
@@ -226,11 +229,26 @@ def growth(
     for _ in range(2):  # thin tips of the solid fall between samples; that of a few steps has thicker ones
         escape = max(_escape(step, points, origin, 0.0 if julia else bounded), 0.0 if julia else bounded)
         bounded = max(bounded, _radius(step, points, julia, FEW, escape))
-    radii = np.linspace(0, 1, LAYERS + 1)[1:] * _radius(step, points, julia, iterations, escape)
-    inside = _inside(step, (_rays(MORE)[:, :, None] * radii).reshape(3, -1), julia, iterations, escape)
-    extent = abs(inside).max(axis=1, initial=radii[0]) * MARGIN
-    x, y, z = (np.ceil(np.minimum(extent, radii[-1]) * 256) / 256).tolist()  # the same on every machine
-    return Growth(max(rate, 1.0), escape, (x, y, z))
+    sampled = 1.5 * _radius(step, points, julia, iterations, escape)
+    found = Growth(max(rate, 1.0), escape, (sampled, sampled, sampled))
+    return replace(found, half=_half(code, found, values, iterations, julia))
+
+
+def _half(code: Code, found: Growth, values: Any, iterations: int, julia: Any) -> tuple[float, float, float]:
+    """Half sizes of a box around the cells that the field does not prove to be empty; the search begins with
+    one half more than the samples reach.
+    """
+    function = field(code, found.by_power, julia is not None)
+    own = arguments(found, iterations, julia) | {f"v_{name}": value for name, value in values}
+    given = [own[name] for name in language.parameters(function)[3:]]
+
+    def evaluate(points: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            return np.asarray(function(*points, *given))
+
+    centres, _, size = possible_cells(evaluate, LIPSCHITZ, Box.centred(*found.half), CELLS)
+    x, y, z = (np.ceil((abs(centres).max(axis=1, initial=0) + size / 2) * 256) / 256).tolist()
+    return x, y, z
 
 
 def _escape(step: Any, points: np.ndarray, origin: np.ndarray, against: float) -> float:
@@ -259,10 +277,10 @@ def _radius(step: Any, points: np.ndarray, julia: Any, steps: int, radius: float
     return float(inside.max(initial=RADII[0]) * (RADII[1] / RADII[0]) * 1.02)
 
 
-def _rays(count: int) -> np.ndarray:
+def _rays() -> np.ndarray:
     """Unit vectors [3, n]: to the corners, edges and faces of a cube, and at random."""
     lattice = np.array([v for v in product((-1, 0, 1), repeat=3) if any(v)], float).T
-    rays = np.hstack([lattice, np.random.default_rng(0).normal(size=(3, count))])
+    rays = np.hstack([lattice, np.random.default_rng(0).normal(size=(3, DIRECTIONS))])
     unit: np.ndarray = rays / np.linalg.norm(rays, axis=0)
     return unit
 

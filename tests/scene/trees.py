@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from fracslice.errors import SceneError
 from fracslice.formulas import Node
-from fracslice.formulas.parameters import AUTO, REQUIRED, SMALLEST, Axis, Count, Number, Vector
+from fracslice.formulas.parameters import AUTO, REQUIRED, SMALLEST, Axis, Choice, Count, Number, Vector
 from fracslice.scene import scene
 from fracslice.scene.layout import formulas
 from fracslice.scene.model import computing
@@ -35,7 +35,7 @@ def _count(kind: Count) -> st.SearchStrategy[Any]:
 
 
 def _vector(kind: Vector) -> st.SearchStrategy[tuple[float, ...]]:
-    items = st.integers(int(kind.least), 9) if kind.whole else _number(kind)
+    items = st.integers(int(kind.least), int(min(kind.most, 9))) if kind.whole else _number(kind)
     return (
         st.sampled_from(kind.sizes)
         .flatmap(lambda n: st.tuples(*[items] * n))
@@ -47,6 +47,7 @@ _POSSIBLE: dict[type, Any] = {
     Number: _number,
     Count: _count,
     Vector: _vector,
+    Choice: lambda kind: st.sampled_from(kind.words),
     Axis: lambda kind: st.sampled_from("xyz"),
 }
 

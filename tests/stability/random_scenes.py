@@ -11,11 +11,13 @@ import numpy as np
 
 from fracslice.errors import FracsliceError
 from fracslice.formulas import Formula, Node, bounds
+from fracslice.formulas.orbits import STEPS
 from fracslice.formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
 from fracslice.kernel import reference
 from fracslice.scene.layout import formulas
 
 from .draws import number
+from .scaling import WALLS
 
 DEPTH = 4
 DEEPEST = {"iterations": 20, "level": 4}
@@ -24,9 +26,12 @@ DEEPEST = {"iterations": 20, "level": 4}
 SHALLOW = 6
 """For a first look, where a depth is automatic."""
 
+FAMILIES = {"flake", "cells", "prism", "superquadric", *WALLS, *STEPS}
+"""Families with a suite of their own, `tests.formulas.test_families`."""
+
 LOOKED = 4000
 TREES, TRIES = 100, 10
-LEAVES = [f for f in formulas() if f.kind == "shape"]
+LEAVES = [f for f in formulas() if f.kind == "shape" and f.name not in FAMILIES]
 OTHERS = [f for f in formulas() if f.kind != "shape" and f.name != "material"]
 Draw = Callable[[np.random.Generator, float], Any]
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from fracslice.formulas import Node, transform
 
+WALLS = ("gyroid", "iwp", "lidinoid", "neovius", "schwarz_d", "schwarz_p")
 LENGTHS: dict[str, tuple[str, ...]] = {
     "sphere": ("radius",),
     "box": ("size", "round"),
@@ -15,6 +16,9 @@ LENGTHS: dict[str, tuple[str, ...]] = {
     "cone": ("radius", "height"),
     "plane": ("offset",),
     "octahedron": ("radius",),
+    "prism": ("radius", "height"),
+    "superquadric": ("size",),
+    **dict.fromkeys(WALLS, ("period", "thickness")),
     "union": ("smooth",),
     "intersection": ("smooth",),
     "difference": ("smooth",),
