@@ -68,7 +68,8 @@ def flake(x, y, z, level, scale, corner, face, height, mirrors):  # type: ignore
     """The flake of a Platonic solid with corners on the unit sphere.
 
     Sierpinski 1915 has the flat one; folds: Knighty 2010, "Kaleidoscopic (escape time) IFS". Reflections move
-    no two points apart, and scaling is undone at the end, so L = 1. Copies touch in points and edges.
+    no two points apart, and copies are made smaller, not space larger, so L = 1. Copies touch in points and
+    edges.
     """
     vx, vy, vz = corner
     fx, fy, fz = face
@@ -77,13 +78,13 @@ def flake(x, y, z, level, scale, corner, face, height, mirrors):  # type: ignore
         for a, b, c in mirrors:
             s = 2.0 * minimum(a * x + b * y + c * z, 0.0)
             x, y, z = x - s * a, y - s * b, z - s * c
-        x, y, z = scale * x - vx, scale * y - vy, scale * z - vz
         size = size / scale
-        orbit((x * x + y * y + z * z) * size, x == x)
+        x, y, z = x - size * vx, y - size * vy, z - size * vz
+        orbit((x * x + y * y + z * z) / size, x == x)
     for a, b, c in mirrors:
         s = 2.0 * minimum(a * x + b * y + c * z, 0.0)
         x, y, z = x - s * a, y - s * b, z - s * c
-    return (fx * x + fy * y + fz * z - height) * size
+    return fx * x + fy * y + fz * z - height * size
 
 
 @flake.arguments

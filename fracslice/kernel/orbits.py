@@ -222,9 +222,9 @@ def growth(
     points = (rays[:, :, None] * RADII).reshape(3, -1)
     origin = np.zeros(3) if julia is None else np.array(julia)
     ends = [np.linalg.norm(step(rays * r, origin), axis=0) for r in (1e4, 1e5)]
-    rate = round(float(np.median(np.log10(ends[1] / ends[0]))), 3)
     if not ends[1].min() > 1.02e5:
         return None
+    rate = round(float(np.median(np.log10(ends[1] / ends[0]))), 3)
     bounded = escape = _radius(step, points, julia, STEPS, FARTHEST)
     for _ in range(2):  # thin tips of the solid fall between samples; that of a few steps has thicker ones
         escape = max(_escape(step, points, origin, 0.0 if julia else bounded), 0.0 if julia else bounded)
