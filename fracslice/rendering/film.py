@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..scene.view import Film
+from .units.pixel import encoded, filmic, reinhard
 
 BRIGHT = 1.0
 """Bloom threshold, linear light."""
@@ -32,7 +33,27 @@ def develop(image: np.ndarray, film: Film, mode: str = "light") -> np.ndarray:
     light = np.maximum(image, 0) * np.float32(2.0**film.exposure)
     if film.bloom:
         light = bloomed(light, film.bloom)
-    return encode(TONES[film.tone](light))
+    if film.tone == "filmic":
+        light = filmic(light)
+    elif film.tone == "reinhard":
+        light = light * reinhard(*np.moveaxis(light, -1, 0))[..., None]
+    return np.asarray(encoded(light), np.float32)
+
+
+def levels(shown: np.ndarray) -> np.ndarray:
+    """Quantise sRGB in [0, 1] to uint8.
+
+    Parameters
+    ----------
+    shown : ndarray of float32
+        sRGB in [0, 1].
+
+    Returns
+    -------
+    ndarray of uint8
+        Levels of 256.
+    """
+    return np.asarray(shown * np.float32(255) + np.float32(0.5), np.uint8)
 
 
 def bloomed(light: np.ndarray, part: float) -> np.ndarray:
@@ -59,73 +80,3 @@ def bloomed(light: np.ndarray, part: float) -> np.ndarray:
     widths = [light.shape[0] / d for d in (256, 128, 64, 32)]
     halo = sum(gaussian_filter(bright, (w, w, 0), mode="constant") for w in widths) / len(widths)
     return np.asarray(light + part * (halo - bright), np.float32)
-
-
-def filmic(light: np.ndarray) -> np.ndarray:
-    """Filmic tone curve: contrast with soft shoulders (Narkowicz 2016, "ACES Filmic Tone Mapping Curve").
-
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        Tone-mapped light.
-    """
-    a = light * np.float32(0.6)
-    return np.asarray(a * (2.51 * a + 0.03) / (a * (2.43 * a + 0.59) + 0.14), np.float32)
-
-
-def reinhard(light: np.ndarray) -> np.ndarray:
-    """Luminance tone curve with white at 4; bright colours keep their hue (Reinhard et al. 2002).
-
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        Tone-mapped light.
-    """
-    y = (light * np.array([0.2126, 0.7152, 0.0722], np.float32)).sum(-1)
-    return np.asarray(light * ((1 + y / 16) / (1 + y))[..., None], np.float32)
-
-
-def plain(light: np.ndarray) -> np.ndarray:
-    """Identity tone curve; `encode` clips the result at white.
-
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        The same array.
-    """
-    return light
-
-
-TONES = {"filmic": filmic, "reinhard": reinhard, "none": plain}
-
-
-def encode(light: np.ndarray) -> np.ndarray:
-    """Encode linear light as sRGB (IEC 61966-2-1).
-
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light, clipped to [0, 1].
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        sRGB in [0, 1].
-    """
-    a = np.clip(light, 0, 1)
-    return np.asarray(np.where(a <= 0.0031308, a * 12.92, 1.055 * a ** (1 / 2.4) - 0.055), np.float32)

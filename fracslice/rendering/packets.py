@@ -20,8 +20,10 @@ from enum import IntEnum
 from ..formulas.vocabulary import any_of, where
 from ..kernel.intrinsics import WIDTH, load, store
 from ..kernel.loops import Loop, loop
+from .accumulator import CHANNELS, COUNT
 from .linking import Frame
 from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
+from .units.pixel import brightness, clamped
 from .units.random import centred, sample
 
 Row = IntEnum("Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb px py", start=0)
@@ -38,9 +40,6 @@ Row = IntEnum("Row", "ox oy oz dx dy dz start end side path t steps status r g b
 """
 Lane = IntEnum("Lane", "ox oy oz dx dy dz start end side path t steps done before stride", start=0)
 """State of a ray in a packet. The first ten entries are those of `Row`."""
-
-CHANNELS = 6
-"""Numbers per pixel: sums of red, green, blue, displayed brightness and its square, and the sample count."""
 
 
 def loops(frame: Frame) -> tuple[Loop, ...]:
@@ -207,7 +206,7 @@ def draw(W, Q, pixels, A, n, m, width, frame):
     """
     for k in range(m):
         pixel = pixels[min(k, n - 1)]
-        q = frame.samples * int(A[CHANNELS * ((pixel >> 16) * width + (pixel & 65535)) + 5])
+        q = frame.samples * int(A[CHANNELS * ((pixel >> 16) * width + (pixel & 65535)) + COUNT])
         W[Row.px * m + k] = (pixel & 65535) + centred(Q[q], pixel, 0)
         W[Row.py * m + k] = (pixel >> 16) + centred(Q[q + 1], pixel, 1)
         for d in range(2, frame.samples):
@@ -483,33 +482,18 @@ def gather(W, pixels, A, n, m, width):
     n, m, width : int
         Pixels, numbers per row of W, picture width.
     """
+    for i in range(0, m, WIDTH):
+        r, g, b = load_vector(W, Row.r, m, i)
+        r, g, b = clamped(r), clamped(g), clamped(b)
+        store_vector(W, Row.r, m, i, r, g, b)
+        store(W, Row.t * m + i, brightness(r, g, b))
     for k in range(n):
         pixel = pixels[k]
         a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
-        r = tamed(W[Row.r * m + k])
-        g = tamed(W[Row.g * m + k])
-        b = tamed(W[Row.b * m + k])
-        bright = 0.2126 * r + 0.7152 * g + 0.0722 * b
-        bright = bright / (1.0 + bright)
-        A[a] += r
-        A[a + 1] += g
-        A[a + 2] += b
+        bright = W[Row.t * m + k]
+        A[a] += W[Row.r * m + k]
+        A[a + 1] += W[Row.g * m + k]
+        A[a + 2] += W[Row.b * m + k]
         A[a + 3] += bright
         A[a + 4] += bright * bright
-        A[a + 5] += 1.0
-
-
-def tamed(c):
-    """Clamp light to [0, 1e4]; NaN becomes 0.
-
-    Parameters
-    ----------
-    c : float
-        Linear light.
-
-    Returns
-    -------
-    float
-        The clamped value.
-    """
-    return min(max(c, 0.0), 1e4) if c == c else 0.0
+        A[a + COUNT] += 1.0

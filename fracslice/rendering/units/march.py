@@ -81,7 +81,7 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
         f = side * f
     radius = f * steepness
     near = cone * (path + t) + least
-    kept = radius + before >= stride
+    kept = maximum(radius, 0.0) + before >= stride  # a ray may start behind the surface, by rounding
     step = relax * radius
     margin = near
     if glass:

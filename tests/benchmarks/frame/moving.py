@@ -18,8 +18,7 @@ import numpy as np
 
 from fracslice import read
 from fracslice.rendering import Renderer
-from fracslice.rendering.cpu import ordered
-from fracslice.rendering.progressive import STEPS
+from fracslice.rendering.accumulator import GOAL, HostAccumulator, Plan, ordered
 from fracslice.scene import library
 from fracslice.scene.view import Camera
 
@@ -60,10 +59,11 @@ def timed(of: Renderer, show: Callable[[Camera], None], camera: Camera) -> tuple
     show(camera)
     clock, spent = time.perf_counter() - start, time.process_time() - busy
     kept = of.accumulator.host()
-    sums, pixels = np.zeros_like(kept.sums), ordered(*SIZE)
+    picture, pixels = HostAccumulator.empty(*SIZE, kept.sums.dtype), ordered(*SIZE)
+    picture.channels[..., GOAL] = 1
     pixels = pixels[kept.counts[pixels >> 16, pixels & 65535] > 0]
     busy = time.process_time()
-    of.tracer.add(sums, pixels, 1, STEPS, of.work)
+    of.tracer.add(picture.sums, Plan(pixels, len(pixels), 1), of.work)
     return clock, spent, time.process_time() - busy, float(len(pixels))
 
 

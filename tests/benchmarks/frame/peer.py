@@ -16,7 +16,8 @@ import time
 import numpy as np
 
 from fracslice.formulas import mandelbulb
-from fracslice.rendering.cpu import BLOCK, CpuTracer, ordered
+from fracslice.rendering.accumulator import GOAL, HostAccumulator, Plan, ordered
+from fracslice.rendering.cpu import BLOCK, CpuTracer
 from fracslice.rendering.linking import link_frame
 from fracslice.rendering.optics import optics
 from fracslice.scene.view import Camera, Light, Shading, View
@@ -24,7 +25,7 @@ from fracslice.work import Work
 
 from ..programs import told
 
-WIDTH, HEIGHT, SAMPLES, STEPS = 800, 600, 16, 300
+WIDTH, HEIGHT, SAMPLES = 800, 600, 16
 
 
 def tracer() -> CpuTracer:
@@ -38,15 +39,15 @@ def tracer() -> CpuTracer:
 
 def ours(of: CpuTracer, pixels: np.ndarray) -> tuple[float, float]:
     """CPU seconds of the first sample, the look ahead included, and of all of them."""
-    work, sums = Work(threads=2), np.zeros((WIDTH * HEIGHT, 6), np.float32)
+    work, picture = Work(threads=2), HostAccumulator.empty(WIDTH, HEIGHT, np.dtype(np.float32))
     of.aim(of.frame)
-    start = time.process_time()
-    of.look_ahead(STEPS, work)
-    of.add(sums, pixels, 0, STEPS, work)
-    first = time.process_time() - start
-    for index in range(1, SAMPLES):
-        of.add(sums, pixels, index, STEPS, work)
-    return first, time.process_time() - start
+    spent, start = [], time.process_time()
+    of.look_ahead(work)
+    for goal in (1, SAMPLES):
+        picture.channels[..., GOAL] = goal
+        of.add(picture.sums, Plan(pixels, goal * pixels.size, goal), work)
+        spent.append(time.process_time() - start)
+    return spent[0], spent[1]
 
 
 def peer() -> tuple[float, float]:

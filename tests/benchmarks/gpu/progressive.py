@@ -18,8 +18,7 @@ from fracslice.export.images import write_image
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
 from fracslice.rendering import Renderer
-from fracslice.rendering.cpu import ordered
-from fracslice.rendering.progressive import GROWTH, STEPS
+from fracslice.rendering.accumulator import CHANNELS, GOAL, Plan, ordered
 from fracslice.scene.view import Camera, Film, Light, View
 
 VIEW = View(
@@ -46,19 +45,21 @@ def main(picture: str | None = None) -> None:
 
     pixels = numba_cuda.to_device(ordered(1920, 1080))
 
+    sums = np.zeros((1920 * 1080, CHANNELS), of.dtype)
+    sums[:, GOAL] = 2 * ROUNDS
+    placed = numba_cuda.to_device(sums.ravel())
+
     def traced() -> None:
-        of.accumulator.receive(
-            pixels, lambda sums: of.tracer.add(sums, pixels, 4096, STEPS * GROWTH, of.work)
-        )
+        of.tracer.add(placed, Plan(pixels, pixels.size, 1), of.work)
         numba_cuda.synchronize()
 
     alone = median(traced)
     for name, run in {"tracing every pixel": traced, "pass": without, "pass and its picture": shown}.items():
         took, active = median(run), next(passes).active
-        note = "" if run is traced else f", of {100 * active:.0f} % of the pixels"
+        note = "" if run is traced else f", of {active:.2f} samples a pixel"
         print(f"1080p {name:22} {took:7.2f} ms, {took / alone:.2f} of the tracing of all{note}")
     statistics = median(lambda: of.accumulator.statistics())
-    wanted = median(lambda: of.accumulator.wanted(4096, 0.0))
+    wanted = median(lambda: of.accumulator.plan(4096, 0.0))
     tones = median(lambda: of.accumulator.shown(VIEW.film, "light"))
     print(f"1080p statistics {statistics:.2f} ms, choice {wanted:.2f} ms, tones and download {tones:.2f} ms")
     moving()
