@@ -24,6 +24,7 @@ from fracslice.errors import (
     SliceError,
     VolumeError,
 )
+from fracslice.version import __version__
 
 from .bench import bench
 from .check import check
@@ -44,7 +45,7 @@ FAILED, USAGE, INTERRUPTED = 1, 2, 130
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-@click.version_option(package_name="fracslice", message="%(prog)s %(version)s")
+@click.version_option(__version__, message="%(prog)s %(version)s")
 @click.pass_context
 def commands(context: click.Context) -> None:
     """Fractals as signed distance fields, made into printable meshes, slices and pictures.
@@ -63,6 +64,8 @@ for command in (mesh, render, slice_, check, show, fly, formulas, scenes, bench)
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run one command and exit with its status."""
+    # The products of matrices here are small: threads of OpenBLAS would only take time to start.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(run(arguments))
 
 
@@ -81,7 +84,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = told
+            warnings.showwarning = show_warning
             return commands.main(arguments, prog_name="fracslice", standalone_mode=False) or 0
     except click.UsageError as error:
         hint = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
@@ -104,7 +107,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return say(f"{error.filename or 'error'}: {error.strerror or error}", FAILED)
 
 
-def told(
+def show_warning(
     message: Warning | str,
     category: type[Warning],
     filename: str,

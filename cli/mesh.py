@@ -25,7 +25,7 @@ from .summary import summary
 from .working import working
 
 if TYPE_CHECKING:
-    from fracslice.job import Result
+    from fracslice.job import MeshResult
     from fracslice.meshjob import MeshJob
     from fracslice.report import Report
     from fracslice.scene import Scene
@@ -94,12 +94,12 @@ def mesh(
     job = job_of(scene, **options)
     how = Work(threads, store=store_in(cache), device=chosen(device))
     with working(how, quiet) as work:
-        told = made(scene, job, output, picture, work)
+        figures = made(scene, job, output, picture, work)
         if report is not None:
-            write_report(told, report)
+            write_report(figures, report)
     if not quiet:
-        click.echo(summary(output, told))
-    return 1 if told.problems else 0
+        click.echo(summary(output, figures))
+    return 1 if figures.problems else 0
 
 
 def store_in(folder: str | None) -> Store | None:
@@ -149,7 +149,7 @@ def check_outputs(source: str, output: str, report: str | None, picture: str | N
         need_pyvista()
 
 
-def write_grid(result: Result, path: str, about: dict[str, str]) -> None:
+def write_grid(result: MeshResult, path: str, about: dict[str, str]) -> None:
     """Write the samples, in mm, as an OpenVDB file."""
     from fracslice.export import replacing
     from fracslice.volume.grid import write_vdb

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,8 +65,8 @@ def printer(context: click.Context, _: click.Parameter, name: str | None) -> Pri
     if name != "list":
         return None if name is None else printers.printer(name)
     for p in printers.PRINTERS.values():
-        room = " x ".join(f"{r:g}" for r in p.room)
-        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {room} mm")
+        volume = " x ".join(f"{r:g}" for r in p.build_volume)
+        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {volume} mm")
     context.exit()
 
 
@@ -159,7 +160,9 @@ def slice_(
     from fracslice.export.jobs import SliceRun
     from fracslice.export.slices import slice_format, write_slices
     from fracslice.shown import layers_amount
+    from fracslice.slicing import plan_stack
     from fracslice.slicing.raster import Screen
+    from fracslice.stackmesh import stack_mesh
 
     if slice_format(output, form) == "sl1":
         refuse_what_no_sl1_says(output, options)
@@ -169,11 +172,13 @@ def slice_(
     check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
     with working(threads, quiet) as work:
-        stack = as_high_as_wanted(stack_of(scene, options, work), options, work)
+        what = job(scene, options)
+        stack = as_high_as_wanted(plan_stack(scene.root, what, work), options, work)
         how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
         screen = Screen(stack, *how)
         about = {"Title": scene.name, "scene_hash": scene.hash}
-        write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about), output, form)
+        mesh = partial(stack_mesh, scene, what, work)
+        write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about, mesh), output, form)
         if preview:
             write_preview(stack, preview, work)
         off = () if quiet else layers_amount(stack, work)[1]

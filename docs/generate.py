@@ -1,14 +1,17 @@
-"""Write docs/reference/elements.md, the schema and the stub of the formulas, after adding a formula."""
+"""Write docs/reference/elements.md, the schema and the stub files, after adding a formula."""
 
 from pathlib import Path
 
-from fracslice.formulas.signatures import stub
+from fracslice import _WHERE
+from fracslice.formulas.signatures import package_stub, stub
 from fracslice.scene.manual import markdown
 from fracslice.scene.schema import relaxng
 
 ROOT = Path(__file__).parents[1]
 
 if __name__ == "__main__":
-    (ROOT / "docs/reference/elements.md").write_text(markdown(), encoding="utf-8")
+    head = (ROOT / "docs/reference/elements.head").read_text(encoding="utf-8")
+    (ROOT / "docs/reference/elements.md").write_text(f"{head}\n{markdown()}", encoding="utf-8")
     (ROOT / "fracslice/scene/scene.rng").write_text(relaxng(), encoding="utf-8")
     (ROOT / "fracslice/formulas/__init__.pyi").write_text(stub(), encoding="utf-8")
+    (ROOT / "fracslice/__init__.pyi").write_text(package_stub(_WHERE), encoding="utf-8")

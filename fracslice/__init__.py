@@ -62,72 +62,9 @@ True
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from .api.meshing import Result, make_mesh
-    from .api.pictures import Picture, render
-    from .api.slices import Slices, slice_layers
-    from .errors import FracsliceError
-    from .export import write
-    from .formulas import (
-        Node,
-        bend,
-        bounds,
-        box,
-        capsule,
-        cone,
-        cylinder,
-        difference,
-        intersection,
-        julia,
-        mandelbulb,
-        material,
-        menger,
-        mirror,
-        octahedron,
-        offset,
-        plane,
-        repeat,
-        shell,
-        sphere,
-        torus,
-        transform,
-        twist,
-        union,
-    )
-    from .mesh import Mesh
-    from .meshjob import MeshJob
-    from .report import Report
-    from .scene import Print, Scene, read, reads, to_xml
-    from .scene.view import Camera, Light
-    from .work import Work
-
-_FORMULAS = (
-    "bend",
-    "bounds",
-    "box",
-    "capsule",
-    "cone",
-    "cylinder",
-    "difference",
-    "intersection",
-    "julia",
-    "mandelbulb",
-    "material",
-    "menger",
-    "mirror",
-    "octahedron",
-    "offset",
-    "plane",
-    "repeat",
-    "shell",
-    "sphere",
-    "torus",
-    "transform",
-    "twist",
-    "union",
-)
+from .version import __version__ as __version__
 
 _WHERE = {
     "Camera": "scene.view",
@@ -150,66 +87,20 @@ _WHERE = {
     "slice_layers": "api.slices",
     "to_xml": "scene",
     "write": "export",
-    **dict.fromkeys(_FORMULAS, "formulas"),
 }
-
-__all__ = [
-    "Camera",
-    "FracsliceError",
-    "Light",
-    "Mesh",
-    "MeshJob",
-    "Node",
-    "Picture",
-    "Print",
-    "Report",
-    "Result",
-    "Scene",
-    "Slices",
-    "Work",
-    "bend",
-    "bounds",
-    "box",
-    "capsule",
-    "cone",
-    "cylinder",
-    "difference",
-    "intersection",
-    "julia",
-    "make_mesh",
-    "mandelbulb",
-    "material",
-    "menger",
-    "mirror",
-    "octahedron",
-    "offset",
-    "plane",
-    "read",
-    "reads",
-    "render",
-    "repeat",
-    "shell",
-    "slice_layers",
-    "sphere",
-    "to_xml",
-    "torus",
-    "transform",
-    "twist",
-    "union",
-    "write",
-]
 
 
 def __getattr__(name: str) -> Any:
     """Load a public name on first use, so that importing fracslice loads no other modules."""
-    if name == "__version__":
-        return import_module(".report", __name__).version()
-    if name not in _WHERE:
+    formulas: Any = import_module(".formulas", __name__) if name not in _WHERE else None
+    if name == "__all__":
+        return sorted([*_WHERE, *formulas.names()])
+    if formulas and name not in formulas.names():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f".{_WHERE[name]}", __name__), name)
+    value = formulas.get(name) if formulas else getattr(import_module(f".{_WHERE[name]}", __name__), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_WHERE])
+    return sorted({*globals(), *__getattr__("__all__")})

@@ -307,9 +307,12 @@ def turned(
     """Triangles, ascending, that degenerate or turn by at least 90 degrees if vertices move to `points`."""
 
 def pointed(
-    vertices: NDArray[float64], triangles: NDArray[int32], sine: float, threads: int = 0
+    vertices: NDArray[float64], triangles: NDArray[int32], sine: float, most: int, threads: int = 0
 ) -> NDArray[int64]:
-    """Vertices, ascending, from which all edges descend, at an angle of at least that sine."""
+    """Vertices, ascending, from which all edges descend, at an angle of at least that sine.
+
+    More than `most`, but not all, where there are more.
+    """
 
 def bounds(points: NDArray[float64], threads: int = 0) -> tuple[Point, Point]:
     """Low and high corner of the bounding box of points, float64 [n, 3]. Raises ValueError without points."""
@@ -326,6 +329,15 @@ def selected(
 
 def touching(triangles: NDArray[int32], vertices: NDArray[bool_], threads: int = 0) -> NDArray[int64]:
     """Triangles, ascending, with a corner among some vertices, bool [n]."""
+
+def near(
+    vertices: NDArray[float64],
+    triangles: NDArray[int32],
+    points: NDArray[float64],
+    reach: float,
+    threads: int = 0,
+) -> NDArray[int64]:
+    """Triangles, ascending, with a corner near some points: within `reach` along each axis, and others."""
 
 def surroundings(
     vertices: NDArray[float64], triangles: NDArray[int32], of: NDArray[bool_], threads: int = 0

@@ -66,8 +66,8 @@ def unite_all(parent, some, others):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def roots(parent):  # type: ignore[no-untyped-def]
-    """Return the root of each element.
+def numbered(parent):  # type: ignore[no-untyped-def]
+    """Replace each parent by the number of its set, from 0 in the order of the smallest elements.
 
     Parameters
     ----------
@@ -76,10 +76,37 @@ def roots(parent):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    ndarray
-        Roots, [n], of the dtype of `parent`.
+    int
+        Number of sets.
     """
-    root = np.empty_like(parent)
-    for i in range(len(parent)):
-        root[i] = find(parent, i)
-    return root
+    count = 0
+    for i in range(len(parent)):  # a parent is a smaller element, which already has its number
+        if parent[i] == i:
+            parent[i] = count
+            count += 1
+        else:
+            parent[i] = parent[parent[i]]
+    return count
+
+
+def grouped(count: int, some: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, int]:
+    """Number the connected components of a graph.
+
+    Parameters
+    ----------
+    count
+        Number of nodes.
+    some, others
+        Nodes at the ends of the edges, int [k] each.
+
+    Returns
+    -------
+    numbers : ndarray of int64 [n]
+        Component of each node, from 0 in the order of their smallest nodes.
+    components : int
+        Number of components.
+    """
+    parent = np.arange(count)
+    unite_all(parent, some, others)
+    components = numbered(parent)
+    return parent, components

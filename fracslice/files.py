@@ -1,59 +1,159 @@
-"""Atomic file writes, and files that no other user can have written."""
+"""Atomic file writes, and cache files."""
 
 from __future__ import annotations
 
-import grp
+import errno
 import os
-import pwd
-import stat
+import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from secrets import token_hex
-from typing import BinaryIO, Literal, TypeVar
+from typing import BinaryIO, TypeVar
 
-from .errors import FracsliceWarning
+from .errors import ExportError, FracsliceWarning
+from .private import NO_LINK, OWNER_ONLY, NotPrivateError, opened, private_folder
 
 T = TypeVar("T")
 
-OWNER_ONLY, BY_OTHERS = 0o600, 0o022
-FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
-
-
-class NotPrivateError(PermissionError):
-    """Another user can write to this place."""
-
 
 @contextmanager
-def replacing(target: Path) -> Iterator[BinaryIO]:
-    """Write a file atomically: it appears at `target` complete when the block ends, or not at all.
-
-    The temporary file lies beside the target, with permissions for its owner only. Any error,
-    KeyboardInterrupt included, removes it.
+def reported(path: str | Path) -> Iterator[None]:
+    """Raise errors of the file system as `ExportError`, with the path and the reason in one line.
 
     Parameters
     ----------
-    target
-        Final path.
+    path
+        File or folder that the message names.
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            reason = "the disk is full; nothing was written"
+        elif error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+            reason = "not allowed to write there"
+        raise ExportError(f"{path}: {reason}") from error
+
+
+def check_target(path: str | Path) -> Path:
+    """Check that a file can be written; nothing is changed.
+
+    Parameters
+    ----------
+    path
+        File to write.
+
+    Returns
+    -------
+    Path
+        The path with links resolved.
+
+    Raises
+    ------
+    ExportError
+        If the folder is missing or not writable, or if `path` is itself a folder.
+    """
+    target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise ExportError(f"{path}: the folder {target.parent} does not exist")
+    if target.is_dir():
+        raise ExportError(f"{path}: is a folder")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise ExportError(f"{path}: the folder {target.parent} is not writable")
+    return target
+
+
+@contextmanager
+def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
+    """Write a file atomically: it appears at `path` complete when the block ends, or not at all.
+
+    The temporary file lies beside the target, with permissions for its owner only, and is flushed to disk
+    before it is renamed. Any error, KeyboardInterrupt included, removes it.
+
+    Parameters
+    ----------
+    path
+        File to write.
+    mode
+        Permissions; by default those of the file that is replaced, or of a new file.
 
     Yields
     ------
     BinaryIO
         Temporary file, open for writing.
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system.
     """
-    part = target.with_name(f".{target.name[:100]}.{token_hex(8)}.part")
-    handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, OWNER_ONLY)
+    target = check_target(path)
+    with reported(path):
+        handle, part = tempfile.mkstemp(".part", f".{target.name[:100]}.", target.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                yield file
+                file.flush()
+                os.chmod(part, _permissions(target) if mode is None else mode)
+                os.fsync(handle)
+            os.replace(part, target)
+        except BaseException:
+            with suppress(FileNotFoundError):
+                os.unlink(part)
+            raise
+        _flush_folder(target.parent)
+
+
+def put(path: str, data: bytes) -> None:
+    """Write one of many files with as few system calls as possible, neither atomically nor flushed to disk.
+
+    The caller must check the files that an interrupted job left before using them.
+
+    Parameters
+    ----------
+    path
+        File to write; links are not followed.
+    data
+        Contents.
+
+    Raises
+    ------
+    OSError
+        For an error of the file system.
+    """
+    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | NO_LINK | getattr(os, "O_BINARY", 0)
+    handle = os.open(path, flags, 0o666)
     try:
-        with os.fdopen(handle, "wb") as file:
-            yield file
-        os.replace(part, target)
-    except BaseException:
-        with suppress(FileNotFoundError):
-            os.unlink(part)
-        raise
+        while data:
+            data = data[os.write(handle, data) :]
+    finally:
+        os.close(handle)
+
+
+def _permissions(target: Path) -> int:
+    """Permissions of a file, or of a new one if it does not exist."""
+    mask = os.umask(0o077)  # the umask cannot be read without setting it
+    os.umask(mask)
+    return target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~mask
+
+
+def _flush_folder(folder: Path) -> None:
+    """Flush the folder's new entry to disk, where the system supports it."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 @dataclass(frozen=True)
@@ -85,14 +185,7 @@ class Kept:
         object
             Result of `read`; None if the file is missing or not trusted.
         """
-        try:
-            with _private_folder(self.folder) as here, opened(name, "rb", folder=here) as file:
-                return read(file)
-        except NotPrivateError as error:
-            self._distrust(error)
-        except OSError:
-            pass
-        return None
+        return self._trusted(lambda here: self._read(name, read, here))
 
     def place(self) -> Path | None:
         """Return the path of the folder, for code that needs one.
@@ -102,14 +195,7 @@ class Kept:
         Path
             Resolved path; None if the folder cannot be opened or is not trusted.
         """
-        try:
-            with _private_folder(self.folder):
-                return Path(os.path.realpath(self.folder))
-        except NotPrivateError as error:
-            self._distrust(error)
-        except OSError:
-            pass
-        return None
+        return self._trusted(lambda _: Path(os.path.realpath(self.folder)))
 
     def put(self, name: str, write: Callable[[BinaryIO], object]) -> None:
         """Write a cached file atomically; ignore a folder that is not trusted.
@@ -123,111 +209,32 @@ class Kept:
 
         Raises
         ------
-        OSError
+        ExportError
             If writing fails for another reason than that.
         """
         target = Path(os.path.realpath(self.folder), name)
-        with suppress(NotPrivateError), _private_folder(self.folder), replacing(target) as file:
+        with (
+            reported(self.folder),
+            suppress(NotPrivateError),
+            private_folder(self.folder),
+            replacing(target, OWNER_ONLY) as file,
+        ):
             write(file)
 
-    def _distrust(self, error: NotPrivateError) -> None:
-        warn(f"{error}: what is kept in {self.folder} is not used")
+    def _read(self, name: str, read: Callable[[BinaryIO], T], here: int | None) -> T:
+        with opened(self.folder / name, "rb", folder=here) as file:
+            return read(file)
 
-
-@contextmanager
-def opened(
-    path: str | Path, mode: Literal["rb", "r+b"], flags: int = 0, folder: int | None = None
-) -> Iterator[BinaryIO]:
-    """Open a file that no other user can write; do not follow a symbolic link.
-
-    Parameters
-    ----------
-    path
-        File.
-    mode
-        "rb" or "r+b".
-    flags
-        Further flags for `os.open`. A file that they create is for its owner only.
-    folder
-        Descriptor of the open folder that `path` is relative to.
-
-    Yields
-    ------
-    BinaryIO
-        Open file.
-
-    Raises
-    ------
-    NotPrivateError
-        If another user can write the file.
-    OSError
-        If it cannot be opened.
-    """
-    flags |= os.O_NOFOLLOW | os.O_NONBLOCK  # opening a pipe would otherwise block
-
-    def opener(name: str, by_mode: int) -> int:
-        return os.open(name, by_mode | flags, OWNER_ONLY, dir_fd=folder)
-
-    with open(path, mode, opener=opener) as file:
-        status = os.fstat(file.fileno())
-        if not stat.S_ISREG(status.st_mode) or status.st_uid not in _trusted() or status.st_mode & BY_OTHERS:
-            raise NotPrivateError(f"{path}: others can write this file")
-        yield file
-
-
-@contextmanager
-def _private_folder(folder: Path) -> Iterator[int]:
-    """Open a folder whose contents and path no other user can change; create it if it does not exist.
-
-    Descends from the root and keeps each folder open while it checks the next one, so that nothing already
-    checked can be exchanged.
-    """
-    path = Path(os.path.realpath(folder))
-    here = os.open(path.anchor, FOLDER)
-    try:
-        for place in [*reversed(path.parents), path][1:]:
-            if _lets_exchange(os.fstat(here)):
-                raise NotPrivateError(f"{place.parent}: others can write in this folder")
-            above, here = here, _folder(place.name, here)
-            os.close(above)
-        status = os.fstat(here)
-        if status.st_uid not in _trusted() or status.st_mode & BY_OTHERS:
-            raise NotPrivateError(f"{path}: others can write in this folder")
-        yield here
-    finally:
-        os.close(here)
-
-
-def _folder(name: str, within: int) -> int:
-    """Open a folder; create it for this user alone if it does not exist."""
-    try:
-        return os.open(name, FOLDER, dir_fd=within)
-    except FileNotFoundError:
-        with suppress(FileExistsError):
-            os.mkdir(name, 0o700, dir_fd=within)
-        return os.open(name, FOLDER, dir_fd=within)
-
-
-def _trusted() -> tuple[int, int]:
-    """User ids whose files are trusted: this user's and root's, which could change any file anyway."""
-    return 0, os.geteuid()
-
-
-def _lets_exchange(status: os.stat_result) -> bool:
-    """True if others can replace an entry of this user in a folder."""
-    others = status.st_mode & stat.S_IWOTH or (status.st_mode & stat.S_IWGRP and not _alone_in(status.st_gid))
-    return status.st_uid not in _trusted() or bool(others and not status.st_mode & stat.S_ISVTX)
-
-
-def _alone_in(group: int) -> bool:
-    """True if a group is the user's private group. Debian creates one per user, with write permission on the
-    user's files.
-    """
-    try:
-        user, found = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
-    except KeyError:
-        return False
-    return (group, found.gr_name) == (user.pw_gid, user.pw_name) and set(found.gr_mem) <= {user.pw_name}
+    def _trusted(self, use: Callable[[int | None], T]) -> T | None:
+        """Result for the open folder; None if it cannot be opened or is not trusted."""
+        try:
+            with private_folder(self.folder) as here:
+                return use(here)
+        except NotPrivateError as error:
+            warn(f"{error}: what is kept in {self.folder} is not used")
+        except OSError:
+            pass
+        return None
 
 
 @cache

@@ -219,7 +219,7 @@ class Check:
         self._errors: list[NDArray[np.float64]] = []
 
     def passing(self, pieces: Iterable[Finished]) -> Iterator[Mesh]:
-        """Check pieces and pass them on.
+        """Pass pieces on and check them.
 
         Parameters
         ----------
@@ -232,11 +232,11 @@ class Check:
             Finished triangles of each piece, mm.
         """
         for piece in pieces:
+            passed = piece.passed
+            yield passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
-                passed = piece.passed
                 self._errors.append(self._off(passed.vertices[:: self._stride]))
-            yield passed
 
     def _off(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances of vertices in mm from the surface, scene units."""

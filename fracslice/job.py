@@ -17,9 +17,10 @@ from .errors import SceneError, TooLargeError
 from .finishing import Check, Finish, Placement
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
-from .report import Report, SurfaceError, SurfaceToMesh, version
+from .report import Report, SurfaceError, SurfaceToMesh
 from .scene import Print, Scene
-from .work import Clock, Work
+from .version import __version__
+from .work import Clock, Work, ahead
 
 if TYPE_CHECKING:
     from .kernel import Field
@@ -32,8 +33,8 @@ STL = ".stl"
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
-    """Result of `make_mesh`.
+class MeshResult:
+    """MeshResult of `make_mesh`.
 
     Attributes
     ----------
@@ -95,7 +96,7 @@ class Result:
 
 def make_mesh(
     scene: Scene, what: MeshJob | None = None, work: Work | None = None, path: str | Path | None = None
-) -> Result:
+) -> MeshResult:
     """Sample, mesh, clean, scale and check a scene.
 
     Parameters
@@ -112,7 +113,7 @@ def make_mesh(
 
     Returns
     -------
-    Result
+    MeshResult
         The mesh and its report. A mesh that is not printable is returned, too; its report lists the problems.
 
     Raises
@@ -218,7 +219,7 @@ class _Job:
         folder = aside() if aside and most < len(signs) else None
         return surfaces.made(sized.planned, signs, most, folder, self.clock)
 
-    def result(self, sized: _Sized, surface: Surface, thin: str) -> Result:
+    def result(self, sized: _Sized, surface: Surface, thin: str) -> MeshResult:
         """Finished mesh and report."""
         from .mesh.missed import surface_to_mesh
         from .shown import mesh_amount
@@ -242,7 +243,7 @@ class _Job:
         report = Report(
             scene=self.scene.name,
             scene_hash=self.scene.hash,
-            version=version(),
+            version=__version__,
             size_mm=size,
             voxel_mm=planned.voxel * scale,
             mesh=check.mesh,
@@ -259,46 +260,47 @@ class _Job:
             notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
             depths=planned.depths,
         )
-        return Result(report, finish.place, planned, whole, clock.work)
+        return MeshResult(report, finish.place, planned, whole, clock.work)
 
     def written(
         self, finish: Finish, check: Check, tips: np.ndarray
     ) -> tuple[Mesh | None, Simplified | None]:
-        """Write the file. Returns the mesh, if in one piece, and the result of its simplification, if any."""
-        from .export import write
+        """Write the file while it is checked. Returns the mesh, if in one piece, and the result of its
+        simplification, if any.
+        """
+        from .export import FORMATS, application, replacing
+        from .export.stl import write_pieces
+        from .mesh.window import Finished, tips_last
 
-        finished, simplified = finish.finished(), None
-        if len(finish.pieces) > 1:
-            self.streamed(check.passing(finished), tips)
-            return None, None
+        finished, simplified, mesh = finish.finished(), None, None
         if self.what.simplify_mm is not None:
             from .mesh.simplify import simplify
-            from .mesh.window import Finished
 
             (piece,) = finished
             with self.clock("simplifying"):
                 mesh, simplified = simplify(piece.mesh, self.what.simplify_mm, self.clock.work)
             finished = iter([Finished.whole(mesh)])
-        (mesh,) = check.passing(finished)
-        if self.path is not None:
-            with self.clock("writing"):
-                write(mesh, self.path, metadata(self.scene))
-        return mesh, simplified
-
-    def streamed(self, meshes: Iterator[Mesh], tips: np.ndarray) -> None:
-        """Write an STL in pieces."""
-        from .export import application, replacing
-        from .export.stl import write_pieces
-        from .mesh.window import tips_last
+        meshes = ahead(check.passing(finished))
+        if several := len(finish.pieces) > 1:
+            meshes = tips_last(meshes, tips)
+        if self.path is None:
+            (mesh,) = meshes
+            return mesh, simplified
 
         def timed() -> Iterator[Mesh]:
-            for mesh in tips_last(meshes, tips) if len(tips) else meshes:
+            nonlocal mesh
+            for mesh in meshes:
                 with self.clock("writing"):  # the consumer writes during the yield
                     yield mesh
 
-        assert self.path is not None
+        about = {"Application": application()} | metadata(self.scene)
         with replacing(self.path) as file:
-            write_pieces(timed(), file, {"Application": application()} | metadata(self.scene))
+            if self.path.suffix.lower() == STL:
+                write_pieces(timed(), file, about)
+            else:
+                for whole in timed():
+                    FORMATS[self.path.suffix.lower()](whole, file, about)
+        return None if several else mesh, simplified
 
 
 def metadata(scene: Scene) -> dict[str, str]:

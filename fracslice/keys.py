@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from functools import cache
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+import scipy
 
 HERE = Path(__file__).parent
 
@@ -69,5 +69,4 @@ def program() -> str:
     """
     native = (find_spec(f"{__package__}.{name}") for name in ("_native", "_slices"))
     compiled = (Path(found.origin) for found in native if found and found.origin)
-    versions = (version(name) for name in ("numpy", "scipy"))
-    return key(texts(*sorted(HERE.rglob("*.py")), *compiled), *versions)
+    return key(texts(*sorted(HERE.rglob("*.py")), *compiled), np.__version__, scipy.__version__)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 
@@ -12,11 +13,12 @@ def peak_rss_mb() -> float:
     Returns
     -------
     float
-        Peak memory, MiB.
+        Peak memory, MiB; 0 on a system that does not report it.
     """
-    import resource
-    import sys
-
+    try:
+        import resource
+    except ImportError:
+        return 0.0
     unit = 1 << 20 if sys.platform == "darwin" else 1 << 10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
@@ -27,9 +29,12 @@ def available_bytes() -> int:
     Returns
     -------
     int
-        Free memory in bytes, within the limits of the process's control group.
+        Free memory in bytes, within the limits of the process's control group; the address space on a system
+        that reports neither.
     """
-    free = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    free = sys.maxsize
+    if hasattr(os, "sysconf"):
+        free = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     for line in _lines("/proc/meminfo"):
         if line.startswith("MemAvailable:"):
             free = int(line.split()[1]) << 10

@@ -178,20 +178,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return dict(value)
     return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
-
-
-def version() -> str:
-    """Installed version of fracslice.
-
-    Returns
-    -------
-    str
-        Version, or "not installed".
-    """
-    from importlib.metadata import PackageNotFoundError
-    from importlib.metadata import version as installed
-
-    try:
-        return installed("fracslice")
-    except PackageNotFoundError:
-        return "not installed"

@@ -6,6 +6,7 @@ import hashlib
 import secrets
 from functools import cache
 
+from .errors import ExportError
 from .files import Kept, users_folder, warn
 
 SIZE = 32
@@ -37,6 +38,6 @@ def _secret() -> bytes:
         found = secrets.token_bytes(SIZE)
         try:
             kept.put("secret", lambda file: file.write(found))
-        except OSError as error:
-            warn(f"{kept.folder}: {error.strerror}: interrupted jobs will not go on")
+        except ExportError as error:
+            warn(f"{error}: interrupted jobs will not go on")
     return found

@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .errors import VolumeError
+from .errors import ExportError, VolumeError
 from .files import Kept
 from .kernel import Field
 from .kernel.objects import toolchain
@@ -63,8 +63,8 @@ class Store:
         made = make()
         try:
             kept.put(name, partial(_write, made))
-        except OSError as error:
-            raise VolumeError(f"{self.folder}: {error.strerror or error}") from None
+        except ExportError as error:
+            raise VolumeError(str(error)) from None
         return made
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING, TypeVar
 
 from .errors import Cancelled, SceneError
@@ -21,8 +23,18 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
-_POOL = ThreadPoolExecutor(256, "fracslice")
+_HERE = threading.local()
+
+
+def _mark() -> None:
+    _HERE.is_worker = True
+
+
+_POOL = ThreadPoolExecutor(256, "fracslice", initializer=_mark)
 """Worker threads, started on demand and kept: starting a thread takes longer than many tasks."""
+
+_AHEAD = 2
+"""Results of `Work.ordered` in memory, times the number of threads."""
 
 
 def _silent(stage: str, done: float) -> None:
@@ -38,7 +50,7 @@ class Work:
     threads
         Number of threads, at most 1024; default: all cores.
     progress
-        Called as ``progress(stage, fraction)`` from time to time.
+        Called as ``progress(stage, fraction)`` from time to time, from any thread.
     cancel
         Event that any thread may set; the job then raises `Cancelled` within a fraction of a second.
     store
@@ -102,6 +114,63 @@ class Work:
         self.map(numbered, range(len(items)))
         return [found[index] for index in range(len(items))]
 
+    def ordered(self, task: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
+        """Yield the results of a task in the order of the items, computed a few items ahead.
+
+        Within a task of another job it computes in the thread of that task, so that workers never wait for
+        workers.
+
+        Parameters
+        ----------
+        task
+            Function of one item.
+        items
+            Items.
+
+        Yields
+        ------
+        R
+            Results in the order of the items.
+
+        Raises
+        ------
+        Cancelled
+            If `cancel` is set.
+        """
+        if self.threads == 1 or getattr(_HERE, "is_worker", False):
+            for item in items:
+                self.check()
+                yield task(item)
+            return
+        lock, waiting, ahead, running = threading.Lock(), iter(items), deque[Future[R]](), 0
+
+        def fill(ended: int = 0) -> None:
+            nonlocal running
+            with lock:
+                running -= ended
+                free = min(self.threads - running, _AHEAD * self.threads - len(ahead))
+                begun = [_POOL.submit(task, item) for item in islice(waiting, max(free, 0))]
+                running += len(begun)
+                ahead.extend(begun)
+            for future in begun:
+                future.add_done_callback(lambda _: fill(1))
+
+        try:
+            fill()
+            while ahead:
+                result = ahead[0].result()
+                ahead.popleft()
+                fill()
+                self.check()
+                yield result
+        except KeyboardInterrupt:
+            self.cancel.set()
+            raise
+        finally:
+            with lock:
+                waiting = iter(())
+            wait([future for future in ahead if not future.cancel()])
+
     def map(self, task: Callable[[T], None], items: Sequence[T]) -> None:
         """Run a task on every item, in this thread and in workers.
 
@@ -154,6 +223,28 @@ class Work:
         self.check()
 
 
+def ahead(items: Iterator[T]) -> Iterator[T]:
+    """Compute each item in another thread while the consumer uses the one before.
+
+    Parameters
+    ----------
+    items
+        Items other than None.
+
+    Yields
+    ------
+    object
+        The same items.
+    """
+    coming = _POOL.submit(next, items, None)
+    try:
+        while (item := coming.result()) is not None:
+            coming = _POOL.submit(next, items, None)
+            yield item
+    finally:
+        wait([coming])
+
+
 def chunks(count: int, size: int) -> list[slice]:
     """Split a range of indices into slices.
 
@@ -181,11 +272,14 @@ class Clock:
     work
         Execution settings.
     seconds
-        Wall-clock time per stage, and "total", in seconds.
+        Wall-clock time per stage, and "total", in seconds. Stages may overlap.
+    begun
+        Time of the start, s.
     """
 
     work: Work
     seconds: dict[str, float] = field(default_factory=lambda: {"total": 0.0})
+    begun: float = field(default_factory=time.perf_counter)
 
     @contextmanager
     def __call__(self, stage: str) -> Iterator[None]:
@@ -205,7 +299,7 @@ class Clock:
         self.work.progress(stage, 0.0)
         started = time.perf_counter()
         yield
-        took = time.perf_counter() - started
-        for name in (stage, "total"):
-            self.seconds[name] = self.seconds.get(name, 0.0) + took
+        ended = time.perf_counter()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + ended - started
+        self.seconds["total"] = ended - self.begun
         self.work.progress(stage, 1.0)

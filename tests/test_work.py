@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
 
 import pytest
 
 from fracslice.errors import Cancelled
-from fracslice.work import Work
+from fracslice.work import Work, ahead
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7])
@@ -46,6 +47,45 @@ def test_maps_within_maps() -> None:
     assert len(set(done)) == len(done) == 400
 
 
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_ordered_results_keep_to_the_number_of_threads(threads: int) -> None:
+    lock, busy, most = threading.Lock(), 0, 0
+
+    def task(item: int) -> int:
+        nonlocal busy, most
+        with lock:
+            busy += 1
+            most = max(most, busy)
+        threading.Event().wait(1e-3 * (item % 3))
+        with lock:
+            busy -= 1
+        return item
+
+    assert list(Work(threads).ordered(task, range(50))) == list(range(50))
+    assert most <= threads
+
+
+def test_ordered_results_within_tasks_do_not_wait_for_each_other() -> None:
+    """More tasks than workers: each would wait for one that never begins."""
+    work = Work(1000)
+    inner = work.collect(lambda i: sum(work.ordered(lambda j: i * j, range(4))), range(600))
+    assert inner == [6 * i for i in range(600)]
+    assert sum(work.ordered(lambda i: sum(work.ordered(lambda j: j, range(3))), range(600))) == 1800
+
+
+def test_ordered_results_end_with_the_first_error() -> None:
+    begun: list[int] = []
+
+    def task(item: int) -> int:
+        begun.append(item)
+        return 1 // (item - 10)
+
+    with pytest.raises(ZeroDivisionError):
+        list(Work(3).ordered(task, range(1000)))
+    assert len(begun) < 100
+    assert begun.count(10) == 1
+
+
 def test_cancelled_work_stops() -> None:
     done: list[int] = []
     work = Work(2)
@@ -57,3 +97,41 @@ def test_cancelled_work_stops() -> None:
     with pytest.raises(Cancelled):
         work.map(task, range(1000))
     assert len(done) <= 2
+
+
+def test_the_next_item_is_computed_while_one_is_used() -> None:
+    used = threading.Event()
+
+    def items() -> Iterator[str]:
+        yield "first"
+        assert used.wait(10)
+        yield "last"
+
+    coming = ahead(items())
+    assert next(coming) == "first"
+    used.set()
+    assert list(coming) == ["last"]
+
+
+def test_an_error_of_the_next_item_reaches_the_consumer_of_the_first() -> None:
+    def items() -> Iterator[int]:
+        yield 1
+        raise Cancelled("stopped")
+
+    with pytest.raises(Cancelled):
+        list(ahead(items()))
+
+
+def test_an_error_of_the_consumer_waits_for_the_next_item() -> None:
+    done = list[str]()
+
+    def items() -> Iterator[int]:
+        yield 1
+        threading.Event().wait(0.05)
+        done.append("next")
+        yield 2
+
+    coming = ahead(items())
+    next(coming)
+    coming.close()  # type: ignore[attr-defined]
+    assert done == ["next"]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ..errors import SceneError
-from ..job import Result as Made
+from ..job import MeshResult
 from ..job import make_mesh as make_mesh_job
 from ..mesh import Mesh
 from ..meshjob import MeshJob
@@ -34,13 +34,13 @@ class Result(Mesh):
 
     Attributes
     ----------
-    made : Result
+    made : MeshResult
         Result of the mesh job.
     """
 
-    made: Made
+    made: MeshResult
 
-    def __init__(self, made: Made) -> None:
+    def __init__(self, made: MeshResult) -> None:
         object.__setattr__(self, "made", made)
 
     def __repr__(self) -> str:

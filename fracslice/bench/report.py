@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from ..errors import BenchError
 from ..export import replacing
 from ..extras import lacking
-from ..report import version
+from ..version import __version__
 from .runs import Measurement
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def write_report(found: list[Measurement], folder: Path) -> list[Path]:
     ExportError
         If a file cannot be written.
     """
-    about = {"version": version(), "machine": _machine()}
+    about = {"version": __version__, "machine": _machine()}
     numbers = about | {"measurements": [asdict(one) for one in found]}
     texts = {"report.md": _page(found, about), "numbers.json": json.dumps(numbers, indent=1) + "\n"}
     for name, text in texts.items():

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import BinaryIO
 
 from fracslice.errors import ExportError
 from fracslice.export import glb, obj, ply, stl, threemf
-from fracslice.export.files import check_target, replacing
+from fracslice.files import check_target, replacing
 from fracslice.mesh.model import Mesh
+from fracslice.version import __version__
 
 __all__ = ["FORMATS", "application", "check_format", "check_target", "replacing", "write"]
 
@@ -25,10 +25,7 @@ FORMATS: dict[str, Callable[[Mesh, BinaryIO, Mapping[str, str]], None]] = {
 
 def application() -> str:
     """Name and version of this program, for file metadata."""
-    try:
-        return f"fracslice {version('fracslice')}"
-    except PackageNotFoundError:
-        return "fracslice"
+    return f"fracslice {__version__}"
 
 
 def check_format(path: str | Path) -> str:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from fracslice.errors import ExportError
-from fracslice.export.files import replacing
+from fracslice.files import replacing
 
 IMAGES = (".png", ".exr", ".tif", ".tiff")
 
@@ -155,39 +156,22 @@ def exr(light: np.ndarray, text: Mapping[str, str]) -> bytes:
 
 
 def tiff(light: np.ndarray, text: Mapping[str, str]) -> bytes:
-    """Encode a TIFF file (Adobe 1992, revision 6.0): one strip of interleaved 32-bit floats, little-endian.
+    """Encode a TIFF file by tifffile: 32-bit floats, uncompressed.
 
     Parameters
     ----------
     light : ndarray, float32 [height, width, 3]
         Linear red, green and blue.
     text : mapping of str to str
-        Keywords and texts of the metadata.
+        Keywords and texts of the metadata, in the description.
 
     Returns
     -------
     bytes
     """
-    height, width, _ = light.shape
-    pixels = np.ascontiguousarray(light, "<f4").tobytes()
-    note = "\n".join(f"{k}: {v}" for k, v in text.items()).encode() + b"\0"
-    heads = 8 + len(pixels)
-    depths, formats, metadata = heads, heads + 6, heads + 12
-    entries = [
-        (256, 4, 1, width),
-        (257, 4, 1, height),
-        (258, 3, 3, depths),
-        (259, 3, 1, 1),
-        (262, 3, 1, 2),
-        (270, 2, len(note), metadata),
-        (273, 4, 1, 8),
-        (277, 3, 1, 3),
-        (278, 4, 1, height),
-        (279, 4, 1, len(pixels)),
-        (284, 3, 1, 1),
-        (339, 3, 3, formats),
-    ]
-    start = metadata + len(note) + len(note) % 2
-    table = struct.pack("<H", len(entries)) + b"".join(struct.pack("<HHII", *e) for e in entries) + bytes(4)
-    tail = struct.pack("<6H", 32, 32, 32, 3, 3, 3) + note + bytes(len(note) % 2) + table
-    return struct.pack("<2sHI", b"II", 42, start) + pixels + tail
+    from tifffile import imwrite
+
+    file, note = BytesIO(), "\n".join(f"{k}: {v}" for k, v in text.items())
+    pixels = np.ascontiguousarray(light, np.float32)
+    imwrite(file, pixels, photometric="rgb", description=note.encode(), metadata=None, software=False)
+    return file.getvalue()

@@ -1,25 +1,21 @@
-"""Shared parts of the layer formats: the slice run, and archives that are written layer by layer."""
+"""Slice runs, and the ways in which their layers get into a file or a folder."""
 
 from __future__ import annotations
 
 import json
-import struct
-import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import BinaryIO
-
-from isal.isal_zlib import crc32
 
 from fracslice.errors import ExportError
-from fracslice.export.files import into_place
-from fracslice.export.resuming import remainder
+from fracslice.export.resuming import Journal, journal, resumable_folder
+from fracslice.files import put, replacing
 from fracslice.formulas.parameters import Vector, validate
 from fracslice.kernel.objects import toolchain
 from fracslice.keys import key, program
-from fracslice.slicing import Slicer, Stack
+from fracslice.mesh.model import Mesh
+from fracslice.slicing import Layer, Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 
@@ -42,6 +38,8 @@ class SliceRun:
         Exposure of each layer and of the first, s.
     metadata : dict of str to str
         Names and values for the files, "scene_hash" among them.
+    mesh : callable, optional
+        Makes the mesh of the object for 3MF files, mm, standing on z = 0 and centred as the layers are.
 
     Raises
     ------
@@ -54,6 +52,7 @@ class SliceRun:
     work: Work = field(default_factory=Work)
     exposure: tuple[float, float] = (8.0, 35.0)
     metadata: dict[str, str] = field(default_factory=dict)
+    mesh: Callable[[], Mesh] | None = None
 
     def __post_init__(self) -> None:
         validate(self, {"exposure": EXPOSURE}, ExportError)
@@ -106,113 +105,103 @@ class SliceRun:
         }
         return json.dumps(manifest, indent=1).encode()
 
-
-@dataclass(frozen=True, eq=False)
-class Stored:
-    """A ZIP file of stored members without times; the central directory is written at the end.
-
-    Attributes
-    ----------
-    file : file
-        Binary file, open for reading and writing.
-    members : list of ZipInfo
-        The members written so far.
-    """
-
-    file: BinaryIO
-    members: list[zipfile.ZipInfo]
-
-    @property
-    def names(self) -> set[str]:
-        """Names of the members."""
-        return {info.filename for info in self.members}
-
-    def add(self, name: str, data: bytes) -> None:
-        """Append a member.
+    @contextmanager
+    def encoded(
+        self, path: str | Path, form: str | bytes, encode: Callable[[Layer], bytes]
+    ) -> Iterator[Journal]:
+        """Encode all layers of a file; an interrupted job resumes.
 
         Parameters
         ----------
-        name : str
-            Name of the member.
-        data : bytes
-            Contents.
+        path : str or path
+            The file that the layers are for.
+        form : str or bytes
+            File format.
+        encode : callable
+            Encodes a layer.
+
+        Yields
+        ------
+        Journal
+            The encoded layers, to be written before the block ends.
+
+        Raises
+        ------
+        ExportError
+            For an error of the file system.
         """
-        info = _info(name, crc32(data), len(data))
-        info.header_offset = _end(self.members)
-        self.file.write(info.FileHeader())
-        self.file.write(data)
-        self.members.append(info)
+        with journal(path, self.key(form)) as layers:
+            for data in self.slicer.map(encode, range(layers.count, self.layers)):
+                layers.append(data)
+            yield layers
 
-    def close(self) -> None:
-        """Write the central directory."""
-        with zipfile.ZipFile(self.file, "w") as archive:
-            archive.filelist.extend(self.members)
+    def into_file(self, path: str | Path, head: bytes, encode: Callable[[Layer], bytes], tail: bytes) -> Path:
+        """Write a head, the encoded layers and a tail to one file; an interrupted job resumes.
 
+        Parameters
+        ----------
+        path : str or path
+            The file to write.
+        head, tail : bytes
+            Text before and after the layers.
+        encode : callable
+            Encodes a layer.
 
-@contextmanager
-def resumable_zip(path: Path, job: str) -> Iterator[Stored]:
-    """Write a stored ZIP file that appears at `path` when the block ends.
+        Returns
+        -------
+        Path
 
-    An interrupted block leaves a `remainder`; the next one resumes after its last complete member.
+        Raises
+        ------
+        ExportError
+            For an error of the file system.
+        """
+        with self.encoded(path, head, encode) as layers, replacing(path) as file:
+            file.write(head)
+            file.writelines(layers)
+            file.write(tail)
+        return Path(path)
 
-    Parameters
-    ----------
-    path : Path
-        The file to write.
-    job : str
-        Key of everything that determines the bytes.
+    def into_folder(
+        self,
+        path: str | Path,
+        ending: str,
+        encode: Callable[[Layer], bytes],
+        is_whole: Callable[[bytes], bool],
+        also: Mapping[str, bytes],
+    ) -> Path:
+        """Write a folder of files 00000.png, ..., one for each layer.
 
-    Yields
-    ------
-    Stored
+        A folder left by an interrupted run of the same job is resumed after its last complete layer.
 
-    Raises
-    ------
-    ExportError
-        As `remainder`.
-    """
-    with remainder(path, job) as file:
-        whole = _members(file)
-        file.seek(_end(whole))
-        file.truncate()
-        archive = Stored(file, whole)
-        yield archive
-        archive.close()
-        into_place(file, path)
+        Parameters
+        ----------
+        path : str or path
+            The folder; it must be new, empty, or left by an interrupted job.
+        ending : str
+            Extension of the files.
+        encode : callable
+            Encodes a layer.
+        is_whole : callable
+            True if the bytes are a complete file.
+        also : mapping of str to bytes
+            Further files by name, written last.
 
+        Returns
+        -------
+        Path
 
-_HEADER = struct.Struct("<4s5H3L2H")
-
-
-def _members(file: BinaryIO) -> list[zipfile.ZipInfo]:
-    """Complete stored members at the start of a file."""
-    found: list[zipfile.ZipInfo] = []
-    while len(head := file.read(_HEADER.size)) == _HEADER.size:
-        signature, _, flags, method, _, _, crc, size, _, name_size, extra_size = _HEADER.unpack(head)
-        if signature != b"PK\x03\x04" or method != 0 or flags & 8:
-            break
-        name = file.read(name_size).decode()
-        file.seek(extra_size, 1)
-        data = file.read(size)
-        if len(data) != size or crc32(data) != crc:
-            break
-        info = _info(name, crc, size)
-        info.header_offset = _end(found)
-        found.append(info)
-    return found
-
-
-def _info(name: str, crc: int, size: int) -> zipfile.ZipInfo:
-    """Header of a stored member without a time."""
-    info = zipfile.ZipInfo(name)
-    info.CRC, info.file_size, info.compress_size = crc, size, size
-    info.external_attr = 0o644 << 16
-    return info
-
-
-def _end(members: list[zipfile.ZipInfo]) -> int:
-    """Offset of the next member."""
-    if not members:
-        return 0
-    last = members[-1]
-    return last.header_offset + _HEADER.size + len(last.filename.encode()) + last.file_size
+        Raises
+        ------
+        ExportError
+            For a folder with other files, or an error of the file system.
+        """
+        folder, name = Path(path), f"{{:05d}}.{ending}".format
+        with resumable_folder(folder, self.key(ending), name, is_whole) as start:
+            layers = range(start, self.layers)
+            for _ in self.slicer.map(lambda k: put(f"{folder}/{name(k.index)}", encode(k)), layers):
+                pass
+            for other, data in also.items():
+                with replacing(folder / other) as file:
+                    file.write(data)
+        return folder

@@ -9,29 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice.errors import ExportError
-from fracslice.export.files import put, reason, replacing
 from fracslice.export.jobs import SliceRun
-from fracslice.export.journal import journal
-from fracslice.export.resuming import JOB, resumable_folder
 from fracslice.slicing import Contours, Layer
 
 MICRON = 0.001
 """Unit of Common Layer Interface files, mm."""
-
-
-def _streamed(
-    run: SliceRun, path: str | Path, head: bytes, make: Callable[[Layer], bytes], tail: bytes
-) -> Path:
-    """Write a head, the encoded layers and a tail to one file; an interrupted job resumes."""
-    with journal(path, run.key(head)) as kept:
-        for layer in run.slicer.map(make, range(kept.count, run.layers)):
-            kept.append(layer)
-        with replacing(path) as file:
-            file.write(head)
-            file.writelines(kept)
-            file.write(tail)
-    return Path(path)
 
 
 def _pairs(points: np.ndarray, template: str, between: str) -> str:
@@ -39,10 +21,10 @@ def _pairs(points: np.ndarray, template: str, between: str) -> str:
     return between.join([template] * len(points)) % tuple(points.ravel().tolist())
 
 
-def _holes(found: Contours) -> np.ndarray:
+def _holes(rings: Contours) -> np.ndarray:
     """Mask of the contours that are holes, bool [m]: contours at an odd nesting depth."""
-    depth = np.zeros(len(found), np.int32)
-    for i, parent in enumerate(found.parent):
+    depth = np.zeros(len(rings), np.int32)
+    for i, parent in enumerate(rings.parent):
         depth[i] = depth[parent] + 1 if parent >= 0 else 0
     return np.asarray(depth % 2 == 1)
 
@@ -70,7 +52,7 @@ def _head(run: SliceRun, namespaces: str = "") -> str:
 def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
     """Write a folder with an SVG file for each layer: one path with all contours, in mm.
 
-    An interrupted job resumes, as with `pictures.write_folder`.
+    An interrupted job resumes.
 
     Parameters
     ----------
@@ -88,27 +70,14 @@ def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
     ExportError
         For a folder with other files, or an error of the file system.
     """
-    folder = Path(path)
-
-    name = "{:05d}.svg".format
-    start = resumable_folder(folder, run.key("svg"), name, lambda data: data.endswith(b"</svg>\n"))
 
     def make(layer: Layer) -> bytes:
-        found = layer.contours
-        d = " ".join("M" + _pairs(_down(run, found[i]), "%.4f,%.4f", " ") + "z" for i in range(len(found)))
+        rings = layer.contours
+        d = " ".join("M" + _pairs(_down(run, rings[i]), "%.4f,%.4f", " ") + "z" for i in range(len(rings)))
         title = f"<title>top {layer.top:.6g} mm, height {layer.height:.6g} mm</title>"
         return f'{_head(run)}{title}\n<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
 
-    def write(layer: Layer) -> None:
-        try:
-            put(f"{folder}/{name(layer.index)}", make(layer))
-        except OSError as error:
-            raise ExportError(f"{folder}: {reason(error)}") from error
-
-    for _ in run.slicer.map(write, range(start, run.layers)):
-        pass
-    (folder / JOB).unlink()
-    return folder
+    return run.into_folder(path, "svg", make, lambda data: data.endswith(b"</svg>\n"), {})
 
 
 def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
@@ -132,16 +101,16 @@ def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
     """
 
     def make(layer: Layer) -> bytes:
-        found = layer.contours
+        rings = layer.contours
         lines = [f'<g id="layer{layer.index}" slic3r:z="{layer.top:.6g}">']
-        for i, hole in enumerate(_holes(found)):
+        for i, hole in enumerate(_holes(rings)):
             kind, fill = ("hole", "black") if hole else ("contour", "white")
-            points = _pairs(_down(run, found[i]), "%.4f,%.4f", " ")
+            points = _pairs(_down(run, rings[i]), "%.4f,%.4f", " ")
             lines.append(f'<polygon slic3r:type="{kind}" points="{points}" style="fill: {fill}"/>')
         return ("\n".join([*lines, "</g>"]) + "\n").encode()
 
     head = _head(run, ' xmlns:slic3r="http://slic3r.org/namespaces/slic3r"')
-    return _streamed(run, path, head.encode(), make, b"</svg>\n")
+    return run.into_file(path, head.encode(), make, b"</svg>\n")
 
 
 # --- Common Layer Interface, version 2.0 (1994)
@@ -164,7 +133,7 @@ def write_cli(run: SliceRun, path: str | Path) -> Path:
     ExportError
         For an error of the file system.
     """
-    return _streamed(run, path, _cli_head(run, "ASCII") + b"$$GEOMETRYSTART\n", _cli_text, b"$$GEOMETRYEND\n")
+    return run.into_file(path, _cli_head(run, "ASCII") + b"$$GEOMETRYSTART\n", _cli_text, b"$$GEOMETRYEND\n")
 
 
 def write_cli_binary(run: SliceRun, path: str | Path) -> Path:
@@ -186,7 +155,7 @@ def write_cli_binary(run: SliceRun, path: str | Path) -> Path:
     ExportError
         For an error of the file system.
     """
-    return _streamed(run, path, _cli_head(run, "BINARY").rstrip(b"\n"), _cli_bytes, b"")
+    return run.into_file(path, _cli_head(run, "BINARY").rstrip(b"\n"), _cli_bytes, b"")
 
 
 def _cli_head(run: SliceRun, kind: str) -> bytes:
@@ -208,21 +177,24 @@ def _closed(points: np.ndarray) -> np.ndarray:
 
 
 def _cli_text(layer: Layer) -> bytes:
-    found = layer.contours
+    rings = layer.contours
     lines = [f"$$LAYER/{layer.top / MICRON:.3f}"]
-    for i, hole in enumerate(_holes(found)):
-        points = _closed(found[i])
+    for i, hole in enumerate(_holes(rings)):
+        points = _closed(rings[i])
         lines.append(f"$$POLYLINE/1,{0 if hole else 1},{len(points)}," + _pairs(points, "%.3f,%.3f", ","))
     return ("\n".join(lines) + "\n").encode()
 
 
 def _cli_bytes(layer: Layer) -> bytes:
-    found = layer.contours
-    parts = [struct.pack("<Hf", 127, layer.top / MICRON)]
-    for i, hole in enumerate(_holes(found)):
-        points = _closed(found[i])
-        parts += [struct.pack("<Hiii", 130, 1, 0 if hole else 1, len(points)), points.astype("<f4").tobytes()]
-    return b"".join(parts)
+    rings = layer.contours
+    commands = [struct.pack("<Hf", 127, layer.top / MICRON)]
+    for i, hole in enumerate(_holes(rings)):
+        points = _closed(rings[i])
+        commands += [
+            struct.pack("<Hiii", 130, 1, 0 if hole else 1, len(points)),
+            points.astype("<f4").tobytes(),
+        ]
+    return b"".join(commands)
 
 
 # --- JSON
@@ -250,16 +222,16 @@ def write_json(run: SliceRun, path: str | Path) -> Path:
     opening = json.dumps(head)[:-1] + ', "unit": "mm", "layers": ['
 
     def make(layer: Layer) -> bytes:
-        found = layer.contours
-        rings = ", ".join(
-            f'{{"parent": {parent}, "points": [{_pairs(found[i], "[%.6g,%.6g]", ",")}]}}'
-            for i, parent in enumerate(found.parent)
+        rings = layer.contours
+        polygons = ", ".join(
+            f'{{"parent": {parent}, "points": [{_pairs(rings[i], "[%.6g,%.6g]", ",")}]}}'
+            for i, parent in enumerate(rings.parent)
         )
         comma = "," if layer.index else ""
         begin = f'{comma}\n{{"top": {layer.top:.6g}, "height": {layer.height:.6g}'
-        return f'{begin}, "contours": [{rings}]}}'.encode()
+        return f'{begin}, "contours": [{polygons}]}}'.encode()
 
-    return _streamed(run, path, opening.encode(), make, b"\n]}\n")
+    return run.into_file(path, opening.encode(), make, b"\n]}\n")
 
 
 WRITERS: dict[str, Callable[[SliceRun, str | Path], Path]] = {

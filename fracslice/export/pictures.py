@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
+import zipfile
+from functools import partial
 from pathlib import Path
 
 from fracslice.errors import ExportError
 from fracslice.export import png
-from fracslice.export.files import put, reason, replacing
-from fracslice.export.jobs import SliceRun, resumable_zip
-from fracslice.export.resuming import JOB, resumable_folder
-from fracslice.slicing import Layer
+from fracslice.export.jobs import SliceRun
+from fracslice.files import replacing
 
 MOST_MEMBERS = 65_535
 
@@ -18,8 +18,7 @@ MOST_MEMBERS = 65_535
 def write_folder(run: SliceRun, path: str | Path) -> Path:
     """Write a folder of pictures 00000.png, ... and, last, manifest.json.
 
-    A folder left by an interrupted run of the same job, by its job.json, is resumed after its last complete
-    picture.
+    An interrupted job resumes.
 
     Parameters
     ----------
@@ -37,22 +36,8 @@ def write_folder(run: SliceRun, path: str | Path) -> Path:
     ExportError
         For a folder with other files, or an error of the file system.
     """
-    folder = Path(path)
-    start = resumable_folder(folder, run.key("png"), "{:05d}.png".format, png.is_whole)
-
-    def write(layer: Layer) -> None:
-        data = png.encode_layer(run.screen, layer)
-        try:
-            put(f"{folder}/{layer.index:05d}.png", data)
-        except OSError as error:
-            raise ExportError(f"{folder}: {reason(error)}") from error
-
-    for _ in run.slicer.map(write, range(start, run.layers)):
-        pass
-    with replacing(folder / "manifest.json") as file:
-        file.write(run.describe())
-    (folder / JOB).unlink()
-    return folder
+    encode = partial(png.encode_layer, run.screen)
+    return run.into_folder(path, "png", encode, png.is_whole, {"manifest.json": run.describe()})
 
 
 def write_sl1(run: SliceRun, path: str | Path) -> Path:
@@ -77,7 +62,6 @@ def write_sl1(run: SliceRun, path: str | Path) -> Path:
         Without a printer, for layers of unequal heights, which the format cannot express, for too many
         layers, or for an error of the file system.
     """
-    target = Path(path)
     if not run.screen.printer:
         raise ExportError(f"{path}: an SL1 archive needs a printer")
     heights = run.stack.heights
@@ -85,20 +69,22 @@ def write_sl1(run: SliceRun, path: str | Path) -> Path:
         raise ExportError(f"{path}: an SL1 archive has layers of one height; others take a range of heights")
     if run.layers >= MOST_MEMBERS:
         raise ExportError(f"{path}: {run.layers} layers are too many for an archive")
-    name = target.stem
+    name = Path(path).stem
     about = {
         "config.ini": _ini(_config(run, name)),
         "fracslice.json": run.describe(),
         "prusaslicer.ini": _ini(_settings(run)),
     }
-    with resumable_zip(target, run.key(f"sl1 {name}")) as archive:
-        for member, data in list(about.items())[len(archive.members) :]:
-            archive.add(member, data)
-        start = len(archive.members) - len(about)
-        pictures = run.slicer.map(lambda layer: png.encode_layer(run.screen, layer), range(start, run.layers))
-        for index, data in enumerate(pictures, start):
-            archive.add(f"{name}{index:05d}.png", data)
-    return target
+    with (
+        run.encoded(path, "png", partial(png.encode_layer, run.screen)) as layers,
+        replacing(path) as file,
+        zipfile.ZipFile(file, "w") as archive,
+    ):
+        for member, data in about.items():
+            archive.writestr(zipfile.ZipInfo(member), data)
+        for index, data in enumerate(layers):
+            archive.writestr(zipfile.ZipInfo(f"{name}{index:05d}.png"), data)
+    return Path(path)
 
 
 def _ini(values: dict[str, object]) -> bytes:

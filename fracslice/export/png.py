@@ -56,5 +56,6 @@ def _chunk(kind: bytes, data: bytes) -> tuple[bytes, bytes, bytes, bytes]:
 
 
 def is_whole(data: bytes) -> bool:
-    """True if the bytes begin and end like a PNG file."""
-    return data.startswith(SIGNATURE) and data.endswith(b"IEND\xaeB`\x82")
+    """True if the bytes are a complete file of `encode`: its last chunk is there, its image undamaged."""
+    image = data[len(SIGNATURE) + 25 : -12]  # after IHDR, before IEND
+    return data.endswith(b"IEND\xaeB`\x82") and crc32(image[4:-4]) == int.from_bytes(image[-4:])

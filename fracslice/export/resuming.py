@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
+import struct
 import warnings
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from fracslice import files
 from fracslice.errors import ExportError, FracsliceWarning
-from fracslice.export.files import check_target, reason
+from fracslice.files import check_target, replacing, reported
+from fracslice.private import OWNER_ONLY, opened
 from fracslice.seals import seal
 
 JOB = "job.json"
@@ -24,14 +26,68 @@ OURS = b'{"application": "fracslice", '
 LAYER = re.compile(r"\d{5,}\.(png|svg)")
 """Names of layer files in a folder."""
 
+_HEAD = struct.Struct("<II")
+"""Header of a record: length and CRC-32 of the data."""
+
+
+@dataclass(eq=False)
+class Journal:
+    """The finished layers of a job.
+
+    Attributes
+    ----------
+    file : file
+        Binary file, open for reading and writing.
+    count : int
+        Number of finished layers.
+    """
+
+    file: BinaryIO
+    count: int = 0
+
+    def append(self, layer: bytes) -> None:
+        """Append the next layer.
+
+        Parameters
+        ----------
+        layer : bytes
+            The encoded layer.
+        """
+        self.file.write(_HEAD.pack(len(layer), zlib.crc32(layer)) + layer)
+        self.count += 1
+
+    def __iter__(self) -> Iterator[bytes]:
+        """Iterate over all layers in order. Raises `ExportError` if a record cannot be read back."""
+        self.file.seek(0)
+        for _ in range(self.count):
+            layer = self.next()
+            if layer is None:
+                raise ExportError("the finished layers cannot be read back")
+            yield layer
+
+    def next(self) -> bytes | None:
+        """Read the next record.
+
+        Returns
+        -------
+        bytes or None
+            The encoded layer; None if it is missing, incomplete or damaged.
+        """
+        head = self.file.read(_HEAD.size)
+        if len(head) < _HEAD.size:
+            return None
+        size, crc = _HEAD.unpack(head)
+        data = self.file.read(size)
+        return data if len(data) == size and zlib.crc32(data) == crc else None
+
 
 @contextmanager
-def remainder(path: str | Path, job: str) -> Iterator[BinaryIO]:
-    """Open the partial file that an interrupted job left; empty if there is none.
+def journal(path: str | Path, job: str) -> Iterator[Journal]:
+    """Open the journal of a job, truncated after the last complete layer that an interrupted job left.
 
-    The partial file is hidden beside the target; a second hidden file identifies its job. Both are removed
-    when the block ends and kept when it is interrupted. A partial file of another job or another user is
-    discarded with a warning.
+    The journal is hidden beside the target; a second hidden file identifies its job. Both are removed when
+    the block ends and kept when it is interrupted. A journal of another job or another user is discarded
+    with a warning.
 
     Parameters
     ----------
@@ -42,8 +98,7 @@ def remainder(path: str | Path, job: str) -> Iterator[BinaryIO]:
 
     Yields
     ------
-    file
-        Binary file, open for reading and writing.
+    Journal
 
     Raises
     ------
@@ -52,28 +107,32 @@ def remainder(path: str | Path, job: str) -> Iterator[BinaryIO]:
     """
     target = check_target(path)
     part, manifest = (target.with_name(f".{target.name}.{end}") for end in ("part", "job"))
-    try:
+    with reported(path):
         _remove_foreign(part)
-        with files.opened(part, "r+b", os.O_CREAT) as file:
+        with opened(part, "r+b", os.O_CREAT) as file:
             _lock(file, path)
             if _read(manifest) != _manifest(job):
                 if os.fstat(file.fileno()).st_size:
-                    _tell(path)
+                    _warn_discarded(path)
                 manifest.unlink(missing_ok=True)
                 file.truncate()
                 os.fsync(file.fileno())  # else, after a power cut, the new job could own the old data
                 _write_manifest(manifest, job)
-            yield file
+            layers, end = Journal(file), 0
+            while layers.next() is not None:
+                layers.count, end = layers.count + 1, file.tell()
+            file.seek(end)
+            file.truncate()
+            yield layers
         manifest.unlink(missing_ok=True)
         part.unlink(missing_ok=True)
-    except OSError as error:
-        raise ExportError(f"{path}: {reason(error)}") from error
 
 
+@contextmanager
 def resumable_folder(
     folder: Path, job: str, name: Callable[[int], str], is_whole: Callable[[bytes], bool]
-) -> int:
-    """Make the folder of a job, or count the complete layers that an interrupted job left in it.
+) -> Iterator[int]:
+    """Make the folder of a job, or resume the one that an interrupted job left.
 
     Layers of another interrupted job are removed with a warning.
 
@@ -88,8 +147,8 @@ def resumable_folder(
     is_whole : callable
         True if the bytes are a complete layer file.
 
-    Returns
-    -------
+    Yields
+    ------
     int
         Index of the first layer to write.
 
@@ -98,15 +157,15 @@ def resumable_folder(
     ExportError
         For a folder with other files, or an error of the file system.
     """
-    try:
+    with reported(folder):
         folder.mkdir(exist_ok=True)
         names = set(os.listdir(folder))
         manifest = _read(folder / JOB)
         if names and not (manifest.startswith(OURS) and all(n == JOB or LAYER.fullmatch(n) for n in names)):
-            raise ExportError(f"{folder}: the folder is not empty, and what is in it is no interrupted job")
+            raise ExportError(f"{folder}: the folder is not empty, and its files are no interrupted job")
         if manifest != _manifest(job):
             if names:
-                _tell(folder)
+                _warn_discarded(folder)
             for layer in sorted(names - {JOB}):
                 (folder / layer).unlink()
             names = set()
@@ -114,22 +173,21 @@ def resumable_folder(
         index = 0
         while name(index) in names and is_whole((folder / name(index)).read_bytes()):
             index += 1
-        return index
-    except OSError as error:
-        raise ExportError(f"{folder}: {reason(error)}") from error
+        yield index
+        (folder / JOB).unlink()
 
 
 def _read(manifest: Path) -> bytes:
     """Contents of a job file; empty if it is missing or others can have written it."""
     try:
-        with files.opened(manifest, "rb") as file:
+        with opened(manifest, "rb") as file:
             return file.read()
     except OSError:
         return b""
 
 
 def _write_manifest(manifest: Path, job: str) -> None:
-    with files.replacing(manifest) as file:
+    with replacing(manifest, OWNER_ONLY) as file:
         file.write(_manifest(job))
 
 
@@ -137,15 +195,15 @@ def _manifest(job: str) -> bytes:
     return OURS + f'"job": "{seal(job)}"}}'.encode()
 
 
-def _tell(path: str | Path) -> None:
-    manifest = f"{path}: what was left there by another job, or somebody else, is dropped; begun afresh"
-    warnings.warn(manifest, FracsliceWarning, stacklevel=2)
+def _warn_discarded(path: str | Path) -> None:
+    text = f"{path}: layers left by another job or another user are discarded; begun afresh"
+    warnings.warn(text, FracsliceWarning, stacklevel=2)
 
 
 def _remove_foreign(part: Path) -> None:
-    """Remove an entry in place of the partial file, such as a link, that others can write."""
+    """Remove an entry in place of the journal, such as a link, that others can write."""
     try:
-        with files.opened(part, "rb"):
+        with opened(part, "rb"):
             return
     except FileNotFoundError:
         return
@@ -154,9 +212,17 @@ def _remove_foreign(part: Path) -> None:
 
 
 def _lock(file: BinaryIO, path: str | Path) -> None:
+    """Lock a file against other processes, where the file system supports it."""
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise ExportError(f"{path}: another process is at it") from None
+        try:
+            import fcntl
+        except ImportError:
+            import msvcrt
+
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+        else:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        raise ExportError(f"{path}: another process is writing it") from None
     except OSError:
         pass  # some file systems have no locks

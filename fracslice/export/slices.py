@@ -7,8 +7,8 @@ from pathlib import Path
 
 from fracslice.errors import ExportError
 from fracslice.export import outlines, pictures, slices3mf
-from fracslice.export.files import check_target
 from fracslice.export.jobs import SliceRun
+from fracslice.files import check_target
 
 FORMATS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
     "png": pictures.write_folder,

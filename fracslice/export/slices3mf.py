@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import zipfile
-from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from fracslice.export.files import replacing
+from fracslice.errors import ExportError
 from fracslice.export.jobs import SliceRun
-from fracslice.export.journal import journal
 from fracslice.export.text import rows
-from fracslice.export.threemf import RELATIONS, TYPES, mesh_element
-from fracslice.mesh import Mesh
-from fracslice.mesh.clean import clean
-from fracslice.mesh.components import select
-from fracslice.mesh.extract import contour
-from fracslice.meshjob import DUST, RESOLUTION
+from fracslice.export.threemf import mesh_element, package
+from fracslice.files import replacing
 from fracslice.slicing import Layer
 
 LEVEL = 1
@@ -29,6 +23,11 @@ HEAD = (
     '<metadata name="Application">fracslice</metadata>\n<resources>\n<s:slicestack id="1" zbottom="0">\n'
 )
 OBJECT = '</s:slicestack>\n<object id="2" type="model" s:slicestackid="1" s:meshresolution="fullres">'
+BUILD = (
+    "</object>\n</resources>\n<build>"
+    '<item objectid="2" transform="1 0 0 0 1 0 0 0 1 {:.6f} {:.6f} 0"/></build>\n</model>\n'
+)
+"""Tail of the model. Objects are centred; coordinates of the build must not be negative."""
 
 
 def write_3mf(run: SliceRun, path: str | Path) -> Path:
@@ -37,7 +36,7 @@ def write_3mf(run: SliceRun, path: str | Path) -> Path:
     Parameters
     ----------
     run : SliceRun
-        The layers to write.
+        The layers to write, with a mesh.
     path : str or path
         The file to write.
 
@@ -48,63 +47,30 @@ def write_3mf(run: SliceRun, path: str | Path) -> Path:
     Raises
     ------
     ExportError
-        For an error of the file system.
+        Without a mesh, or for an error of the file system.
     """
-    mesh = _mesh(run)
-    with journal(path, run.key("3mf")) as kept:
-        for slice_ in run.slicer.map(lambda layer: _slice(run, layer), range(kept.count, run.layers)):
-            kept.append(slice_)
-        with (
-            replacing(path) as file,
-            zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive,
-        ):
-            for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS)):
-                with archive.open(name, "w") as part:
-                    part.write(text.encode())
-            with archive.open("3D/3dmodel.model", "w", force_zip64=run.layers > 1000) as part:
-                part.write(HEAD.encode())
-                part.writelines(kept)
-                part.write(OBJECT.encode())
-                part.writelines(mesh_element(mesh))
-                part.write(b'</object>\n</resources>\n<build><item objectid="2"/></build>\n</model>\n')
+    if run.mesh is None:
+        raise ExportError(f"{path}: a 3MF file needs the mesh of the object")
+    with run.encoded(path, "3mf", _slice) as layers:
+        middle = np.array(run.stack.shape[::-1]) * run.stack.pixel / 2
+        build, mesh = BUILD.format(*middle).encode(), run.mesh()
+        model = chain([HEAD.encode()], layers, [OBJECT.encode()], mesh_element(mesh), [build])
+        with replacing(path) as file:
+            package(file, model, run.layers > 1000, LEVEL)
     return Path(path)
 
 
-def _slice(run: SliceRun, layer: Layer) -> bytes:
-    found = layer.contours
-    parts = [f'<s:slice ztop="{layer.top:.6f}">\n'.encode()]
-    if len(found):
-        parts += [
-            b"<s:vertices>\n",
-            *rows('<s:vertex x="%.5f" y="%.5f"/>\n', found.points + _middle(run)),
-            b"</s:vertices>\n",
-        ]
-    for first, end in zip(found.starts[:-1], found.starts[1:], strict=True):
+def _slice(layer: Layer) -> bytes:
+    rings = layer.contours
+    texts = [f'<s:slice ztop="{layer.top:.6f}">\n'.encode()]
+    if len(rings):
+        vertices = rows('<s:vertex x="%.5f" y="%.5f"/>\n', rings.points)
+        texts += [b"<s:vertices>\n", *vertices, b"</s:vertices>\n"]
+    for first, end in zip(rings.starts[:-1], rings.starts[1:], strict=True):
         following = np.concatenate([np.arange(first + 1, end), [first]])
-        parts += [
+        texts += [
             f'<s:polygon startv="{first}">\n'.encode(),
             *rows('<s:segment v2="%d"/>\n', following[:, None]),
+            b"</s:polygon>\n",
         ]
-        parts.append(b"</s:polygon>\n")
-    return b"".join([*parts, b"</s:slice>\n"])
-
-
-def _middle(run: SliceRun) -> np.ndarray:
-    """Offset from the window's corner to its middle: build coordinates must not be negative."""
-    return np.array(run.stack.shape[::-1]) * run.stack.pixel / 2
-
-
-def _mesh(run: SliceRun) -> Mesh:
-    """Mesh of the object in mm, aligned with its slices."""
-    from fracslice.printing.connectivity import shown  # imported here: only this format needs Numba
-
-    stack, longest = run.stack, max(run.stack.size)
-    finest = max(*stack.pixel, float(stack.heights.max()))
-    samples = min(longest / finest, RESOLUTION)
-    bricks = shown(stack.root, stack.outer, longest / stack.scale, samples, run.work)
-    run.work.progress("meshing", 0.0)
-    found = contour(stack.root, bricks, run.work)
-    bottom = float(stack.z[0]) - float(stack.heights[0]) / stack.scale / 2
-    placed = replace(found, vertices=(found.vertices - (*stack.corner, bottom)) * stack.scale)
-    whole, _ = select(placed, keep="all", dust_mm3=DUST * placed.volume, cavities="keep")
-    return clean(whole)
+    return b"".join([*texts, b"</s:slice>\n"])

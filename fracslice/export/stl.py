@@ -68,4 +68,4 @@ def _write_triangles(mesh: Mesh, file: BinaryIO) -> None:
     from fracslice._native import stl
 
     for begin in range(0, len(mesh.triangles), BLOCK):
-        file.write(stl(mesh.vertices, mesh.triangles[begin : begin + BLOCK], 1).data)
+        file.write(stl(mesh.vertices, mesh.triangles[begin : begin + BLOCK]).data)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
+from html import escape
 from typing import BinaryIO
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
@@ -46,17 +46,28 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
     metadata : mapping of str to str
         Names and values; names that 3MF does not define get fracslice's namespace.
     """
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
-        _add(archive, "[Content_Types].xml", [TYPES.encode()])
-        _add(archive, "_rels/.rels", [RELATIONS.encode()])
-        _add(archive, "3D/3dmodel.model", _model(mesh, metadata), _is_large(mesh))
+    package(file, _model(mesh, metadata), _is_large(mesh), LEVEL)
 
 
-def _add(archive: zipfile.ZipFile, name: str, texts: Iterable[bytes], large: bool = False) -> None:
-    """Stream a member. Opened by name it carries no time, unlike a member of `zipfile.ZipFile.writestr`."""
-    with archive.open(name, "w", force_zip64=large) as part:
-        for text in texts:
-            part.write(text)
+def package(file: BinaryIO, model: Iterable[bytes], is_large: bool, level: int) -> None:
+    """Write a package with one model, streamed. Members opened by name carry no time.
+
+    Parameters
+    ----------
+    file : file
+        Binary file, open for writing.
+    model : iterable of bytes
+        Text of the model.
+    is_large : bool
+        True if the text may exceed 2 GiB.
+    level : int
+        Level of deflate.
+    """
+    members = ("[Content_Types].xml", [TYPES.encode()]), ("_rels/.rels", [RELATIONS.encode()])
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=level) as archive:
+        for name, texts in (*members, ("3D/3dmodel.model", model)):
+            with archive.open(name, "w", force_zip64=is_large) as member:
+                member.writelines(texts)
 
 
 def _is_large(mesh: Mesh) -> bool:
@@ -68,7 +79,7 @@ def _model(mesh: Mesh, metadata: Mapping[str, str]) -> Iterator[bytes]:
     yield MODEL.encode()
     for key, value in metadata.items():
         name = key if key in CORE_NAMES else f"fracslice:{key}"
-        yield f"<metadata name={quoteattr(name)}>{escape(value)}</metadata>\n".encode()
+        yield f'<metadata name="{escape(name)}">{escape(value)}</metadata>\n'.encode()
     yield b'<resources><object id="1" type="model">'
     yield from mesh_element(mesh)
     yield b'</object></resources>\n<build><item objectid="1"/></build>\n</model>\n'

@@ -1,84 +1,25 @@
-"""The formulas: fractals, primitives, CSG and domain operators. Importing this registers them all."""
+"""The formulas: fractals, primitives, CSG and domain operators. Importing this package registers them all."""
 
-from .box import Box
-from .confining import bounds, offset, repeat
-from .csg import difference, intersection, shell, union
-from .deformations import bend, twist
-from .julia import julia
-from .mandelbulb import mandelbulb
-from .material import material
-from .menger import menger
-from .parameters import Axis, Choice, Count, Number, Vector
-from .primitives import box, capsule, cone, cylinder, octahedron, plane, sphere, torus
-from .registry import Fixed, Formula, Node, csg_operator, domain_operator, get, names, shape
-from .transforms import mirror, transform
-from .vocabulary import (
-    absolute,
-    any_of,
-    atan2,
-    cos,
-    exp,
-    floor,
-    log,
-    maximum,
-    minimum,
-    ratio,
-    rsqrt,
-    sin,
-    sqrt,
-    where,
-)
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
 
-__all__ = [
-    "Axis",
-    "Box",
-    "Choice",
-    "Count",
-    "Fixed",
-    "Formula",
-    "Node",
-    "Number",
-    "Vector",
-    "absolute",
-    "any_of",
-    "atan2",
-    "bend",
-    "bounds",
-    "box",
-    "capsule",
-    "cone",
-    "cos",
-    "csg_operator",
-    "cylinder",
-    "difference",
-    "domain_operator",
-    "exp",
-    "floor",
-    "get",
-    "intersection",
-    "julia",
-    "log",
-    "mandelbulb",
-    "material",
-    "maximum",
-    "menger",
-    "minimum",
-    "mirror",
-    "names",
-    "octahedron",
-    "offset",
-    "plane",
-    "ratio",
-    "repeat",
-    "rsqrt",
-    "shape",
-    "shell",
-    "sin",
-    "sphere",
-    "sqrt",
-    "torus",
-    "transform",
-    "twist",
-    "union",
-    "where",
-]
+from .box import Box as Box
+from .parameters import Axis as Axis
+from .parameters import Choice as Choice
+from .parameters import Count as Count
+from .parameters import Number as Number
+from .parameters import Vector as Vector
+from .registry import Fixed as Fixed
+from .registry import Formula as Formula
+from .registry import Node as Node
+from .registry import csg_operator as csg_operator
+from .registry import domain_operator as domain_operator
+from .registry import get as get
+from .registry import names as names
+from .registry import shape as shape
+from .vocabulary import *  # noqa: F403
+
+for _module in iter_modules([str(Path(__file__).parent)]):
+    import_module(f".{_module.name}", __name__)
+globals().update({name: get(name) for name in names()})

@@ -47,7 +47,7 @@ def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') ->
         What it is applied to; several are a union.
     degrees : a number
         how far to turn per unit of length along the bent axis
-    axis : "x", "y" or "z", default 'z'
+    axis : x, y or z, default 'z'
         the hinge, which stays straight: z bends x towards y, x bends y towards z, y bends z towards x
 
     Returns
@@ -289,7 +289,7 @@ def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
     ----------
     *elements : Node
         What it is applied to; several are a union.
-    axis : "x", "y" or "z"
+    axis : x, y or z
         the axis that is mirrored: what is on its positive side also appears on its negative side
 
     Returns
@@ -447,7 +447,7 @@ def twist(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -
         What it is applied to; several are a union.
     degrees : a number
         how far to turn per unit of length along the axis
-    axis : "x", "y" or "z", default 'z'
+    axis : x, y or z, default 'z'
         the axis to turn about
 
     Returns

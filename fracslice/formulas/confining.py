@@ -16,6 +16,13 @@ from .vocabulary import absolute, any_of, floor, maximum, minimum
 # its Lipschitz bound is needed there.
 
 
+def beyond(x, y, z, centre, half):  # type: ignore[no-untyped-def]
+    """Largest coordinate of a point relative to a box: negative inside."""
+    cx, cy, cz = centre
+    hx, hy, hz = half
+    return maximum(absolute(x - cx) - hx, maximum(absolute(y - cy) - hy, absolute(z - cz) - hz))
+
+
 @domain_operator(
     min=Vector(REQUIRED, "the corner with the smallest coordinates"),
     max=Vector(REQUIRED, "the corner with the largest coordinates"),
@@ -25,9 +32,7 @@ def bounds(child, x, y, z, centre, half, margin):  # type: ignore[no-untyped-def
 
     The element may be unbounded. L = maximum of 1 (the box) and the element's.
     """
-    cx, cy, cz = centre
-    hx, hy, hz = half
-    d = maximum(absolute(x - cx) - hx, maximum(absolute(y - cy) - hy, absolute(z - cz) - hz))
+    d = beyond(x, y, z, centre, half)
     f = d
     if any_of(d < margin):
         f = maximum(d, minimum(child(x, y, z), 2.0 * margin - d))
@@ -52,11 +57,6 @@ def bounds_bounds(node: Node) -> Box:
     return Box(node["min"], node["max"]) & node.children[0].bounds.box
 
 
-@bounds.slope
-def bounds_slope(node: Node) -> float:
-    return max(1.0, node.children[0].bounds.lipschitz)
-
-
 @domain_operator(
     distance=Number(REQUIRED, "how far outward the surface moves, in scene units; negative: inward")
 )
@@ -69,10 +69,7 @@ def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-d
     a fractal is an exterior bound only, so the conservative field of a shrunk fractal is that of the
     original.
     """
-    cx, cy, cz = centre
-    hx, hy, hz = half
-    d = maximum(absolute(x - cx) - hx, maximum(absolute(y - cy) - hy, absolute(z - cz) - hz))
-    return maximum(child(x, y, z) - distance, d)
+    return maximum(child(x, y, z) - distance, beyond(x, y, z, centre, half))
 
 
 @offset.arguments
@@ -145,21 +142,17 @@ def repeat(child, x, y, z, period, first, last, centre, half, middle, reach, gap
     fx, fy, fz = first
     lx, ly, lz = last
     cx, cy, cz = centre
-    hx, hy, hz = half
-    mx, my, mz = middle
-    rx, ry, rz = reach
     kx = minimum(maximum(floor((x - cx) / px - fx) - 0.5 * (nx - 2.0), 0.0), lx - (nx - 1.0))
     ky = minimum(maximum(floor((y - cy) / py - fy) - 0.5 * (ny - 2.0), 0.0), ly - (ny - 1.0))
     kz = minimum(maximum(floor((z - cz) / pz - fz) - 0.5 * (nz - 2.0), 0.0), lz - (nz - 1.0))
-    f = maximum(gap, maximum(absolute(x - mx) - rx, maximum(absolute(y - my) - ry, absolute(z - mz) - rz)))
+    f = maximum(gap, beyond(x, y, z, middle, reach))
     for i in range(nx):
         qx = x - (kx + (fx + i)) * px
         for j in range(ny):
             qy = y - (ky + (fy + j)) * py
             for k in range(nz):
                 qz = z - (kz + (fz + k)) * pz
-                d = maximum(absolute(qx - cx) - hx, maximum(absolute(qy - cy) - hy, absolute(qz - cz) - hz))
-                f = minimum(f, maximum(d, child(qx, qy, qz)))
+                f = minimum(f, maximum(beyond(qx, qy, qz, centre, half), child(qx, qy, qz)))
     return f
 
 
@@ -188,7 +181,7 @@ def repeat_arguments(node: Node) -> dict[str, object]:
     number = [c or ENDLESS for c in count]
     first = tuple(-((c - 1) / 2) if c else -float(ENDLESS // 2) for c in count)
     gaps = [w / 2 * p - s / 2 for w, p, s, n in zip(windows, period, box.size, number, strict=True) if n > w]
-    whole = _frame(_lattice(node))
+    whole = _frame(repeat_bounds(node))
     return {
         "period": period,
         "first": first,
@@ -203,21 +196,10 @@ def repeat_arguments(node: Node) -> dict[str, object]:
     }
 
 
-def _lattice(node: Node) -> Box:
-    """Bounding box of all copies."""
-    box, lo, hi = node.children[0].bounds.box, [], []
-    for a, b, p, c in zip(box.lo, box.hi, node["period"], node["count"], strict=True):
-        reach = (c - 1) / 2 * p if c else math.inf
-        lo.append(a - reach)
-        hi.append(b + reach)
-    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
-
-
 @repeat.bounds
 def repeat_bounds(node: Node) -> Box:
-    return _lattice(node)
-
-
-@repeat.slope
-def repeat_slope(node: Node) -> float:
-    return max(1.0, node.children[0].bounds.lipschitz)
+    """Bounding box of all copies."""
+    box = node.children[0].bounds.box
+    far = [(c - 1) / 2 * p if c else math.inf for p, c in zip(node["period"], node["count"], strict=True)]
+    lo, hi = ([e + s * f for e, f in zip(ends, far, strict=True)] for ends, s in ((box.lo, -1), (box.hi, 1)))
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
+from typing import Any
 
 from .box import Box
 from .parameters import REQUIRED, SMALLEST, Number
@@ -16,6 +18,12 @@ SMOOTH = Number(
 )
 
 
+def seam(a, b, smooth):  # type: ignore[no-untyped-def]
+    """Height of a quadratic seam between two fields (Quilez 2013, "Smooth minimum")."""
+    h = maximum(smooth - absolute(a - b), 0.0)
+    return h * h / (4.0 * smooth)
+
+
 @csg_operator((1, None), smooth=SMOOTH)
 def union(a, b, smooth):  # type: ignore[no-untyped-def]
     """The union of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
@@ -25,8 +33,7 @@ def union(a, b, smooth):  # type: ignore[no-untyped-def]
     seam with one escape-time fractal has 1.25 times that, a seam between several 3 times (measured;
     `conservative_union` avoids the factor).
     """
-    h = maximum(smooth - absolute(a - b), 0.0)
-    return minimum(a, b) - h * h / (4.0 * smooth)
+    return minimum(a, b) - seam(a, b, smooth)
 
 
 def conservative_union(a, b, smooth, steepest):  # type: ignore[no-untyped-def]
@@ -45,34 +52,31 @@ def conservative_union(a, b, smooth, steepest):  # type: ignore[no-untyped-def]
     steepest
         Ratio of the steepest slope in the seam to the Lipschitz bound.
     """
-    h = maximum(smooth - absolute(a - b), 0.0)
     low, high = minimum(a, b), maximum(a, b)
-    return minimum(low, maximum(low - h * h / (4.0 * smooth), high - 1.25 * smooth) / steepest)
-
-
-def hard_union(a, b):  # type: ignore[no-untyped-def]
-    return minimum(a, b)
+    return minimum(low, maximum(low - seam(a, b, smooth), high - 1.25 * smooth) / steepest)
 
 
 @csg_operator((1, None), smooth=SMOOTH)
 def intersection(a, b, smooth):  # type: ignore[no-untyped-def]
     """The intersection of the elements. L = maximum of the elements', as for a union."""
-    h = maximum(smooth - absolute(a - b), 0.0)
-    return maximum(a, b) + h * h / (4.0 * smooth)
-
-
-def hard_intersection(a, b):  # type: ignore[no-untyped-def]
-    return maximum(a, b)
+    return maximum(a, b) + seam(a, b, smooth)
 
 
 @csg_operator((1, None), smooth=SMOOTH)
 def difference(a, b, smooth):  # type: ignore[no-untyped-def]
     """The first element minus the others. L = maximum of the elements', as for a union."""
-    h = maximum(smooth - absolute(a + b), 0.0)
-    return maximum(a, -b) + h * h / (4.0 * smooth)
+    return maximum(a, -b) + seam(a, -b, smooth)
 
 
-def hard_difference(a, b):  # type: ignore[no-untyped-def]
+def sharp_union(a, b):  # type: ignore[no-untyped-def]
+    return minimum(a, b)
+
+
+def sharp_intersection(a, b):  # type: ignore[no-untyped-def]
+    return maximum(a, b)
+
+
+def sharp_difference(a, b):  # type: ignore[no-untyped-def]
     return maximum(a, -b)
 
 
@@ -81,66 +85,35 @@ def conservative_difference(a, b):  # type: ignore[no-untyped-def]
     return maximum(a, minimum(-b, 0.0))
 
 
-def _is_sharp(node: Node) -> bool:
-    return bool(node["smooth"] < SMALLEST)
+SHARP = {union: sharp_union, intersection: sharp_intersection, difference: sharp_difference}
 
 
 def _needs_conservative(node: Node) -> bool:
     """True for the conservative field of a smooth operator with an escape-time fractal among its elements."""
-    return (
-        node.is_conservative
-        and not _is_sharp(node)
-        and any(child.bounds.exterior_only for child in node.children)
-    )
+    smooth = node["smooth"] >= SMALLEST
+    return smooth and node.is_conservative and any(child.bounds.exterior_only for child in node.children)
 
 
-@union.unordered
-@intersection.unordered
-@difference.unordered
 def csg_unordered(node: Node) -> bool:
-    return _is_sharp(node)
+    return bool(node["smooth"] < SMALLEST)
 
 
-@union.select
-def union_select(node: Node):  # type: ignore[no-untyped-def]
-    return (
-        hard_union if _is_sharp(node) else conservative_union if _needs_conservative(node) else union.function
-    )
-
-
-@union.arguments
-def union_arguments(node: Node) -> dict[str, object]:
-    if _is_sharp(node):
-        return {}
-    steepest = 1 + node.bounds.steepening / 8
-    return {"smooth": node["smooth"], **({"steepest": steepest} if _needs_conservative(node) else {})}
-
-
-@intersection.select
-def intersection_select(node: Node):  # type: ignore[no-untyped-def]
-    return hard_intersection if _is_cut_sharp(node) else intersection.function
-
-
-@difference.select
-def difference_select(node: Node):  # type: ignore[no-untyped-def]
-    if node.is_conservative and any(child.bounds.exterior_only for child in node.children[1:]):
-        return conservative_difference
-    return hard_difference if _is_cut_sharp(node) else difference.function
-
-
-def _is_cut_sharp(node: Node) -> bool:
-    """True if the sharp operator serves: a seam only removes material, so a ball outside the sharp solid is
-    outside the smooth one.
+def csg_select(node: Node) -> Callable[..., Any]:
+    """A seam of a union adds material, and its conservative field has to know. Other seams only remove
+    material, so a ball outside the sharp solid is outside the smooth one.
     """
-    return _is_sharp(node) or _needs_conservative(node)
+    later = any(child.bounds.exterior_only for child in node.children[1:])
+    if node.formula is difference and node.is_conservative and later:
+        return conservative_difference
+    if _needs_conservative(node) and node.formula is union:
+        return conservative_union
+    return SHARP[node.formula] if csg_unordered(node) or _needs_conservative(node) else node.formula.function
 
 
-def cut_arguments(node: Node) -> dict[str, object]:
-    return {} if _is_cut_sharp(node) else {"smooth": node["smooth"]}
-
-
-intersection.arguments(cut_arguments)
-difference.arguments(cut_arguments)
+def csg_arguments(node: Node) -> dict[str, object]:
+    if node.function is conservative_union:
+        return {"smooth": node["smooth"], "steepest": 1 + node.bounds.steepening / 8}
+    return {"smooth": node["smooth"]} if node.function is node.formula.function else {}
 
 
 def csg_slope(node: Node) -> float:
@@ -161,14 +134,16 @@ def csg_slope(node: Node) -> float:
     float
     """
     fields = [child.bounds for child in node.children]
-    exterior_only = (
-        0 if _is_sharp(node) or _needs_conservative(node) else sum(f.exterior_only for f in fields)
-    )
+    seams = not (csg_unordered(node) or _needs_conservative(node))
+    exterior_only = seams * sum(f.exterior_only for f in fields)
     return max(f.lipschitz for f in fields) * (1.0, 1.25, 3.0)[min(exterior_only, 2)]
 
 
-for _blend in (union, intersection, difference):
-    _blend.slope(csg_slope)
+for _operator in SHARP:
+    _operator.unordered(csg_unordered)
+    _operator.select(csg_select)
+    _operator.arguments(csg_arguments)
+    _operator.slope(csg_slope)
 
 
 @union.bounds
@@ -180,11 +155,6 @@ def union_bounds(node: Node) -> Box:
 @intersection.bounds
 def intersection_bounds(node: Node) -> Box:
     return reduce(Box.__and__, (c.bounds.box for c in node.children))
-
-
-@difference.bounds
-def difference_bounds(node: Node) -> Box:
-    return node.children[0].bounds.box
 
 
 @csg_operator(
@@ -208,6 +178,7 @@ def shell_select(node: Node):  # type: ignore[no-untyped-def]
     return conservative_shell if node.is_conservative and node.bounds.exterior_only else shell.function
 
 
+@difference.bounds
 @shell.bounds
-def shell_bounds(node: Node) -> Box:
+def first_bounds(node: Node) -> Box:
     return node.children[0].bounds.box

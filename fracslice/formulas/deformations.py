@@ -10,7 +10,7 @@ import math
 from .box import Box
 from .parameters import REQUIRED, SMALLEST, Axis, Number
 from .registry import Node, domain_operator
-from .transforms import along
+from .transforms import chosen_axis
 from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt, where
 
 
@@ -18,19 +18,15 @@ from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqr
     axis=Axis("z", "the axis to turn about"),
     degrees=Number(REQUIRED, "how far to turn per unit of length along the axis"),
 )
-def twist(child, x, y, z, rate, radius, margin, along_x, along_y):  # type: ignore[no-untyped-def]
+def twist(child, x, y, z, rate, radius, margin, axis):  # type: ignore[no-untyped-def]
     """The element twisted about an axis (Barr 1984, "Global and Local Deformations of Solid Primitives").
 
     At radius rho the twist shears space by s = rate rho, which stretches lengths by (s + sqrt(s^2 + 4)) / 2.
     L = the element's times this stretch at 5/4 of the element's radius. Beyond, the value is the distance to
     the cylinder around the element.
     """
-    if along_x:
-        a, b, t = y, z, x
-    elif along_y:
-        a, b, t = z, x, y
-    else:
-        a, b, t = x, y, z
+    axes = x, y, z, x, y
+    t, a, b = axes[axis], axes[axis + 1], axes[axis + 2]
     d = sqrt(a * a + b * b) - radius
     f = d
     if any_of(d < margin):
@@ -38,12 +34,8 @@ def twist(child, x, y, z, rate, radius, margin, along_x, along_y):  # type: igno
         s = sin(rate * t)
         p = c * a + s * b
         q = c * b - s * a
-        if along_x:
-            inner = child(t, p, q)
-        elif along_y:
-            inner = child(q, t, p)
-        else:
-            inner = child(p, q, t)
+        turned = p, q, t, p, q
+        inner = child(turned[2 - axis], turned[3 - axis], turned[4 - axis])
         f = maximum(d, minimum(inner, 2.0 * margin - d))
     return f
 
@@ -67,7 +59,12 @@ def twist_identity(node: Node) -> bool:
 @twist.arguments
 def twist_arguments(node: Node) -> dict[str, object]:
     radius = _twist_radius(node)
-    return {"rate": math.radians(node["degrees"]), "radius": radius, "margin": radius / 4, **along(node)}
+    return {
+        "rate": math.radians(node["degrees"]),
+        "radius": radius,
+        "margin": radius / 4,
+        "axis": chosen_axis(node),
+    }
 
 
 @twist.bounds
@@ -90,7 +87,7 @@ def twist_slope(node: Node) -> float:
     ),
     degrees=Number(REQUIRED, "how far to turn per unit of length along the bent axis"),
 )
-def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, margin, along_x, along_y):  # type: ignore[no-untyped-def]
+def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, margin, axis):  # type: ignore[no-untyped-def]
     """The element bent: a straight axis becomes an arc (Barr 1984, "Global and Local Deformations of Solid
     Primitives").
 
@@ -100,12 +97,8 @@ def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, mar
     centre, and near the cut opposite to the element, the value is a distance to the sector that holds the
     element.
     """
-    if along_x:
-        a, b, t = y, side * z, x
-    elif along_y:
-        a, b, t = z, side * x, y
-    else:
-        a, b, t = x, side * y, z
+    axes = x, y, z, x, y
+    t, a, b = axes[axis], axes[axis + 1], side * axes[axis + 2]
     # Distances are measured from the arc: for a slight bend its centre is too far away for float32.
     s = curvature * a
     c = 1.0 - curvature * b
@@ -116,12 +109,8 @@ def bend(child, x, y, z, curvature, side, inward, inner_radius, half, slope, mar
     d = maximum(deep - inward, minimum(slope * (absolute(u) - half), 0.5 * inner_radius))
     f = d
     if any_of(d < margin):
-        if along_x:
-            inner = child(t, u, v)
-        elif along_y:
-            inner = child(v, t, u)
-        else:
-            inner = child(u, v, t)
+        straight = u, v, t, u, v
+        inner = child(straight[2 - axis], straight[3 - axis], straight[4 - axis])
         f = maximum(d, minimum(inner, 2.0 * margin - d))
     return f
 
@@ -166,7 +155,7 @@ def bend_arguments(node: Node) -> dict[str, object]:
         "half": half,
         "slope": slope,
         "margin": margin,
-        **along(node),
+        "axis": chosen_axis(node),
     }
 
 

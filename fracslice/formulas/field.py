@@ -102,7 +102,7 @@ class Kernel(Protocol):
         return evaluate
 
 
-class Run(Protocol):
+class CompiledLoop(Protocol):
     """A loop over a field."""
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
@@ -145,13 +145,13 @@ class Loops:
         The number of points in a call is a multiple of it.
     batch : int
         Points that make a call worthwhile.
-    runs : mapping of str to Run
+    runs : mapping of str to CompiledLoop
         The loops by name.
     """
 
     width: int
     batch: int
-    runs: Mapping[str, Run]
+    runs: Mapping[str, CompiledLoop]
 
 
 class Field(Protocol):

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ..errors import SceneError
+from ..late import late
 from . import signatures
 from .box import Box
 from .field import Bounds, Device, Field, Kernel, Loops, Precision
@@ -58,6 +60,9 @@ class Node(Operators, Field):
 
     def __hash__(self) -> int:
         return hash((self.formula.name, tuple(self.values.items()), self.children))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self.formula, dict(self.values), self.children, self.place, self.is_conservative)
 
     def walk(self) -> Iterator[Node]:
         """Iterate over this node and all below it, parents first."""
@@ -150,21 +155,18 @@ class Node(Operators, Field):
     @property
     def key(self) -> str:
         """See `Field.key`. All depths must be resolved, as for kernels and loops."""
-        from ..kernel import tree  # imported here: it is a layer above
-
-        return tree.key(self)
+        found: str = late("kernel.tree.key")(self)
+        return found
 
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
         """See `Field.kernel`."""
-        from ..kernel import tree
-
-        return tree.kernel(self, device, precision)
+        found: Kernel = late("kernel.tree.kernel")(self, device, precision)
+        return found
 
     def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
         """See `Field.loops`."""
-        from ..kernel import tree
-
-        return tree.loops(self, loops, precision)
+        found: Loops = late("kernel.tree.loops")(self, loops, precision)
+        return found
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -204,6 +206,11 @@ class Node(Operators, Field):
         """True if the elements but the first may be folded in any order, to the same bits."""
         hook = self.formula.hooks.get("unordered")
         return bool(hook and hook(self))
+
+
+def _restored(formula: Formula, values: dict[str, Any], *fields: Any) -> Node:
+    """Node from its pickled fields."""
+    return Node(formula, MappingProxyType(values), *fields)
 
 
 def _given(node: Node) -> dict[str, Any]:

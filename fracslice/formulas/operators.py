@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+from ..late import late
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
@@ -272,9 +274,8 @@ class Operators:
         >>> sphere(0.5).distance([[0, 0, 0], [2, 0, 0]])
         array([-0.5,  1.5])
         """
-        from ..api.distances import distance  # imported here: it is a layer above
-
-        return distance(cast("Node", self), points)
+        found: NDArray[np.floating] = late("api.distances.distance")(self, points)
+        return found
 
 
 def _made(name: str, *elements: Operators, **values: Any) -> Node:

@@ -8,8 +8,9 @@ objects; `validate` applies them to the fields of a record.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any
 
@@ -21,60 +22,125 @@ SMALLEST, LARGEST = 1e-15, 1e9
 
 
 @dataclass(frozen=True)
-class Number:
-    """One finite number.
+class Parameter(ABC):
+    """Kind of a parameter.
 
     Attributes
     ----------
-    default : float, None or REQUIRED
+    default : value, None or REQUIRED
         Default value.
     doc : str
         Description.
+    """
+
+    default: Any
+    doc: str
+
+    @property
+    @abstractmethod
+    def expects(self) -> str:
+        """Description of the accepted values."""
+
+    @abstractmethod
+    def check(self, value: Any) -> Any:
+        """Validate and convert a value.
+
+        Parameters
+        ----------
+        value : object
+            Any value.
+
+        Returns
+        -------
+        object
+            The value in the type of this kind.
+
+        Raises
+        ------
+        ValueError
+            With `expects`, for any other value.
+        """
+
+    def read(self, text: str) -> Any:
+        """Parse a value; see `check`."""
+        return self.check(text.strip())
+
+    def text(self, value: Any) -> str:
+        """Format a value."""
+        return str(value)
+
+
+@dataclass(frozen=True)
+class Limits(Parameter):
+    """Kind of finite numbers within limits.
+
+    Attributes
+    ----------
     above, below : float
         Exclusive limits.
     least, most : float
         Inclusive limits.
     """
 
-    default: Any
-    doc: str
     above: float = -math.inf
     least: float = -math.inf
     most: float = math.inf
     below: float = math.inf
 
     @property
+    def range(self) -> str:
+        """Description of the limits, such as " > 0 and <= 4"."""
+        signs = {">": self.above, ">=": self.least, "<": self.below, "<=": self.most}
+        limits = [f" {sign} {limit:g}" for sign, limit in signs.items() if math.isfinite(limit)]
+        return " and".join(limits)
+
+    def parsed(self, text: str) -> float:
+        """Number that a text spells."""
+        try:
+            return float(_plain(text))
+        except ValueError:
+            raise ValueError(self.expects) from None
+
+    def checked(self, value: Any) -> float:
+        """Number within the limits."""
+        number = finite(value)
+        if number is None or not (self.above < number < self.below and self.least <= number <= self.most):
+            raise ValueError(self.expects)
+        if abs(number) > LARGEST or (self.above == 0 and number < SMALLEST):
+            raise ValueError(f"{self.expects}, of a size from {SMALLEST:g} to {LARGEST:g}")
+        return number
+
+
+@dataclass(frozen=True)
+class Number(Limits):
+    """One finite number."""
+
+    @property
     def expects(self) -> str:
-        return "a number" + _range(self)
+        return "a number" + self.range
 
     def read(self, text: str) -> Any:
-        return self.check(_number(text, self.expects))
+        return self.check(self.parsed(text))
 
     def check(self, value: Any) -> Any:
-        return _checked(value, self)
+        return self.checked(value)
 
     def text(self, value: Any) -> str:
         return _shortest(value)
 
 
 @dataclass(frozen=True)
-class Count:
+class Count(Parameter):
     """A whole number.
 
     Attributes
     ----------
-    default : int, str, None or REQUIRED
-        Default value.
-    doc : str
-        Description.
     least, most : int
         Inclusive limits.
     auto : bool
         True if the word "auto" is allowed, too.
     """
 
-    default: Any
-    doc: str
     least: int = 0
     most: int = 10_000
     auto: bool = False
@@ -84,11 +150,8 @@ class Count:
         return f"a whole number from {self.least} to {self.most}" + (' or "auto"' if self.auto else "")
 
     def read(self, text: str) -> Any:
-        text = text.strip()
-        if self.auto and text == AUTO:
-            return AUTO
         try:
-            return self.check(int(_plain(text)))
+            return self.check(text.strip() if self.auto and text.strip() == AUTO else int(_plain(text)))
         except ValueError:
             raise ValueError(self.expects) from None
 
@@ -100,39 +163,22 @@ class Count:
             raise ValueError(self.expects)
         return int(value)
 
-    def text(self, value: Any) -> str:
-        return str(value)
-
 
 @dataclass(frozen=True)
-class Vector:
-    """Several finite numbers, separated by spaces.
+class Vector(Limits):
+    """Several finite numbers, separated by spaces; the limits hold for each.
 
     Attributes
     ----------
-    default : tuple of float, None or REQUIRED
-        Default value.
-    doc : str
-        Description.
     sizes : tuple of int
         Allowed lengths.
-    above, below : float
-        Exclusive limits of each number.
-    least, most : float
-        Inclusive limits of each number.
     nonzero : bool
         True if the numbers must not all be zero.
     whole : bool
         True if the numbers must be whole.
     """
 
-    default: Any
-    doc: str
     sizes: tuple[int, ...] = (3,)
-    above: float = -math.inf
-    least: float = -math.inf
-    most: float = math.inf
-    below: float = math.inf
     nonzero: bool = False
     whole: bool = False
 
@@ -140,91 +186,53 @@ class Vector:
     def expects(self) -> str:
         kind = "whole numbers" if self.whole else "numbers"
         nonzero = ", not all zero" if self.nonzero else ""
-        return f"{' or '.join(map(str, self.sizes))} {kind}{_range(self)}{nonzero}"
+        return f"{' or '.join(map(str, self.sizes))} {kind}{self.range}{nonzero}"
 
     def read(self, text: str) -> Any:
-        return self.check(tuple(_number(word, self.expects) for word in text.split()))
+        return self.check(tuple(map(self.parsed, text.split())))
 
     def check(self, value: Any) -> Any:
         items = _items(value)
         if len(items) not in self.sizes:
             raise ValueError(self.expects)
-        numbers = tuple(_checked(item, self) for item in items)
-        if self.nonzero and not any(abs(n) >= SMALLEST for n in numbers):
+        numbers = tuple(map(self.checked, items))
+        zero = self.nonzero and not any(abs(n) >= SMALLEST for n in numbers)
+        if zero or (self.whole and any(n != int(n) for n in numbers)):
             raise ValueError(self.expects)
-        if self.whole and any(n != int(n) for n in numbers):
-            raise ValueError(self.expects)
-        return tuple(int(n) for n in numbers) if self.whole else numbers
+        return tuple(map(int, numbers)) if self.whole else numbers
 
     def text(self, value: Any) -> str:
         return " ".join(map(_shortest, value))
 
 
 @dataclass(frozen=True)
-class Axis:
-    """One of the letters x, y and z.
-
-    Attributes
-    ----------
-    default : str or REQUIRED
-        Default value.
-    doc : str
-        Description.
-    expects : str
-        Allowed values, in words.
-    """
-
-    default: Any
-    doc: str
-    expects: str = field(default='"x", "y" or "z"', init=False)
-
-    def read(self, text: str) -> Any:
-        return self.check(text.strip())
-
-    def check(self, value: Any) -> Any:
-        if not isinstance(value, str) or value not in ("x", "y", "z"):
-            raise ValueError(self.expects)
-        return value
-
-    def text(self, value: Any) -> str:
-        return str(value)
-
-
-@dataclass(frozen=True)
-class Choice:
+class Choice(Parameter):
     """One word of a list.
 
     Attributes
     ----------
-    default : str or REQUIRED
-        Default value.
-    doc : str
-        Description.
     words : tuple of str
         Allowed words.
     """
 
-    default: Any
-    doc: str
     words: tuple[str, ...]
 
     @property
     def expects(self) -> str:
-        return f"{', '.join(self.words[:-1])} or {self.words[-1]}"
-
-    def read(self, text: str) -> Any:
-        return self.check(text.strip())
+        *others, last = self.words
+        return f"{', '.join(others)} or {last}" if others else last
 
     def check(self, value: Any) -> Any:
         if not isinstance(value, str) or value not in self.words:
             raise ValueError(self.expects)
         return value
 
-    def text(self, value: Any) -> str:
-        return str(value)
 
+@dataclass(frozen=True)
+class Axis(Choice):
+    """One of the letters x, y and z."""
 
-Parameter = Number | Count | Vector | Axis | Choice
+    words: tuple[str, ...] = ("x", "y", "z")
 
 
 def validate(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exception]) -> None:
@@ -307,47 +315,11 @@ def _items(value: Any) -> Sequence[Any]:
     return plain if isinstance(plain, Sequence) and not isinstance(plain, (str, bytes)) else (plain,)
 
 
-def _number(text: str, expects: str) -> float:
-    try:
-        return float(_plain(text))
-    except ValueError:
-        raise ValueError(expects) from None
-
-
 def _plain(text: str) -> str:
     """Reject numbers in Python's extended syntax: underscores and non-ASCII digits."""
     if "_" in text or not text.isascii():
         raise ValueError
     return text
-
-
-def _checked(value: Any, kind: Number | Vector) -> float:
-    number = finite(value)
-    if number is None:
-        raise ValueError(kind.expects)
-    if not (kind.above < number < kind.below and kind.least <= number <= kind.most):
-        raise ValueError(kind.expects)
-    if abs(number) > LARGEST or (kind.above == 0 and number < SMALLEST):
-        raise ValueError(f"{kind.expects}, of a size from {SMALLEST:g} to {LARGEST:g}")
-    return number
-
-
-def _range(kind: Number | Vector) -> str:
-    low = (
-        f" > {kind.above:g}"
-        if math.isfinite(kind.above)
-        else f" >= {kind.least:g}"
-        if math.isfinite(kind.least)
-        else ""
-    )
-    high = (
-        f" < {kind.below:g}"
-        if math.isfinite(kind.below)
-        else f" <= {kind.most:g}"
-        if math.isfinite(kind.most)
-        else ""
-    )
-    return low + (" and" if low and high else "") + high
 
 
 def _shortest(value: Any) -> str:

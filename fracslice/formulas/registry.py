@@ -92,6 +92,9 @@ class Formula:
     def __repr__(self) -> str:
         return f"<{self.kind} {self.name}{signatures.signature(self)}>"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return get, (self.name,)
+
     @cached_property
     def names(self) -> Mapping[str, str]:
         """Parameter names by their names in Python, in the order of positional arguments."""

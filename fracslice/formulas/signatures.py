@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import SceneError
 from ..nearest import hint
-from .parameters import REQUIRED, Axis, Choice, Count, Vector
+from . import vocabulary
+from .parameters import REQUIRED, Choice, Count, Vector
 
 if TYPE_CHECKING:
     from .registry import Formula
@@ -97,8 +98,6 @@ def annotation(parameter: Any) -> Any:
         case Vector(sizes=sizes, whole=whole):
             several = Sequence[int] if whole else Sequence[float]
             found = float | several if 1 in sizes else several
-        case Axis():
-            found = Literal["x", "y", "z"]
         case Choice(words=words):
             found = Literal[*words]
         case _:
@@ -133,13 +132,33 @@ def stub() -> str:
     formulas = [name for name in names() if get(name).function.__module__.startswith(__package__)]
     lines = [_HEAD]
     for node in imports:
-        kept = sorted(f"{a.name} as {a.name}" for a in node.names if a.name not in formulas)
-        lines += [f"from .{node.module} import {name}" for name in kept]
+        exported = sorted(vocabulary.NAMES) if node.module == "vocabulary" else [a.name for a in node.names]
+        lines += [f"from .{node.module} import {name} as {name}" for name in exported if node.level]
     return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in formulas)]) + "\n"
 
 
-_HEAD = """\
-# Made from the registry of formulas by `python docs/generate.py`; do not edit.
+def package_stub(modules: Mapping[str, str]) -> str:
+    """Text of the stub file of `fracslice`: its public names, and every formula.
+
+    Parameters
+    ----------
+    modules : mapping of str to str
+        Module of each public name, relative to the package.
+
+    Returns
+    -------
+    str
+    """
+    from .registry import names
+
+    exported = {**modules, **dict.fromkeys(names(), "formulas")}
+    lines = sorted(f"from .{module} import {name} as {name}" for name, module in exported.items())
+    return "\n".join([_MADE, *lines, "", "__version__: str", ""])
+
+
+_MADE = "# Made from the registry of formulas by `python docs/generate.py`; do not edit."
+_HEAD = f"""\
+{_MADE}
 from collections.abc import Sequence
 from typing import Literal, Union
 """

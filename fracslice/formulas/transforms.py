@@ -126,23 +126,24 @@ def transform_bounds(node: Node) -> Box:
         REQUIRED, "the axis that is mirrored: what is on its positive side also appears on its negative side"
     )
 )
-def mirror(child, x, y, z, along_x, along_y):  # type: ignore[no-untyped-def]
+def mirror(child, x, y, z, axis):  # type: ignore[no-untyped-def]
     """The half of the element on the positive side of an axis, and its mirror image.
 
     L = the element's: folding space does not increase distances.
     """
-    if along_x:
-        x = absolute(x)
-    elif along_y:
-        y = absolute(y)
-    else:
-        z = absolute(z)
-    return child(x, y, z)
+    return child(
+        absolute(x) if axis == 0 else x, absolute(y) if axis == 1 else y, absolute(z) if axis == 2 else z
+    )
+
+
+def chosen_axis(node: Node) -> Fixed:
+    """Index of the axis of a node, which selects code."""
+    return Fixed("xyz".index(node["axis"]))
 
 
 @mirror.arguments
 def mirror_arguments(node: Node) -> dict[str, object]:
-    return along(node)
+    return {"axis": chosen_axis(node)}
 
 
 @mirror.bounds
@@ -151,8 +152,3 @@ def mirror_bounds(node: Node) -> Box:
     lo, hi = list(box.lo), list(box.hi)
     lo[axis] = -hi[axis]
     return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
-
-
-def along(node: Node) -> dict[str, object]:
-    """Kernel arguments that select the axis of a node."""
-    return {"along_x": Fixed(node["axis"] == "x"), "along_y": Fixed(node["axis"] == "y")}

@@ -56,3 +56,4 @@ def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
 
 _FUNCTIONS = ("where", "sqrt", "rsqrt", "ratio", "log", "exp", "sin", "cos", "atan2", "floor")
 NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))
+__all__ = sorted(NAMES)

@@ -96,9 +96,7 @@ class CpuKernel(Kernel):
         self._bricks(self._parameters, frame, *self._offsets, corners, out, len(corners))
 
 
-@lru_cache(maxsize=32)
-def _kernel(source: str, parameters: bytes, precision: Precision) -> CpuKernel:
-    return CpuKernel(Linked(source, np.frombuffer(parameters)), precision)
+_kernel = lru_cache(maxsize=32)(CpuKernel)
 
 
 def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
@@ -121,13 +119,12 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
     KernelError
         If the scene cannot be linked or compiled.
     """
-    linked = link(root)
-    return _kernel(linked.source, linked.parameters.tobytes(), precision)
+    return _kernel(link(root), precision)
 
 
 @dataclass(frozen=True, eq=False)
 class CompiledLoop:
-    """Machine-code implementation of `formulas.field.Run`.
+    """Machine-code implementation of `formulas.field.CompiledLoop`.
 
     Attributes
     ----------
@@ -160,15 +157,13 @@ class CompiledLoop:
 
 
 @lru_cache(maxsize=32)
-def compile_loops(source: str, numbers: bytes, loops: tuple[Loop, ...], precision: Precision) -> Loops:
+def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision) -> Loops:
     """Compile loops over a linked scene.
 
     Parameters
     ----------
-    source
-        Text of the linked scene.
-    numbers
-        Parameters P, float64, as bytes.
+    linked
+        Linked scene.
     loops
         Loops to compile.
     precision
@@ -184,10 +179,10 @@ def compile_loops(source: str, numbers: bytes, loops: tuple[Loop, ...], precisio
     KernelError
         If the scene or a loop cannot be compiled.
     """
-    parameters = constant(np.frombuffer(numbers), precision)
+    parameters = constant(linked.parameters, precision)
     bits = parameters.dtype.itemsize * 8
     width = lane_count(bits)
-    functions = load_functions(Linked(source, parameters), bits, width, loops)
+    functions = load_functions(linked, bits, width, loops)
     return Loops(width, BATCH, {name: CompiledLoop(f, parameters) for name, f in functions.items()})
 
 

@@ -26,7 +26,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..errors import KernelError
+from ..errors import ExportError, KernelError
 from ..extras import lacking
 from ..files import Kept
 from ..formulas.field import Kernel, Precision
@@ -233,9 +233,7 @@ def launched(loop: Any, threads: int, *arguments: Any) -> None:
         loop[-(-threads // BLOCK), BLOCK](*arguments)
 
 
-@lru_cache(maxsize=32)
-def _kernel(source: str, values: bytes, precision: Precision) -> CudaKernel:
-    return CudaKernel(Linked(source, np.frombuffer(values)), precision)
+_kernel = lru_cache(maxsize=32)(CudaKernel)
 
 
 def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
@@ -258,8 +256,7 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
     KernelError
         If the scene cannot be linked or compiled, or no GPU can be used.
     """
-    linked = link(root)
-    return _kernel(linked.source, linked.parameters.tobytes(), precision)
+    return _kernel(link(root), precision)
 
 
 def parameters(linked: Linked, precision: Precision) -> Any:
@@ -359,7 +356,7 @@ def _kept(folder: Path, name: str, text: str) -> Path | None:
     """
     kept, file, whole = Kept(folder), f"{name}.py", text.encode()
     if kept.get(file, _read) != whole:
-        with suppress(OSError):
+        with suppress(ExportError):
             kept.put(file, lambda to: to.write(whole))
         if kept.get(file, _read) != whole:
             return None

@@ -138,8 +138,11 @@ def _within(node: Node, voxel: float) -> float:
 
 def _depth(node: Node, detail: float) -> int:
     """Smallest sufficient depth; the deepest non-empty one if none is sufficient."""
+    steps = _steps(Known(node.changed(iterations=1)))
     for depth in range(1, DEEPEST):
-        step = _step(*(Known(node.changed(iterations=d)) for d in (depth, depth + 1)))
+        if depth not in steps:
+            steps[depth] = _step(*(Known(node.changed(iterations=d)) for d in (depth, depth + 1)))
+        step = steps[depth]
         if step is None:
             return max(depth - 1, 1)
         if step < detail / 2:
@@ -147,7 +150,12 @@ def _depth(node: Node, detail: float) -> int:
     return DEEPEST
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
+def _steps(_: Known) -> dict[int, float | None]:
+    """Results of `_step` for a formula by depth, filled by `_depth`: a key per depth would take longer."""
+    return {}
+
+
 def _step(before: Known, after: Known) -> float | None:
     """Largest displacement of nine tenths of the surface by one more iteration, scene units.
 

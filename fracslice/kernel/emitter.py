@@ -80,13 +80,6 @@ class Emitter:
         Body(self, name).written(kinds, name)
 
 
-@dataclass
-class _Loop:
-    """Loop under construction: its exits, each a block and the names there."""
-
-    left: list[tuple[Any, Names]] = field(default_factory=list)
-
-
 class _WiderError(Exception):
     """Names have wider kinds at the end of a loop than at its beginning."""
 
@@ -102,7 +95,9 @@ class Body(Expressions):
         self.name, self.tree = name, emitter.functions[name]
         self.returned: Kind = ()
         self.returns: list[tuple[Any, Value]] = []
-        self.loops: list[_Loop] = []
+        self.exits: list[
+            list[tuple[Any, Names]]
+        ] = []  # exits of the loops around: a block and the names there
         self.blocks: dict[str, Any] = {}
 
     def written(self, kinds: Sequence[Kind], name: str) -> ir.Function:
@@ -170,7 +165,7 @@ class Body(Expressions):
                 self.returns.append((self.builder.block, given))
                 return False
             case ast.Break():
-                self.loops[-1].left.append((self.builder.block, dict(self.names)))
+                self.exits[-1].append((self.builder.block, dict(self.names)))
                 return False
             case ast.If(test, body, orelse):
                 return self.branch(self.condition(test), body, orelse)
@@ -255,7 +250,7 @@ class Body(Expressions):
         """Emit a loop, again if names turn out to be of wider kinds than at its beginning."""
         function, start = self.builder.function, self.builder.block
         names, blocks, size = dict(self.names), len(function.blocks), len(start.instructions)
-        returns, depth = len(self.returns), len(self.loops)
+        returns, depth = len(self.returns), len(self.exits)
         changed = assigned_names(node.body) | set(own)
         kinds: dict[str, Kind] = {}
         while True:
@@ -267,7 +262,7 @@ class Body(Expressions):
                 function.blocks[blocks:],
                 start.instructions[size:],
                 self.returns[returns:],
-                self.loops[depth:],
+                self.exits[depth:],
             )
             start.terminator = None
             self.builder.position_at_end(start)
@@ -292,13 +287,13 @@ class Body(Expressions):
         phis = {n: [self.builder.phi(p.type) for p in rows[n][0][1]] for n in changed}
         for name in changed:
             self.names[name] = made_of(kind_of(before[name]), phis[name], self.lanes, self.builder)
-        self.loops.append(_Loop())
+        self.exits.append([])
         inside, more = self.builder.append_basic_block(), test()
         if more is None:
             self.builder.branch(inside)
         else:
             out = self.builder.append_basic_block()
-            self.loops[-1].left.append((out, {n: v for n, v in self.names.items() if n not in own}))
+            self.exits[-1].append((out, {n: v for n, v in self.names.items() if n not in own}))
             self.builder.cbranch(more, inside, out)
         self.builder.position_at_end(inside)
         if self.statements(body):
@@ -314,4 +309,4 @@ class Body(Expressions):
             for block, parts in rows[name]:
                 for phi, part in zip(phis[name], parts, strict=True):
                     phi.add_incoming(part, block)
-        return self.joined(self.loops.pop().left)
+        return self.joined(self.exits.pop())

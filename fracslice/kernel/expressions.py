@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import operator
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -65,6 +66,10 @@ class Expressions:
     builder: Any
     names: dict[str, Value]
     blocks: dict[str, Any]
+
+    @abstractmethod
+    def joined(self, ends: Sequence[tuple[Any, dict[str, Value]]]) -> bool:
+        """Join blocks, each with the values of names there."""
 
     def value(self, node: ast.expr) -> Value:
         """Emit an expression; return its value."""
@@ -155,26 +160,15 @@ class Expressions:
 
     def chosen(self, test: Any, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
         """Emit a choice between two values; only the chosen one is computed."""
-        ends = []
-        blocks = [self.builder.append_basic_block() for _ in range(2)]
+        blocks, names, ends = [self.builder.append_basic_block() for _ in range(2)], self.names, []
         self.builder.cbranch(test, *blocks)
         for block, way in zip(blocks, (yes, no), strict=True):
             self.builder.position_at_end(block)
             value = way()
-            ends.append((self.builder.block, value))
-        return self.merged(ends)
-
-    def merged(self, ends: Sequence[tuple[Any, Value]], into: Any = None) -> Value:
-        """Join blocks that each have a value; continue there with the joined value."""
-        kind = reduce(joined, (kind_of(value) for _, value in ends))
-        into = into or self.builder.append_basic_block()
-        rows = []
-        for block, value in ends:
-            self.builder.position_at_end(block)
-            rows.append((block, parts_of(as_kind(value, kind, self.lanes, self.builder))))
-            self.builder.branch(into)
-        self.builder.position_at_end(into)
-        return self.phis(kind, rows)
+            ends.append((self.builder.block, {"": value}))
+        self.joined(ends)
+        (value,), self.names = self.names.values(), names
+        return value
 
     def phis(self, kind: Kind, rows: Sequence[tuple[Any, Sequence[Any]]]) -> Value:
         """Emit phis for a value of a given kind, from its parts in each block."""

@@ -37,9 +37,9 @@ LEADING = {"shape": 3, "csg": 2, "domain": 4}
 """Number of leading arguments (points, values or child) by kind of formula."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Linked:
-    """Linked scene.
+    """Linked scene; equal if text and numbers are.
 
     Attributes
     ----------
@@ -50,7 +50,17 @@ class Linked:
     """
 
     source: str
-    parameters: np.ndarray = field(compare=False)
+    parameters: np.ndarray
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Linked) and self._contents == other._contents
+
+    def __hash__(self) -> int:
+        return hash(self._contents)
+
+    @property
+    def _contents(self) -> tuple[str, bytes]:
+        return self.source, self.parameters.tobytes()
 
     @property
     def digest(self) -> str:

@@ -21,6 +21,7 @@ from ..errors import KernelError
 from . import language
 from .intrinsics import is_intrinsic
 from .loops import Loop
+from .syntax import Folding
 
 OF_LOOPS = "l_"
 """Prefix of the names of functions that loops call, distinct from those of formulas and units."""
@@ -109,7 +110,7 @@ class _LoopLinker:
 _UNKNOWN = object()
 
 
-class _Resolver(ast.NodeTransformer):
+class _Resolver(Folding):
     """Substitutes the values of outside names in a function."""
 
     def __init__(self, linker: _LoopLinker, function: Callable[..., Any], fixed: dict[str, Any]) -> None:
@@ -209,31 +210,6 @@ class _Resolver(ast.NodeTransformer):
         found: ast.expr = self.visit(copy.deepcopy(element))
         self.fixed = outer
         return found
-
-    # --- branches ---
-    def statements(self, body: Sequence[ast.stmt]) -> list[ast.stmt]:
-        visited = (self.visit(statement) for statement in body)
-        return [part for found in visited for part in (found if isinstance(found, list) else [found])]
-
-    def visit_If(self, node: ast.If) -> Any:
-        node.test = self.visit(node.test)
-        if isinstance(node.test, ast.Constant):
-            return self.statements(node.body if node.test.value else node.orelse)
-        node.body, node.orelse = self.statements(node.body), self.statements(node.orelse)
-        return node
-
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
-        self.generic_visit(node)
-        if isinstance(node.op, ast.Not) and isinstance(node.operand, ast.Constant):
-            return ast.copy_location(ast.Constant(not node.operand.value), node)
-        return node
-
-    def visit_IfExp(self, node: ast.IfExp) -> Any:
-        node.test = self.visit(node.test)
-        if isinstance(node.test, ast.Constant):
-            return self.visit(node.body if node.test.value else node.orelse)
-        node.body, node.orelse = self.visit(node.body), self.visit(node.orelse)
-        return node
 
 
 def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:

@@ -7,10 +7,12 @@ import os
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import BinaryIO
 
+import llvmlite
+
+from ..errors import ExportError
 from ..files import Kept, users_folder
 from ..formulas import vocabulary
 from ..keys import key, texts
@@ -57,7 +59,7 @@ def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) ->
 
         code = compile_object(linked, Target(bits, width, REGISTERS, *host()), loops)
         sealed = hashlib.sha256(code).digest() + code
-        with suppress(OSError):
+        with suppress(ExportError):
             kept.put(name, lambda file: file.write(sealed))
     return code
 
@@ -74,7 +76,7 @@ def toolchain() -> str:
     from llvmlite.binding import llvm_version_info
 
     own = texts(*sorted(Path(__file__).parent.glob("*.py")), Path(vocabulary.__file__))
-    return key(own, host(), version("llvmlite"), llvm_version_info)
+    return key(own, host(), llvmlite.__version__, llvm_version_info)
 
 
 def _read(file: BinaryIO) -> bytes | None:

@@ -52,14 +52,8 @@ class Vec:
     @property
     def bits(self) -> int:
         """Width of an element: 1, 32 or 64."""
-        element = self.register.element
-        return (
-            element.width
-            if isinstance(element, ir.IntType)
-            else 32
-            if isinstance(element, ir.FloatType)
-            else 64
-        )
+        sizes = {ir.FloatType: 32, ir.DoubleType: 64}
+        return sizes.get(type(self.register.element)) or self.register.element.width
 
     @property
     def whole(self) -> ir.VectorType:

@@ -12,7 +12,7 @@ from typing import Any
 
 from . import language
 from .seen import seen
-from .syntax import stored_names
+from .syntax import Folding, stored_names
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.F
     tree = ast.parse(language.text(function)).body[0]
     assert isinstance(tree, ast.FunctionDef)
     tree.args.args = [a for a in tree.args.args if a.arg not in fixed]
-    pruned: ast.FunctionDef = _Prune().visit(_Substitute(fixed).visit(tree))
+    pruned: ast.FunctionDef = _Substitute(fixed).visit(tree)
     return pruned
 
 
@@ -142,7 +142,7 @@ def _plain(value: Any) -> Any:
     return int(value) if isinstance(value, int) else float(value)
 
 
-class _Substitute(ast.NodeTransformer):
+class _Substitute(Folding):
     """Replaces names by constants; unrolls loops over a constant tuple."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
@@ -162,24 +162,8 @@ class _Substitute(ast.NodeTransformer):
         unrolled: list[ast.stmt] = []
         for value in values:
             inner = _Substitute({**self.values, node.target.id: value})
-            unrolled += [inner.visit(ast.parse(ast.unparse(statement)).body[0]) for statement in node.body]
+            unrolled += inner.statements(ast.parse(ast.unparse(ast.Module(node.body, []))).body)
         return unrolled
-
-
-class _Prune(ast.NodeTransformer):
-    """Replaces branches and choices on a constant by the one taken."""
-
-    def visit_If(self, node: ast.If) -> Any:
-        self.generic_visit(node)
-        if isinstance(node.test, ast.Constant):
-            return node.body if node.test.value else node.orelse
-        return node
-
-    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
-        self.generic_visit(node)
-        if isinstance(node.test, ast.Constant):
-            return node.body if node.test.value else node.orelse
-        return node
 
 
 class _Forget(ast.NodeTransformer):

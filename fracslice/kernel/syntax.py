@@ -4,9 +4,42 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 CHILD = "child"
 """Name of a domain operator's child function."""
+
+
+class Folding(ast.NodeTransformer):
+    """Evaluates operators on whole numbers and truth values; keeps the branch that a constant selects."""
+
+    def statements(self, body: Sequence[ast.stmt]) -> list[ast.stmt]:
+        """Visit statements, each of which may become several."""
+        visited = (self.visit(statement) for statement in body)
+        return [part for found in visited for part in (found if isinstance(found, list) else [found])]
+
+    def visit_If(self, node: ast.If) -> Any:
+        node.test = self.visit(node.test)
+        if isinstance(node.test, ast.Constant):
+            return self.statements(node.body if node.test.value else node.orelse)
+        node.body, node.orelse = self.statements(node.body), self.statements(node.orelse)
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> Any:
+        node.test = self.visit(node.test)
+        if isinstance(node.test, ast.Constant):
+            return self.visit(node.body if node.test.value else node.orelse)
+        return self.generic_visit(node)
+
+    def folded(self, node: Any) -> Any:
+        """Visit an operator, and evaluate it if its operands are known."""
+        node = self.generic_visit(node)
+        operands = [child for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
+        if not all(isinstance(o, ast.Constant) and isinstance(o.value, int) for o in operands):
+            return node
+        return ast.copy_location(ast.Constant(eval(ast.unparse(node), {})), node)
+
+    visit_UnaryOp = visit_BinOp = visit_Compare = folded  # noqa: N815
 
 
 def stored_names(*trees: ast.AST) -> set[str]:

@@ -63,8 +63,7 @@ def loops(root: Node, loops: Sequence[Loop], precision: Precision) -> Loops:
     KernelError
         If the scene or a loop cannot be compiled.
     """
-    linked = link(root)
-    return cpu.compile_loops(linked.source, linked.parameters.tobytes(), tuple(loops), precision)
+    return cpu.compile_loops(link(root), tuple(loops), precision)
 
 
 def key(root: Node) -> str:

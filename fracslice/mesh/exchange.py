@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from fracslice.errors import MeshError
 from fracslice.extras import lacking
+from fracslice.late import late
 
 if TYPE_CHECKING:
     import trimesh
@@ -40,9 +41,8 @@ class Exchange:
         ExportError
             For an empty mesh, an unknown extension, or a file that cannot be written.
         """
-        from fracslice.export import write  # lazy: `export` is a layer above
-
-        return write(cast("Mesh", self), path, metadata)
+        written: Path = late("export.write")(self, path, metadata)
+        return written
 
     def to_trimesh(self) -> trimesh.Trimesh:
         """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice._native import near
 from fracslice.mesh.model import Mesh
 from fracslice.mesh.nearest import Nearest
-from fracslice.mesh.pieces import Around
 from fracslice.volume import Plan
 from fracslice.volume.accuracy import NEAR, surface_error, surface_points
 from fracslice.work import Work
@@ -17,8 +17,8 @@ from fracslice.work import Work
 POINTS = 256
 """Random points on the field's surface, besides its extreme points."""
 
-CELL = 3.0
-"""Size of a cell in the search for triangles near points, voxels."""
+NEARBY, FARTHER = 3.0, 4.0
+"""First distance within which triangles are searched, voxels, and its growth."""
 
 
 def surface_to_mesh(
@@ -58,8 +58,7 @@ def distances(
 ) -> NDArray[np.float64]:
     """Distances from points to a mesh.
 
-    Only triangles in the cells around the points are searched at first. Points without a triangle nearby are
-    compared with all triangles.
+    Triangles near the points are searched; then, for points without a triangle nearby, those farther away.
 
     Parameters
     ----------
@@ -82,14 +81,20 @@ def distances(
     Cancelled
         If the work is cancelled.
     """
-    around = Around(points, CELL * voxel)
-    near = (Mesh(mesh.vertices, mesh.triangles[around.triangles(mesh)]) for mesh in pieces())
-    found = _least(near, points, work)
-    # Triangles lie within a grid cell: the corners of any nearer one are in the searched cells.
-    far = np.flatnonzero(found > (CELL - np.sqrt(3)) * voxel)
-    if len(far):
-        found[far] = _least(pieces(), points[far], work)
+    found, far, reach = np.full(len(points), np.inf), np.arange(len(points)), NEARBY * voxel
+    while len(far):
+        near_ones = (_near(mesh, points[far], reach, work) for mesh in pieces())
+        found[far] = _least(near_ones, points[far], work)
+        # Triangles lie within a grid cell: any nearer one has its corners in reach.
+        far = far[found[far] > reach - np.sqrt(3) * voxel]
+        reach *= FARTHER
     return found
+
+
+def _near(mesh: Mesh, points: NDArray[np.float64], reach: float, work: Work) -> Mesh:
+    """Triangles with a corner near points."""
+    chosen = near(mesh.vertices, mesh.triangles, points, reach, work.threads)
+    return Mesh(mesh.vertices, mesh.triangles[chosen])
 
 
 def _least(meshes: Iterable[Mesh], points: NDArray[np.float64], work: Work) -> NDArray[np.float64]:

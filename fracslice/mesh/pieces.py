@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .._native import near
 from ..store import Arrays
 from .extract import Piece
 from .model import Mesh
@@ -148,11 +149,11 @@ class Pieces:
         ndarray of int64, shape (k,)
             Their indices, ascending, counted from the first piece on.
         """
-        around, parts, numbers = Around(points, reach), NOTHING, list[NDArray[np.int64]]()
+        parts, numbers = NOTHING, list[NDArray[np.int64]]()
         for number, mesh in enumerate(self.meshes()):
-            chosen = around.triangles(mesh)
-            numbers.append(self.starts[number] + np.flatnonzero(chosen))
-            part = mesh.selected(chosen)
+            chosen = near(mesh.vertices, mesh.triangles, points, reach)
+            numbers.append(self.starts[number] + chosen)
+            part = mesh.selected(np.bincount(chosen, minlength=len(mesh.triangles)) > 0)
             parts = joined(parts, part, self.ends[number - 1], reach / 2) if number else part
         return parts, np.concatenate(numbers)
 
@@ -189,60 +190,6 @@ class Pieces:
             return self._held[name]
         with np.load(self.folder / f"{name}.npz") as arrays:
             return dict(arrays)
-
-
-class Around:
-    """Cells of a grid that contain given points, and their neighbours.
-
-    Parameters
-    ----------
-    points : ndarray of float64, shape (n, 3)
-        Points.
-    size : float
-        Minimum size of a cell.
-    """
-
-    def __init__(self, points: NDArray[np.float64], size: float) -> None:
-        self.low = points.min(axis=0) - 2 * size
-        self.size = max(size, float(np.ptp(points, axis=0).max()) / 256)
-        own = self.cells(points)
-        self.near = np.zeros(own.max(axis=0) + 3, bool)
-        for step in np.ndindex(3, 3, 3):
-            self.near[tuple((own + step).T - 1)] = True
-
-    def cells(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Cells of points.
-
-        Parameters
-        ----------
-        points : ndarray of float64, shape (n, 3)
-            Points.
-
-        Returns
-        -------
-        ndarray of int64, shape (n, 3)
-            Grid coordinates of their cells.
-        """
-        found: NDArray[np.int64] = np.floor((points - self.low) / self.size).astype(np.int64)
-        return found
-
-    def triangles(self, mesh: Mesh) -> NDArray[np.bool_]:
-        """Triangles with a corner in these cells.
-
-        Parameters
-        ----------
-        mesh : Mesh
-            The mesh.
-
-        Returns
-        -------
-        ndarray of bool, shape (m,)
-            True for each of them.
-        """
-        cells = np.clip(self.cells(mesh.vertices), 0, np.array(self.near.shape) - 1)
-        seen = self.near[tuple(cells.T)]
-        found: NDArray[np.bool_] = seen[mesh.triangles].any(axis=1)
-        return found
 
 
 def joined(one: Mesh, other: Mesh, seam: float, near: float) -> Mesh:

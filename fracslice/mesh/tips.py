@@ -72,9 +72,9 @@ class Pointed:
         mesh, voxel = piece.mesh, self._voxel
         if len(self._near.triangles):
             mesh = joined(self._near, mesh, self._seam, voxel / 2)
-        at = mesh.vertices[pointed(mesh.vertices, mesh.triangles, POINTED, self._threads)]
+        at = mesh.vertices[pointed(mesh.vertices, mesh.triangles, POINTED, MANY, self._threads)]
         low, high = self._seam - 2 * voxel, piece.end - 2 * voxel
-        self._points.append(at[(low <= at[:, 0]) & (at[:, 0] < high)])
+        self._points.append(at if len(at) > MANY else at[(low <= at[:, 0]) & (at[:, 0] < high)])
         self._seam = piece.end
         if np.isfinite(piece.end):
             top = mesh.vertices[mesh.triangles, 0].max(axis=1)

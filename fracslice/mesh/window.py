@@ -234,6 +234,9 @@ def tips_last(meshes: Iterable[Mesh], tips: NDArray[np.float64]) -> Iterator[Mes
     places = {tuple(tip): number for number, tip in enumerate(tips.astype(np.float32).tolist())}
     late: list[tuple[int, NDArray[np.float64]]] = []
     for mesh in meshes:
+        if not places:
+            yield mesh
+            continue
         near = np.flatnonzero(np.isin(mesh.vertices[:, 0], [tip[0] for tip in places]))
         of_vertex = np.full(len(mesh.vertices), -1)
         of_vertex[near] = [places.get(tuple(point), -1) for point in mesh.vertices[near].tolist()]

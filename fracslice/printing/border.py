@@ -9,7 +9,7 @@ import numpy as np
 from ..compiled import compiled
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
-from .components import Connected
+from .components import Components
 from .samples import Samples
 
 FAR = 255
@@ -21,7 +21,7 @@ cannot cross.
 """
 
 
-def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
+def nearer(found: Components, these: np.ndarray, others: np.ndarray) -> Samples:
     """A field that is negative nearer to some components than to others.
 
     The value is half the difference of the grid steps to either, so the border lies midway between them. The
@@ -29,8 +29,8 @@ def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
 
     Parameters
     ----------
-    found : Connected
-        Samples of a solid and its components.
+    found : Components
+        Components of a sampled solid.
     these, others : int64 [k]
         Numbers of the components on the negative and on the positive side.
 
@@ -39,10 +39,9 @@ def nearer(found: Connected, these: np.ndarray, others: np.ndarray) -> Samples:
     Samples
         The field in scene units, at most `REACH` voxels in magnitude, on bricks in and around `these`.
     """
-    solid, components = found.solid, found.components
-    rows, _ = components.samples(these)
-    near, index = _around(solid, rows, np.isin(components.tiles, these))
-    labels, ijk = components.labels[near], solid.ijk[near]
+    solid, (samples, tiles) = found.solid, found.masks(these)
+    near, index = _around(solid, np.any(samples, axis=1), tiles)
+    labels, ijk = found.labels[near], solid.ijk[near]
     to_these, to_others = (_steps(index, ijk, np.isin(labels, those)) for those in (these, others))
     half = np.clip((to_these.astype(np.float32) - to_others) / 2, -REACH, REACH)
     values = half * np.float32(solid.voxel)
@@ -83,10 +82,10 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
         for axis in range(3):
             shift = 6 - 3 * axis
             at = (s >> shift) & 7
-            for way in (-1, 1):
-                there, to = row, s + (way << shift)
-                if not 0 <= at + way < 8:
-                    there, to = beside(index, ijk, row, axis, way), to - (way << (shift + 3))
+            for sign in (-1, 1):
+                there, to = row, s + (sign << shift)
+                if not 0 <= at + sign < 8:
+                    there, to = beside(index, ijk, row, axis, sign), to - (sign << (shift + 3))
                 if there >= 0 and steps[there, to] == FAR and steps[row, s] + 1 < FAR:
                     steps[there, to] = steps[row, s] + 1
                     queue[last] = 512 * there + to
@@ -95,14 +94,14 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def beside(index, ijk, row, axis, way):  # type: ignore[no-untyped-def]
+def beside(index, ijk, row, axis, sign):  # type: ignore[no-untyped-def]
     """Row of the adjacent brick along an axis.
 
     Parameters
     ----------
     index, ijk : int32 [bx, by, bz], int32 [n, 3]
         As of `Bricks`.
-    row, axis, way : int
+    row, axis, sign : int
         Row of the brick, axis 0 to 2, and direction, -1 or 1.
 
     Returns
@@ -111,6 +110,6 @@ def beside(index, ijk, row, axis, way):  # type: ignore[no-untyped-def]
         Negative if the adjacent brick has no samples or does not exist.
     """
     x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
-    x, y, z = x + way * (axis == 0), y + way * (axis == 1), z + way * (axis == 2)
+    x, y, z = x + sign * (axis == 0), y + sign * (axis == 1), z + sign * (axis == 2)
     nx, ny, nz = index.shape
     return index[x, y, z] if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz else -1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..volume import Bricks
 from .components import Components
 from .samples import positions
 
@@ -18,7 +17,7 @@ CHUNK = 2048
 """Bricks processed at a time."""
 
 
-def struts(solid: Bricks, components: Components, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def struts(components: Components, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Struts that join n bodies with minimum total length.
 
     Each cell of the empty space belongs to its nearest body, by exact Euclidean distances (Maurer, Qi and
@@ -27,10 +26,8 @@ def struts(solid: Bricks, components: Components, bodies: np.ndarray) -> tuple[n
 
     Parameters
     ----------
-    solid : Bricks
-        Samples of the solid.
     components : Components
-        Its connected components.
+        Connected components of a sampled solid.
     bodies : int64 [n]
         Numbers of the components to join.
 
@@ -45,8 +42,9 @@ def struts(solid: Bricks, components: Components, bodies: np.ndarray) -> tuple[n
 
     if len(bodies) < 2:
         return np.empty((0, 3)), np.empty((0, 3))
+    solid = components.solid
     times = -(-8 * max(solid.index.shape) // ACROSS)
-    cell, body, place = _cells(solid, components, bodies, times)
+    cell, body, place = _cells(components, bodies, times)
     shape = tuple(-(-8 * n // times) for n in solid.index.shape)
     of = np.full(shape, NONE)
     of.flat[cell] = np.arange(len(cell))
@@ -84,14 +82,14 @@ def _nearest(pairs: np.ndarray, ends: np.ndarray, slack: int) -> tuple[np.ndarra
 
 
 def _cells(
-    solid: Bricks, components: Components, bodies: np.ndarray, times: int
+    components: Components, bodies: np.ndarray, times: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cells of `times` samples along each side that contain bodies, once for each body in a cell.
 
     Returns the flat index of the cell, the position of the body in `bodies`, and the grid index of one of its
     samples in the cell: int64 [n], [n] and [n, 3].
     """
-    number = np.full(len(components.inside), NONE)
+    solid, number = components.solid, np.full(len(components.inside), NONE)
     number[bodies] = np.arange(len(bodies))
     shape = [-(-8 * n // times) for n in solid.index.shape]
     keys, places = [np.empty(0, np.int64)], [np.empty((0, 3), np.int64)]

@@ -88,10 +88,10 @@ def _shorten(lines, points, of, reach, index, squares):  # type: ignore[no-untyp
         for i in range(int(np.ceil(x - far)), int(x + far) + 1):
             for j in range(int(np.ceil(y - far)), int(y + far) + 1):
                 u, v = i - lines[n, 0], j - lines[n, 1]
-                room = far * far - (i - x) ** 2 - (j - y) ** 2
-                if room < 0:
+                left = far * far - (i - x) ** 2 - (j - y) ** 2
+                if left < 0:
                     continue
-                for k in range(int(np.ceil(z - np.sqrt(room))), int(z + np.sqrt(room)) + 1):
+                for k in range(int(np.ceil(z - np.sqrt(left))), int(z + np.sqrt(left)) + 1):
                     w = k - lines[n, 2]
                     t = min(max((u * a + v * b + w * c) * inverse, 0.0), 1.0)
                     square = (u - t * a) ** 2 + (v - t * b) ** 2 + (w - t * c) ** 2

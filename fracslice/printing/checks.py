@@ -244,11 +244,24 @@ def check_solid(
         problems.append(f"{narrow:.3g} mm2 of walls are thinner than {limits.wall:g} mm")
     if bare >= limits.thin:
         problems.append(f"{bare:.3g} mm2 of floors are thinner than {limits.floor:g} mm")
-    told = [widths_of(w.width * scale, w.area * scale**2) for w in (thick, between, floors)]
     unseen = _unseen(thick, finest or bricks.voxel * scale, limits.thin, scale)
     return SolidReport(
-        bricks.voxel * scale, bodies, cavities, told[0], told[1], told[2], narrow, bare, unseen, problems
+        voxel=bricks.voxel * scale,
+        bodies=bodies,
+        cavities=cavities,
+        walls=_widths(thick, scale),
+        gaps=_widths(between, scale),
+        floors=_widths(floors, scale),
+        thin_walls=narrow,
+        thin_floors=bare,
+        unseen=unseen,
+        problems=problems,
     )
+
+
+def _widths(found: Walls, scale: float) -> Widths | None:
+    """Statistics of widths in mm, weighted by their surface."""
+    return widths_of(found.width * scale, found.area * scale**2)
 
 
 def _unseen(found: Walls, finest: float, least: float, scale: float) -> str:

@@ -4,48 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernel import Field, Kernel
+from ..kernel import Field
 from ..volume.values import values_at
 from ..work import Work
-from .walls import OPPOSITE, Walls
+from .walls import OPPOSITE, Walls, slopes
 
 STEP = 0.05
 """Step of central differences, voxels."""
 
 AWAY = 0.5
 """Maximum displacement of a face, voxels."""
-
-
-def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient of a field by central differences.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        Kernel of the field.
-    points : float64 [3, n]
-        Points, scene units.
-    step : float
-        Distance from a point to either side, scene units.
-    work : Work
-        Threads and cancellation.
-
-    Returns
-    -------
-    length, normals : [n], [3, n]
-        Magnitude of the gradient, and unit normals.
-
-    Raises
-    ------
-    Cancelled
-        When the work is cancelled.
-    """
-    shifts = step * np.eye(3)[:, :, None]
-    slope = np.stack(
-        [values_at(kernel, points + s, work) - values_at(kernel, points - s, work) for s in shifts]
-    )
-    length = np.maximum(np.linalg.norm(slope, axis=0), 1e-30)
-    return length / (2 * step), slope / length
 
 
 def projected(root: Field, found: Walls, voxel: float, work: Work) -> Walls:
@@ -78,16 +46,16 @@ def projected(root: Field, found: Walls, voxel: float, work: Work) -> Walls:
     """
     if root.bounds.exterior_only or not len(found.width):
         return found
-    kernel, ways = root.kernel(), ((found.end - found.start) / found.width[:, None]).T
+    kernel, directions = root.kernel(), ((found.end - found.start) / found.width[:, None]).T
     ends, normals = [], []
     for points in (found.start.T, found.end.T):
         steep, normal = slopes(kernel, points, STEP * voxel, work)
-        along = steep * (normal * ways).sum(0)
+        along = steep * (normal * directions).sum(0)
         shift = -values_at(kernel, points, work) / np.where(np.abs(along) > -OPPOSITE * steep, along, np.inf)
-        ends.append(points + np.clip(shift, -AWAY * voxel, AWAY * voxel) * ways)
+        ends.append(points + np.clip(shift, -AWAY * voxel, AWAY * voxel) * directions)
         normals.append(normal)
-    across = [np.abs((normal * ways).sum(0)) > -OPPOSITE for normal in normals]
+    across = [np.abs((normal * directions).sum(0)) > -OPPOSITE for normal in normals]
     away = (normals[0] * normals[1]).sum(0) < OPPOSITE
-    width = ((ends[1] - ends[0]) * ways).sum(0)
+    width = ((ends[1] - ends[0]) * directions).sum(0)
     stays = np.where(across[0] & across[1], away, across[0] | across[1]) & (width > 0)
     return Walls(ends[0].T, ends[1].T, width, found.area).chosen(stays)

@@ -24,7 +24,7 @@ from .edits import edited
 
 # Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
 if TYPE_CHECKING:
-    from .components import Components, Connected
+    from .components import Components
     from .samples import Samples
 
 COARSE, FINE = 128, 640
@@ -73,17 +73,17 @@ def printable(planned: Plan, size: float, how: Print, work: Work | None = None) 
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
         if (length := getattr(how, name)) > size and (name != "drain" or how.hollow):
             raise VolumeError(f"{name} {length:g} mm: expected at most the object's size, {size:g} mm")
-    run = _Run(planned, size, how, work or Work())
-    for stage, change in run.changes():
-        run.work.check()
-        run.work.progress(stage, 0.0)
-        run.put(change())
-        run.work.progress(stage, 1.0)
-    return _standing(run.planned, how, run.scale), run.scale
+    job = _Preparation(planned, size, how, work or Work())
+    for stage, change in job.changes():
+        job.work.check()
+        job.work.progress(stage, 0.0)
+        job.put(change())
+        job.work.progress(stage, 1.0)
+    return _standing(job.planned, how, job.scale), job.scale
 
 
 @dataclass
-class _Run:
+class _Preparation:
     """The object during its edits."""
 
     planned: Plan
@@ -92,8 +92,8 @@ class _Run:
     work: Work
     scale: float = 1.0
     """mm per scene unit, set once the bodies that stay are known."""
-    known: Connected | None = None
-    """Samples and components, once computed."""
+    known: Components | None = None
+    """Components, once computed."""
 
     @property
     def thing(self) -> Field:
@@ -150,9 +150,9 @@ class _Run:
 
         return shown(self.thing, self.planned.outer, max(self.planned.box.size), samples, self.work)
 
-    def connected(self) -> Connected:
-        """Samples that resolve connectivity, and their components; shared by cavities, bodies and bridges."""
-        from .components import Connected, components_of
+    def connected(self) -> Components:
+        """Components of samples that resolve connectivity; shared by cavities, bodies and bridges."""
+        from .components import components_of
         from .connectivity import resolved
 
         if self.known is None:
@@ -160,7 +160,7 @@ class _Run:
             found = components_of(coarse)
             unit = max(self.planned.box.size) / self.size
             bricks = resolved(self.thing, coarse, THIN * unit**2, len(_large(found)) > 1, self.work)
-            self.known = Connected(bricks, found if bricks is coarse else components_of(bricks))
+            self.known = found if bricks is coarse else components_of(bricks)
         return self.known
 
     def seen(self, length: float) -> Samples:
@@ -171,7 +171,7 @@ class _Run:
 
     def filled(self) -> Field:
         """Fill enclosed cavities."""
-        return self.without(self.connected().components.cavities)
+        return self.without(self.connected().cavities)
 
     def without(self, cavities: np.ndarray) -> Field:
         """Fill the given cavities."""
@@ -188,7 +188,7 @@ class _Run:
         from .border import nearer
 
         found = self.connected()
-        first, others = np.split(found.components.bodies, [1])
+        first, others = np.split(found.bodies, [1])
         return edited(self.thing, "keep", nearer(found, first, others)) if len(others) else self.thing
 
     def bridged(self) -> Field:
@@ -198,9 +198,9 @@ class _Run:
         from .capsules import capsules
 
         found = self.connected()
-        large = _large(found.components)
-        dust = np.setdiff1d(found.components.bodies, large)
-        start, end = struts(found.solid, found.components, large)
+        large = _large(found)
+        dust = np.setdiff1d(found.bodies, large)
+        start, end = struts(found, large)
         if len(dust):
             self.put(edited(self.thing, "cut", nearer(found, dust, large)))
         if not len(start):
@@ -210,9 +210,9 @@ class _Run:
 
     def unsealed(self) -> Field:
         """Fill cavities that are sealed only at the sample spacing of the mesh."""
-        from .components import Connected
+        from .components import components_of
 
-        fine, self.known = self.known, Connected.of(sample_scene(self.planned, self.work))
+        fine, self.known = self.known, components_of(sample_scene(self.planned, self.work))
         return self.without(self.known.sealed(fine)) if fine else self.thing
 
     def closed(self) -> Field:
@@ -222,7 +222,7 @@ class _Run:
 
         solid = self.seen(self.how.gap)
         found = all_walls(self.thing, solid, self.how.gap / self.scale, self.work, gaps=True)
-        one = _apart(found.middle, solid.bricks.voxel)
+        one = _spaced(found.middle, solid.bricks.voxel)
         if not len(one):
             return self.thing
         radius = solid.bricks.voxel
@@ -236,19 +236,19 @@ class _Run:
         axis between opposite faces. Pores that they seal are filled.
         """
         from .capsules import capsules
-        from .components import Connected
+        from .components import components_of
         from .samples import together
         from .thin_features import all_walls
 
         solid, least = self.seen(self.how.thickness), self.how.thickness / self.scale
         middle = all_walls(self.thing, solid, least, self.work).middle
-        middle = middle[_apart(middle, solid.bricks.voxel)]
+        middle = middle[_spaced(middle, solid.bricks.voxel)]
         if not len(middle):
             return self.thing
         balls = capsules(middle, middle, least / 2, solid.bricks)
         self.put(self.with_capsules(balls, least))
-        before = Connected.of(solid.bricks)
-        self.known = Connected.of(together(solid.bricks, balls.bricks))
+        before = components_of(solid.bricks)
+        self.known = components_of(together(solid.bricks, balls.bricks))
         return self.without(self.known.sealed(before))
 
     def with_capsules(self, made: Samples, width: float) -> Field:
@@ -262,13 +262,13 @@ class _Run:
 
         With drain holes, hollows under `POCKET` of the largest stay solid.
         """
-        from .components import Connected, components_of
+        from .components import components_of
         from .samples import Samples, positions
 
         swept = to_grid(self.sampled(self.how.hollow)).redistance()
         hollow = from_grid(swept.offset(-self.how.hollow / self.scale))
-        found = Connected(hollow, components_of(hollow))
-        numbers, count = found.components.bodies, found.components.count
+        found = components_of(hollow)
+        numbers, count = found.bodies, found.count
         if not len(numbers):
             raise VolumeError(f"walls of {self.how.hollow:g} mm leave nothing to hollow out")
         if not self.how.drain:
@@ -276,7 +276,7 @@ class _Run:
         large, holes = count[numbers] >= POCKET * count[numbers[0]], list[Node]()
         thing = edited(self.thing, "cut", Samples(found.without(numbers[~large])))
         for number in numbers[large]:
-            at = (found.components.labels == number) & (hollow.values > -hollow.voxel)
+            at = (found.labels == number) & (hollow.values > -hollow.voxel)
             points = np.array(hollow.origin) + hollow.voxel * positions(hollow, *np.nonzero(at))
             holes += self.drains(points, -hollow.values[at])
         return edited(thing, "cut", union(*holes))
@@ -300,7 +300,7 @@ class _Run:
         yield transform(cylinder(radius=radius, height=high - low), translate=(x, y, (low + high) / 2))
 
 
-def _apart(points: np.ndarray, voxel: float) -> np.ndarray:
+def _spaced(points: np.ndarray, voxel: float) -> np.ndarray:
     """Numbers of points, one in each occupied cell of a quarter voxel, ordered along x, then y, then z."""
     if not len(points):
         return np.empty(0, np.int64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,31 @@ SIDE = 11
 """Samples along each axis of a brick with one layer before it and two after it."""
 
 
+class Grid(NamedTuple):
+    """Samples for compiled functions.
+
+    Attributes
+    ----------
+    x0, y0, z0 : float
+        Origin, scene units.
+    voxel : float
+        Spacing, scene units.
+    ijk, row, values : ndarray
+        As of `Bricks`: `row` is its index.
+    bounds : float32 [bx, by, bz]
+        Signed lower bound of the distance to the surface in each unsampled brick, scene units.
+    """
+
+    x0: float
+    y0: float
+    z0: float
+    voxel: float
+    ijk: np.ndarray
+    row: np.ndarray
+    values: np.ndarray
+    bounds: np.ndarray
+
+
 class Samples(ArrayField):
     """Bricks of samples as a field over all space.
 
@@ -43,8 +69,8 @@ class Samples(ArrayField):
     """
 
     def __init__(self, bricks: Bricks) -> None:
-        self.bricks = bricks
-        self.brick_bounds = _brick_bounds(bricks)
+        self.bricks = b = bricks
+        self.grid = Grid(*b.origin, b.voxel, b.ijk, b.index, b.values, _brick_bounds(b))
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -66,17 +92,16 @@ class Samples(ArrayField):
     @cached_property
     def beside(self) -> np.ndarray:
         """True for samples with the opposite sign among the 26 samples around them, bool [n, 512]."""
-        b = self.bricks
-        found = np.empty(b.values.shape, np.bool_)
-        _beside(b.ijk, b.index, self.brick_bounds, b.values, found)
+        found = np.empty(self.bricks.values.shape, np.bool_)
+        _beside(self.grid, found)
         return found
 
-    def free(self, start: np.ndarray, ways: np.ndarray, far: np.ndarray) -> np.ndarray:
+    def free(self, start: np.ndarray, directions: np.ndarray, far: np.ndarray) -> np.ndarray:
         """Distance along rays to the first grid cell that contains the surface.
 
         Parameters
         ----------
-        start, ways : float64 [n, 3]
+        start, directions : float64 [n, 3]
             Origins and unit directions, scene units.
         far : float64 [n]
             Maximum distances, scene units.
@@ -86,9 +111,8 @@ class Samples(ArrayField):
         float64 [n]
             Distances, at most `far`.
         """
-        b, out = self.bricks, np.empty(len(far))
-        grid = b.index, self.brick_bounds, b.values, self.beside
-        _free(start, ways, far, *b.origin, b.voxel, *grid, out)
+        out = np.empty(len(far))
+        _free(start, directions, far, self.grid, self.beside, out)
         return out
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -104,9 +128,9 @@ class Samples(ArrayField):
         float64
             Values, in the shape of `x`.
         """
-        b, out = self.bricks, np.empty(np.shape(x))
+        out = np.empty(np.shape(x))
         u, v, w = (np.ascontiguousarray(a, np.float64).ravel() for a in (x, y, z))
-        _interpolate(u, v, w, *b.origin, b.voxel, b.index, self.brick_bounds, b.values, out.ravel())
+        _interpolate(u, v, w, self.grid, out.ravel())
         return out
 
 
@@ -172,52 +196,30 @@ def _brick_bounds(bricks: Bricks) -> np.ndarray:
 
 
 @compiled
-def _interpolate(xs, ys, zs, x0, y0, z0, voxel, index, brick_bounds, values, out):  # type: ignore[no-untyped-def]
+def _interpolate(xs, ys, zs, grid, out):  # type: ignore[no-untyped-def]
     """Write the values at points."""
+    x0, y0, z0, voxel = grid.x0, grid.y0, grid.z0, grid.voxel
     for n in range(len(xs)):
-        out[n] = interpolated(xs[n], ys[n], zs[n], x0, y0, z0, voxel, index, brick_bounds, values)
+        out[n] = between((xs[n] - x0) / voxel, (ys[n] - y0) / voxel, (zs[n] - z0) / voxel, grid)
 
 
 @compiled
-def interpolated(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
-    """Value at a point in scene units.
-
-    Parameters
-    ----------
-    x, y, z : float
-        The point.
-    x0, y0, z0, voxel : float
-        Origin and spacing of the grid, scene units.
-    index, brick_bounds, values : ndarray
-        As of `Bricks` and `Samples`.
-
-    Returns
-    -------
-    float
-        The interpolated value, or a bound.
-    """
-    u, v, w = (x - x0) / voxel, (y - y0) / voxel, (z - z0) / voxel
-    return between(u, v, w, voxel, index, brick_bounds, values)
-
-
-@compiled
-def between(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
+def between(u, v, w, grid):  # type: ignore[no-untyped-def]
     """Value at a point in voxels from the origin of the grid.
 
     Parameters
     ----------
     u, v, w : float
         The point, voxels.
-    voxel : float
-        Spacing of the grid, scene units.
-    index, brick_bounds, values : ndarray
-        As of `Bricks` and `Samples`.
+    grid : Grid
+        The samples.
 
     Returns
     -------
     float
         The interpolated value, or a bound, scene units.
     """
+    index, values, bounds = grid.row, grid.values, grid.bounds
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
     u, v, w = u - i, v - j, w - k
     p, q, r = i & 7, j & 7, k & 7
@@ -225,8 +227,8 @@ def between(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-unt
     nx, ny, nz = index.shape
     within = 0 <= bi < nx and 0 <= bj < ny and 0 <= bk < nz
     row = index[bi, bj, bk] if within else 0
-    if row < 0 and (max(p, q, r) < 7 or abs(brick_bounds[bi, bj, bk]) > BRICK / 2 * voxel):
-        return float(brick_bounds[bi, bj, bk])
+    if row < 0 and (max(p, q, r) < 7 or abs(bounds[bi, bj, bk]) > BRICK / 2 * grid.voxel):
+        return float(bounds[bi, bj, bk])
     if within and max(p, q, r) < 7:
         f, s = values[row], 64 * p + 8 * q + r
         a, b = (1 - w) * f[s] + w * f[s + 1], (1 - w) * f[s + 8] + w * f[s + 9]
@@ -236,20 +238,18 @@ def between(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-unt
     for corner in range(8):
         a, b, c = corner >> 2, (corner >> 1) & 1, corner & 1
         share = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w)
-        total += share * sample_at(index, brick_bounds, values, voxel, i + a, j + b, k + c)
+        total += share * sample_at(grid, i + a, j + b, k + c)
     return total
 
 
 @compiled
-def sample_at(index, brick_bounds, values, voxel, i, j, k):  # type: ignore[no-untyped-def]
+def sample_at(grid, i, j, k):  # type: ignore[no-untyped-def]
     """Sample at a grid point, or a bound if it has none.
 
     Parameters
     ----------
-    index, brick_bounds, values : ndarray
-        As of `Bricks` and `Samples`.
-    voxel : float
-        Spacing of the grid, scene units.
+    grid : Grid
+        The samples.
     i, j, k : int
         Grid index, which may lie beyond the bricks.
 
@@ -259,30 +259,31 @@ def sample_at(index, brick_bounds, values, voxel, i, j, k):  # type: ignore[no-u
         The sample; beyond the bricks, a bound from the distance to them.
     """
     bi, bj, bk = i >> 3, j >> 3, k >> 3
-    nx, ny, nz = index.shape
+    nx, ny, nz = grid.row.shape
     if min(bi, bj, bk) < 0 or bi >= nx or bj >= ny or bk >= nz:
         beyond = max(max(-i, i - 8 * nx + 1), max(max(-j, j - 8 * ny + 1), max(-k, k - 8 * nz + 1)))
-        return voxel * (NEAR + beyond - 1)
-    row = index[bi, bj, bk]
+        return grid.voxel * (NEAR + beyond - 1)
+    row = grid.row[bi, bj, bk]
     if row < 0:
-        return float(brick_bounds[bi, bj, bk])
-    return float(values[row, (i & 7) * 64 + (j & 7) * 8 + (k & 7)])
+        return float(grid.bounds[bi, bj, bk])
+    return float(grid.values[row, (i & 7) * 64 + (j & 7) * 8 + (k & 7)])
 
 
 @compiled
-def gather(ijk, index, brick_bounds, values, row, f):  # type: ignore[no-untyped-def]
+def gather(grid, row, f):  # type: ignore[no-untyped-def]
     """Copy a brick's samples with one layer before them and two after them along each axis.
 
     Parameters
     ----------
-    ijk, index, brick_bounds, values : ndarray
-        As of `Bricks` and `Samples`.
+    grid : Grid
+        The samples.
     row : int
         Row of the brick.
     f : float32 [SIDE**3]
         Written: the samples.
     """
-    x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
+    index, values, bounds = grid.row, grid.values, grid.bounds
+    x, y, z = grid.ijk[row, 0] >> 3, grid.ijk[row, 1] >> 3, grid.ijk[row, 2] >> 3
     nx, ny, nz = index.shape
     for a in range(3):
         for b in range(3):
@@ -290,7 +291,7 @@ def gather(ijk, index, brick_bounds, values, row, f):  # type: ignore[no-untyped
                 u, v, w = x + a - 1, y + b - 1, z + c - 1
                 known = 0 <= u < nx and 0 <= v < ny and 0 <= w < nz
                 there = index[u, v, w] if known else -1
-                flat = brick_bounds[u, v, w] if known else brick_bounds[x, y, z]
+                flat = bounds[u, v, w] if known else bounds[x, y, z]
                 for i in range((0, 1, 9)[a], (1, 9, 11)[a]):
                     for j in range((0, 1, 9)[b], (1, 9, 11)[b]):
                         to = (i * SIDE + j) * SIDE
@@ -300,12 +301,12 @@ def gather(ijk, index, brick_bounds, values, row, f):  # type: ignore[no-untyped
 
 
 @compiled
-def _beside(ijk, index, brick_bounds, values, found):  # type: ignore[no-untyped-def]
+def _beside(grid, found):  # type: ignore[no-untyped-def]
     """Write `Samples.beside`."""
     f = np.empty(SIDE**3, np.float32)
     one, two = np.empty(SIDE**3, np.uint8), np.empty(SIDE**3, np.uint8)
-    for row in range(len(ijk)):
-        gather(ijk, index, brick_bounds, values, row, f)
+    for row in range(len(grid.ijk)):
+        gather(grid, row, f)
         for s in range(SIDE**3):
             one[s] = 1 if f[s] < 0 else 2
         for step in (1, SIDE, SIDE * SIDE):
@@ -318,40 +319,43 @@ def _beside(ijk, index, brick_bounds, values, found):  # type: ignore[no-untyped
 
 
 @compiled
-def _free(start, ways, far, x0, y0, z0, voxel, index, brick_bounds, values, beside, out):  # type: ignore[no-untyped-def]
+def _free(start, directions, far, grid, beside, out):  # type: ignore[no-untyped-def]
     """Write `Samples.free`."""
+    x0, y0, z0, voxel = grid.x0, grid.y0, grid.z0, grid.voxel
     for n in range(len(far)):
         x, y, z = (start[n, 0] - x0) / voxel, (start[n, 1] - y0) / voxel, (start[n, 2] - z0) / voxel
         s = 0.0
         while s < far[n] / voxel:
-            u, v, w = x + s * ways[n, 0], y + s * ways[n, 1], z + s * ways[n, 2]
-            if is_beside(u, v, w, index, beside) and _is_mixed(u, v, w, voxel, index, brick_bounds, values):
+            u, v, w = x + s * directions[n, 0], y + s * directions[n, 1], z + s * directions[n, 2]
+            if is_beside(u, v, w, grid, beside) and _is_mixed(u, v, w, grid):
                 break
             s += STRIDE
         out[n] = min(voxel * s, far[n])
 
 
 @compiled
-def _is_mixed(u, v, w, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
+def _is_mixed(u, v, w, grid):  # type: ignore[no-untyped-def]
     """True if the cell around a point, in voxels from the origin, has corners on both sides."""
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
     inside = 0
     for corner in range(8):
         at = i + (corner >> 2), j + ((corner >> 1) & 1), k + (corner & 1)
-        inside += sample_at(index, brick_bounds, values, voxel, *at) < 0
+        inside += sample_at(grid, *at) < 0
     return 0 < inside < 8
 
 
 @compiled
-def is_beside(u, v, w, index, beside):  # type: ignore[no-untyped-def]
+def is_beside(u, v, w, grid, beside):  # type: ignore[no-untyped-def]
     """True if the nearest sample of a point is `Samples.beside`.
 
     Parameters
     ----------
     u, v, w : float
         The point, voxels from the origin of the grid.
-    index, beside : ndarray
-        As of `Bricks` and `Samples`.
+    grid : Grid
+        The samples.
+    beside : bool [n, 512]
+        As of `Samples`.
 
     Returns
     -------
@@ -359,9 +363,9 @@ def is_beside(u, v, w, index, beside):  # type: ignore[no-untyped-def]
         False if the point has no sample.
     """
     i, j, k = int(np.floor(u + 0.5)), int(np.floor(v + 0.5)), int(np.floor(w + 0.5))
-    nx, ny, nz = index.shape
+    nx, ny, nz = grid.row.shape
     x, y, z = i >> 3, j >> 3, k >> 3
-    row = index[x, y, z] if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz else -1
+    row = grid.row[x, y, z] if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz else -1
     return row >= 0 and beside[row, ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)]
 
 

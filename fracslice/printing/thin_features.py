@@ -20,10 +20,9 @@ from ..rows import Rows
 from ..volume import Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
-from .faces import slopes
 from .offset_field import OffsetField
 from .samples import Samples
-from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, walls
+from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, slopes, walls
 
 NEAR = 0.9
 """Offset in voxels: more than the distance from any point to the nearest sample, half the diagonal."""
@@ -112,26 +111,26 @@ def thin_features(root: Field, seen: Samples, work: Work) -> tuple[ThinFeatures,
         When the work is cancelled.
     """
     look = _Look(root, seen, THIN * seen.bricks.voxel, work)
-    return look.told(look.walls()), look.told(look.gaps())
+    return look.features(look.walls()), look.features(look.gaps())
 
 
 @dataclass(frozen=True, eq=False)
 class _Rays(Rows):
     """Rays that start next to a surface and pass through it.
 
-    start, ways: float64 [n, 3]. area: [n], surface that each represents. enter, leave: [n], distances along
-    the ray to the beginning and the end of the thin wall or gap.
+    start, directions: float64 [n, 3]. area: [n], surface that each represents. enter, leave: [n], distances
+    along the ray to the beginning and the end of the thin wall or gap.
     """
 
     start: np.ndarray
-    ways: np.ndarray
+    directions: np.ndarray
     area: np.ndarray
     enter: np.ndarray
     leave: np.ndarray
 
     def points(self, s: np.ndarray) -> np.ndarray:
         """Points at distances `s` along the rays, [3, n]."""
-        return np.asarray(self.start.T + s * self.ways.T)
+        return np.asarray(self.start.T + s * self.directions.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +150,7 @@ class _Look:
     def voxel(self) -> float:
         return self.seen.bricks.voxel
 
-    def told(self, found: Walls) -> ThinFeatures:
+    def features(self, found: Walls) -> ThinFeatures:
         """Walls or gaps with the width below which they replace sampled ones."""
         return ThinFeatures(found, 0.0 if self.root.bounds.exterior_only else self.most)
 
@@ -187,7 +186,7 @@ class _Look:
         except VolumeError:  # all walls are thin
             return Walls.none()
         limit = np.full(len(rays.start), self.most)
-        back = self.first(replace(rays, ways=-rays.ways), 0 * limit, limit, -1.0)
+        back = self.first(replace(rays, directions=-rays.directions), 0 * limit, limit, -1.0)
         return self.facing(rays.chosen(rays.enter + back > limit))
 
     def stretch(self, rays: _Rays, begin: np.ndarray, sign: float) -> _Rays:
@@ -222,7 +221,7 @@ class _Look:
         fractal end where its samples contain a surface.
         """
         if self.root.bounds.exterior_only:
-            end = self.seen.free(rays.start, rays.ways, rays.leave)
+            end = self.seen.free(rays.start, rays.directions, rays.leave)
             return replace(rays, leave=end).chosen(end > BEFORE * self.voxel)
         half = self.most / 2
         middle = np.full(len(rays.start), (NEAR + SLACK) * self.voxel + half)
@@ -234,7 +233,7 @@ class _Look:
         if not self.root.bounds.exterior_only:
             return rays
         begin = rays.points(s).T
-        return rays.chosen(self.seen.free(begin, rays.ways, np.full(len(begin), self.voxel)) > 0)
+        return rays.chosen(self.seen.free(begin, rays.directions, np.full(len(begin), self.voxel)) > 0)
 
     def offset_field(self, by: float) -> Samples:
         """Samples of the field less `by`. The box grows: a flatter field's inside extends farther from it."""
@@ -254,7 +253,7 @@ class _Look:
         """
 
         def field(which: np.ndarray, s: np.ndarray) -> np.ndarray:
-            return sign * self.field(_points(rays.start, rays.ways, which, s))
+            return sign * self.field(_points(rays.start, rays.directions, which, s))
 
         return _first(field, begin, end, self.root.bounds.lipschitz, STEP * self.voxel)
 
@@ -316,12 +315,12 @@ def all_walls(root: Field, seen: Samples, limit: float, work: Work, *, gaps: boo
 
 
 @compiled
-def _points(start, ways, which, s):  # type: ignore[no-untyped-def]
+def _points(start, directions, which, s):  # type: ignore[no-untyped-def]
     """Points at distances `s` along some rays, [3, n]."""
     points = np.empty((3, len(s)))
     for i in range(len(s)):
         for axis in range(3):
-            points[axis, i] = start[which[i], axis] + s[i] * ways[which[i], axis]
+            points[axis, i] = start[which[i], axis] + s[i] * directions[which[i], axis]
     return points
 
 

@@ -16,9 +16,11 @@ from typing import TypeVar
 import numpy as np
 
 from ..compiled import compiled
+from ..kernel import Kernel
 from ..rows import Rows
+from ..volume.values import values_at
 from ..work import Work, chunks
-from .samples import SIDE, STRIDE, Samples, between, gather, interpolated, is_beside
+from .samples import SIDE, STRIDE, Samples, between, gather, is_beside
 
 OPPOSITE = -0.5
 """Maximum cosine between the normals of the two faces of a wall: wedges up to 60 degrees count."""
@@ -26,7 +28,7 @@ OPPOSITE = -0.5
 AT_ONCE = 512
 """Bricks processed at a time by one thread."""
 
-ROOM = 8
+FIRST_SIZE = 8
 """Samples per crossing in the first allocation."""
 
 ALONG = 0.999
@@ -87,8 +89,8 @@ class Walls(Rows):
         Walls
             The walls, with new ends and widths.
         """
-        way = self.end - self.start
-        share = (way * direction).sum(1) / np.linalg.norm(way, axis=1)
+        span = self.end - self.start
+        share = (span * direction).sum(1) / np.linalg.norm(span, axis=1)
         width = self.width / np.maximum(np.abs(share), 1e-9)
         end = self.start + np.copysign(width, share)[:, None] * np.array(direction)
         return Walls(self.start, end, width, self.area).chosen(np.abs(share) > -OPPOSITE)
@@ -130,33 +132,22 @@ def walls(
     Cancelled
         When the work is cancelled.
     """
-    b, towards = solid.bricks, -1.0 if gaps else 1.0
+    exact, towards = solid.kernel("cpu", "float64"), -1.0 if gaps else 1.0
 
     def look(rows: slice) -> Walls:
         points, normals, area = crossed(solid, rows)
-        ways = -towards * normals
+        directions = -towards * normals
         if direction is not None:
-            ways = np.copysign(1, (ways * direction).sum(1))[:, None] * np.array(direction)
+            directions = np.copysign(1, (directions * direction).sum(1))[:, None] * np.array(direction)
         width = np.empty(len(points))
-        _through(
-            points,
-            ways,
-            limit,
-            towards,
-            *b.origin,
-            b.voxel,
-            b.index,
-            solid.brick_bounds,
-            b.values,
-            solid.beside,
-            width,
-        )
-        thin = (width < limit) & (np.abs((normals * ways).sum(1)) > -OPPOSITE)
-        ends = points + width[:, None] * ways
-        thin[thin] = (normals_at(solid, ends[thin]) * normals[thin]).sum(1) < OPPOSITE
+        _through(points, directions, limit, towards, solid.grid, solid.beside, width)
+        thin = (width < limit) & (np.abs((normals * directions).sum(1)) > -OPPOSITE)
+        ends = points + width[:, None] * directions
+        opposite = slopes(exact, ends[thin].T, solid.bricks.voxel / 2, work)[1].T
+        thin[thin] = (opposite * normals[thin]).sum(1) < OPPOSITE
         return Walls(points, ends, width, area).chosen(thin)
 
-    return gathered(look, len(b), AT_ONCE, work)
+    return gathered(look, len(solid.bricks), AT_ONCE, work)
 
 
 def gathered(look: Callable[[slice], R], count: int, size: int, work: Work) -> R:
@@ -204,55 +195,55 @@ def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.nda
     area : float64 [n]
         Surface that each crossing represents, squared scene units.
     """
-    b = solid.bricks
-    begin, end, _ = rows.indices(len(b))
-    n, room = (end - begin) * 512 // ROOM, -1
-    while n > room:
-        room = n
-        points, normals = np.empty((2, room, 3))
-        area = np.empty(room)
-        n = _cross(
-            begin,
-            end,
-            *b.origin,
-            b.voxel,
-            b.ijk,
-            b.index,
-            solid.brick_bounds,
-            b.values,
-            points,
-            normals,
-            area,
-        )
+    begin, end, _ = rows.indices(len(solid.bricks))
+    n, size = (end - begin) * 512 // FIRST_SIZE, -1
+    while n > size:
+        size = n
+        points, normals = np.empty((2, size, 3))
+        area = np.empty(size)
+        n = _cross(begin, end, solid.grid, points, normals, area)
     return points[:n].copy(), normals[:n].copy(), area[:n].copy()
 
 
-def normals_at(solid: Samples, points: np.ndarray) -> np.ndarray:
-    """Unit normals by central differences over a voxel.
+def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient of a field by central differences.
 
     Parameters
     ----------
-    solid : Samples
-        The samples.
-    points : float64 [n, 3]
+    kernel : Kernel
+        Kernel of the field.
+    points : float64 [3, n]
         Points, scene units.
+    step : float
+        Distance from a point to either side, scene units.
+    work : Work
+        Threads and cancellation.
 
     Returns
     -------
-    float64 [n, 3]
-        Unit normals.
+    length, normals : [n], [3, n]
+        Magnitude of the gradient, and unit normals.
+
+    Raises
+    ------
+    Cancelled
+        When the work is cancelled.
     """
-    b, normals = solid.bricks, np.empty(points.shape)
-    _normals(points, *b.origin, b.voxel, b.index, solid.brick_bounds, b.values, normals)
-    return normals
+    shifts = step * np.eye(3)[:, :, None]
+    slope = np.stack(
+        [values_at(kernel, points + s, work) - values_at(kernel, points - s, work) for s in shifts]
+    )
+    length = np.maximum(np.linalg.norm(slope, axis=0), 1e-30)
+    return length / (2 * step), slope / length
 
 
 @compiled
-def _cross(begin, end, x0, y0, z0, voxel, ijk, index, brick_bounds, values, points, normals, area):  # type: ignore[no-untyped-def]
+def _cross(begin, end, grid, points, normals, area):  # type: ignore[no-untyped-def]
     """Write the results of `crossed` as far as the arrays reach; return the number of crossings."""
     n, f = 0, np.empty(SIDE**3, np.float32)
+    ijk, voxel = grid.ijk, grid.voxel
     for row in range(begin, end):
-        gather(ijk, index, brick_bounds, values, row, f)
+        gather(grid, row, f)
         for s in range(512):
             u, v, w = s >> 6, (s >> 3) & 7, s & 7
             at = (u + 1) * SIDE * SIDE + (v + 1) * SIDE + w + 1
@@ -262,9 +253,9 @@ def _cross(begin, end, x0, y0, z0, voxel, ijk, index, brick_bounds, values, poin
                     continue
                 if n < len(area):
                     share = float(f[at]) / (float(f[at]) - float(f[at + step]))
-                    points[n, 0] = x0 + voxel * (ijk[row, 0] + u)
-                    points[n, 1] = y0 + voxel * (ijk[row, 1] + v)
-                    points[n, 2] = z0 + voxel * (ijk[row, 2] + w)
+                    points[n, 0] = grid.x0 + voxel * (ijk[row, 0] + u)
+                    points[n, 1] = grid.y0 + voxel * (ijk[row, 1] + v)
+                    points[n, 2] = grid.z0 + voxel * (ijk[row, 2] + w)
                     points[n, axis] += voxel * share
                     _across(f, at, axis, share, normals[n])
                     along = abs(normals[n, axis])
@@ -297,39 +288,18 @@ def _across(f, at, axis, share, normal):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _normals(points, x0, y0, z0, voxel, index, brick_bounds, values, normals):  # type: ignore[no-untyped-def]
-    """Write the unit normals at points."""
-    for n in range(len(points)):
-        x, y, z = points[n]
-        normals[n] = _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
-
-
-@compiled
-def _normal(x, y, z, x0, y0, z0, voxel, index, brick_bounds, values):  # type: ignore[no-untyped-def]
-    """Unit normal at a point, by central differences over a voxel."""
-    h = voxel / 2
-    u = interpolated(x + h, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
-    u -= interpolated(x - h, y, z, x0, y0, z0, voxel, index, brick_bounds, values)
-    v = interpolated(x, y + h, z, x0, y0, z0, voxel, index, brick_bounds, values)
-    v -= interpolated(x, y - h, z, x0, y0, z0, voxel, index, brick_bounds, values)
-    w = interpolated(x, y, z + h, x0, y0, z0, voxel, index, brick_bounds, values)
-    w -= interpolated(x, y, z - h, x0, y0, z0, voxel, index, brick_bounds, values)
-    length = max(np.sqrt(u * u + v * v + w * w), 1e-30)
-    return u / length, v / length, w / length
-
-
-@compiled
-def _through(points, ways, limit, towards, x0, y0, z0, voxel, index, brick_bounds, values, beside, width):  # type: ignore[no-untyped-def]
+def _through(points, directions, limit, towards, grid, beside, width):  # type: ignore[no-untyped-def]
     """Write the distance along each ray to the opposite surface; twice the limit if it is farther."""
+    x0, y0, z0, voxel = grid.x0, grid.y0, grid.z0, grid.voxel
     for n in range(len(points)):
         x, y, z = (points[n, 0] - x0) / voxel, (points[n, 1] - y0) / voxel, (points[n, 2] - z0) / voxel
         s, before = FIRST, 0.0
         width[n] = 2 * limit
         while s < limit / voxel + 1:
-            u, v, w = x + s * ways[n, 0], y + s * ways[n, 1], z + s * ways[n, 2]
+            u, v, w = x + s * directions[n, 0], y + s * directions[n, 1], z + s * directions[n, 2]
             f = -1.0
-            if is_beside(u, v, w, index, beside):
-                f = towards * between(u, v, w, voxel, index, brick_bounds, values)
+            if is_beside(u, v, w, grid, beside):
+                f = towards * between(u, v, w, grid)
             if f >= 0:
                 width[n] = voxel * (s - (STRIDE * f / (f - before) if before < 0 else 0.0))
                 break

@@ -23,6 +23,8 @@ CELLS = 1 << 13
 
 DETAIL = 0.5
 """Finest detail, pixels."""
+FINER = 4.0
+"""Ratio of details in the search for the depth at which the eye is outside the solid."""
 ROUNDING = {"float32": 2.0**-21, "float64": 2.0**-49}
 """Resolution of float positions, relative to the camera's coordinates: 4 ulp."""
 
@@ -85,12 +87,58 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     if sum(light.kind == "sky" for light in lights) > 1:
         raise lights[-1].fail("kind: expected at most one sky")
     pixel = 2 * math.tan(math.radians(camera.fov) / 2) / size[1]
-    near = clearance(resolve_depths(root, pixel * math.dist(camera.eye, camera.target)), camera)
+    near = surroundings(root, camera, pixel)
     scale = max(map(abs, camera.eye))
     precision = "float32" if pixel * near > 4 * ROUNDING["float32"] * scale else "float64"
-    resolved = resolve_depths(root, DETAIL * pixel * near)
+    resolved, _ = _around_eye(root, camera, DETAIL * pixel * near)
     seen = optics(camera, size, root, ROUNDING[precision] * scale)
     return RenderSetup(resolved, replace(view, lights=lights), camera, seen, precision)
+
+
+def surroundings(root: Node, camera: Camera, pixel: float) -> float:
+    """Return a lower bound of the distance from the eye to the surface, at the depth that is visible there.
+
+    The distance depends on the depth, and the depth on the size of a pixel at that distance. The search
+    starts at the target's distance and refines until a pixel at the surface is no smaller than the detail.
+
+    Parameters
+    ----------
+    root : Node
+        Root of the formula tree; depths may be "auto".
+    camera : Camera
+        The camera.
+    pixel : float
+        Size of a pixel at distance 1.
+
+    Returns
+    -------
+    float
+        Distance, scene units.
+
+    Raises
+    ------
+    SceneError
+        If the eye is inside the solid at every depth.
+    """
+    detail = pixel * math.dist(camera.eye, camera.target)
+    known, near = _around_eye(root, camera, detail)
+    while known is not root and pixel * near < detail:
+        detail /= FINER
+        known, near = _around_eye(root, camera, detail)
+    return near
+
+
+def _around_eye(root: Node, camera: Camera, detail: float) -> tuple[Node, float]:
+    """Tree resolved for a detail, or the coarsest finer one outside of which the eye lies; its clearance."""
+    finest = ROUNDING["float64"] * max(map(abs, camera.eye))
+    while True:
+        known = resolve_depths(root, detail)
+        try:
+            return known, clearance(known, camera)
+        except SceneError:
+            if known is root or detail < finest:
+                raise
+        detail /= FINER
 
 
 def _whole(root: Node, aspect: float) -> Camera:

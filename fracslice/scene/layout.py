@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
 
 from ..formulas import get, names
-from ..formulas.parameters import REQUIRED, Parameter
+from ..formulas.parameters import REQUIRED, Choice, Parameter
 from ..formulas.registry import Formula
 from .lengths import Length
 from .printing import Print
@@ -37,7 +36,7 @@ class TopElement:
 
     name: str
     doc: str
-    parameters: Mapping[str, Parameter | Length | Version]
+    parameters: Mapping[str, Parameter]
     children: tuple[int, int | None] = (0, 0)
     part: type[Part] | None = None
     many: bool = False
@@ -46,67 +45,11 @@ class TopElement:
 Element = Formula | TopElement
 
 
-@dataclass(frozen=True)
-class Version:
-    """Version of the file format; only one exists.
-
-    Attributes
-    ----------
-    default : Any
-        Default value; required.
-    doc : str
-        Meaning.
-    expects : str
-        Accepted text.
-    """
-
-    default: Any = REQUIRED
-    doc: str = "of the file format"
-    expects: str = "1"
-
-    def read(self, text: str) -> int:
-        """Parse the attribute.
-
-        Parameters
-        ----------
-        text : str
-            Text of the attribute.
-
-        Returns
-        -------
-        int
-            The version.
-
-        Raises
-        ------
-        ValueError
-            If the version is unknown.
-        """
-        if text.strip() != self.expects:
-            raise ValueError(self.expects)
-        return VERSION
-
-    def text(self, value: int) -> str:
-        """Format the attribute.
-
-        Parameters
-        ----------
-        value : int
-            The version.
-
-        Returns
-        -------
-        str
-            Text of the attribute.
-        """
-        return str(value)
-
-
-VERSION = 1
+VERSION = "1"
 SCENE = TopElement(
     "scene",
     "The whole file.",
-    MappingProxyType({"version": Version()}),
+    MappingProxyType({"version": Choice(REQUIRED, "of the file format", (VERSION,))}),
     (1, None),
 )
 SOLID = TopElement(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import SceneError
-from ..formulas.parameters import finite, shown
+from ..formulas.parameters import Parameter, finite, shown
 
 MILLIMETRES = {"um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
 SMALLEST, LARGEST = 1e-6, 1e6
@@ -48,21 +48,15 @@ def parse_length(value: str | float, what: str = "length") -> float:
 
 
 @dataclass(frozen=True)
-class Length:
+class Length(Parameter):
     """Parameter kind of a length: text with a unit, or a number of mm. Its value is in mm.
 
     Attributes
     ----------
-    default : Any
-        Default value, mm.
-    doc : str
-        Meaning.
     zero : bool
         True if 0 is allowed, for none.
     """
 
-    default: Any
-    doc: str
     zero: bool = False
 
     @property

@@ -21,36 +21,9 @@ _GROUPS = {
     ),
 }
 
-_START = """\
-# Elements
-
-*Made from the registry of formulas by `python docs/generate.py`; do not edit.*
-
-A scene file is XML. It says what the object is, in units of its own, and how large the finished object is:
-
-```xml
-<scene version="1">
-  <solid size="80mm">
-    <union smooth="0.05">
-      <mandelbulb power="8" iterations="auto"/>
-      <transform translate="0 0 -1.1" rotate="1 0 0 90" scale="0.4"><menger level="3"/></transform>
-      <repeat period="0.5 0.5 0.5" count="3 3 1"><sphere radius="0.2"/></repeat>
-    </union>
-  </solid>
-</scene>
-```
-
-- Spaces separate numbers. No number is beyond 1e9, no radius or size below 1e-15: kernels compute in float32.
-- Lengths in scene units have no unit. `size` takes `mm` (the default), `cm`, `m`, `in` or `um`.
-- Comments may stand anywhere. Document types, entities and includes are refused.
-- An editor completes and checks a scene with the RELAX NG schema that ships with the package;
-  `python -c "from fracslice.scene import schema; print(schema.PATH)"` prints its path.
-- In Python every element is a function of the same name in `fracslice.formulas`.
-"""
-
 
 def markdown() -> str:
-    """Return the page of all elements.
+    """Return the sections of all elements.
 
     Returns
     -------
@@ -61,7 +34,6 @@ def markdown() -> str:
 
 
 def _page() -> Iterator[str]:
-    yield _START
     yield "## The frame\n"
     for section in (SCENE, *SECTIONS.values()):
         yield from _described(section)

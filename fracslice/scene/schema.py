@@ -13,7 +13,7 @@ from typing import Any
 from xml.etree import ElementTree as Tree
 
 from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
-from .layout import SCENE, SECTIONS, VERSION, Element, Version, formulas
+from .layout import SCENE, SECTIONS, Element, formulas
 from .lengths import MILLIMETRES, Length
 
 PATH = Path(__file__).with_name("scene.rng")
@@ -108,34 +108,23 @@ def _items(parent: Tree.Element, kind: Vector, count: int) -> None:
         _data(parent, "integer" if kind.whole else "double", kind)
 
 
-def _axis(parent: Tree.Element, kind: Axis) -> None:
-    choice = Tree.SubElement(parent, "choice")
-    for letter in "xyz":
-        Tree.SubElement(choice, "value").text = letter
-
-
 def _words(parent: Tree.Element, kind: Choice) -> None:
-    choice = Tree.SubElement(parent, "choice")
+    values = Tree.SubElement(parent, "choice") if len(kind.words) > 1 else parent
     for word in kind.words:
-        Tree.SubElement(choice, "value").text = word
+        Tree.SubElement(values, "value").text = word
 
 
 def _length(parent: Tree.Element, kind: Length) -> None:
     _param(Tree.SubElement(parent, "data", type="string"), "pattern", _LENGTH)
 
 
-def _version(parent: Tree.Element, kind: Version) -> None:
-    Tree.SubElement(parent, "value").text = str(VERSION)
-
-
 _PATTERNS: dict[type, Any] = {
     Number: _number,
     Count: _count,
     Vector: _vector,
-    Axis: _axis,
+    Axis: _words,
     Choice: _words,
     Length: _length,
-    Version: _version,
 }
 
 

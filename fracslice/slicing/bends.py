@@ -43,7 +43,7 @@ class _Sides(Rows):
     high: np.ndarray
 
     @property
-    def way(self) -> np.ndarray:
+    def span(self) -> np.ndarray:
         """Vectors from `begin` to `end`."""
         return np.asarray(self.end - self.begin)
 
@@ -55,7 +55,7 @@ class _Sides(Rows):
     @property
     def tops(self) -> np.ndarray:
         """Points of the outline next to the midpoints."""
-        x, y = self.way.T
+        x, y = self.span.T
         left = np.column_stack([-y, x]) / np.hypot(x, y)[:, None]
         return np.asarray(self.middles + self.height[:, None] * left)
 
@@ -68,7 +68,7 @@ class _Sides(Rows):
     def bent(self) -> _Sides:
         """Sides with a bend next to them."""
         away = np.abs(self.height)
-        return self.chosen((away > SAGITTA) & (away < STEEPEST * np.hypot(*self.way.T)))
+        return self.chosen((away > SAGITTA) & (away < STEEPEST * np.hypot(*self.span.T)))
 
 
 def bends(
@@ -151,9 +151,9 @@ def _curvature(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     return twice / np.where(product > 0, product, np.inf)
 
 
-def _square(way: np.ndarray) -> np.ndarray:
+def _square(span: np.ndarray) -> np.ndarray:
     """Squared lengths of vectors [n, 2]."""
-    return np.asarray(way[:, 0] ** 2 + way[:, 1] ** 2)
+    return np.asarray(span[:, 0] ** 2 + span[:, 1] ** 2)
 
 
 def _settled(sides: _Sides, section: CrossSection) -> _Sides:

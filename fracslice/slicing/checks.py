@@ -14,7 +14,7 @@ from ..errors import SliceError
 from ..printing.checks import Limits, SolidReport, check_object, counted
 from ..printing.widths import Widths, widths_of
 from ..work import Work
-from .graph import Found, Graph, Nodes
+from .graph import Found, Graph
 from .layers import Layer, Slicer
 from .printers import Printer
 from .raster import check_fits
@@ -164,9 +164,7 @@ class _Collector:
         for k, now in enumerate(findings):
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
-            overhangs.append(
-                0.0 if below is None else square * unsupported(below, now.solid, reach, stack.shape[1])
-            )
+            overhangs.append(0.0 if below is None else square * unsupported(below, now.solid, reach))
             solid.add(now.solid)
             empty.add(now.empty)
             volume += now.area * float(stack.heights[k])
@@ -174,11 +172,11 @@ class _Collector:
                 walls.append(now.walls)
                 gaps.append(now.gaps)
         unfit = misfit(self.stack, self.printer) if self.printer else ""
-        components, hollows, overhang = solid.nodes(), empty.nodes(), np.array(overhangs)
-        islands = self.found(components, components.islands())
-        bodies = self.bodies(components)
-        cups = [c for c in self.shut(hollows, False) if self.height(c) >= self.limits.deep]
-        traps = self.shut(hollows, True)
+        overhang = np.array(overhangs)
+        islands = self.found(solid, solid.islands())
+        bodies = self.found(solid, np.ones(solid.count, bool))
+        cups = [c for c in self.shut(empty, False) if self.height(c) >= self.limits.deep]
+        traps = self.shut(empty, True)
         real = [i for i in islands if i.area >= self.limits.speck]
         kept = [b for b in bodies if b.area >= self.limits.speck]
         report = PrintReport(
@@ -195,7 +193,7 @@ class _Collector:
             largest_overhang=float(overhang.max(initial=0)),
             cups=cups,
             traps=traps,
-            cavities=[c for c in self.found(hollows, hollows.sealed()) if c.area >= self.limits.speck],
+            cavities=[c for c in self.found(empty, empty.sealed()) if c.area >= self.limits.speck],
             walls=widths_of(*np.concatenate(walls).T),
             gaps=widths_of(*np.concatenate(gaps).T),
             worst=_worst(overhang, real),
@@ -204,22 +202,18 @@ class _Collector:
         report.problems.extend([unfit] * bool(unfit) + _problems(report, self.limits))
         return report
 
-    def found(self, nodes: Nodes, chosen: np.ndarray) -> list[Found]:
+    def found(self, graph: Graph, chosen: np.ndarray) -> list[Found]:
         """Chosen nodes as connected groups."""
-        return nodes.grouped(chosen, self.stack.heights, self.stack.pixel, self.stack.shape)
+        return graph.groups(chosen, self.stack.heights, self.stack.pixel, self.stack.shape)
 
-    def shut(self, hollows: Nodes, backwards: bool) -> list[Found]:
-        """Large groups of shut nodes, see `Nodes.shut`."""
+    def shut(self, hollows: Graph, backwards: bool) -> list[Found]:
+        """Large groups of shut nodes, see `Graph.shut`."""
         return [p for p in self.found(hollows, hollows.shut(backwards)) if p.area >= self.limits.cup]
 
     def height(self, part: Found) -> float:
         """Height of a group, mm."""
         first, last = part.layers
         return float(self.stack.heights[first : last + 1].sum())
-
-    def bodies(self, nodes: Nodes) -> list[Found]:
-        """All nodes as connected groups."""
-        return self.found(nodes, np.ones(len(nodes.layer), bool))
 
 
 def misfit(stack: Stack, printer: Printer) -> str:
@@ -240,8 +234,8 @@ def misfit(stack: Stack, printer: Printer) -> str:
     try:
         check_fits(stack, printer)
     except SliceError:
-        mine, room = (" x ".join(f"{s:.4g}" for s in size) for size in (stack.size, printer.room))
-        return f"does not fit the {printer.title}: {mine} mm, and it has {room} mm"
+        mine, most = (" x ".join(f"{s:.4g}" for s in size) for size in (stack.size, printer.build_volume))
+        return f"does not fit the {printer.title}: {mine} mm, and it has {most} mm"
     return ""
 
 

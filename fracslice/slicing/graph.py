@@ -9,12 +9,13 @@ One without any way out is a cavity.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from ..compiled import compiled
-from ..disjoint import find, unite
-from .runs import LayerComponents, overlaps
+from ..disjoint import find, grouped, unite
+from .runs import LayerComponents, Nodes, overlaps
 
 
 @dataclass(frozen=True)
@@ -45,19 +46,18 @@ class Graph:
 
     Attributes
     ----------
-    layer, area, middle, open, edges : list of ndarray
-        Arrays of `Nodes`, layer by layer.
+    layers : list of Nodes
+        Nodes of each layer.
+    pairs : list of ndarray
+        Overlapping nodes of successive layers, int64 [n, 2] each.
     last : LayerComponents or None
         Components of the last layer.
     count : int
         Number of nodes.
     """
 
-    layer: list[np.ndarray] = field(default_factory=list)
-    area: list[np.ndarray] = field(default_factory=list)
-    middle: list[np.ndarray] = field(default_factory=list)
-    open: list[np.ndarray] = field(default_factory=list)
-    edges: list[np.ndarray] = field(default_factory=list)
+    layers: list[Nodes] = field(default_factory=list)
+    pairs: list[np.ndarray] = field(default_factory=list)
     last: LayerComponents | None = None
     count: int = 0
 
@@ -70,63 +70,26 @@ class Graph:
             Solid or empty components.
         """
         if self.last is not None:
-            pairs = overlaps(self.last, components).astype(np.int64)
-            self.edges.append(pairs + np.array([self.count - len(self.last), self.count]))
-        self.layer.append(np.full(len(components), len(self.layer), np.int32))
-        self.area.append(components.area)
-        self.middle.append(components.middle)
-        self.open.append(components.open)
+            first = np.array([self.count - len(self.last), self.count])
+            self.pairs.append(overlaps(self.last, components) + first)
+        self.layers.append(components.nodes)
         self.last = components
         self.count += len(components)
 
+    @cached_property
     def nodes(self) -> Nodes:
-        """Combine all layers.
+        """Nodes of all layers; no layer may be added after the first access, nor to those below."""
+        return Nodes.joined(self.layers)
 
-        Returns
-        -------
-        Nodes
-            Nodes and edges as arrays.
-        """
-        edges = np.concatenate([np.empty((0, 2), np.int64), *self.edges])
-        layer, area, middle, free = (
-            np.concatenate(a) for a in (self.layer, self.area, self.middle, self.open)
-        )
-        return Nodes(layer, area, middle, free, edges)
+    @cached_property
+    def layer(self) -> np.ndarray:
+        """Layer of each node, int64 [n]."""
+        return np.repeat(np.arange(len(self.layers)), [len(nodes.area) for nodes in self.layers])
 
-
-@dataclass(frozen=True, eq=False)
-class Nodes:
-    """Nodes and edges of a `Graph`.
-
-    Attributes
-    ----------
-    layer : int32 [n]
-        Layer of each node.
-    area : int64 [n]
-        Area, pixels.
-    middle : float64 [n, 2]
-        Centroid (x, y), pixels.
-    open : bool [n]
-        True if it reaches the border of the window.
-    edges : int64 [e, 2]
-        Pairs of overlapping nodes (below, above), sorted by layer.
-    """
-
-    layer: np.ndarray
-    area: np.ndarray
-    middle: np.ndarray
-    open: np.ndarray
-    edges: np.ndarray
-
-    def bodies(self) -> np.ndarray:
-        """Connected component of each node.
-
-        Returns
-        -------
-        int64 [n]
-            Its first node.
-        """
-        return _united(self.edges, len(self.layer))
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """Pairs of overlapping nodes (below, above), sorted by layer, int64 [e, 2]."""
+        return np.concatenate([np.empty((0, 2), np.int64), *self.pairs])
 
     def islands(self) -> np.ndarray:
         """Nodes with nothing below them. The first layer lies on the plate.
@@ -155,13 +118,11 @@ class Nodes:
         bool [n]
             True for shut nodes.
         """
-        order = -1 if backwards else 1
-        free = self.open | (backwards & (self.layer == self.layer.max(initial=0)))
-        later = (
-            np.maximum(*self.layer[self.edges].T) if not backwards else -np.minimum(*self.layer[self.edges].T)
-        )
-        edges = self.edges[np.argsort(later, kind="stable")]
-        return np.asarray(_shut(edges, np.sort(later), order * self.layer, free))
+        sign = -1 if backwards else 1
+        free = self.nodes.open | (backwards & (self.layer == self.layer.max(initial=0)))
+        later = np.max(sign * self.layer[self.edges], axis=1)
+        order = np.argsort(later, kind="stable")
+        return np.asarray(_shut(self.edges[order], later[order], sign * self.layer, free))
 
     def sealed(self) -> np.ndarray:
         """Empty nodes without any way out, not even to the plate.
@@ -171,12 +132,12 @@ class Nodes:
         bool [n]
             True for sealed nodes.
         """
-        body = self.bodies()
-        free = np.zeros(len(body), bool)
-        free[body[self.open | (self.layer == 0) | (self.layer == self.layer.max(initial=0))]] = True
+        body, count = grouped(self.count, *self.edges.T)
+        free = np.zeros(count, bool)
+        free[body[self.nodes.open | (self.layer == 0) | (self.layer == self.layer.max(initial=0))]] = True
         return np.asarray(~free[body])
 
-    def grouped(
+    def groups(
         self, chosen: np.ndarray, heights: np.ndarray, pixel: tuple[float, float], shape: tuple[int, int]
     ) -> list[Found]:
         """Group chosen nodes into connected components.
@@ -197,17 +158,16 @@ class Nodes:
         list of Found
             The groups, by descending volume.
         """
-        inner = self.edges[chosen[self.edges].all(1)]
-        root = _united(inner, len(self.layer))
+        number, _ = grouped(self.count, *self.edges[chosen[self.edges].all(1)].T)
         nodes = np.flatnonzero(chosen)
-        names, group = np.unique(root[nodes], return_inverse=True)
+        names, lowest, group = np.unique(number[nodes], return_index=True, return_inverse=True)
         square = pixel[0] * pixel[1]
-        volume = np.bincount(group, self.area[nodes] * heights[self.layer[nodes]] * square, len(names))
+        volume = np.bincount(group, self.nodes.area[nodes] * heights[self.layer[nodes]] * square, len(names))
         area, first, last = np.zeros(len(names)), np.full(len(names), 1 << 30), np.zeros(len(names), np.int64)
-        np.maximum.at(area, group, self.area[nodes] * square)
+        np.maximum.at(area, group, self.nodes.area[nodes] * square)
         np.minimum.at(first, group, self.layer[nodes])
         np.maximum.at(last, group, self.layer[nodes])
-        at = (self.middle[names] - np.array(shape[::-1]) / 2) * pixel
+        at = (self.nodes.middle[nodes[lowest]] - np.array(shape[::-1]) / 2) * pixel
         order = np.argsort(-volume, kind="stable")
         return [
             Found(
@@ -218,22 +178,6 @@ class Nodes:
             )
             for i in order
         ]
-
-
-def _united(edges: np.ndarray, count: int) -> np.ndarray:
-    """Root of each node."""
-    parent = np.arange(count)
-    _unite_all(parent, edges)
-    return parent
-
-
-@compiled
-def _unite_all(parent, edges):  # type: ignore[no-untyped-def]
-    """Unite the nodes of all edges and flatten the tree."""
-    for a, b in edges:
-        unite(parent, a, b)
-    for i in range(len(parent)):
-        parent[i] = find(parent, i)
 
 
 @compiled

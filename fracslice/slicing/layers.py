@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
@@ -211,22 +209,6 @@ class Slicer:
             return made
 
         groups = [list(g) for _, g in groupby(chosen, lambda index: index // SLAB)]
-        return self._in_order(slab, groups)
-
-    def _in_order(self, slab: Callable[[list[int]], list[T]], groups: list[list[int]]) -> Iterator[T]:
-        """Results of slabs in order, computed a few slabs ahead."""
-        ahead: deque[Future[list[T]]] = deque()
-        waiting = iter(groups)
-        with ThreadPoolExecutor(self.work.threads) as pool:
-            try:
-                for done in range(len(groups)):
-                    while len(ahead) <= self.work.threads and (group := next(waiting, None)):
-                        ahead.append(pool.submit(slab, group))
-                    made = ahead.popleft().result()
-                    self.work.check()
-                    yield from made
-                    self.work.progress("slicing", (done + 1) / len(groups))
-            except BaseException:
-                for future in ahead:
-                    future.cancel()
-                raise
+        for done, made in enumerate(self.work.ordered(slab, groups), 1):
+            yield from made
+            self.work.progress("slicing", done / len(groups))

@@ -42,7 +42,7 @@ class Printer:
         return self.screen[0] / self.pixels[0], self.screen[1] / self.pixels[1]
 
     @property
-    def room(self) -> tuple[float, float, float]:
+    def build_volume(self) -> tuple[float, float, float]:
         """Build volume (x, y, z), mm."""
         return *self.screen, self.height
 

@@ -121,8 +121,8 @@ class Screen:
         """The layer centred on the bed; it may be a few empty pixels larger than the bed."""
         bed = self.printer.pixels[::-1] if self.printer else self.stack.shape
         on_bed, of_layer = [], []
-        for mine, room in zip(self.stack.shape, bed, strict=True):
-            first, count = (room - mine) // 2, min(mine, room)
+        for mine, available in zip(self.stack.shape, bed, strict=True):
+            first, count = (available - mine) // 2, min(mine, available)
             on_bed.append(slice(max(first, 0), max(first, 0) + count))
             of_layer.append(slice(max(-first, 0), max(-first, 0) + count))
         return _Window((on_bed[0], on_bed[1]), (of_layer[0], of_layer[1]))
@@ -173,8 +173,8 @@ def check_fits(stack: Stack, printer: Printer) -> None:
     SliceError
         If the object is larger than the build volume.
     """
-    for axis, mine, room in zip("xyz", stack.size, printer.room, strict=True):
-        if mine > room * (1 + 1e-6):
+    for axis, mine, most in zip("xyz", stack.size, printer.build_volume, strict=True):
+        if mine > most * (1 + 1e-6):
             raise SliceError(
-                f"the object is {mine:.4g} mm along {axis}, the {printer.title} has {room:.4g} mm"
+                f"the object is {mine:.4g} mm along {axis}, the {printer.title} has {most:.4g} mm"
             )

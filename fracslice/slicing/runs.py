@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..compiled import compiled
-from ..disjoint import find, unite
+from ..disjoint import grouped
+from ..rows import Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,35 +45,44 @@ class Runs:
 
 
 @dataclass(frozen=True, eq=False)
+class Nodes(Rows):
+    """Connected components as nodes of a graph.
+
+    Attributes
+    ----------
+    area : int64 [n]
+        Area, pixels.
+    middle : float64 [n, 2]
+        Centroid (x, y), pixels.
+    open : bool [n]
+        True if it reaches the border of the window.
+    """
+
+    area: np.ndarray
+    middle: np.ndarray
+    open: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class LayerComponents:
     """Connected components of one layer, solid or empty.
 
     Attributes
     ----------
-    rows : int32 [ny + 1]
-        Row y has the runs ``rows[y]:rows[y + 1]``.
-    begin, end : int32 [r]
-        Pixels of each run, end excluded.
-    part : int32 [r]
+    runs : Runs
+        Pixels of the layer.
+    label : int64 [r]
         Component of each run.
-    area : int64 [m]
-        Area, pixels.
-    middle : float64 [m, 2]
-        Centroid (x, y), pixels.
-    open : bool [m]
-        True if the component reaches the border of the window.
+    nodes : Nodes
+        The components.
     """
 
-    rows: np.ndarray
-    begin: np.ndarray
-    end: np.ndarray
-    part: np.ndarray
-    area: np.ndarray
-    middle: np.ndarray
-    open: np.ndarray
+    runs: Runs
+    label: np.ndarray
+    nodes: Nodes
 
     def __len__(self) -> int:
-        return len(self.area)
+        return len(self.nodes.area)
 
 
 def components_of(solid: Runs) -> tuple[LayerComponents, LayerComponents]:
@@ -94,18 +104,17 @@ def components_of(solid: Runs) -> tuple[LayerComponents, LayerComponents]:
 def _labelled(runs: Runs, reach: int) -> LayerComponents:
     """Label runs that overlap, or at `reach` 1 touch at a corner."""
     rows, begin, end = runs.rows, runs.begin, runs.end
-    part = np.empty(len(begin), np.int32)
-    count = _label(rows, begin, end, reach, part)
+    pairs = _touching(rows[:-1], begin, end, rows[1:], begin, end, reach)
+    label, count = grouped(len(begin), *pairs)
     row = np.repeat(np.arange(runs.height), np.diff(rows))
     length = end - begin
-    area = np.bincount(part, length, count).astype(np.int64)
-    x, y = (np.bincount(part, length * at, count) for at in ((begin + end) / 2, row + 0.5))
+    area = np.bincount(label, length, count).astype(np.int64)
+    x, y = (np.bincount(label, length * at, count) for at in ((begin + end) / 2, row + 0.5))
     rim = (begin == 0) | (end == runs.width) | (row == 0) | (row == runs.height - 1)
     opened = np.zeros(count, bool)
-    opened[part[rim]] = True
-    return LayerComponents(
-        rows, begin, end, part, area, np.stack([x, y], 1) / np.maximum(area, 1)[:, None], opened
-    )
+    opened[label[rim]] = True
+    middle = np.stack([x, y], 1) / np.maximum(area, 1)[:, None]
+    return LayerComponents(runs, label, Nodes(area, middle, opened))
 
 
 @compiled
@@ -126,29 +135,6 @@ def _gaps(rows, begin, end, nx, gaps, gap_begin, gap_end):  # type: ignore[no-un
     return n
 
 
-@compiled
-def _label(rows, begin, end, reach, part):  # type: ignore[no-untyped-def]
-    """Write the component of each run; return the number of components."""
-    parent = np.arange(len(begin))
-    for y in range(1, len(rows) - 1):
-        a, b = rows[y - 1], rows[y]
-        while a < rows[y] and b < rows[y + 1]:
-            if begin[a] < end[b] + reach and begin[b] < end[a] + reach:
-                unite(parent, a, b)
-            if end[a] < end[b]:
-                a += 1
-            else:
-                b += 1
-    count = 0
-    for r in range(len(begin)):
-        if parent[r] == r:
-            part[r] = count
-            count += 1
-        else:
-            part[r] = part[find(parent, r)]
-    return count
-
-
 def overlaps(below: LayerComponents, above: LayerComponents) -> np.ndarray:
     """Pairs of components of two layers that share a pixel.
 
@@ -159,36 +145,35 @@ def overlaps(below: LayerComponents, above: LayerComponents) -> np.ndarray:
 
     Returns
     -------
-    int32 [n, 2]
+    int64 [n, 2]
         Unique pairs (below, above), sorted.
     """
-    pairs = np.empty((len(below.begin) + len(above.begin), 2), np.int32)
-    count = _overlaps(
-        below.rows, below.begin, below.end, below.part, above.rows, above.begin, above.end, above.part, pairs
-    )
+    a, b = below.runs, above.runs
+    some, others = _touching(a.rows, a.begin, a.end, b.rows, b.begin, b.end, 0)
     # Sorting numbers is several times faster than sorting rows.
-    numbers = np.unique(pairs[:count, 0].astype(np.int64) * len(above) + pairs[:count, 1])
-    return np.column_stack(np.divmod(numbers, max(len(above), 1))).astype(np.int32)
+    numbers = np.unique(below.label[some] * len(above) + above.label[others])
+    return np.column_stack(np.divmod(numbers, max(len(above), 1)))
 
 
 @compiled
-def _overlaps(rows_a, begin_a, end_a, part_a, rows_b, begin_b, end_b, part_b, pairs):  # type: ignore[no-untyped-def]
-    """Write the components of overlapping runs; return their number."""
+def _touching(rows_a, begin_a, end_a, rows_b, begin_b, end_b, reach):  # type: ignore[no-untyped-def]
+    """Runs of corresponding rows that overlap, or at `reach` 1 touch: their numbers, int64 [n] each."""
+    some, others = np.empty((2, len(begin_a) + len(begin_b)), np.int64)
     n = 0
     for y in range(len(rows_a) - 1):
         a, b = rows_a[y], rows_b[y]
         while a < rows_a[y + 1] and b < rows_b[y + 1]:
-            if begin_a[a] < end_b[b] and begin_b[b] < end_a[a]:
-                pairs[n, 0], pairs[n, 1] = part_a[a], part_b[b]
+            if begin_a[a] < end_b[b] + reach and begin_b[b] < end_a[a] + reach:
+                some[n], others[n] = a, b
                 n += 1
             if end_a[a] < end_b[b]:
                 a += 1
             else:
                 b += 1
-    return n
+    return some[:n], others[:n]
 
 
-def unsupported(below: LayerComponents, above: LayerComponents, reach: float, width: int) -> int:
+def unsupported(below: LayerComponents, above: LayerComponents, reach: float) -> int:
     """Count the overhanging pixels of a layer.
 
     Parameters
@@ -197,17 +182,14 @@ def unsupported(below: LayerComponents, above: LayerComponents, reach: float, wi
         Solid components of the layers.
     reach : float
         Pixels within this distance of a solid pixel of the layer below are supported, pixels.
-    width : int
-        Pixels in a row.
 
     Returns
     -------
     int
         Number of unsupported pixels.
     """
-    return int(
-        _unsupported(below.rows, below.begin, below.end, above.rows, above.begin, above.end, reach, width)
-    )
+    a, b = below.runs, above.runs
+    return int(_unsupported(a.rows, a.begin, a.end, b.rows, b.begin, b.end, reach, a.width))
 
 
 @compiled

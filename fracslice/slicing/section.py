@@ -56,7 +56,7 @@ class Vertices(Rows):
     after : int64 [n]
         The crossing that each vertex is or follows.
     share : float64 [n]
-        Fraction of the way to the next crossing, 0 to 1.
+        Fraction of the distance to the next crossing, 0 to 1.
     """
 
     points: np.ndarray

@@ -12,7 +12,6 @@ from ..formulas import transform
 from ..formulas.algebra import length
 from ..formulas.box import Box
 from ..formulas.parameters import REQUIRED, Vector, validate
-from ..formulas.registry import Node
 from ..kernel import Field
 from ..printing import printable
 from ..scene import Print
@@ -121,13 +120,13 @@ class Stack:
         return np.array([*self.corner, self.pixel[0] / self.scale, self.pixel[1] / self.scale])
 
 
-def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
+def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     """Find the object's size and depths, make it printable, and place layers and pixels.
 
     Parameters
     ----------
-    root : Node
-        The scene.
+    root : Field
+        The object.
     job : SliceJob
         The job.
     work : Work, optional
@@ -147,8 +146,7 @@ def plan_stack(root: Node, job: SliceJob, work: Work | None = None) -> Stack:
     Cancelled
         When the work is cancelled.
     """
-    turned = _turned(root, job.up, work)
-    planned = plan(turned, job.size / min(job.pixel), work)
+    planned = plan(turned(root, job.up, work), job.size / min(job.pixel), work)
     planned, scale = printable(planned, job.size, job.printing, work)
     found, outer = planned.box, planned.outer
     mm = tuple(s * scale for s in found.size)
@@ -181,13 +179,35 @@ def _rounded(height: float, made: float) -> tuple[str, ...]:
     return (f"whole layers are {made:.4g} mm high, the object {height:.4g} mm; expected lower layers",)
 
 
-def _turned(root: Node, up: tuple[float, float, float], work: Work | None) -> Node:
-    """The scene rotated by the shortest way so that `up` is along z, with the depths of the unrotated one."""
+def turned(root: Field, up: tuple[float, float, float], work: Work | None) -> Field:
+    """Rotate a scene by the shortest way so that a direction points along z.
+
+    Parameters
+    ----------
+    root : Field
+        The scene.
+    up : three numbers
+        Direction.
+    work : Work, optional
+        Threads and cancellation.
+
+    Returns
+    -------
+    Field
+        The rotated scene, with the depths of the unrotated one.
+
+    Raises
+    ------
+    SliceError
+        If a field without a scene tree must be rotated.
+    """
     direction = np.asarray(up, float) / length(np.asarray(up, float))
     axis = np.cross(direction, (0.0, 0.0, 1.0))
     angle = math.degrees(math.atan2(length(axis), float(direction[2])))
     if angle == 0:
         return root
+    if root.tree is None:
+        raise SliceError("up: expected a scene of formulas")
     if not length(axis) > 0:
         axis = np.array([1.0, 0.0, 0.0])
-    return transform(with_depths(root, work), rotate=(*axis.tolist(), angle))
+    return transform(with_depths(root.tree, work), rotate=(*axis.tolist(), angle))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -87,7 +87,7 @@ class Plan:
         return Lattice.around(self.outer, self.voxel, self.box)
 
 
-def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
+def plan(root: Field, resolution: float, work: Work | None = None) -> Plan:
     """Measure the object, resolve automatic depths and drop detail below the resolution.
 
     Parameters
@@ -111,11 +111,15 @@ def plan(root: Node, resolution: float, work: Work | None = None) -> Plan:
     Cancelled
         If the job was cancelled.
     """
-    known = with_depths(root, work)
-    found = extent(known, resolution, work)
+    tree = root.tree
+    known = with_depths(tree, work) if tree else None
+    found = extent(known or root, resolution, work)
     voxel = max(found.box.size) / resolution
+    planned = Plan(known or root, found.box, found.outer, found.tips, voxel)
+    if tree is None or known is None:
+        return planned
     shown, notes = visible(known, voxel)
-    return Plan(shown, found.box, found.outer, found.tips, voxel, notes, depth_notes(root, known))
+    return replace(planned, root=shown, notes=notes, depths=depth_notes(tree, known))
 
 
 def with_depths(root: Node, work: Work | None = None) -> Node:

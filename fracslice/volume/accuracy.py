@@ -15,7 +15,9 @@ REACH = 1e-4
 """Step of the finite differences, in voxels."""
 
 FLAT = 1e-5
-"""Estimated distance in voxels above which differences along diagonals are taken too."""
+"""Estimated distance in voxels above which backward differences, and then those along diagonals, are taken
+too.
+"""
 
 DIAGONALS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if np.count_nonzero(way) > 1])
 """Diagonal directions of a cube, [20, 3]."""
@@ -80,8 +82,9 @@ def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | No
     """Estimate distances from the zero set to first order, ``|f| / |grad f|``.
 
     The float64 kernel is used. Along each axis the steeper of the two one-sided differences counts, because
-    they cancel at an edge or corner. Where two solids touch in an edge the axes lie in the surface: where
-    they are flat, the steepest of all directions counts, diagonals included.
+    they cancel at an edge or corner; the backward one is taken only where the forward one does not suffice.
+    Where two solids touch in an edge the axes lie in the surface: where they are flat, the steepest of all
+    directions counts, diagonals included.
 
     Parameters
     ----------
@@ -110,17 +113,22 @@ def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | No
 
     def task(part: slice) -> None:
         p = np.ascontiguousarray(points[part].T, np.float64)
-        f, square = kernel.points(*p), np.zeros(p.shape[1])
-        for step in h * np.eye(3):
-            up, down = kernel.points(*(p + step[:, None])) - f, f - kernel.points(*(p - step[:, None]))
-            square += (np.maximum(np.abs(up), np.abs(down)) / h) ** 2
-        steep = np.sqrt(square)
+        f = kernel.points(*p)
+
+        def slopes(which: np.ndarray | slice, way: np.ndarray) -> np.ndarray:
+            there = kernel.points(*(p[:, which] + (h / length(way) * way)[:, None]))
+            found: np.ndarray = np.abs(there - f[which]) / h
+            return found
+
+        ups = np.stack([slopes(slice(None), axis) for axis in np.eye(3)])
+        steep = np.linalg.norm(ups, axis=0)
         flat = np.flatnonzero(np.abs(f) > FLAT * voxel * steep)
         if len(flat):
-            for way in DIAGONALS:
-                step = h / length(way) * way
-                there = kernel.points(*(p[:, flat] + step[:, None]))
-                steep[flat] = np.maximum(steep[flat], np.abs(there - f[flat]) / h)
+            downs = np.stack([slopes(flat, -axis) for axis in np.eye(3)])
+            steep[flat] = np.linalg.norm(np.maximum(ups[:, flat], downs), axis=0)
+            flat = flat[np.abs(f[flat]) > FLAT * voxel * steep[flat]]
+        for way in DIAGONALS if len(flat) else ():
+            steep[flat] = np.maximum(steep[flat], slopes(flat, way))
         error[part] = np.minimum(np.abs(f) / np.maximum(steep, 1e-30), voxel)
 
     (work or Work()).map(task, chunks(len(points), 1 << 14))

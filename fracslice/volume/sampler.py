@@ -81,7 +81,7 @@ def sample(
     def keep(wave: np.ndarray) -> None:
         values.append(wave)
 
-    run = _Run(kernel, conservative or kernel, bounds, lattice, work or Work(), keep)
+    run = _Sampling(kernel, conservative or kernel, bounds, lattice, work or Work(), keep)
     signs, order = run.signs()
     return Bricks(
         signs.origin,
@@ -129,12 +129,12 @@ def sample_signs(
     Cancelled
         If the job was cancelled.
     """
-    signs, _ = _Run(kernel, conservative or kernel, bounds, lattice, work or Work(), None).signs()
+    signs, _ = _Sampling(kernel, conservative or kernel, bounds, lattice, work or Work(), None).signs()
     return signs
 
 
 @dataclass
-class _Run:
+class _Sampling:
     """State of one sampling."""
 
     kernel: Kernel

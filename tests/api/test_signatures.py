@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import pydoc
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -13,14 +14,17 @@ from fracslice import capsule, formulas, sphere, torus
 from fracslice.errors import SceneError
 from fracslice.formulas import get, names
 from fracslice.formulas.parameters import REQUIRED
-from fracslice.formulas.signatures import python_name, stub
+from fracslice.formulas.signatures import package_stub, python_name, stub
 
 SHIPPED = [name for name in names() if get(name).function.__module__.startswith("fracslice.")]
 
 
-def test_the_stub_file_is_up_to_date() -> None:
-    made = Path(formulas.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-    assert made == stub(), "run `python docs/generate.py`"
+@pytest.mark.parametrize(
+    ("package", "text"), [(formulas, stub()), (fracslice, package_stub(fracslice._WHERE))]
+)
+def test_the_stub_files_are_up_to_date(package: ModuleType, text: str) -> None:
+    made = Path(str(package.__file__)).with_suffix(".pyi").read_text(encoding="utf-8")
+    assert made == text, "run `python docs/generate.py`"
 
 
 def test_every_formula_is_a_public_name() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run
 
-from fracslice.export.jobs import Stored
+from fracslice.export.resuming import Journal
 
 
 def sliced(*arguments: object) -> int:
@@ -73,7 +73,7 @@ def test_a_folder_that_is_not_this_job(ball: Path, tmp_path: Path, capfd: pytest
     (tmp_path / "layers").mkdir()
     (tmp_path / "layers" / "job.json").write_text('{"mine": 1}')
     assert sliced(ball, "-o", tmp_path / "layers", "--layer", "1mm") == 2
-    assert "what is in it is no interrupted job" in capfd.readouterr().err
+    assert "its files are no interrupted job" in capfd.readouterr().err
     assert (tmp_path / "layers" / "job.json").read_text() == '{"mine": 1}'
 
 
@@ -81,21 +81,21 @@ def test_an_edited_scene_begins_afresh_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """Interrupted, edited, and the same command again: not a layer of the scene before."""
-    scene, target, add = tmp_path / "a.xml", tmp_path / "a.sl1", Stored.add
+    scene, target, add = tmp_path / "a.xml", tmp_path / "a.sl1", Journal.append
     text = (
         '<scene version="1"><solid size="20mm"><difference><box size="1 1 1.5"/>'
         '<cylinder radius="{}" height="3"/></difference></solid></scene>'
     )
     options = ("-o", target, "--layer", "1mm", "--printer", "sl1s", "--quiet")
 
-    def stopped(self: Stored, name: str, data: bytes) -> None:
-        if name == "a00008.png":
+    def stopped(self: Journal, data: bytes) -> None:
+        if self.count == 8:
             raise KeyboardInterrupt
-        add(self, name, data)
+        add(self, data)
 
     scene.write_text(text.format(0.3))
     with monkeypatch.context() as patch:
-        patch.setattr(Stored, "add", stopped)
+        patch.setattr(Journal, "append", stopped)
         assert run(["slice", str(scene), *map(str, options)]) == 130
     scene.write_text(text.format(0.1))
     capfd.readouterr()

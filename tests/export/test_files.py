@@ -15,7 +15,7 @@ import pytest
 
 from fracslice.errors import ExportError
 from fracslice.export import check_target, replacing, write
-from fracslice.export.files import put
+from fracslice.files import put
 from tests.mesh.shapes import cube
 
 

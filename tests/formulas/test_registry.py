@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import pickle
+
+import pytest
+
 from fracslice import formulas
+from tests.examples import EXAMPLES
 
 
 def test_tracebacks_name_the_formula_and_the_hook() -> None:
@@ -15,3 +20,16 @@ def test_tracebacks_name_the_formula_and_the_hook() -> None:
     ]
     assert len(hooks) > 50
     assert not [found for found, name in hooks if not found.strip("_").endswith(f"_{name}")]
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_nodes_pickle(name: str) -> None:
+    """Jobs go to other processes as they are."""
+    node = EXAMPLES[name].conservative()
+    again = pickle.loads(pickle.dumps(node))
+    assert again == node and again.place == node.place and again.bounds == node.bounds
+    assert again.formula is node.formula and again.is_conservative
+
+
+def test_every_formula_is_among_the_pickled() -> None:
+    assert {node.formula.name for root in EXAMPLES.values() for node in root.walk()} == set(formulas.names())

@@ -15,7 +15,9 @@ from fracslice._native import Cells, Contouring
 from fracslice.errors import MeshError
 from fracslice.formulas import (
     Node,
+    Number,
     box,
+    cos,
     difference,
     intersection,
     julia,
@@ -23,6 +25,8 @@ from fracslice.formulas import (
     menger,
     octahedron,
     offset,
+    shape,
+    sin,
     sphere,
     torus,
     transform,
@@ -121,6 +125,27 @@ def test_round_ridges_have_no_nicks(root: Node, resolution: float, most: float) 
     normals = mesh.normals / np.linalg.norm(mesh.normals, axis=1)[:, None]
     both = normals[order // 3].reshape(-1, 2, 3)
     assert ((both[:, 0] * both[:, 1]).sum(1) < np.cos(np.radians(40))).mean() < most
+    assert_solid(mesh)
+
+
+@shape(period=Number(1.0, "period of the lattice", above=0), thickness=Number(0.1, "of the wall", above=0))
+def gyroid_wall(x, y, z, period, thickness):  # type: ignore[no-untyped-def]
+    """The wall of a gyroid (Schoen 1970)."""
+    k = 6.283185307179586 / period
+    u, v, w = k * x, k * y, k * z
+    g = sin(u) * cos(v) + sin(v) * cos(w) + sin(w) * cos(u)
+    return abs(g) / (1.7320508075688772 * k) - thickness / 2
+
+
+def test_walls_that_meet_a_cutting_box_at_an_acute_angle_have_no_teeth() -> None:
+    """Edges of 50 degrees enter cells without crossings. When they were cut off there, 1,850 triangles were a
+    fifth of a voxel away from the surface; 247 are now."""
+    root = intersection(gyroid_wall(period=1, thickness=0.12), box(size=(2, 2, 1)))
+    mesh = made(root, 137)
+    off = np.abs(root.distance(mesh.corners.mean(axis=1))) * 137 / 2
+    assert (off > 0.2).sum() < 300
+    assert (off > 0.1).sum() < 1300
+    assert off.max() < 0.34
     assert_solid(mesh)
 
 

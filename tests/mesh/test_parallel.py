@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components as components_of_a_graph
 
-from fracslice._native import quantise, selected, stl, surroundings, touching
+from fracslice._native import near, pointed, quantise, selected, stl, surroundings, touching
 from fracslice.mesh import Mesh
 from fracslice.mesh.nesting import nesting
 from fracslice.mesh.reading import joined
@@ -73,6 +73,27 @@ def test_touching(threads: int) -> None:
     marked = RNG.random(N) < 0.01
     found = touching(LOOSE.triangles, marked, threads)
     assert (found == np.flatnonzero(marked[LOOSE.triangles].any(axis=1))).all()
+
+
+@pytest.mark.parametrize("threads", THREADS)
+def test_all_triangles_near_points_are_found_and_few_others(threads: int) -> None:
+    points = np.random.default_rng(12).normal(size=(20, 3))
+    found = near(LOOSE.vertices, LOOSE.triangles, points, 0.1, threads)
+    off = np.abs(LOOSE.vertices[:, None] - points).max(axis=2).min(axis=1)
+    assert set(np.flatnonzero((off < 0.1)[LOOSE.triangles].any(axis=1))) <= set(found)
+    assert (off[LOOSE.triangles[found]].min(axis=1) < 0.21).all()
+
+
+def test_pointed_vertices_are_all_found_unless_there_are_too_many() -> None:
+    """Pyramids without a base: each has one."""
+    count = 70_000
+    corners = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], float)
+    vertices = np.concatenate([corners + [3 * k, 0, 0] for k in range(count)])
+    sides = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]], np.int32)
+    triangles = (sides + 5 * np.arange(count, dtype=np.int32)[:, None, None]).reshape(-1, 3)
+    assert (pointed(vertices, triangles[:4000], 0.1, 1000) == 5 * np.arange(1000)).all()
+    assert 1000 < len(pointed(vertices, triangles, 0.1, 1000)) < count
+    assert (pointed(vertices, triangles, 0.1, count) == 5 * np.arange(count)).all()
 
 
 def test_the_surroundings_of_triangles_hold_all_that_they_meet() -> None:

@@ -52,7 +52,7 @@ def refused(text: str | bytes) -> str:
         ("<menger level='3.5'/>", 'f.xml:3: <menger> level="3.5": expected a whole number from 0 to 20'),
         ("<menger level='1_0'/>", 'f.xml:3: <menger> level="1_0": expected a whole number from 0 to 20'),
         ("<box size='1 2'/>", 'f.xml:3: <box> size="1 2": expected 3 numbers > 0'),
-        ("<mirror axis='w'><box/></mirror>", 'f.xml:3: <mirror> axis="w": expected "x", "y" or "z"'),
+        ("<mirror axis='w'><box/></mirror>", 'f.xml:3: <mirror> axis="w": expected x, y or z'),
         (
             "<repeat><box/></repeat>",
             'f.xml:3: <repeat> needs the attribute period="...": expected 3 numbers > 0',

@@ -186,13 +186,13 @@ def test_parts_by_hand() -> None:
         [[0, 0, 0, 0, 0], [0, 1, 1, 0, 0], [0, 1, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 0]], np.uint8
     )
     solid, empty = components_of(runs_of(image))
-    assert solid.area.tolist() == [5]
-    assert sorted(empty.area.tolist()) == [1, 19]
-    assert empty.open[np.argsort(empty.area)].tolist() == [False, True]
+    assert solid.nodes.area.tolist() == [5]
+    assert sorted(empty.nodes.area.tolist()) == [1, 19]
+    assert empty.nodes.open[np.argsort(empty.nodes.area)].tolist() == [False, True]
     other, _ = components_of(runs_of(np.roll(image, 1, 1)))
     assert overlaps(solid, other).tolist() == [[0, 0]]
-    assert unsupported(solid, other, 0.0, 5) == 5 - (image & np.roll(image, 1, 1) > 0).sum()
-    assert unsupported(solid, other, 1.0, 5) == 0
+    assert unsupported(solid, other, 0.0) == 5 - (image & np.roll(image, 1, 1) > 0).sum()
+    assert unsupported(solid, other, 1.0) == 0
 
 
 def test_time_is_linear_in_the_holes() -> None:
@@ -208,7 +208,7 @@ def test_time_is_linear_in_the_holes() -> None:
         begin, graph = time.perf_counter(), Graph()
         for _ in range(3):
             graph.add(components_of(runs_of(image))[1])
-        assert len(graph.nodes().grouped(~graph.nodes().open, np.ones(3), (1, 1), image.shape)) == holes**2
+        assert len(graph.groups(~graph.nodes.open, np.ones(3), (1, 1), image.shape)) == holes**2
         return time.perf_counter() - begin
 
     seconds(10)

@@ -77,8 +77,8 @@ nb::object bind_turned(const Rows<double>& vertices, const Rows<int32_t>& triang
     return numbers(unlocked(threads, [&] { return turned(mesh_of(vertices, triangles), points.data()); }));
 }
 
-nb::object bind_pointed(const Rows<double>& vertices, const Rows<int32_t>& triangles, double sine, int threads) {
-    return numbers(unlocked(threads, [&] { return pointed(mesh_of(vertices, triangles), sine); }));
+nb::object bind_pointed(const Rows<double>& vertices, const Rows<int32_t>& triangles, double sine, size_t most, int threads) {
+    return numbers(unlocked(threads, [&] { return pointed(mesh_of(vertices, triangles), sine, most); }));
 }
 
 nb::tuple bind_bounds(const Rows<double>& points, int threads) {
@@ -106,6 +106,10 @@ nb::object bind_selected(const Rows<double>& vertices, const Rows<int32_t>& tria
 
 nb::object bind_touching(const Rows<int32_t>& triangles, const Vector<bool>& vertices, int threads) {
     return numbers(unlocked(threads, [&] { return touching(triangles_of(triangles, vertices.size()), span_of(vertices)); }));
+}
+
+nb::object bind_near(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<double>& points, double reach, int threads) {
+    return numbers(unlocked(threads, [&] { return near(mesh_of(vertices, triangles), points.data(), points.shape(0), reach); }));
 }
 
 nb::object bind_surroundings(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<bool>& of, int threads) {
@@ -174,11 +178,12 @@ void bind_mesh(nb::module_& module) {
     module.def("component_sizes", &bind_sizes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a, "threads"_a = 0);
     module.def("measures", &bind_measures, "vertices"_a, "triangles"_a, "point"_a, "threads"_a = 0);
     module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "points"_a, "threads"_a = 0);
-    module.def("pointed", &bind_pointed, "vertices"_a, "triangles"_a, "sine"_a, "threads"_a = 0);
+    module.def("pointed", &bind_pointed, "vertices"_a, "triangles"_a, "sine"_a, "most"_a, "threads"_a = 0);
     module.def("bounds", &bind_bounds, "points"_a, "threads"_a = 0);
     module.def("quantise", &bind_quantise, "points"_a, "planes"_a, "threads"_a = 0);
     module.def("selected", &bind_selected, "vertices"_a, "triangles"_a, "keep"_a, "threads"_a = 0);
     module.def("touching", &bind_touching, "triangles"_a, "vertices"_a, "threads"_a = 0);
+    module.def("near", &bind_near, "vertices"_a, "triangles"_a, "points"_a, "reach"_a, "threads"_a = 0);
     module.def("surroundings", &bind_surroundings, "vertices"_a, "triangles"_a, "of"_a, "threads"_a = 0);
     module.def("stl", &bind_stl, "vertices"_a, "triangles"_a, "threads"_a = 0);
     module.def("weld", &bind_weld, "points"_a);

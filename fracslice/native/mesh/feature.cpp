@@ -55,16 +55,17 @@ Vec3 eigenvector(const Symmetric& a, std::array<Vec3, 3> adjugate, double trace,
 // Directions whose eigenvalue is a smaller share of the trace say nothing about where the planes meet.
 constexpr double kRank = 0.01;
 
-// How far outside its cell a feature may lie to be moved to the cell's border instead of being given up.
-constexpr double kNear = 0.4;
+// How far outside its cell a feature may lie to be moved to the cell's border instead of being given up. The edge of an acute
+// wedge enters cells without crossings, and is moved from further there.
+constexpr double kNear = 0.4, kNearWedge = 1;
 
 // How far from its planes a feature may lie, root mean square.
 constexpr double kMiss = 0.06;
 
-// Moves a point to the border of the unit cell, `margin` inside, if it is not further outside than kNear.
-bool moved_inside(Vec3& point, double margin) {
+// Moves a point to the border of the unit cell, `margin` inside, if it is not further outside than `near`.
+bool moved_inside(Vec3& point, double margin, double near = kNear) {
     for (double& x : point) {
-        if (!(x > -kNear && x < 1 + kNear)) return false;
+        if (!(x > -near && x < 1 + near)) return false;
         x = std::clamp(x, margin, 1 - margin);
     }
     return true;
@@ -80,12 +81,12 @@ bool fits(double squares, int count) { return squares < kMiss * kMiss * count; }
 
 // The point of a line in the unit cell that is nearest to `start`; where the line misses the cell by little, the
 // cell's point beside it.
-bool clipped(const Vec3& start, const Vec3& direction, double margin, Vec3& point) {
+bool clipped(const Vec3& start, const Vec3& direction, double margin, double near, Vec3& point) {
     double first = -10, last = 10;
     for (int k = 0; k < 3; ++k) {
         double low = margin - start[k], high = 1 - margin - start[k];
         if (std::abs(direction[k]) < 1e-9) {
-            if (low > kNear || high < -kNear) return false;
+            if (low > near || high < -near) return false;
             continue;
         }
         double over = 1 / direction[k], p = low * over, q = high * over;
@@ -94,7 +95,26 @@ bool clipped(const Vec3& start, const Vec3& direction, double margin, Vec3& poin
     }
     double at = first <= last ? std::clamp(0.0, first, last) : (first + last) / 2;
     point = start + at * direction;
-    return moved_inside(point, margin);
+    return moved_inside(point, margin, near);
+}
+
+// Normals of a wedge: two directions at more than this angle (70 degrees), and none between them.
+constexpr double kWedge = 0.34, kOneSide = 0.95;
+
+// Whether the crossings lie on the two sides of a wedge. The edge of a round ridge has normals of all directions between.
+bool wedge(std::span<const Crossing> crossings) {
+    const Vec3 *one = nullptr, *two = nullptr;
+    double least = kWedge;
+    for (const Crossing& a : crossings) {
+        for (const Crossing& b : crossings) {
+            double cosine = dot(a.normal, b.normal);
+            if (cosine < least) least = cosine, one = &a.normal, two = &b.normal;
+        }
+    }
+    if (!one) return false;
+    return std::all_of(crossings.begin(), crossings.end(), [&](const Crossing& c) {
+        return std::max(dot(c.normal, *one), dot(c.normal, *two)) > kOneSide;
+    });
 }
 
 }  // namespace
@@ -135,7 +155,8 @@ bool feature_point(std::span<const Crossing> crossings, double margin, Vec3& poi
     if (!fits(miss - dot(b, best), count)) return false;
     point = mean + best;
     if (inside(point, margin)) return true;
-    if (!clipped(mean + best, along, margin, point)) return false;
+    if (wedge(crossings)) return clipped(mean + best, along, margin, kNearWedge, point);
+    if (!clipped(mean + best, along, margin, kNear, point)) return false;
     miss = 0;
     for (const Crossing& crossing : crossings) {
         double d = dot(crossing.normal, point - crossing.point);
@@ -153,7 +174,7 @@ bool face_corner(const Crossing& a, const Crossing& b, int axis, double margin, 
     corner[axis] = 0.5;
     corner[u] = (ca * bv - cb * av) / det;
     corner[v] = (au * cb - bu * ca) / det;
-    bool near = moved_inside(corner, margin);
+    bool near = moved_inside(corner, margin, dot(a.normal, b.normal) < kWedge ? kNearWedge : kNear);
     corner[axis] = 0;
     return near;
 }

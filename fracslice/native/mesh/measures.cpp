@@ -8,6 +8,9 @@
 namespace fracslice::mesh {
 namespace {
 
+// Triangles of a surface that may be rough.
+constexpr size_t kRough = size_t(1) << 18;
+
 Vec3 at(const double* p) { return {p[0], p[1], p[2]}; }
 
 // Twice a triangle's area long.
@@ -42,10 +45,23 @@ std::vector<int64_t> turned(const MeshView& mesh, const double* points) {
     return chosen(mesh.count, [&](size_t t) { return !(dot(normal(mesh, t), normal(moved, t)) > 0); });
 }
 
-std::vector<int64_t> pointed(const MeshView& mesh, double sine) {
+std::vector<int64_t> pointed(const MeshView& mesh, double sine, size_t most) {
+    if (mesh.count > kRough) {  // a rough surface shows in some of its triangles
+        MeshView some = mesh;
+        some.corners += 3 * ((mesh.count - kRough / 2) / 2), some.count = kRough / 2;
+        std::vector<int64_t> found = pointed(some, sine, most);
+        if (found.size() > most) return found;
+    }
     auto falls_off = [&](size_t v, std::span<const int64_t> corners) {
         Vec3 up{0, 0, 0};
-        for (int64_t corner : corners) up = up + normal(mesh, size_t(corner / 3));
+        int64_t ring = 0;  // not zero where triangles are missing
+        for (int64_t corner : corners) {
+            size_t t = size_t(corner / 3);
+            int k = int(corner % 3);
+            ring += mesh[t][(k + 1) % 3] - mesh[t][(k + 2) % 3];
+            up = up + normal(mesh, t);
+        }
+        if (ring != 0) return false;
         double least = sine * std::sqrt(dot(up, up));
         for (int64_t corner : corners) {
             Vec3 edge = at(mesh.corner(size_t(corner / 3), int((corner + 1) % 3))) - at(mesh.point(int32_t(v)));

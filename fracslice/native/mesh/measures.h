@@ -20,8 +20,9 @@ Measures measures(const MeshView& mesh, const Vec3& point);
 // The triangles, in order, that are flat or turn by a right angle or more when the vertices move to `points`.
 std::vector<int64_t> turned(const MeshView& mesh, const double* points);
 
-// The vertices, in order, from which all edges fall off, at an angle of at least that sine.
-std::vector<int64_t> pointed(const MeshView& mesh, double sine);
+// The vertices, in order, from which all edges fall off, at an angle of at least that sine. On a surface that has more than
+// `most` of them, only some.
+std::vector<int64_t> pointed(const MeshView& mesh, double sine, size_t most);
 
 // The box around some points; low above high if there are none.
 struct Bounds {

@@ -109,6 +109,28 @@ std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> 
     });
 }
 
+std::vector<int64_t> near(const MeshView& mesh, const double* points, size_t count, double reach) {
+    constexpr size_t kMost = 128;
+    Bounds box = bounds(points, count);
+    double size = reach;
+    for (size_t k = 0; k < 3; ++k) size = std::max(size, (box.high[k] - box.low[k]) / kMost);
+    constexpr size_t side = kMost + 4;  // a point in the second cell to the last but one marks those beside its own, too
+    auto place = [&](const double* p, size_t k) { return size_t(std::clamp((p[k] - box.low[k]) / size + 2, 0.0, side - 1.0)); };
+    std::vector<uint8_t> marked(side * side * side, false);
+    for (size_t i = 0; i < count; ++i) {
+        size_t x = place(points + 3 * i, 0), y = place(points + 3 * i, 1), z = place(points + 3 * i, 2);
+        for (size_t k = 0; k < 27; ++k) marked[((x + k / 9 - 1) * side + y + k / 3 % 3 - 1) * side + z + k % 3 - 1] = true;
+    }
+    Array<bool> seen(mesh.vertices, 1);
+    for_each_block(mesh.vertices, [&](size_t, size_t first, size_t last) {
+        for (size_t v = first; v < last; ++v) {
+            const double* p = mesh.point(int32_t(v));
+            seen.data[v] = marked[(place(p, 0) * side + place(p, 1)) * side + place(p, 2)];
+        }
+    });
+    return touching(mesh, {seen.data.get(), mesh.vertices});
+}
+
 std::vector<int64_t> surroundings(const MeshView& mesh, std::span<const bool> of) {
     assert(of.size() == mesh.count);
     CoarseGrid grid(mesh);

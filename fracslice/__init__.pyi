@@ -1,0 +1,46 @@
+# Made from the registry of formulas by `python docs/generate.py`; do not edit.
+from .api.meshing import Result as Result
+from .api.meshing import make_mesh as make_mesh
+from .api.pictures import Picture as Picture
+from .api.pictures import render as render
+from .api.slices import Slices as Slices
+from .api.slices import slice_layers as slice_layers
+from .errors import FracsliceError as FracsliceError
+from .export import write as write
+from .formulas import Node as Node
+from .formulas import bend as bend
+from .formulas import bounds as bounds
+from .formulas import box as box
+from .formulas import capsule as capsule
+from .formulas import cone as cone
+from .formulas import cylinder as cylinder
+from .formulas import difference as difference
+from .formulas import intersection as intersection
+from .formulas import julia as julia
+from .formulas import mandelbulb as mandelbulb
+from .formulas import material as material
+from .formulas import menger as menger
+from .formulas import mirror as mirror
+from .formulas import octahedron as octahedron
+from .formulas import offset as offset
+from .formulas import plane as plane
+from .formulas import repeat as repeat
+from .formulas import shell as shell
+from .formulas import sphere as sphere
+from .formulas import torus as torus
+from .formulas import transform as transform
+from .formulas import twist as twist
+from .formulas import union as union
+from .mesh import Mesh as Mesh
+from .meshjob import MeshJob as MeshJob
+from .report import Report as Report
+from .scene import Print as Print
+from .scene import Scene as Scene
+from .scene import read as read
+from .scene import reads as reads
+from .scene import to_xml as to_xml
+from .scene.view import Camera as Camera
+from .scene.view import Light as Light
+from .work import Work as Work
+
+__version__: str
