@@ -10,7 +10,7 @@ import numpy as np
 
 from ..scene.view import Film
 from ..work import Work, chunks
-from .film import develop, levels
+from .film import BAND, develop, levels
 from .units.pixel import UNKNOWN, squared_error
 
 CHANNELS = 7
@@ -27,8 +27,6 @@ NEARLY = 0.999
 FEW = 1 / 256
 """Fraction of unfinished pixels up to which all of them are sampled: a pass has a fixed cost even for one
 pixel."""
-BAND = 32
-"""Rows of a picture per task; a multiple of the blocks of `band_order`."""
 
 
 @dataclass(frozen=True)
@@ -228,7 +226,24 @@ class HostAccumulator:
 
     def shown(self, film: Film, mode: str) -> np.ndarray:
         """Develop the picture; see `Accumulator.shown`."""
-        return self._spread(levels(develop(self._known(), film, mode)))
+        return self._spread(levels(develop(self._known(), film, mode, self.work)))
+
+    def developed(self, film: Film, mode: str) -> np.ndarray:
+        """Develop the picture to floats.
+
+        Parameters
+        ----------
+        film : Film
+            Exposure, bloom and tone curve.
+        mode : str
+            `Shading.mode`.
+
+        Returns
+        -------
+        ndarray of float32, shape (height, width, 3)
+            sRGB in [0, 1].
+        """
+        return self._spread(develop(self._known(), film, mode, self.work))
 
     def _known(self) -> np.ndarray:
         """Mean of the sampled pixels, float32: after the first pass its grid, later the whole picture."""

@@ -99,6 +99,22 @@ class Pass:
         """
         return self._current().shown(self.film, self.mode)
 
+    @cached_property
+    def developed(self) -> np.ndarray:
+        """Developed picture in floats.
+
+        Returns
+        -------
+        ndarray of float32, shape (height, width, 3)
+            sRGB in [0, 1].
+
+        Raises
+        ------
+        RenderError
+            If a later pass has replaced this picture.
+        """
+        return self._current().host().developed(self.film, self.mode)
+
     def _current(self) -> Accumulator:
         """The accumulator, if it still holds this pass."""
         if self.source.passes != self.number:
@@ -159,9 +175,10 @@ class Renderer:
         self.setup = prepare(root, view, (self.width, self.height))
         self.dtype = np.dtype(self.setup.precision)
         tracer, self._placed = _backend(self.device)
-        self.tracer = tracer(self._frame(), self.dtype, self.width, self.height)
+        self._frame = self._linked()
+        self.tracer = tracer(self._frame, self.dtype, self.width, self.height)
         self.accumulator = self._placed(self._empty)
-        self._prepared: bool | None = None
+        self._prepared = False
         self._rate = 0.0
 
     @property
@@ -179,7 +196,7 @@ class Renderer:
         str
             Equal keys mean equal pictures after equal passes.
         """
-        linked = self._frame().linked
+        linked = self._frame.linked
         return key(program(), self.width, self.height, self.setup.precision, linked.source, linked.parameters)
 
     def look(self, camera: Camera, within: float | None = None) -> None:
@@ -199,7 +216,8 @@ class Renderer:
         setup = self.setup
         seen = optics(camera, (self.width, self.height), setup.root, setup.optics.least)
         self.setup = replace(setup, camera=camera, optics=seen)
-        self._prepared = None
+        self._frame, self._prepared = self._linked(), False
+        self.tracer.aim(self._frame)
         self.accumulator = self.accumulator.anew(COARSE if within is None else self._affordable(within))
 
     def _affordable(self, within: float) -> int:
@@ -277,15 +295,12 @@ class Renderer:
         return self._seen(samples, error, plan.samples, self._rate)
 
     def _prepare(self) -> None:
-        """Load the camera into the tracer; run the cone prepass if a block holds several rays."""
-        ahead = self.accumulator.passes > 0 or self.accumulator.coarse < BLOCK
-        if ahead != self._prepared:
-            self.tracer.aim(self._frame())
-            if ahead:
-                self.tracer.look_ahead(self.work)
-            self._prepared = ahead
+        """Run the cone prepass of the camera once a block holds several rays."""
+        if not self._prepared and (self.accumulator.passes > 0 or self.accumulator.coarse < BLOCK):
+            self.tracer.look_ahead(self.work)
+            self._prepared = True
 
-    def _frame(self) -> Frame:
+    def _linked(self) -> Frame:
         setup = self.setup
         return link_frame(setup.root, setup.view, setup.camera, setup.optics, BLOCK)
 

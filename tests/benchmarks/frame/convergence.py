@@ -59,7 +59,6 @@ def centred(a, pixel, dimension):  # type: ignore[no-untyped-def]
 
 def renderer(root: Node, view: View) -> Renderer:
     made = Renderer(root, view, SIZE, Work(threads=2), "cpu")
-    made.tracer.aim(made._frame())
     made.tracer.look_ahead(made.work)
     return made
 
