@@ -257,7 +257,13 @@ class HostAccumulator:
 
     def _means(self, step: int) -> np.ndarray:
         sums = self.channels[::step, ::step]
-        return np.asarray(sums[..., :3] / np.maximum(sums[..., COUNT, None], 1), np.float32)
+        means = np.empty((*sums.shape[:2], 3), np.float32)
+
+        def divided(rows: slice) -> None:
+            means[rows] = sums[rows, :, :3] / np.maximum(sums[rows, :, COUNT, None], 1)
+
+        self.work.map(divided, chunks(len(sums), BAND))
+        return means
 
     def _spread(self, known: np.ndarray) -> np.ndarray:
         """Expand the grid of the first pass to the whole picture."""

@@ -10,15 +10,15 @@ from ..kernel.cpu import load_functions
 from ..kernel.host import lane_count
 from ..kernel.machine import constant
 from ..work import Work, chunks
-from .accumulator import CHANNELS, COUNT, GOAL, Plan
+from .accumulator import Plan
 from .linking import Frame
 from .packets import Lane, loops, workspace
 from .sequence import points
 
 TILE = 2048
 """Maximum rays per tile; their workspace stays in the cache."""
-LEAST, TILES = 128, 8
-"""Minimum rays per tile, and tiles per thread in a pass over few pixels."""
+LEAST, TILES, RAYS = 128, 8, 1 << 14
+"""Minimum pixels per tile, tiles per thread in a pass over few pixels, and maximum rays per tile."""
 STEPS = 1600
 """Maximum steps of a ray."""
 BLOCK = 4
@@ -75,8 +75,8 @@ class CpuTracer:
         ids = np.arange(len(self._starts), dtype=np.int32)
 
         def task(part: np.ndarray) -> None:
-            m, space = self._workspace(len(part))
-            cones(self._parameters, self._starts, part, *space, len(part), m, self.blocks, STEPS)
+            m = -(-len(part) // self.lanes) * self.lanes
+            cones(self._parameters, self._starts, part, *self._workspace, len(part), m, self.blocks, STEPS)
 
         work.map(task, np.array_split(ids, max(1, len(ids) // 512)))
 
@@ -96,26 +96,22 @@ class CpuTracer:
         """
         if len(self._points) < plan.last:
             self._points = points(2 * plan.last, self.frame.samples)
-        state = sums.reshape(-1, CHANNELS)
 
-        def task(pixels: np.ndarray) -> None:
-            places = (pixels >> 16).astype(np.intp) * self.width + (pixels & 65535)
-            left = (state[places, GOAL] - state[places, COUNT]).astype(np.intp)
-            for taken in range(left.max()):
-                work.check()
-                part = pixels[left > taken]
-                m, space = self._workspace(len(part))
-                arrays = self._parameters, self._points, self._starts, *space, part, sums
-                self._tile(*arrays, len(part), m, self.width, STEPS, self.blocks)
+        def task(part: slice) -> None:
+            pixels = plan.pixels[part].copy()
+            arrays = self._parameters, self._points, self._starts, *self._workspace, pixels, sums
+            self._tile(*arrays, len(pixels), self.width, STEPS, self.blocks)
 
-        share = -(-len(plan.pixels) // (TILES * work.threads))
-        tile = min(max(share, LEAST), TILE) if work.threads > 1 else TILE
-        work.map(task, [plan.pixels[part] for part in chunks(len(plan.pixels), tile)])
+        share = -(-len(plan.pixels) // (TILES * work.threads)) if work.threads > 1 else TILE
+        tile = max(min(share, TILE, RAYS // plan.last), LEAST)
+        work.map(task, chunks(len(plan.pixels), tile))
 
-    def _workspace(self, rays: int) -> tuple[int, tuple[np.ndarray, ...]]:
-        """The padded row length for some rays, and this thread's arrays W, L and rays (see `packets`)."""
+    @property
+    def _workspace(self) -> tuple[np.ndarray, ...]:
+        """This thread's arrays W, L and rays (see `packets`)."""
         if not hasattr(self._own, "space"):
             sizes = workspace(self.frame, TILE), len(Lane) * self.lanes
             rows, lanes = (np.zeros(size, self.dtype) for size in sizes)
             self._own.space = rows, lanes, np.zeros(self.lanes, np.int32)
-        return -(-rays // self.lanes) * self.lanes, self._own.space
+        space: tuple[np.ndarray, ...] = self._own.space
+        return space

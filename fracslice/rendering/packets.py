@@ -20,7 +20,7 @@ from enum import IntEnum
 from ..formulas.vocabulary import any_of, where
 from ..kernel.intrinsics import WIDTH, load, store
 from ..kernel.loops import Loop, loop
-from .accumulator import CHANNELS, COUNT
+from .accumulator import CHANNELS, COUNT, GOAL
 from .linking import Frame
 from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
 from .units.pixel import brightness, clamped
@@ -76,9 +76,9 @@ def workspace(frame: Frame, rays: int) -> int:
     return (Row.px + frame.samples) * rays
 
 
-@loop("rirrriirnnnnn")
-def tile(P, Q, S, W, L, rays, pixels, A, n, m, width, limit, blocks, frame):
-    """Add the next sample to each of n pixels.
+@loop("rirrriirnnnn")
+def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, blocks, frame):
+    """Add samples to each of n pixels up to their goals.
 
     Parameters
     ----------
@@ -87,11 +87,11 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, m, width, limit, blocks, frame):
     W, L, rays : pointer to float, pointer to float, pointer to int32
         Workspace, lanes, ray of each lane.
     pixels : pointer to int32
-        Pixels, ``y << 16 | x``.
+        Pixels, ``y << 16 | x``, below their goals; overwritten.
     A : pointer to float
         Sums of the picture, `CHANNELS` per pixel.
-    n, m : int
-        Pixels, and numbers per row of W.
+    n : int
+        Pixels.
     width : int
         Picture width, pixels.
     limit : int
@@ -101,16 +101,47 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, m, width, limit, blocks, frame):
     frame : Frame
         Linked frame.
     """
-    draw(W, Q, pixels, A, n, m, width, frame)
-    begin(W, m, P, frame)
+    left = n
+    while left > 0:
+        m = (left + WIDTH - 1) // WIDTH * WIDTH
+        draw(W, Q, pixels, A, left, m, width, frame)
+        begin(W, m, P, frame)
+        for k in range(left):
+            pixel = pixels[k]
+            early = S[(pixel >> 16 + frame.shift) * blocks + ((pixel & 65535) >> frame.shift)]
+            W[Row.start * m + k] = max(W[Row.start * m + k], early)
+        for bounce in range(frame.bounces + 1):
+            follow(W, L, rays, left, m, limit, P, step_ray)
+            shade(W, m, Row.px + frame.camera_samples + bounce * frame.bounce_samples, P, frame)
+        gather(W, pixels, A, left, m, width)
+        left = unfinished(pixels, A, left, width)
+
+
+def unfinished(pixels, A, n, width):
+    """Move the pixels below their goals to the front.
+
+    Parameters
+    ----------
+    pixels : pointer to int32
+        Pixels, changed in place.
+    A : pointer to float
+        Sums of the picture.
+    n, width : int
+        Pixels, and picture width.
+
+    Returns
+    -------
+    int
+        Their number.
+    """
+    kept = 0
     for k in range(n):
         pixel = pixels[k]
-        early = S[(pixel >> 16 + frame.shift) * blocks + ((pixel & 65535) >> frame.shift)]
-        W[Row.start * m + k] = max(W[Row.start * m + k], early)
-    for bounce in range(frame.bounces + 1):
-        follow(W, L, rays, n, m, limit, P, step_ray)
-        shade(W, m, Row.px + frame.camera_samples + bounce * frame.bounce_samples, P, frame)
-    gather(W, pixels, A, n, m, width)
+        a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
+        if A[a + COUNT] < A[a + GOAL]:
+            pixels[kept] = pixel
+            kept += 1
+    return kept
 
 
 @loop("rrirrinnnn")
