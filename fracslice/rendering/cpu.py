@@ -103,7 +103,7 @@ class CpuTracer:
             self._tile(*arrays, len(pixels), self.width, STEPS, self.blocks)
 
         share = -(-len(plan.pixels) // (TILES * work.threads)) if work.threads > 1 else TILE
-        tile = max(min(share, TILE, RAYS // plan.last), LEAST)
+        tile = min(max(min(share, RAYS // plan.last), LEAST), TILE)
         work.map(task, chunks(len(plan.pixels), tile))
 
     @property

@@ -19,6 +19,7 @@ from tests.examples import EXAMPLES
 from tests.rendering.rays import directions, distances
 
 SIDE, POINTS = 320, 500
+PIXEL = 2 * np.tan(np.radians(25)) / SIDE
 
 
 def missed(root: Node, camera: Camera) -> tuple[int, int]:
@@ -26,7 +27,7 @@ def missed(root: Node, camera: Camera) -> tuple[int, int]:
     found, d = distances(root, camera, (SIDE, SIDE)), directions(camera, (SIDE, SIDE))
     first = first_inside(root, np.array(camera.eye), d)
     hit = np.isfinite(first)
-    return int((np.isnan(found[hit]) | (found[hit] > first[hit] + 1e-3)).sum()), int(hit.sum())
+    return int((np.isnan(found[hit]) | (found[hit] > first[hit] * (1 + 2 * PIXEL))).sum()), int(hit.sum())
 
 
 def first_inside(root: Node, eye: np.ndarray, d: np.ndarray) -> np.ndarray:
