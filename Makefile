@@ -9,9 +9,9 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
-# The compiler and OpenVDB's headers (they include Boost's); Python's headers; what draws without a screen.
+# The compiler and OpenVDB's headers (they include Boost's); Python's headers; what draws without a screen, and a screen for the tests of windows.
 PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb-dev libimath-dev libboost-dev zlib1g-dev doctest-dev \
-	libgl1 libegl1 libgl1-mesa-dri libopenvdb-tools
+	libgl1 libegl1 libgl1-mesa-dri libopenvdb-tools xvfb libxtst6
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
 NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
 
@@ -44,7 +44,7 @@ $(VENV)/.docs: docs/requirements.lock | $(VENV)/.locked
 	touch $@
 
 nightly: setup
-	$(BIN)/python -m tests.benchmarks.stability.random_scenes
+	$(BIN)/python -m tests.benchmarks stability.random_scenes
 
 # Memory and undefined behaviour, then races between threads.
 sanitize: setup

@@ -84,12 +84,12 @@ def bench(
     folder = Path(output)
     check_folder(folder)
     with working(threads, quiet) as work:
-        found = measure(task, work)
+        rows = measure(task, work)
         folder.mkdir(exist_ok=True)
-        paths = write_report(found, folder)
+        paths = write_report(rows, folder)
     if not quiet:
-        click.echo(f"{paths[0]}: {len(found)} measurements")
-        for one in found:
+        click.echo(f"{paths[0]}: {len(rows)} measurements")
+        for one in rows:
             if one.failed:
                 click.echo(f"{one.workload} {one.resolution}, {one.method}: {one.failed}", err=True)
-    return 1 if any(one.failed for one in found) else 0
+    return 1 if any(one.failed for one in rows) else 0

@@ -4,28 +4,51 @@ from __future__ import annotations
 
 import json
 import os
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .inputs import is_model, load_model, load_scene, refuse_options, refuse_scene_options
+from .inputs import check_targets, is_model, load_model, load_scene, refuse_options
 from .options import (
     NAME,
     job_of,
     job_options,
     length,
     print_options,
+    printing_of,
     quiet_option,
     set_option,
     source_argument,
     threads_option,
 )
-from .slice import check_print, heights, limits_of, printer_option, verdict
-from .summary import found, summary
+from .slice import LAYER, PIXEL_MM, as_high_as_wanted, heights, printer_option
+from .summary import figures, summary
 from .working import working
 
-OF_LAYERS = {"pixel", "machine", "picture"}
+if TYPE_CHECKING:
+    from fracslice.kernel import Field
+    from fracslice.mesh import Mesh
+    from fracslice.printing.limits import Limits
+    from fracslice.scene import Print
+    from fracslice.slicing import Stack
+    from fracslice.slicing.checks import PrintReport
+    from fracslice.work import Work
+
+OF_LAYERS = {"pixel", "machine", "picture", "fix"}
 OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
+OF_SCENES = {*OF_MESHES, "settings", "size"}
+
+ACROSS = 256
+"""Layers of a model's longest side, if --layer is not given, unless they would be thinner than `LAYER`."""
+
+
+def limit(name: str, text: str) -> Callable[..., Any]:
+    """Decorator that adds a minimum thickness of 0.1 mm by default."""
+    text = f"Minimum thickness of {text}; 0.1mm by default."
+    return click.option(f"--{name}", callback=length, default="0.1mm", metavar="LENGTH", help=text)
 
 
 @click.command(short_help="Say whether a model, or a scene's mesh or layers, would print.")
@@ -36,24 +59,13 @@ OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
     "--pixel",
     callback=length,
     metavar="LENGTH",
-    help="With --layer: pixel size; the printer's by default, or 0.05mm.",
+    help="With layers: pixel size; the printer's by default, or 0.05mm.",
 )
-@printer_option('With --layer: the printer it has to fit; "list" shows all.')
-@click.option("--picture", type=NAME, metavar="FILE.png", help="With --layer: draw the worst layers.")
-@click.option(
-    "--wall",
-    callback=length,
-    default="0.1mm",
-    metavar="LENGTH",
-    help="Minimum thickness of walls; 0.1mm by default.",
-)
-@click.option(
-    "--floor",
-    callback=length,
-    default="0.1mm",
-    metavar="LENGTH",
-    help="Minimum thickness of floors and roofs; 0.1mm by default.",
-)
+@printer_option('With layers: the printer it has to fit; "list" shows all.')
+@click.option("--picture", type=NAME, metavar="FILE.png", help="With layers: draw the worst layers.")
+@click.option("--fix", is_flag=True, help="With layers: mend what can be mended, and check again.")
+@limit("wall", "walls")
+@limit("floor", "floors and roofs")
 @print_options
 @job_options
 @set_option
@@ -61,41 +73,148 @@ OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
 @quiet_option
 @click.pass_context
 def check(
-    context: click.Context,
-    /,
-    source: str,
-    as_json: bool,
-    settings: tuple[str, ...],
-    threads: int,
-    quiet: bool,
-    **options: Any,
+    context: click.Context, /, source: str, as_json: bool, threads: int, quiet: bool, **options: Any
 ) -> int:
     """Say whether a model file, or the mesh or the layers of a scene, would print as it is.
 
-    The options between --json and --threads are for scenes. Exit status: 1 if it would not print.
+    The layers of a model are always checked, those of a scene with --layer. Each problem comes with its
+    layer, its place in mm from the middle of the object and above its lowest point, and the option that mends
+    it. Exit status: 1 if it would not print.
     """
-    from fracslice.job import make_mesh
-    from fracslice.mesh.check import check_mesh as examined
-
-    if options["layer"] is not None and not is_model(source):
-        refuse_options(context, OF_MESHES, "only for meshes, and --layer checks layers")
-        return check_print(source, settings, as_json, threads, quiet, **options)
+    numbers: dict[str, Any]
     if is_model(source):
-        refuse_scene_options(context)
-        checked = examined(load_model(source), threads=threads)
-        numbers, line, problems = checked.as_dict(), f"{source}: {found(checked)}", checked.problems
-        line += "" if problems else ", would print"
+        refuse_options(context, OF_SCENES, "only for scenes, and a model was given")
+        with working(threads, quiet) as work:
+            numbers, lines, problems = of_model(source, options, work)
+    elif options["layer"] is not None:
+        refuse_options(context, OF_MESHES, "only for meshes, and --layer checks layers")
+        scene = load_scene(source, options["settings"])
+        with working(threads, quiet) as work:
+            size, how = options["size"] or scene.size_mm, printing_of(scene, options)
+            numbers, lines, problems = of_layers(source, scene.root, size, how, options, work)
     else:
         refuse_options(context, OF_LAYERS, "only with --layer")
-        from fracslice.printing.checks import check_solid  # imported here: models need no Numba
-
-        scene = load_scene(source, settings)
         with working(threads, quiet) as work:
-            result = make_mesh(scene, job_of(scene, **options), work)
-            solid = check_solid(result.root, result.bricks, result.place.scale, limits_of(options), work)
-        numbers = result.report.as_dict() | {"solid": solid.as_dict()}
-        problems = (*result.report.problems, *solid.thin)
-        said = verdict(problems) + ("" if problems else "; --layer looks at islands, cups and traps, too")
-        line = os.linesep.join(filter(None, [summary(source, result.report), solid.unseen, said]))
-    click.echo(json.dumps(numbers, indent=2) if as_json else line)
+            numbers, lines, problems = of_mesh(source, options, work)
+    click.echo(json.dumps(numbers, indent=2) if as_json else os.linesep.join(filter(None, lines)))
     return 1 if problems else 0
+
+
+Checked = tuple[dict[str, Any], list[str], Sequence[object]]
+"""Figures, lines of text, and problems."""
+
+
+def of_mesh(source: str, options: dict[str, Any], work: Work) -> Checked:
+    """Check the mesh of a scene."""
+    from fracslice.job import make_mesh
+    from fracslice.printing.checks import check_solid
+
+    scene = load_scene(source, options["settings"])
+    result = make_mesh(scene, job_of(scene, **options), work)
+    solid = check_solid(result.root, result.bricks, result.place.scale, limits_of(options), work)
+    problems = (*result.report.problems, *solid.thin)
+    hint = "" if problems else "; --layer looks at islands, cups, traps, overhangs and necks, too"
+    numbers = result.report.as_dict() | {"solid": solid.as_dict()}
+    return numbers, [summary(source, result.report), solid.unseen, verdict(problems) + hint], problems
+
+
+def of_model(source: str, options: dict[str, Any], work: Work) -> Checked:
+    """Check the mesh of a model and, if it is closed, its layers."""
+    from fracslice.mesh.check import check_mesh
+    from fracslice.mesh.field import MeshField
+    from fracslice.scene import Print
+
+    mesh = load_model(source)
+    report = check_mesh(mesh, threads=work.threads)
+    line, numbers = f"{source}: {figures(report)}", report.as_dict()
+    if not report.watertight:
+        return numbers, [line], report.problems
+    size = longest(mesh)
+    height = max(size / ACROSS, float(LAYER[:-2]))
+    options = options | {
+        "layer": options["layer"] or (height, None),
+        "pixel": options["pixel"] or (None if options["machine"] else max(height, PIXEL_MM)),
+    }
+    given = {name: value for name, value in options.items() if name in Print.kinds() and value is not None}
+    layers, lines, problems = of_layers(source, MeshField(mesh), size, Print(**given), options, work)
+    return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
+
+
+def longest(mesh: Mesh) -> float:
+    """Longest side of a mesh, mm."""
+    return float((mesh.vertices.max(0) - mesh.vertices.min(0)).max())
+
+
+def of_layers(
+    source: str, root: Field, size: float, how: Print, options: dict[str, Any], work: Work
+) -> Checked:
+    """Check the layers of an object; with --fix, mend it and check it again."""
+    from fracslice.printing.problems import mended
+    from fracslice.scene import Print
+
+    if options["picture"] and Path(options["picture"]).suffix.lower() != ".png":
+        raise click.UsageError(f"{options['picture']}: expected a file name that ends in .png")
+    check_targets(source, options["picture"])
+    numbers, lines, problems = examined(source, root, size, how, options, work)
+    settings = mended(problems) if options["fix"] else {}
+    if not settings:
+        return numbers, lines, problems
+    flags = " ".join(f"--{name} {value}" for name, value in settings.items())
+    size = float(settings.pop("size", f"{size}mm")[:-2])
+    values = {name: Print.kinds()[name].read(text) for name, text in settings.items()}
+    after, again, left = examined(f"with {flags}", root, size, replace(how, **values), options, work)
+    return {"before": numbers, "flags": flags, "after": after}, [*lines, *again], left
+
+
+def examined(
+    name: str, root: Field, size: float, how: Print, options: dict[str, Any], work: Work
+) -> tuple[dict[str, Any], list[str], list[Any]]:
+    """Check the layers of an object once."""
+    from fracslice.slicing import SliceJob, plan_stack
+    from fracslice.slicing.checks import check_layers
+    from fracslice.slicing.problems import misfit
+
+    pixel, machine = options["pixel"], options["machine"]
+    if pixel is not None and machine is not None:
+        raise click.UsageError("--pixel and --printer: expected one of them")
+    square = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
+    stack = plan_stack(root, SliceJob(size, options["layer"][0], square, printing=how), work)
+    if machine and (unfit := misfit(stack, machine)):
+        return (
+            {"size": stack.size, "fits": False, "problems": [str(unfit)]},
+            [f"{name}: would not print: {unfit}"],
+            [unfit],
+        )
+    stack = as_high_as_wanted(stack, options, work)
+    report = check_layers(stack, limits_of(options), machine, work)
+    if options["picture"]:
+        draw(stack, report, options["picture"], work)
+    return report.as_dict(), described(name, report), report.problems
+
+
+def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
+    """Draw the worst layers."""
+    from fracslice.export import replacing
+    from fracslice.slicing.preview import worst_layers
+
+    with replacing(path) as file:
+        worst_layers(stack, report.worst, file, work)
+
+
+def limits_of(options: dict[str, Any]) -> Limits:
+    """Minimum thicknesses of walls and floors."""
+    from fracslice.printing.limits import Limits
+
+    return Limits(wall=options["wall"], floor=options["floor"])
+
+
+def described(name: str, report: PrintReport) -> list[str]:
+    """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
+    size = " x ".join(f"{s:.2f}" for s in report.size)
+    figures = f"{report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
+    return [f"{name}: {figures}, {verdict(report.problems)}", report.solid.unseen]
+
+
+def verdict(problems: Sequence[object]) -> str:
+    """Verdict on printability, with a line for each problem."""
+    return os.linesep.join(["would not print:", *(f"  {p}" for p in problems)]) if problems else "would print"

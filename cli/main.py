@@ -21,11 +21,13 @@ from fracslice.errors import (
     FracsliceWarning,
     RenderError,
     SceneError,
+    SharedError,
     SliceError,
     VolumeError,
 )
 from fracslice.version import __version__
 
+from .animate import animate
 from .bench import bench
 from .check import check
 from .fly import fly
@@ -58,7 +60,7 @@ def commands(context: click.Context) -> None:
         context.exit(USAGE)
 
 
-for command in (mesh, render, slice_, check, show, fly, formulas, scenes, bench):
+for command in (mesh, render, animate, slice_, check, show, fly, formulas, scenes, bench):
     commands.add_command(command)
 
 
@@ -93,6 +95,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return say(error.format_message(), error.exit_code)
     except StoppedError as error:
         return say(str(error), error.status)
+    except SharedError as error:
+        return say(str(error), 0)
     except FracsliceError as error:
         return say(str(error), USAGE if isinstance(error, BAD_INPUT) else FAILED)
     except (KeyboardInterrupt, click.Abort):

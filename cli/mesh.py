@@ -35,6 +35,16 @@ if TYPE_CHECKING:
 GRID = ".vdb"
 
 
+def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
+    """Parse a time of an animation into seconds."""
+    from fracslice.scene.animation import Seconds
+
+    try:
+        return None if text is None else Seconds(0.0, "").read(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: expected {error}") from None
+
+
 @click.command()
 @source_argument("SCENE")
 @click.option(
@@ -48,6 +58,13 @@ GRID = ".vdb"
 @print_options
 @job_options
 @set_option
+@click.option(
+    "--time",
+    "seconds",
+    callback=moment,
+    metavar="TIME",
+    help="Mesh the scene of this time of its <animation>, such as 2.5s.",
+)
 @click.option("--report", type=NAME, metavar="FILE.json", help="Write the figures that prove the mesh.")
 @click.option("--picture", type=NAME, metavar="FILE.png", help="Write a shaded picture of the mesh.")
 @click.option(
@@ -71,6 +88,7 @@ def mesh(
     source: str,
     output: str,
     settings: tuple[str, ...],
+    seconds: float | None,
     report: str | None,
     picture: str | None,
     cache: str | None,
@@ -91,6 +109,10 @@ def mesh(
     if Path(output).suffix.lower() == GRID:
         refuse_options(context, {"chord", "simplify"}, "only for meshes, and a .vdb file holds samples")
     scene = load_scene(source, settings)
+    if seconds is not None:
+        from fracslice.animation import Timeline
+
+        scene = Timeline(scene).at(seconds)
     job = job_of(scene, **options)
     how = Work(threads, store=store_in(cache), device=chosen(device))
     with working(how, quiet) as work:

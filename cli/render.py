@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.errors import Cancelled
+from fracslice.errors import Cancelled, SharedError
 from fracslice.work import Work
 
+from .cluster import cluster_options, pooled
 from .inputs import check_folder, check_targets, load_scene
 from .options import NAME, Whole, device_option, quiet_option, set_option, source_argument, threads_option
 from .working import KeptError, working
@@ -90,6 +91,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     metavar="FILE.npz",
     help="Resume from this file if it exists, and save to it after every pass.",
 )
+@cluster_options
 @set_option
 @threads_option
 @quiet_option
@@ -103,6 +105,9 @@ def render(
     bits: str,
     pass_images: str | None,
     state: str | None,
+    cluster: str | None,
+    shard: str | None,
+    store: str | None,
     settings: tuple[str, ...],
     threads: int,
     quiet: bool,
@@ -116,15 +121,19 @@ def render(
     if pass_images:
         check_folder(Path(pass_images))
     scene, start = load_scene(source, settings), time.monotonic()
-    with working(threads, quiet) as work:
+    with (
+        pooled(output, threads, cluster, shard, store) as pool,
+        working(Work(threads, cluster=pool), quiet) as work,
+    ):
         renderer = Renderer(scene.root, scene.view, size, work, device)
+        aside = None if pool is None or state else pool.pieces.path(f"{renderer.key}.npz")
+        state = state or aside
         if state and Path(state).exists():
             renderer.resume(state)
+        first = pool is None or pool.first
 
         def write(path: str | Path, done: Pass, bits: str) -> str:
             save(path, done, scene, bits, threads)
-            if state:
-                save_state(renderer, state)
             return f"{path}: {renderer.width} x {renderer.height} pixels, {reached(done)}"
 
         try:
@@ -134,13 +143,19 @@ def render(
                 if pass_images:
                     Path(pass_images).mkdir(exist_ok=True)
                     write(Path(pass_images) / f"pass{done.number:04}.png", done, "8")
-                elif state:
+                if state and first:
                     save_state(renderer, state)
         except Cancelled:
-            if not renderer.seen().samples:
+            if not first or not renderer.seen().samples:
                 raise
+            if state:
+                save_state(renderer, state)
             raise KeptError(write(output, renderer.seen(), bits)) from None
+    if not first:
+        raise SharedError("the samples are made; shard 1 writes the file")
     written = write(output, renderer.seen(), bits)
+    if aside:
+        Path(aside).unlink(missing_ok=True)
     if not quiet:
         took = time.monotonic() - start
         click.echo(f"{written}, {renderer.setup.precision}, {renderer.device}, {took:.1f} s")

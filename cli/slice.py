@@ -1,16 +1,17 @@
-"""fracslice slice and "fracslice check --layer": writing and checking the layers of a print."""
+"""fracslice slice: writing the layers of a print."""
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from .cluster import cluster_options, pooled
 from .inputs import check_targets, load_scene
 from .options import (
     NAME,
@@ -26,10 +27,9 @@ from .options import (
 from .working import working
 
 if TYPE_CHECKING:
-    from fracslice.printing.checks import Limits
+    from fracslice.export.resins import Resin
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Stack
-    from fracslice.slicing.checks import PrintReport
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
 
@@ -66,13 +66,14 @@ def printer(context: click.Context, _: click.Parameter, name: str | None) -> Pri
         return None if name is None else printers.printer(name)
     for p in printers.PRINTERS.values():
         volume = " x ".join(f"{r:g}" for r in p.build_volume)
-        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {volume} mm")
+        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {volume} mm, .{p.file}")
     context.exit()
 
 
 def printer_option(text: str) -> Callable[..., Any]:
     """Decorator that adds --printer, parsed before missing options are reported. text: its help."""
-    return click.option("--printer", "machine", callback=printer, is_eager=True, metavar="NAME", help=text)
+    names = "--printer", "machine"
+    return click.option(*names, callback=printer, is_eager=True, metavar="NAME|FILE", help=text)
 
 
 @click.command("slice")
@@ -83,13 +84,15 @@ def printer_option(text: str) -> Callable[..., Any]:
     type=NAME,
     required=True,
     metavar="OUT",
-    help="An .sl1, .3mf, .svg, .cli or .json file, or a folder of PNG pictures.",
+    help="A printer's file (.sl1, .goo, .ctb, .cbddlp, .pwmx, .nanodlp, ...), an .svg, .3mf, .cli or .json "
+    "file, or a folder of PNG pictures.",
 )
 @click.option(
     "--format",
     "form",
     metavar="NAME",
-    help="png, sl1, 3mf, svg, slic3r, cli, cli-binary or json; by default, what the ending of OUT says.",
+    help="png, sl1, goo, ctb, cbddlp, pwmx, nanodlp, 3mf, svg, slic3r, cli, cli-binary or json; by default, "
+    "that of the extension of OUT.",
 )
 @click.option(
     "--size",
@@ -107,7 +110,7 @@ def printer_option(text: str) -> Callable[..., Any]:
 @click.option(
     "--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's by default, or 0.05mm."
 )
-@printer_option('The printer whose screen the layers are for; "list" shows all.')
+@printer_option('The printer whose screen the layers are for, or a .toml file of it; "list" shows all.')
 @click.option(
     "--up",
     nargs=3,
@@ -127,12 +130,23 @@ def printer_option(text: str) -> Callable[..., Any]:
     "--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default."
 )
 @click.option(
+    "--sections",
+    type=click.Choice(["1", "2", "4", "8"]),
+    default="1",
+    help="Sections per layer, for grey from z: the share of the layer's height that is inside; 1 by default.",
+)
+@click.option(
     "--exposure",
     nargs=2,
     type=NUMBER,
-    default=(8.0, 35.0),
     metavar="S S",
-    help="Exposure in an .sl1 file: seconds of each layer and of the first; 8 35 by default.",
+    help="Exposure in a printer's file: seconds of each layer and of a bottom layer; the resin's by default.",
+)
+@click.option(
+    "--resin",
+    type=NAME,
+    metavar="NAME|FILE",
+    help='A resin such as "Siraya Tech Fast Grey", or a file of its settings: .toml, or .ini of PrusaSlicer.',
 )
 @click.option(
     "--preview",
@@ -140,6 +154,7 @@ def printer_option(text: str) -> Callable[..., Any]:
     metavar="FILE",
     help="Write a contact sheet (.png) or an animation (.webp) of the layers.",
 )
+@cluster_options
 @print_options
 @set_option
 @threads_option
@@ -157,49 +172,98 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
-    from fracslice.export.jobs import SliceRun
-    from fracslice.export.slices import slice_format, write_slices
+    from fracslice.export.slices import PICTURES, PRINTS, printers_file, slice_format, write_slices
+    from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
-    from fracslice.slicing import plan_stack
-    from fracslice.slicing.raster import Screen
-    from fracslice.stackmesh import stack_mesh
+    from fracslice.slicerecipe import SliceRecipe
+    from fracslice.work import Work
 
-    if slice_format(output, form) == "sl1":
-        refuse_what_no_sl1_says(output, options)
+    kind, resin = slice_format(output, form), resin_of(options)
+    if options["sections"] != "1" and kind not in PICTURES:
+        raise click.UsageError(f"{output}: --sections is for pictures; contours are of one section per layer")
+    if kind in PRINTS:
+        refuse_what_no_print_has(output, kind, options, resin)
     preview = options["preview"]
     if preview and Path(preview).suffix.lower() not in (".png", ".webp"):
         raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
     check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
-    with working(threads, quiet) as work:
-        what = job(scene, options)
-        stack = as_high_as_wanted(plan_stack(scene.root, what, work), options, work)
-        how = (options[name] for name in ("machine", "compensation", "gamma", "mirror"))
-        screen = Screen(stack, *how)
-        about = {"Title": scene.name, "scene_hash": scene.hash}
-        mesh = partial(stack_mesh, scene, what, work)
-        write_slices(SliceRun(stack, screen, work, tuple(options["exposure"]), about, mesh), output, form)
+    recipe = SliceRecipe(
+        to_xml(scene),
+        scene.name,
+        job(scene, options),
+        options["layer"][1],
+        Path(output).name,
+        kind,
+        options["machine"],
+        options["compensation"],
+        options["gamma"],
+        options["mirror"],
+        resin,
+        created(),
+        int(options["sections"]),
+    )
+    shared = (options[name] for name in ("cluster", "shard", "store"))
+    with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
+        run = recipe.run(work)
+        stack, screen = run.stack, run.screen
+        write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
-        off = () if quiet else layers_amount(stack, work)[1]
+        off = () if quiet else layers_amount(run.slicer, work)[1]
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape
         click.echo(f"{output}: {len(stack.z)} layers of {columns} x {rows} pixels, {size} mm")
-        for note in stack.notes + off:
+        other = printers_file(screen.printer, output) if screen.printer else ""
+        for note in stack.notes + off + ((other,) if other else ()):
             click.echo(note)
     return 0
 
 
-def refuse_what_no_sl1_says(output: str, options: dict[str, Any]) -> None:
-    """Raise a usage error for options that an SL1 archive does not allow.
+def resin_of(options: dict[str, Any]) -> Resin | None:
+    """Exposure and motion of --resin, else of the printer's own; --exposure changes them. None if there is
+    neither.
+    """
+    from fracslice.export.resins import Resin, default_resin, moving, resin
+
+    machine, layer = options["machine"], options["layer"][0]
+    found = default_resin(machine, layer) if machine else None
+    if options["resin"] is not None:
+        found = resin(options["resin"], machine, layer)
+    if options["exposure"] is None:
+        return found
+    exposure, bottom = options["exposure"]
+    if found is None:
+        return moving(Resin(exposure, bottom), machine)
+    return replace(found, exposure=exposure, bottom_exposure=bottom)
+
+
+def refuse_what_no_print_has(output: str, kind: str, options: dict[str, Any], resin: Resin | None) -> None:
+    """Raise a usage error for options that a printer's file does not allow.
 
     This is checked before print preparation, which may take minutes.
     """
-    if options["machine"] is None:
-        raise click.UsageError(f'{output}: an SL1 archive needs --printer, such as sl1s; "list" shows all')
-    if options["layer"][1] is not None:
+    from fracslice.export.slices import ENDINGS, printers_file
+
+    machine = options["machine"]
+    if machine is None:
+        raise click.UsageError(f'{output}: a .{kind} file needs --printer, such as sl1s; "list" shows all')
+    if f".{machine.file}" in ENDINGS and (other := printers_file(machine, output)):
+        raise click.UsageError(f"{output}: {other}")
+    if resin is None:
+        raise click.UsageError(
+            f"{output}: no exposure is known for {machine.title}; expected --exposure S S or --resin"
+        )
+    if options["layer"][1] is not None and kind == "sl1":
         raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")
+
+
+def created() -> datetime:
+    """Date of print files, UTC: now, or of SOURCE_DATE_EPOCH."""
+    seconds = os.environ.get("SOURCE_DATE_EPOCH")
+    now = datetime.now(UTC)
+    return datetime.fromtimestamp(int(seconds), UTC) if seconds else now
 
 
 def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
@@ -213,13 +277,6 @@ def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
     up = tuple(options.get("up") or (0.0, 0.0, 1.0))
     size = options["size"] or scene.size_mm
     return SliceJob(size, options["layer"][0], given, up, printing_of(scene, options))
-
-
-def stack_of(scene: Scene, options: dict[str, Any], work: Work) -> Stack:
-    """Plan layers of one height for the object after print preparation."""
-    from fracslice.slicing import plan_stack
-
-    return plan_stack(scene.root, job(scene, options), work)
 
 
 def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:
@@ -237,52 +294,3 @@ def write_preview(stack: Stack, path: str, work: Work) -> None:
 
     with replacing(path) as file:
         (contact_sheet if path.lower().endswith(".png") else animation)(stack, file, work)
-
-
-def check_print(
-    source: str, settings: tuple[str, ...], as_json: bool, threads: int, quiet: bool, **options: Any
-) -> int:
-    """Check the layers of a scene, print the result and return the exit status."""
-    from fracslice.export import replacing
-    from fracslice.slicing.checks import check_layers, misfit
-    from fracslice.slicing.preview import worst_layers
-
-    if options["picture"] and Path(options["picture"]).suffix.lower() != ".png":
-        raise click.UsageError(f"{options['picture']}: expected a file name that ends in .png")
-    check_targets(source, options["picture"])
-    scene = load_scene(source, settings)
-    with working(threads, quiet) as work:
-        stack, machine = stack_of(scene, options, work), options["machine"]
-        if machine and (unfit := misfit(stack, machine)):
-            early = {"size": stack.size, "fits": False, "problems": [unfit]}
-            click.echo(json.dumps(early, indent=2) if as_json else f"{source}: would not print: {unfit}")
-            return 1
-        stack = as_high_as_wanted(stack, options, work)
-        report = check_layers(stack, limits_of(options), machine, work)
-        if options["picture"]:
-            with replacing(options["picture"]) as file:
-                worst_layers(stack, report.worst, file, work)
-    click.echo(json.dumps(report.as_dict(), indent=2) if as_json else told(source, report))
-    return 1 if report.problems else 0
-
-
-def limits_of(options: dict[str, Any]) -> Limits:
-    """Minimum thicknesses of walls and floors."""
-    from fracslice.printing.checks import Limits
-
-    return Limits(wall=options["wall"], floor=options["floor"])
-
-
-def told(source: str, report: PrintReport) -> str:
-    """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
-    size = " x ".join(f"{s:.2f}" for s in report.size)
-    first = (
-        f"{source}: {report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
-    )
-    said = f"{first}, {verdict(report.problems)}"
-    return os.linesep.join(filter(None, [said, report.solid.unseen]))
-
-
-def verdict(problems: Sequence[str]) -> str:
-    """Verdict on printability, with a line for each problem."""
-    return os.linesep.join(["would not print:", *(f"  {p}" for p in problems)]) if problems else "would print"

@@ -18,14 +18,14 @@ def summary(path: str, report: Report) -> str:
         fewer = f"simplified from {done.from_triangles:,} triangles, at most {off:.3g} mm off\n"
     notes = "".join(f"{note}\n" for note in report.notes)
     return (
-        f"{path}: {found(report.mesh)}\n{notes}"
+        f"{path}: {figures(report.mesh)}\n{notes}"
         f"{fewer}vertices {error.mean * 1000:.2g} um from the surface (99 %: {error.p99 * 1000:.2g} um), "
         f"the surface {back.mean:.2g} mm from the mesh (at most {back.max:.2g} mm), "
         f"voxel {report.voxel_mm:.3g} mm, {report.seconds['total']:.1f} s, {report.peak_rss_mb:.0f} MB"
     )
 
 
-def found(mesh: MeshReport) -> str:
+def figures(mesh: MeshReport) -> str:
     """Figures and printability of a mesh, in one line."""
     (x0, y0, z0), (x1, y1, z1) = mesh.bbox_mm
     size = f"{x1 - x0:.2f} x {y1 - y0:.2f} x {z1 - z0:.2f} mm"

@@ -64,8 +64,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from .version import __version__ as __version__
-
 _WHERE = {
     "Camera": "scene.view",
     "FracsliceError": "errors",
@@ -80,6 +78,7 @@ _WHERE = {
     "Scene": "scene",
     "Slices": "api.slices",
     "Work": "work",
+    "__version__": "version",
     "make_mesh": "api.meshing",
     "read": "scene",
     "reads": "scene",

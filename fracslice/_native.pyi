@@ -1,5 +1,4 @@
-"""C++ parts of fracslice: marching cubes on bricks, triangle meshes, and OpenVDB. Call `fracslice.mesh` and
-`fracslice.volume.grid` instead.
+"""C++ parts of fracslice: marching cubes on bricks, and triangle meshes. Call `fracslice.mesh` instead.
 
 Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Long calls release the GIL.
 """
@@ -7,7 +6,7 @@ Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Lon
 from collections.abc import Callable
 from typing import Any
 
-from numpy import bool_, float32, float64, int32, int64, uint8, uint32
+from numpy import bool_, float32, float64, int32, int64, uint8
 from numpy.typing import NDArray
 
 from .kernel.machine import Function
@@ -166,6 +165,22 @@ class Cells:
             through.
         """
 
+def trust_regions(
+    features: NDArray[float64],
+    cases: NDArray[uint8],
+    to_means: NDArray[float32],
+    which: NDArray[int64],
+    inside: NDArray[bool_],
+    origin: Point,
+    voxel: float,
+    minimum_edge_parameter: float,
+) -> NDArray[float64]:
+    """Trust regions of features, as `Contouring.finish` returns them, float64 [4, 3, n].
+
+    The interior of the cell or face of each feature, its nearest corner of the other sign, and the mean of
+    the crossings around it. Raises ValueError for arrays that do not fit.
+    """
+
 class Contouring:
     """Surface of `marching_cubes` through exact crossings, with sharp edges and corners, in layers of cells.
 
@@ -229,50 +244,6 @@ class Contouring:
 def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32]) -> int:
     """Number of grid edges with a sign change at a point without a sample: 0 for a closed surface."""
 
-class Grid:
-    """Sparse OpenVDB level set."""
-
-    @staticmethod
-    def from_bricks(
-        ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32], origin: Point, voxel: float
-    ) -> Grid:
-        """Grid of samples: active at samples; the background is the largest sample, negative inside."""
-
-    @staticmethod
-    def read(path: str, name: str = "") -> Grid:
-        """Read the named float grid of a .vdb file, or the first one. Raises RuntimeError."""
-
-    def write(self, path: str, metadata: dict[str, str]) -> None:
-        """Write a .vdb file. Raises RuntimeError if it cannot be written completely."""
-
-    def to_bricks(self) -> tuple[list[float], float, NDArray[int32], NDArray[float32], NDArray[int32]]:
-        """Origin, voxel, ijk, values and index. Raises ValueError unless voxels are axis-aligned cubes."""
-
-    def mesh(self, adaptivity: float = 0.0) -> tuple[NDArray[float32], NDArray[uint32], NDArray[uint32]]:
-        """Dual contouring by OpenVDB: points [n, 3], triangles [m, 3], quads [k, 4]."""
-
-    def redistance(self) -> Grid:
-        """Signed distance field of the same surface, by fast sweeping (Zhao, 2004). Raises ValueError."""
-
-    def offset(self, distance: float) -> Grid:
-        """Signed distances of the surface, offset outwards by `distance`, scene units. Raises ValueError."""
-
-    def surfaces(self) -> list[Grid]:
-        """One grid per connected component of the surface, the largest first."""
-
-    name: str
-    @property
-    def metadata(self) -> dict[str, str]: ...
-    @property
-    def background(self) -> float: ...
-    @property
-    def active_voxels(self) -> int: ...
-    @property
-    def leaves(self) -> int: ...
-    @property
-    def memory(self) -> int:
-        """Memory in bytes."""
-
 # Triangle meshes: vertices [n, 3], triangles [m, 3]. All functions raise ValueError for an index out of range
 # or inconsistent arrays. Results do not depend on the number of threads.
 
@@ -293,7 +264,7 @@ def component_sizes(
     labels: NDArray[int32],
     count: int,
     threads: int = 0,
-) -> tuple[NDArray[float64], NDArray[float64]]:
+) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[int32]]:
     """See `fracslice.mesh.topology.component_sizes`."""
 
 def measures(
@@ -302,9 +273,9 @@ def measures(
     """Area of triangles, signed volume between them and a point, and number of triangles without area."""
 
 def turned(
-    vertices: NDArray[float64], triangles: NDArray[int32], points: NDArray[float64], threads: int = 0
+    vertices: NDArray[float64], triangles: NDArray[int32], frame: tuple[float, Point, float], threads: int = 0
 ) -> NDArray[int64]:
-    """Triangles, ascending, that degenerate or turn by at least 90 degrees if vertices move to `points`."""
+    """Triangles, ascending, that degenerate or turn by at least 90 degrees when they are quantised."""
 
 def pointed(
     vertices: NDArray[float64], triangles: NDArray[int32], sine: float, most: int, threads: int = 0
@@ -318,8 +289,16 @@ def bounds(points: NDArray[float64], threads: int = 0) -> tuple[Point, Point]:
     """Low and high corner of the bounding box of points, float64 [n, 3]. Raises ValueError without points."""
 
 def quantise(
-    points: NDArray[float64], planes: NDArray[float64], threads: int = 0
-) -> tuple[NDArray[float64], NDArray[bool_]]:
+    vertices: NDArray[float64],
+    triangles: NDArray[int32],
+    keep: NDArray[bool_],
+    displaced: NDArray[bool_],
+    rows: NDArray[int64],
+    corners: NDArray[int32],
+    planes: NDArray[float64],
+    frame: tuple[float, Point, float],
+    threads: int = 0,
+) -> tuple[NDArray[float64], NDArray[int32], NDArray[bool_], NDArray[int64]]:
     """See `fracslice.mesh.quantisation.quantise`. Raises ValueError for a coordinate that is not finite."""
 
 def selected(

@@ -5,6 +5,7 @@ Long calls release the GIL.
 """
 
 from collections.abc import Callable
+from enum import Enum
 
 from numpy import float32, float64, int32, uint8
 from numpy.typing import NDArray
@@ -43,6 +44,20 @@ class ProbeBounds:
         stop_inside: int,
         escape_time_only: bool,
     ) -> None: ...
+
+class Encoding(Enum):
+    """Encodings of a picture.
+
+    PNG: rows, each after a byte 0, as a zlib stream. The others are run lengths of all pixels, row after row.
+    GOO: levels of 8 bits, as in .goo V3.0. RLE7: 7 bits, as in .ctb. RLE4: 4 bits, as in .pwmx. RLE1: one
+    bit, as in .cbddlp.
+    """
+
+    PNG = ...
+    GOO = ...
+    RLE7 = ...
+    RLE4 = ...
+    RLE1 = ...
 
 class Memory:
     """Memory of finished slabs, reused by later ones."""
@@ -137,8 +152,9 @@ class Slab:
         at: tuple[int, int],
         shape: tuple[int, int],
         levels: bytes,
+        encoding: Encoding,
     ) -> tuple[bytes, float, int]:
-        """Coverage of a layer as shown on a screen; see `fracslice.slicing.layers.ScreenView`.
+        """Coverage of a layer as shown on a screen, encoded; see `fracslice.slicing.layers.ScreenView`.
 
         Parameters
         ----------
@@ -150,11 +166,13 @@ class Slab:
             As in `ScreenView`.
         shape : tuple of int
             Rows and columns of the layer.
+        encoding : Encoding
+            Encoding of the picture.
 
         Returns
         -------
-        stream : bytes
-            Rows of pixels, each after a byte 0, as a zlib stream.
+        data : bytes
+            Encoded picture.
         area, cut
             As from `paint`.
         """
@@ -176,5 +194,5 @@ class Slab:
         of 8.
         """
 
-def deflated(image: NDArray[uint8]) -> bytes:
-    """Rows of an image of any strides, each after a byte 0, as a zlib stream."""
+def encoded(image: NDArray[uint8], encoding: Encoding) -> bytes:
+    """Encode an image of any strides."""

@@ -44,6 +44,14 @@ class SliceError(FracsliceError):
     """Failure to cut or write layers."""
 
 
+class ClusterError(FracsliceError):
+    """Failure of a cluster's scheduler, workers or shared storage."""
+
+
+class SharedError(ClusterError):
+    """Pieces of a shard are made, and another shard writes the output. This is no failure."""
+
+
 class BenchError(FracsliceError):
     """Invalid or impossible benchmark."""
 

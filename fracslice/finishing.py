@@ -15,9 +15,7 @@ from .scene import Print
 from .work import Clock
 
 if TYPE_CHECKING:
-    from .formulas import Box
     from .mesh import Mesh
-    from .mesh.certificate import Certificate
     from .mesh.check import MeshReport
     from .mesh.components import Removed
     from .mesh.window import Finished
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
 MOST_ERRORS = 1 << 22
 """Approximate maximum of vertices whose distance from the surface is measured, evenly distributed over it."""
 
-VERTICES_A_BRICK = 40
+VERTICES_A_BRICK = 170
 
 FLAT = 0.1
 """Fraction of the minimum distance between vertices. Vertices within this height of the bed are moved to the
@@ -62,8 +60,8 @@ class Placement:
         ndarray of float64, shape (n, 3)
             Points, mm.
         """
-        found: NDArray[np.float64] = points * self.scale + np.array(self.offset)
-        return found
+        placed: NDArray[np.float64] = points * self.scale + np.array(self.offset)
+        return placed
 
     def units(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transform points from print space to the scene.
@@ -78,8 +76,9 @@ class Placement:
         ndarray of float64, shape (n, 3)
             Points, scene units.
         """
-        found: NDArray[np.float64] = (points - np.array(self.offset)) / self.scale
-        return found
+        axes = np.ascontiguousarray(points.T)  # three long rows: NumPy is slow on many short ones
+        scene: NDArray[np.float64] = ((axes - np.array(self.offset)[:, None]) / self.scale).T
+        return scene
 
 
 class Finish:
@@ -115,18 +114,21 @@ class Finish:
         scale: float | None,
         clock: Clock,
     ) -> None:
-        from .mesh.certificate import Certificate
         from .mesh.components import choose
         from .mesh.extract import minimum_edge_parameter
+        from .mesh.quantisation import grid_planes
+        from .volume.rest import box_of_the_rest
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
         self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
         unit = (scale or size / max(planned.box.size)) ** 3
-        nested, self.misplaced = shells.nested(pieces, clock.work.threads)
+        nested, self.misplaced = shells.nested(pieces, how.cavities == "fill", clock.work.threads)
         sized = replace(nested, volumes=nested.volumes * unit)
         limit = dust(float(sized.volumes.sum()))
         self.stays, removed = choose(sized, keep=how.keep, dust_mm3=limit, cavities=how.cavities)
-        rest, box = shells.bounds(self.stays), self._box()
+        rest = shells.bounds(self.stays)
+        tips = shells.tips(self.stays)
+        box = box_of_the_rest(planned, shells.bounds(), rest, tips, clock.work)
         exact = scale or size / max(box.size)
         x, y, _ = box.centre
         self.place = Placement(exact, (-exact * x, -exact * y, -exact * float(rest[0, 2])))
@@ -134,33 +136,8 @@ class Finish:
         self.volume = float(nested.volumes[self.stays].sum()) * exact**3
         """Volume of all bodies, removed ones included, mm3."""
         self.volume += removed.bodies_mm3 - removed.filled_mm3
-        grid = Certificate.of(surface.signs, 0)
-        self._grid = replace(grid, planes=self.place.mm(grid.planes))
-        self._flat = FLAT * minimum_edge_parameter(surface.signs) * planned.voxel * exact
-
-    def _box(self) -> Box:
-        """Bounding box of the remaining bodies."""
-        from .volume.rest import box_of_the_rest
-
-        whole, rest = self.shells.bounds(), self.shells.bounds(self.stays)
-        return box_of_the_rest(self.planned, whole, rest, self._outermost, self.clock.work)
-
-    def _outermost(self) -> NDArray[np.float64]:
-        """Extreme vertices of the remaining triangles, of each piece."""
-        from .volume.rest import outermost
-
-        kept = map(self._kept, range(len(self.pieces)))
-        return np.concatenate([outermost(mesh.vertices) for mesh in kept if len(mesh.vertices)])
-
-    def _stay(self, number: int) -> NDArray[np.bool_]:
-        """Mask of the remaining triangles of a piece, bool [m]."""
-        found: NDArray[np.bool_] = self.stays[self.shells.of_label[self.pieces.labels(number)]]
-        return found
-
-    def _kept(self, number: int) -> Mesh:
-        """Remaining triangles of a piece, scene units."""
-        mesh = self.pieces.mesh(number)
-        return mesh if self.stays.all() else mesh.selected(self._stay(number), self.clock.work.threads)
+        self._planes = self.place.mm(grid_planes(surface.signs))
+        self._bed = FLAT * minimum_edge_parameter(surface.signs) * planned.voxel * exact
 
     def finished(self) -> Iterator[Finished]:
         """Place and clean the pieces, mm. Pieces held in memory are released.
@@ -172,32 +149,20 @@ class Finish:
         """
         from .mesh.window import Window
 
-        voxel, threads = self.planned.voxel * self.place.scale, self.clock.work.threads
-        window, count = Window(voxel, threads), len(self.pieces)
+        frame = self.place.scale, self.place.offset, self._bed
+        window = Window(self.planned.voxel, self._planes, frame, self.clock.work.threads)
+        count = len(self.pieces)
         for number in range(count):
             with self.clock("finishing"):
                 self.clock.work.progress("finishing", number / count)
-                mesh, known = self._placed(number)
+                mesh, end = self.pieces.mesh(number), self.pieces.ends[number]
+                keep = self.stays[self.shells.of_label][self.pieces.labels(number)]
+                fresh = np.arange(len(mesh.triangles) - self.pieces.fresh[number], len(mesh.triangles))
                 self.pieces.drop(number)
-                end = self.place.scale * self.pieces.ends[number] + self.place.offset[0]
-                made = window.add(mesh, end, known)
+                made = window.add(mesh, end, keep, fresh)
                 del mesh  # free it before the checks of the caller
             self.clock.work.progress("finishing", (number + 1) / count)
             yield made
-
-    def _placed(self, number: int) -> tuple[Mesh, Certificate]:
-        """Remaining triangles of a piece, mm, and their certificate. Triangles moved to the bed are not
-        certified.
-        """
-        mesh = self._kept(number)
-        points = self.place.mm(mesh.vertices)
-        points[points[:, 2] < self._flat, 2] = 0
-        stay = self._stay(number)
-        holds = (np.arange(len(stay)) < len(stay) - self.pieces.fresh[number])[stay]
-        planes = self._grid.planes[:, 2]
-        if ((planes >= 0) & (planes < self._flat)).any():  # the plane is above some vertices now
-            holds &= (points[:, 2] > 0)[mesh.triangles].all(axis=1)
-        return replace(mesh, vertices=points), replace(self._grid, holds=holds)
 
 
 class Check:
@@ -215,7 +180,7 @@ class Check:
         from .mesh.window import Tally
 
         self._finish, self._tally = finish, Tally(finish.clock.work.threads)
-        self._stride = max(1, round(VERTICES_A_BRICK * bricks / MOST_ERRORS))
+        self._stride = -(-VERTICES_A_BRICK * bricks // MOST_ERRORS)
         self._errors: list[NDArray[np.float64]] = []
 
     def passing(self, pieces: Iterable[Finished]) -> Iterator[Mesh]:
@@ -232,18 +197,22 @@ class Check:
             Finished triangles of each piece, mm.
         """
         for piece in pieces:
-            passed = piece.passed
-            yield passed  # the consumer may write it meanwhile
+            yield piece.passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
-                self._errors.append(self._off(passed.vertices[:: self._stride]))
+                self._errors += self._off(piece.points[:: self._stride])
 
-    def _off(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _off(self, vertices: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Distances of vertices in mm from the surface, scene units."""
         from .volume.accuracy import surface_error
+        from .work import Work, chunks
 
-        planned, place = self._finish.planned, self._finish.place
-        return surface_error(planned.root, place.units(vertices), planned.voxel, self._finish.clock.work)
+        planned, place, alone = self._finish.planned, self._finish.place, Work(1)
+
+        def task(part: slice) -> NDArray[np.float64]:
+            return surface_error(planned.root, place.units(vertices[part]), planned.voxel, alone)
+
+        return self._finish.clock.work.collect(task, chunks(len(vertices), 1 << 14))
 
     @property
     def mesh(self) -> MeshReport:

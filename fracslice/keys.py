@@ -67,6 +67,6 @@ def program() -> str:
     str
         Key of this installation.
     """
-    native = (find_spec(f"{__package__}.{name}") for name in ("_native", "_slices"))
-    compiled = (Path(found.origin) for found in native if found and found.origin)
+    native = (find_spec(f"{__package__}.{name}") for name in ("_native", "_slices", "_vdb"))
+    compiled = (Path(module.origin) for module in native if module and module.origin)
     return key(texts(*sorted(HERE.rglob("*.py")), *compiled), np.__version__, scipy.__version__)

@@ -33,11 +33,11 @@ def seal(text: str) -> str:
 def _secret() -> bytes:
     """Secret of this user, the same in every process, stored in the user's configuration folder."""
     kept = Kept(users_folder("XDG_CONFIG_HOME", "~/.config"))
-    found = kept.get("secret", lambda file: file.read())
-    if found is None or len(found) != SIZE:
-        found = secrets.token_bytes(SIZE)
+    secret = kept.get("secret", lambda file: file.read())
+    if secret is None or len(secret) != SIZE:
+        secret = secrets.token_bytes(SIZE)
         try:
-            kept.put("secret", lambda file: file.write(found))
+            kept.put("secret", lambda file: file.write(secret))
         except ExportError as error:
             warn(f"{error}: interrupted jobs will not go on")
-    return found
+    return secret

@@ -17,7 +17,7 @@ from .work import Work
 
 if TYPE_CHECKING:
     from .kernel import Field
-    from .slicing import Stack
+    from .slicing import Slicer
 
 Grid = tuple[Triple, Triple, Callable[[float], str]]
 """Origin and spacing of the samples, scene units, and a function that names samples of a fraction of the
@@ -56,20 +56,20 @@ def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[A
     """
     lattice = Lattice.around(planned.outer, planned.voxel)
 
-    def told(voxel: float) -> str:
+    def sampling(voxel: float) -> str:
         return f"a voxel of {voxel * planned.voxel * scale:.2g} mm"
 
     spacing = planned.voxel, planned.voxel, planned.voxel
-    return _compared(planned.root, [planned.outer], made, scale, (lattice.origin, spacing, told), work)
+    return _compared(planned.root, [planned.outer], made, scale, (lattice.origin, spacing, sampling), work)
 
 
-def layers_amount(stack: Stack, work: Work) -> tuple[Amount, tuple[str, ...]]:
+def layers_amount(slicer: Slicer, work: Work) -> tuple[Amount, tuple[str, ...]]:
     """Compare the volume of some slabs of a stack with that of its field.
 
     Parameters
     ----------
-    stack : Stack
-        The stack.
+    slicer : Slicer
+        Slicer of the stack; layers that it has painted are not sampled again.
     work : Work
         Threads and cancellation.
 
@@ -85,23 +85,26 @@ def layers_amount(stack: Stack, work: Work) -> tuple[Amount, tuple[str, ...]]:
     SliceError, Cancelled
         If a layer cannot be sampled, or the work is cancelled.
     """
-    from .slicing import SLAB, Slicer
+    from .slicing import SLAB
 
+    stack = slicer.stack
     starts = np.arange(0, len(stack.z), SLAB)
     chosen = [s.tolist() for s in np.split(np.arange(len(stack.z)), starts[1:])]
     chosen = [chosen[k] for k in np.unique(np.linspace(0, len(starts) - 1, SLABS).round().astype(int))]
     layers = [layer for slab in chosen for layer in slab]
-    areas = np.array(list(Slicer(stack, work).map(lambda layer: layer.area, layers)))
+    for _ in slicer.map(lambda layer: layer.area, [k for k in layers if k not in slicer.areas]):
+        pass  # the slicer keeps the areas
+    areas = np.array([slicer.areas[k] for k in layers])
     (x0, y0, dx, dy), height = stack.frame.tolist(), stack.heights / stack.scale
     low, high = stack.z - height / 2, stack.z + height / 2
     (left, front, _), (right, back, _) = stack.outer.lo, stack.outer.hi
     boxes = [Box((left, front, low[s[0]]), (right, back, high[s[-1]])) for s in chosen]
     least = float(stack.heights.min())
 
-    def told(share: float) -> str:
+    def sampling(share: float) -> str:
         return f"pixels of {share * min(stack.pixel):.2g} mm and layers of {share * least:.2g} mm"
 
-    grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), told
+    grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), sampling
     return _compared(stack.root, boxes, dot(areas, stack.heights[layers]), stack.scale, grid, work)
 
 
@@ -114,14 +117,14 @@ def _compared(
     work: Work,
 ) -> tuple[Amount, tuple[str, ...]]:
     """Compare the volume of the field in boxes, scene units, with `made`, mm3."""
-    found = amount(root, boxes, work)
-    off, unit = found.off(made / scale**3), scale**3
-    told = Amount(found.volume * unit, found.error * unit, made, off)
+    true = amount(root, boxes, work)
+    off, unit = true.off(made / scale**3), scale**3
+    compared = Amount(true.volume * unit, true.error * unit, made, off)
     if off > 0:
-        return told, (f"{off:.1%} more volume than the object has: the samples are too coarse for it",)
+        return compared, (f"{off:.1%} more volume than the object has: the samples are too coarse for it",)
     if off == 0:
-        return told, ()
+        return compared, ()
     origin, spacing, name = grid
-    times = finer(root, found, off, origin, spacing, work)
+    times = finer(root, true, off, origin, spacing, work)
     would = f"{name(1 / times)} would show it" if times else f"{name(1 / FINER[-1])} would not show it either"
-    return told, (f"{-off:.1%} of the object's volume is finer than the samples and missing: {would}",)
+    return compared, (f"{-off:.1%} of the object's volume is finer than the samples and missing: {would}",)

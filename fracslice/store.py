@@ -57,9 +57,9 @@ class Store:
             If the folder cannot be written.
         """
         kept, name = Kept(self.folder), f"{key(program(), toolchain(), *made_of)}.npz"
-        found = kept.get(name, _read)
-        if found is not None:
-            return found
+        value = kept.get(name, _read)
+        if value is not None:
+            return value
         made = make()
         try:
             kept.put(name, partial(_write, made))

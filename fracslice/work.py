@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 from .errors import Cancelled, SceneError
 
 if TYPE_CHECKING:
+    from .cluster import Pool
     from .formulas.field import Device
     from .store import Store
 
@@ -57,6 +58,8 @@ class Work:
         Cache of samples and surfaces, or None.
     device
         Device that samples bricks. Samples of a GPU can differ from those of the CPU in the last place.
+    cluster
+        Pool of other processes for tasks, or a client of Dask; None for threads alone.
 
     Raises
     ------
@@ -69,8 +72,13 @@ class Work:
     cancel: threading.Event = field(default_factory=threading.Event)
     store: Store | None = None
     device: Device = "cpu"
+    cluster: Pool | None = None
 
     def __post_init__(self) -> None:
+        if hasattr(self.cluster, "scheduler_info"):
+            from .cluster import Workers
+
+            object.__setattr__(self, "cluster", Workers.of(self.cluster))
         from .formulas.parameters import Count, validate  # imports NumPy, which --help does not need
 
         validate(self, {"threads": Count(1, "how many", least=1, most=1024)}, SceneError)
@@ -106,13 +114,13 @@ class Work:
         Cancelled
             If `cancel` is set.
         """
-        found: dict[int, R] = {}
+        results: dict[int, R] = {}
 
         def numbered(index: int) -> None:
-            found[index] = task(items[index])
+            results[index] = task(items[index])
 
         self.map(numbered, range(len(items)))
-        return [found[index] for index in range(len(items))]
+        return [results[index] for index in range(len(items))]
 
     def ordered(self, task: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
         """Yield the results of a task in the order of the items, computed a few items ahead.
@@ -142,24 +150,24 @@ class Work:
                 self.check()
                 yield task(item)
             return
-        lock, waiting, ahead, running = threading.Lock(), iter(items), deque[Future[R]](), 0
+        lock, waiting, ahead = threading.Lock(), iter(items), deque[Future[R]]()
 
-        def fill(ended: int = 0) -> None:
-            nonlocal running
+        def fill(_: Future[R] | None = None) -> None:
             with lock:
-                running -= ended
+                # Callbacks come after `result`, late on a busy machine: ask the futures.
+                running = sum(not future.done() for future in ahead)
                 free = min(self.threads - running, _AHEAD * self.threads - len(ahead))
                 begun = [_POOL.submit(task, item) for item in islice(waiting, max(free, 0))]
-                running += len(begun)
                 ahead.extend(begun)
             for future in begun:
-                future.add_done_callback(lambda _: fill(1))
+                future.add_done_callback(fill)
 
         try:
             fill()
             while ahead:
                 result = ahead[0].result()
-                ahead.popleft()
+                with lock:
+                    ahead.popleft()
                 fill()
                 self.check()
                 yield result

@@ -5,31 +5,53 @@ from __future__ import annotations
 from functools import reduce
 
 from fracslice.formulas import (
+    Formula,
     Node,
+    abox,
     bend,
     bounds,
     box,
+    bristorbrot,
+    burning_ship,
     capsule,
+    cells,
     cone,
     cylinder,
     difference,
+    flake,
+    gyroid,
     intersection,
+    iwp,
     julia,
+    lidinoid,
+    mandelbox,
     mandelbulb,
     material,
     menger,
     mirror,
+    neovius,
     octahedron,
     offset,
     plane,
+    prism,
+    quaternion_mandelbrot,
     repeat,
+    schwarz_d,
+    schwarz_p,
     shell,
     sphere,
+    superquadric,
     torus,
     transform,
     twist,
     union,
 )
+
+
+def walled(wall: Formula) -> Node:
+    """A wall without end in a ball."""
+    return bounds(wall(period=0.9, thickness=0.12), min=(-0.8, -0.7, -0.9), max=(0.8, 0.7, 0.9))
+
 
 BAR = box(size=(1.6, 0.3, 0.4))
 
@@ -54,6 +76,24 @@ EXAMPLES: dict[str, Node] = {
     "mandelbulb 7.5": mandelbulb(iterations=4, power=7.5),
     "mandelbulb in pieces": mandelbulb(iterations=3, power=6, julia=(0.9, -0.6, 0.5)),
     "mandelbulb julia": mandelbulb(iterations=6, julia=(0.3, 0.4, -0.5)),
+    "tetrahedron flake": flake(solid="tetrahedron", level=3),
+    "octahedron flake": flake(solid="octahedron", level=2),
+    "dodecahedron flake": flake(solid="dodecahedron", level=1),
+    "icosahedron flake": flake(level=2),
+    "snowflake": cells(level=2),
+    "cantor dust": cells(keep=(0,), level=2),
+    "vicsek": cells(keep=(2, 3), level=2),
+    "striped cells": cells(keep=(0, 2), level=2),
+    "prism": prism(sides=5, radius=0.8, height=1.1),
+    "superquadric": superquadric(size=(1.5, 1.2, 0.9), exponent=3.5),
+    **{f"{wall.name} wall": walled(wall) for wall in (gyroid, iwp, lidinoid, neovius, schwarz_d, schwarz_p)},
+    "mandelbox": mandelbox(iterations=5),
+    "mandelbox -1.5": mandelbox(scale=-1.5, iterations=7, julia=(1, 0.5, -0.3)),
+    "abox": abox(iterations=5, size=(1, 0.8, 1e6), angle=20),
+    "quaternion mandelbrot": quaternion_mandelbrot(iterations=7),
+    "bristorbrot": bristorbrot(iterations=6),
+    "bristorbrot julia": bristorbrot(iterations=6, julia=(-0.4, 0.3, 0.2)),
+    "burning ship": burning_ship(iterations=4),
     "union": union(sphere(radius=0.7), BAR, torus(radius=0.9, tube=0.1)),
     "smooth union": union(sphere(radius=0.7), BAR, smooth=0.2),
     "intersection": intersection(sphere(radius=0.7), BAR),

@@ -16,14 +16,20 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 
-MODULES = {"pillow": "PIL", "scikit-image": "skimage", "numba-cuda": "numba_cuda"}
+MODULES = {
+    "pillow": "PIL",
+    "scikit-image": "skimage",
+    "numba-cuda": "numba_cuda",
+    "imageio-ffmpeg": "imageio_ffmpeg",
+}
 """Of packages, where it has another name."""
 
 WITHIN = {"vtkmodules": "pyvista"}
 """Modules that come with a package, and no other way."""
 
 BLOCKED = (
-    "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx hypothesis shapely"
+    "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx "
+    "hypothesis shapely imageio_ffmpeg distributed dask fsspec"
 )
 
 
@@ -109,6 +115,11 @@ def test_the_main_job_needs_no_extra(ball_xml: Path) -> None:
     [
         ("pyvista", "mesh ball.xml -o b.stl --picture b.png", 'pictures of meshes need pyvista{} "pyvista"'),
         ("pyvista", "fly ball.xml", 'windows need pyvista{} "pyvista"'),
+        (
+            "distributed",
+            "slice ball.xml -o b.cli --cluster local",
+            'clusters need distributed{} "distributed"',
+        ),
         ("matplotlib", "bench", 'plots need matplotlib{} "matplotlib"'),
         (
             "numba_cuda",

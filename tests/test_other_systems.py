@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -45,6 +46,7 @@ def test_files_and_caches_without_posix(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     environment = {
         "PATH": "/usr/bin:/bin",
+        "PYTHONPATH": os.environ.get("PYTHONPATH", ""),
         "FRACSLICE_CACHE": f"{tmp_path}/cache",
         "XDG_CONFIG_HOME": f"{tmp_path}/config",
     }

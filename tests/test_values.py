@@ -15,14 +15,14 @@ import pytest
 from fracslice import MeshJob, Work
 from fracslice.bench.runs import Task
 from fracslice.errors import FracsliceError
-from fracslice.export.jobs import SliceRun
+from fracslice.export.resins import Resin
 from fracslice.formulas import Node, names, sphere
 from fracslice.formulas import get as formula
 from fracslice.formulas.parameters import AUTO, REQUIRED, Count, Number, Vector
 from fracslice.formulas.registry import Formula
 from fracslice.kernel.devices import chosen
 from fracslice.mesh.simplify import simplify
-from fracslice.printing.checks import Limits
+from fracslice.printing.limits import Limits
 from fracslice.rendering import Renderer
 from fracslice.scene import Print, parse_length, scene
 from fracslice.scene.view import PARTS, Camera, Film, View
@@ -72,7 +72,7 @@ NUMBERS: dict[str, Callable[[Any], Any]] = {
     "SliceJob.up": lambda v: SliceJob(20, up=(v, 0, v)),
     "SliceJob.up, all": lambda v: SliceJob(20, up=v),
     "Screen.gamma": lambda v: Screen(STACK, gamma=v),
-    "SliceRun.exposure": lambda v: SliceRun(STACK, Screen(STACK), exposure=(v, 30)),
+    "Resin.exposure": lambda v: Resin(v, 30),
     "adapted": lambda v: adapted(STACK, v),
     "Limits.speck": lambda v: Limits(speck=v),
     "Limits.cup": lambda v: Limits(cup=v),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from concurrent.futures import Future
 
 import pytest
 
@@ -63,6 +64,22 @@ def test_ordered_results_keep_to_the_number_of_threads(threads: int) -> None:
 
     assert list(Work(threads).ordered(task, range(50))) == list(range(50))
     assert most <= threads
+
+
+def test_ordered_results_are_complete_if_callbacks_are_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine a result can be read long before the callbacks of its future run."""
+    real = Future._invoke_callbacks  # type: ignore[attr-defined]
+
+    def late(future: Future[int]) -> None:
+        threading.Event().wait(0.02)
+        real(future)
+
+    def task(item: int) -> int:
+        threading.Event().wait(0.005)
+        return item
+
+    monkeypatch.setattr(Future, "_invoke_callbacks", late)
+    assert list(Work(2).ordered(task, range(20))) == list(range(20))
 
 
 def test_ordered_results_within_tasks_do_not_wait_for_each_other() -> None:

@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 import fracslice._native
+import fracslice._vdb
 
 with tempfile.TemporaryDirectory() as folder:
     program = [

@@ -6,25 +6,33 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 
-from fracslice.errors import ExportError
+import numpy as np
+from numpy.typing import NDArray
+
+from fracslice.errors import SliceError
+from fracslice.export.ranges import Recipe, begin, encoded_layers
+from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.files import put, replacing
-from fracslice.formulas.parameters import Vector, validate
 from fracslice.kernel.objects import toolchain
 from fracslice.keys import key, program
 from fracslice.mesh.model import Mesh
 from fracslice.slicing import Layer, Slicer, Stack
 from fracslice.slicing.raster import Screen
+from fracslice.slicing.sublayers import COUNTS, MeanSlicer
 from fracslice.work import Work
 
-EXPOSURE = Vector((8.0, 35.0), "seconds of each layer, and of the first", sizes=(2,), above=0)
+EPOCH = datetime(1980, 1, 1)
+"""Date of files by default, so that equal jobs give equal bytes."""
 
 
 @dataclass(frozen=True, eq=False)
 class SliceRun:
-    """A planned stack with the screen, exposure and metadata of its files.
+    """A planned stack with all that its files contain besides layers.
 
     Attributes
     ----------
@@ -34,33 +42,60 @@ class SliceRun:
         Conversion of layers to pictures.
     work : Work
         Threads, progress and cancellation.
-    exposure : (float, float)
-        Exposure of each layer and of the first, s.
+    resin : Resin, optional
+        Exposure and motion; print files need them.
     metadata : dict of str to str
         Names and values for the files, "scene_hash" among them.
     mesh : callable, optional
         Makes the mesh of the object for 3MF files, mm, standing on z = 0 and centred as the layers are.
+    picture : callable, optional
+        Renders the object for print files: from width and height in pixels, uint8 [height, width, 3], sRGB.
+    created : datetime
+        Date in print files, UTC.
+    sections : int
+        Sections per layer; the grey level of a pixel is the mean of their coverages.
+    recipe : Recipe, optional
+        Plans the same run in another process; a cluster needs it.
 
     Raises
     ------
-    ExportError
-        For an invalid exposure.
+    SliceError
+        For an invalid number of sections.
     """
 
     stack: Stack
     screen: Screen
     work: Work = field(default_factory=Work)
-    exposure: tuple[float, float] = (8.0, 35.0)
+    resin: Resin | None = None
     metadata: dict[str, str] = field(default_factory=dict)
     mesh: Callable[[], Mesh] | None = None
+    picture: Callable[[int, int], NDArray[np.uint8]] | None = None
+    created: datetime = EPOCH
+    sections: int = 1
+    recipe: Recipe | None = None
 
     def __post_init__(self) -> None:
-        validate(self, {"exposure": EXPOSURE}, ExportError)
+        if self.sections not in COUNTS:
+            raise SliceError(f"sections={self.sections}: expected one of {', '.join(map(str, COUNTS))}")
 
-    @property
+    @cached_property
     def slicer(self) -> Slicer:
         """Slicer of the stack."""
-        return Slicer(self.stack, self.work)
+        return self.slicer_with(self.work)
+
+    def slicer_with(self, work: Work) -> Slicer:
+        """Slicer of the stack with other threads.
+
+        Parameters
+        ----------
+        work : Work
+            Threads, progress and cancellation.
+
+        Returns
+        -------
+        Slicer
+        """
+        return Slicer(self.stack, work) if self.sections == 1 else MeanSlicer(self.stack, work, self.sections)
 
     @property
     def layers(self) -> int:
@@ -68,7 +103,7 @@ class SliceRun:
         return len(self.stack.z)
 
     def key(self, form: str | bytes) -> str:
-        """Key of everything that determines the bytes of the layers.
+        """Key of everything that determines the bytes of encoded layers.
 
         Parameters
         ----------
@@ -83,7 +118,8 @@ class SliceRun:
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
         field = self.stack.root.key
         return key(
-            program(), toolchain(), form, field, *stack, *screen, self.exposure, sorted(self.metadata.items())
+            *(program(), toolchain(), form, field, *stack, *screen),
+            *(self.resin, self.sections, sorted(self.metadata.items())),
         )
 
     def describe(self) -> bytes:
@@ -130,8 +166,9 @@ class SliceRun:
         ExportError
             For an error of the file system.
         """
+        begin(self, form, encode)
         with journal(path, self.key(form)) as layers:
-            for data in self.slicer.map(encode, range(layers.count, self.layers)):
+            for data in encoded_layers(self, form, encode, layers.count):
                 layers.append(data)
             yield layers
 
@@ -196,11 +233,11 @@ class SliceRun:
         ExportError
             For a folder with other files, or an error of the file system.
         """
+        begin(self, ending, encode)
         folder, name = Path(path), f"{{:05d}}.{ending}".format
         with resumable_folder(folder, self.key(ending), name, is_whole) as start:
-            layers = range(start, self.layers)
-            for _ in self.slicer.map(lambda k: put(f"{folder}/{name(k.index)}", encode(k)), layers):
-                pass
+            for index, data in enumerate(encoded_layers(self, ending, encode, start), start):
+                put(f"{folder}/{name(index)}", data)
             for other, data in also.items():
                 with replacing(folder / other) as file:
                     file.write(data)

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 from isal.isal_zlib import crc32
 
-from fracslice._slices import deflated
+from fracslice._slices import Encoding, encoded
 from fracslice.slicing import Layer
 from fracslice.slicing.raster import Screen
 
@@ -26,7 +26,7 @@ def encode(image: np.ndarray) -> bytes:
     -------
     bytes
     """
-    return _file((image.shape[0], image.shape[1]), deflated(image))
+    return _file((image.shape[0], image.shape[1]), encoded(image, Encoding.PNG))
 
 
 def encode_layer(screen: Screen, layer: Layer) -> bytes:
@@ -43,7 +43,7 @@ def encode_layer(screen: Screen, layer: Layer) -> bytes:
     -------
     bytes
     """
-    return _file(screen.shape, screen.deflated(layer))
+    return _file(screen.shape, screen.encoded(layer, Encoding.PNG))
 
 
 def _file(shape: tuple[int, int], rows: bytes) -> bytes:

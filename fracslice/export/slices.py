@@ -6,26 +6,52 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fracslice.errors import ExportError
-from fracslice.export import outlines, pictures, slices3mf
+from fracslice.export import anycubic, archives, chitu, goo, outlines, pictures, slices3mf
 from fracslice.export.jobs import SliceRun
 from fracslice.files import check_target
+from fracslice.slicing.printers import Printer
+
+PRINTS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
+    "sl1": archives.write_sl1,
+    "goo": goo.write_goo,
+    "ctb": chitu.write_ctb,
+    "cbddlp": chitu.write_cbddlp,
+    "pwmx": anycubic.write_photon,
+    "nanodlp": archives.write_nanodlp,
+}
+"""Formats of printers; they need a printer and a resin."""
 
 FORMATS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
     "png": pictures.write_folder,
-    "sl1": pictures.write_sl1,
+    **PRINTS,
     "3mf": slices3mf.write_3mf,
     **outlines.WRITERS,
 }
+PICTURES = {"png", *PRINTS}
 FOLDERS = {"png", "svg"}
+PHOTON = "pwmx pwmo pwms pmsq pwma pwmb pmx2 pm3 pm3m pm3r dlp dl2p pw0 pwx"
+"""Extensions of one format, one for each model."""
+
 ENDINGS = {
     ".sl1": "sl1",
     ".sl1s": "sl1",
+    ".goo": "goo",
+    ".prz": "goo",
+    ".ctb": "ctb",
+    ".cbddlp": "cbddlp",
+    ".photon": "cbddlp",
+    **{f".{ending}": "pwmx" for ending in PHOTON.split()},
+    ".nanodlp": "nanodlp",
     ".3mf": "3mf",
     ".svg": "slic3r",
     ".cli": "cli",
     ".json": "json",
     "": "png",
 }
+
+
+ALIASES = {".sl1": (".sl1s",), ".prz": (".goo",)}
+"""Extensions of the same format that the same printers read."""
 
 
 def slice_format(path: str | Path, name: str | None = None) -> str:
@@ -61,6 +87,32 @@ def slice_format(path: str | Path, name: str | None = None) -> str:
     return name
 
 
+def printers_file(printer: Printer, output: str | Path) -> str:
+    """Compare the file to write with the one that a printer reads.
+
+    Parameters
+    ----------
+    printer : Printer
+        The printer.
+    output : str or path
+        The file to write.
+
+    Returns
+    -------
+    str
+        Which file to make instead, in one line; empty if the printer reads this one.
+    """
+    path, ending = Path(output), f".{printer.file}"
+    own = {ending, *ALIASES.get(ending, ())}
+    if not printer.file or path.suffix.lower() in own:
+        return ""
+    if ending in ENDINGS:
+        return f"{printer.title} reads {ending} files: make {path.with_suffix(ending).name}"
+    kind, name = ending.replace(".encrypted", "encrypted "), path.with_suffix(".goo").name
+    make = f"make {name} and convert it with UVtools"
+    return f"{printer.title} reads {kind} files, which are not written: {make}"
+
+
 def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Path:
     """Slice a planned stack and write the layers to a file or folder.
 
@@ -86,4 +138,7 @@ def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Pa
     Cancelled
         When the work is cancelled.
     """
-    return FORMATS[slice_format(path, name)](run, path)
+    form = slice_format(path, name)
+    if run.sections > 1 and form not in PICTURES:
+        raise ExportError(f"{path}: contours are of one section per layer")
+    return FORMATS[form](run, path)

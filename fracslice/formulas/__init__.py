@@ -5,6 +5,7 @@ from pathlib import Path
 from pkgutil import iter_modules
 
 from .box import Box as Box
+from .orbits import orbit as orbit
 from .parameters import Axis as Axis
 from .parameters import Choice as Choice
 from .parameters import Count as Count

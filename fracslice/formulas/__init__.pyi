@@ -3,6 +3,7 @@ from collections.abc import Sequence
 from typing import Literal, Union
 
 from .box import Box as Box
+from .orbits import orbit as orbit
 from .parameters import Axis as Axis
 from .parameters import Choice as Choice
 from .parameters import Count as Count
@@ -30,6 +31,31 @@ from .vocabulary import rsqrt as rsqrt
 from .vocabulary import sin as sin
 from .vocabulary import sqrt as sqrt
 from .vocabulary import where as where
+
+def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1.0, 0.7), angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The asymmetric Mandelbox, turned in each step (Rrrola and Knighty 2010, fractalforums.com).
+
+    With a third size of 1e6, z is never folded: the Amazing Surf (Kali 2011).
+
+    Parameters
+    ----------
+    scale : a number >= -10 and <= 10, default 2.0
+        how much each step enlarges; less than -1 or more than 1
+    inner : a number > 0 and <= 1, default 0.5
+        radius within which the ball's fold only scales
+    size : 3 numbers > 0 and <= 1e+06, default (1.0, 1.0, 0.7)
+        half sizes of the box that is folded into
+    angle : a number, default 0.0
+        rotation about the z axis in each step, degrees
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
 
 def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
     """The element bent: a straight axis becomes an arc (Barr 1984, "Global and Local Deformations of Solid
@@ -89,6 +115,38 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> Node:
     Node
     """
 
+def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Bristorbrot (Bristor 2009, fractalforums.com).
+
+    Parameters
+    ----------
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
+def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Mandelbulb of absolute coordinates, after Michelitsch and Roessler 1992, "The burning ship".
+
+    Parameters
+    ----------
+    power : a number >= 2 and <= 16, default 8.0
+        the exponent
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
 def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.0, 0.0, 0.5), radius: float = 0.25) -> Node:
     """A capsule: all points within the radius of a segment. L = 1: an exact distance.
 
@@ -100,6 +158,26 @@ def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.
         centre of the other end
     radius : a number > 0, default 0.25
         the radius
+
+    Returns
+    -------
+    Node
+    """
+
+def cells(keep: float | Sequence[int] = (1, 2, 3), level: int = 3) -> Node:
+    """Fractals of kept cells in the cube [-1, 1]^3.
+
+    Kept 0 is Cantor dust (Cantor 1883), 0 and 1 the Menger sponge (Menger 1926), 2 and 3 the Vicsek fractal
+    (Vicsek 1983, "Fractal models for diffusion controlled aggregation"), 1 and 2, or 1 to 3, Mosely's
+    snowflake (Mosely 2006). Each level is a lattice of kept cells; the fields of all are joined by their
+    maximum. They are built from minima and maxima of coordinates, so L = 1.
+
+    Parameters
+    ----------
+    keep : 1 or 2 or 3 whole numbers >= 0 and <= 3, default (1, 2, 3)
+        cells kept, by how many of their coordinates are in the middle third: 0 at a corner, 1 at an edge, 2 at a face, 3 at the centre
+    level : a whole number from 0 to 20, default 3
+        how often every cell is cut into 27
 
     Returns
     -------
@@ -151,6 +229,40 @@ def difference(*elements: Node, smooth: float = 0.0) -> Node:
     Node
     """
 
+def flake(solid: Literal['tetrahedron', 'octahedron', 'dodecahedron', 'icosahedron'] = 'icosahedron', level: int = 3) -> Node:
+    """The flake of a Platonic solid with corners on the unit sphere.
+
+    Sierpinski 1915 has the flat one; folds: Knighty 2010, "Kaleidoscopic (escape time) IFS". Reflections move
+    no two points apart, and scaling is undone at the end, so L = 1. Copies touch in points and edges.
+
+    Parameters
+    ----------
+    solid : tetrahedron, octahedron, dodecahedron or icosahedron, default 'icosahedron'
+        the Platonic solid
+    level : a whole number from 0 to 20, default 3
+        how often each solid is replaced by copies at its corners
+
+    Returns
+    -------
+    Node
+    """
+
+def gyroid(period: float = 1.0, thickness: float = 0.1) -> Node:
+    """A wall along the gyroid (Schoen 1970, "Infinite periodic minimal surfaces without
+    self-intersections"). The gradient of its level function is at most sqrt(3).
+
+    Parameters
+    ----------
+    period : a number > 0, default 1.0
+        length after which the surface repeats
+    thickness : a number > 0, default 0.1
+        of the wall, at its thinnest
+
+    Returns
+    -------
+    Node
+    """
+
 def intersection(*elements: Node, smooth: float = 0.0) -> Node:
     """The intersection of the elements. L = maximum of the elements', as for a union.
 
@@ -160,6 +272,22 @@ def intersection(*elements: Node, smooth: float = 0.0) -> Node:
         What it is made of.
     smooth : a number >= 0, default 0.0
         width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)
+
+    Returns
+    -------
+    Node
+    """
+
+def iwp(period: float = 1.0, thickness: float = 0.1) -> Node:
+    """A wall along the surface I-WP of Schoen 1970. The gradient of its level function is at most
+    3 sqrt(3).
+
+    Parameters
+    ----------
+    period : a number > 0, default 1.0
+        length after which the surface repeats
+    thickness : a number > 0, default 0.1
+        of the wall, at its thinnest
 
     Returns
     -------
@@ -183,6 +311,41 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     bailout : a number > 1 and <= 1e+06, default 2.0
         the solid is where the last step is not larger than this
+
+    Returns
+    -------
+    Node
+    """
+
+def lidinoid(period: float = 1.0, thickness: float = 0.1) -> Node:
+    """A wall along the lidinoid (Lidin and Larsson 1990). The gradient of its level function is at most
+    1.5 sqrt(3).
+
+    Parameters
+    ----------
+    period : a number > 0, default 1.0
+        length after which the surface repeats
+    thickness : a number > 0, default 0.1
+        of the wall, at its thinnest
+
+    Returns
+    -------
+    Node
+    """
+
+def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Mandelbox (Lowe 2010, "What is a Mandelbox?").
+
+    Parameters
+    ----------
+    scale : a number >= -10 and <= 10, default 2.0
+        how much each step enlarges; less than -1 or more than 1
+    inner : a number > 0 and <= 1, default 0.5
+        radius within which the ball's fold only scales
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
 
     Returns
     -------
@@ -297,6 +460,21 @@ def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
     Node
     """
 
+def neovius(period: float = 1.0, thickness: float = 0.1) -> Node:
+    """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7.
+
+    Parameters
+    ----------
+    period : a number > 0, default 1.0
+        length after which the surface repeats
+    thickness : a number > 0, default 0.1
+        of the wall, at its thinnest
+
+    Returns
+    -------
+    Node
+    """
+
 def octahedron(radius: float = 1.0) -> Node:
     """A regular octahedron centred at the origin. L = 1: an exact distance.
 
@@ -346,6 +524,42 @@ def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> Nod
     Node
     """
 
+def prism(sides: int = 6, radius: float = 0.5, height: float = 1.0) -> Node:
+    """A regular prism along the z axis, with a corner on the x axis (Quilez 2020, "Distance functions").
+
+    L = 1: an exact distance.
+
+    Parameters
+    ----------
+    sides : a whole number from 3 to 1000, default 6
+        number of sides
+    radius : a number > 0, default 0.5
+        from the axis to the corners
+    height : a number > 0, default 1.0
+        the height along z, centred at the origin
+
+    Returns
+    -------
+    Node
+    """
+
+def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Mandelbrot set of q^2 + c in the quaternions, cut at k = 0 (Norton 1982).
+
+    It is the complex Mandelbrot set turned about the real axis.
+
+    Parameters
+    ----------
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
 def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 0, 0)) -> Node:
     """Copies on a lattice. Every copy that can be the nearest is evaluated, so cell borders are right.
 
@@ -361,6 +575,36 @@ def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 
         distance between copies along x, y and z
     count : 3 whole numbers >= 0 and <= 1e+06, default (0, 0, 0)
         copies along x, y and z, centred at the origin; 0: without end
+
+    Returns
+    -------
+    Node
+    """
+
+def schwarz_d(period: float = 1.0, thickness: float = 0.1) -> Node:
+    """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most sqrt(3).
+
+    Parameters
+    ----------
+    period : a number > 0, default 1.0
+        length after which the surface repeats
+    thickness : a number > 0, default 0.1
+        of the wall, at its thinnest
+
+    Returns
+    -------
+    Node
+    """
+
+def schwarz_p(period: float = 1.0, thickness: float = 0.1) -> Node:
+    """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most sqrt(3).
+
+    Parameters
+    ----------
+    period : a number > 0, default 1.0
+        length after which the surface repeats
+    thickness : a number > 0, default 0.1
+        of the wall, at its thinnest
 
     Returns
     -------
@@ -389,6 +633,24 @@ def sphere(radius: float = 1.0) -> Node:
     ----------
     radius : a number > 0, default 1.0
         the radius
+
+    Returns
+    -------
+    Node
+    """
+
+def superquadric(size: Sequence[float] = (1.0, 1.0, 1.0), exponent: float = 4.0) -> Node:
+    """A superellipsoid (Barr 1981, "Superquadrics and angle-preserving transformations").
+
+    The p-norm of the coordinates in half diameters, minus 1, times the smallest one. For p >= 2 the gradient
+    of the p-norm is at most 1, so L = 1.
+
+    Parameters
+    ----------
+    size : 3 numbers > 0, default (1.0, 1.0, 1.0)
+        the three diameters
+    exponent : a number >= 2 and <= 100, default 4.0
+        2 is an ellipsoid; larger numbers come near to a box
 
     Returns
     -------

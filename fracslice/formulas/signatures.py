@@ -123,18 +123,24 @@ _ELEMENTS = {True: "What it is applied to; several are a union.", False: "What i
 
 def stub() -> str:
     """Text of the stub file of `fracslice.formulas`: formulas as functions, all other names re-exported."""
-    from .registry import get, names
+    from .registry import get
 
     package = Path(__file__).with_name("__init__.py")
     imports = [
         n for n in ast.parse(package.read_text(encoding="utf-8")).body if isinstance(n, ast.ImportFrom)
     ]
-    formulas = [name for name in names() if get(name).function.__module__.startswith(__package__)]
     lines = [_HEAD]
     for node in imports:
         exported = sorted(vocabulary.NAMES) if node.module == "vocabulary" else [a.name for a in node.names]
         lines += [f"from .{node.module} import {name} as {name}" for name in exported if node.level]
-    return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in formulas)]) + "\n"
+    return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in _shipped())]) + "\n"
+
+
+def _shipped() -> list[str]:
+    """Names of the formulas of this package."""
+    from .registry import get, names
+
+    return [name for name in names() if get(name).function.__module__.startswith(__package__)]
 
 
 def package_stub(modules: Mapping[str, str]) -> str:
@@ -149,11 +155,9 @@ def package_stub(modules: Mapping[str, str]) -> str:
     -------
     str
     """
-    from .registry import names
-
-    exported = {**modules, **dict.fromkeys(names(), "formulas")}
+    exported = {**modules, **dict.fromkeys(_shipped(), "formulas")}
     lines = sorted(f"from .{module} import {name} as {name}" for name, module in exported.items())
-    return "\n".join([_MADE, *lines, "", "__version__: str", ""])
+    return "\n".join([_MADE, *lines, ""])
 
 
 _MADE = "# Made from the registry of formulas by `python docs/generate.py`; do not edit."

@@ -36,7 +36,7 @@ def rsqrt(a: np.ndarray) -> np.ndarray:
     return found
 
 
-def ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def ratio(a: np.ndarray | float, b: np.ndarray) -> np.ndarray:
     """a/b for a normal, finite b whose inverse is normal, too; GPUs have an instruction for the inverse."""
     found: np.ndarray = a / b
     return found

@@ -123,7 +123,13 @@ class _Typed(ast.NodeTransformer):
         return _call("real", node) if isinstance(node.value, float) else node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        if isinstance(node.value, ast.Tuple):
+            node.value = self.given(node.value)
         return node
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        op = ast.Not() if isinstance(node.op, ast.Invert) else node.op
+        return ast.UnaryOp(op, self.visit(node.operand))
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         if self.whole(node):

@@ -137,15 +137,20 @@ def _within(node: Node, voxel: float) -> float:
 
 
 def _depth(node: Node, detail: float) -> int:
-    """Smallest sufficient depth; the deepest non-empty one if none is sufficient."""
+    """Smallest sufficient depth; the deepest non-empty one if none is sufficient.
+
+    Solids of successive depths need not be nested: steps of a Mandelbox add and take away in turns, and every
+    other step is small. So two successive steps have to be.
+    """
     steps = _steps(Known(node.changed(iterations=1)))
     for depth in range(1, DEEPEST):
-        if depth not in steps:
-            steps[depth] = _step(*(Known(node.changed(iterations=d)) for d in (depth, depth + 1)))
-        step = steps[depth]
+        for k in (depth, depth + 1):
+            if k not in steps:
+                steps[k] = _step(*(Known(node.changed(iterations=d)) for d in (k, k + 1)))
+        step, following = steps[depth], steps[depth + 1]
         if step is None:
             return max(depth - 1, 1)
-        if step < detail / 2:
+        if max(step, following or 0.0) < detail / 2:
             return depth
     return DEEPEST
 

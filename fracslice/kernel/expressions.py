@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 _ON_LANES: dict[type, Callable[[Vec, Vec], Vec]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
 }  # fmt: skip
 _INTRINSICS = {
     name: (getattr(lanes_math, name), count)
@@ -122,6 +123,10 @@ class Expressions:
     def unary(self, op: ast.unaryop, value: Value) -> Value:
         """Emit a unary operator."""
         if isinstance(op, ast.Not):
+            return self.builder.not_(truth(self.builder, value))
+        if isinstance(op, ast.Invert):
+            if is_mask(value):
+                return value.each(self.builder.not_)
             return self.builder.not_(truth(self.builder, value))
         if isinstance(value, Vec):
             return -self.lanes.vec(self.builder, value)

@@ -1,9 +1,9 @@
 """Language of formulas: a subset of Python, and the text of a function in that subset.
 
 A formula is plain Python over points: arithmetic, comparisons, the intrinsics of `formulas.vocabulary`,
-``for`` over a range and ``if not any_of(...): break``. Functions of Python and NumPy with the same meaning
-(abs, min, max, pow, ``math.sqrt``, ``np.sqrt``) are rewritten as intrinsics. Everything else is rejected
-here, by file and line, before anything is compiled.
+``for`` over a range or a tuple of numbers, and ``if not any_of(...): break``. Functions of Python and NumPy
+with the same meaning (abs, min, max, pow, ``math.sqrt``, ``np.sqrt``) are rewritten as intrinsics. Everything
+else is rejected here, by file and line, before anything is compiled.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import inspect
 import math
 import re
 import textwrap
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache, reduce
 from types import FunctionType, ModuleType
 from typing import Any, NoReturn
 
@@ -45,14 +45,9 @@ _EXPRESSIONS = (
     ast.Subscript,
     ast.IfExp,
 )
-_ON_NUMBERS_ALONE = {
-    ast.Mod: "a - b * floor(a / b)",
-    ast.FloorDiv: "floor(a / b)",
-    ast.NotEq: "(a < b) | (a > b)",
-    ast.And: "&",
-    ast.Or: "|",
-    ast.Not: "the opposite comparison",
-}
+_ON_NUMBERS_ALONE = {ast.And: "&", ast.Or: "|", ast.Not: "~"}
+_FLOORED = {ast.Mod: "a - b * floor(a / b)", ast.FloorDiv: "floor(a / b)"}
+"""Operators of Python on points, in the vocabulary."""
 
 
 def parameters(function: Callable[..., Any]) -> list[str]:
@@ -138,8 +133,10 @@ class _Language(ast.NodeTransformer):
     def __init__(self, function: Callable[..., Any], tree: ast.FunctionDef, place: str, first: int) -> None:
         self.scope, self.place, self.first = scope(function), place, first
         arguments = parameters(function)
+        self.arguments = set(arguments)
         self.local = {*arguments, *stored_names(tree)}
-        self.points = point_names(tree, {a for a in arguments if a in ("x", "y", "z", "a", "b")})
+        points = {"w", "c"} if arguments[:2] == ["w", "c"] else {"x", "y", "z", "a", "b"}
+        self.points = point_names(tree, points & {*arguments})
 
     def fail(self, node: ast.AST, message: str) -> NoReturn:
         line = self.first + getattr(node, "lineno", 1) - 1
@@ -204,14 +201,38 @@ class _Language(ast.NodeTransformer):
         return self.of_numbers(node, node.op)
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
-        if len(node.ops) > 1 and self.on_points(node):
-            self.refuse(node, "one comparison at a time, joined by &")
-        return self.of_numbers(node, node.ops[0])
+        if len(node.ops) == 1:
+            return self.generic_visit(node)
+        terms = [node.left, *node.comparators]
+        pairs = [ast.Compare(a, [op], [b]) for a, op, b in zip(terms, node.ops, terms[1:], strict=False)]
+        visited: list[Any] = [self.generic_visit(pair) for pair in pairs]
+        joined: ast.expr = reduce(lambda a, b: ast.BinOp(a, ast.BitAnd(), b), visited)
+        return ast.copy_location(joined, node)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        on_points = self.on_points(node)
+        node.left, node.right = self.visit(node.left), self.visit(node.right)
         if isinstance(node.op, ast.Pow):
-            return self.power(node, self.visit(node.left), self.visit(node.right))
-        return self.of_numbers(node, node.op)
+            return self.power(node, node.left, node.right)
+        if on_points and type(node.op) in _FLOORED:
+            names = {"a": node.left, "b": node.right}
+            floored: ast.expr = _Named(names).visit(ast.parse(_FLOORED[type(node.op)], mode="eval").body)
+            return floored
+        return node
+
+    def visit_For(self, node: ast.For) -> ast.AST:
+        match node.iter:
+            case ast.Call(ast.Name("range")):
+                return self.generic_visit(node)
+            case ast.Name(name) if name in self.arguments - self.points or is_number(self.scope.get(name)):
+                pass
+            case ast.Tuple():
+                pass
+            case _:
+                self.refuse(node, "for over a range or a tuple of numbers")
+        for found in _breaks(node.body):
+            self.refuse(found, "a loop over a range to leave")
+        return self.generic_visit(node)
 
     def of_numbers(self, node: ast.expr, op: ast.AST) -> ast.AST:
         """Reject operators that require scalars if their operands are points."""
@@ -221,11 +242,13 @@ class _Language(ast.NodeTransformer):
 
     def power(self, node: ast.expr, base: ast.expr, exponent: ast.expr) -> ast.AST:
         match exponent:
+            case ast.Name(name) if name not in self.local and is_number(self.scope.get(name)):
+                return self.power(node, base, ast.Constant(self.scope[name]))
             case ast.Constant(0.5):
                 return _call("sqrt", base)
-            case ast.Constant(int(n)) if 1 <= n <= _HIGHEST:
+            case ast.Constant(int(n) | float(n)) if n in range(1, _HIGHEST + 1):
                 product = base
-                for _ in range(n - 1):
+                for _ in range(int(n) - 1):
                     product = ast.BinOp(product, ast.Mult(), base)
                 return product
         self.refuse(
@@ -276,6 +299,25 @@ class _Language(ast.NodeTransformer):
             return node
         near = hint(name, {*vocabulary.NAMES, *self.local, *_PYTHON}, "{}")
         self.fail(node, f"{_short(node)} is not a word of the language of formulas; {near}")
+
+
+class _Named(ast.NodeTransformer):
+    """Puts expressions in the place of names."""
+
+    def __init__(self, values: dict[str, ast.expr]) -> None:
+        self.values = values
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        return self.values.get(node.id, node)
+
+
+def _breaks(body: Sequence[ast.stmt]) -> Iterator[ast.Break]:
+    """Statements that leave the loop with this body."""
+    for statement in body:
+        if isinstance(statement, ast.Break):
+            yield statement
+        elif isinstance(statement, ast.If):
+            yield from _breaks([*statement.body, *statement.orelse])
 
 
 def is_number(value: Any) -> bool:

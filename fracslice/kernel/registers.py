@@ -128,6 +128,9 @@ class Vec:
     def __eq__(self, other: object) -> Vec:  # type: ignore[override]
         return self._compare("==", other)  # type: ignore[arg-type]
 
+    def __ne__(self, other: object) -> Vec:  # type: ignore[override]
+        return self.each(partial(self.builder.fcmp_unordered, "!="), other)  # type: ignore[arg-type]
+
     def choose(self, yes: Vec | float, no: Vec | float) -> Vec:
         """Select `yes` where the mask self is set, else `no`; at least one of them is a vector."""
         like = yes if isinstance(yes, Vec) else no

@@ -150,20 +150,38 @@ class _Substitute(Folding):
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         if isinstance(node.ctx, ast.Load) and node.id in self.values:
-            return ast.Constant(self.values[node.id])
+            return _literal(self.values[node.id])
         return node
 
     def visit_For(self, node: ast.For) -> Any:
-        name = node.iter.id if isinstance(node.iter, ast.Name) else None
-        values = self.values.get(name) if name else None
-        if not isinstance(values, tuple):
-            return self.generic_visit(node)
-        assert isinstance(node.target, ast.Name)
+        node.iter = self.visit(node.iter)
+        if not (isinstance(node.iter, ast.Tuple) and is_literal(node.iter)):
+            node.body = self.statements(node.body)
+            return node
+        names = node.target.elts if isinstance(node.target, ast.Tuple) else [node.target]
         unrolled: list[ast.stmt] = []
-        for value in values:
-            inner = _Substitute({**self.values, node.target.id: value})
-            unrolled += inner.statements(ast.parse(ast.unparse(ast.Module(node.body, []))).body)
+        for value in ast.literal_eval(node.iter):
+            values = value if isinstance(node.target, ast.Tuple) else [value]
+            inner = dict(zip(map(ast.unparse, names), values, strict=True))
+            body = ast.parse(ast.unparse(ast.Module(node.body, []))).body
+            unrolled += _Substitute({**self.values, **inner}).statements(body)
         return unrolled
+
+
+def is_literal(node: ast.expr) -> bool:
+    """Return True for a number, or a tuple of literals."""
+    if isinstance(node, ast.Tuple):
+        return all(map(is_literal, node.elts))
+    if isinstance(node, ast.UnaryOp):
+        node = node.operand
+    return isinstance(node, ast.Constant)
+
+
+def _literal(value: Any) -> ast.expr:
+    """Syntax of a number or of a tuple."""
+    if isinstance(value, tuple):
+        return ast.Tuple([_literal(v) for v in value], ast.Load())
+    return ast.Constant(value)
 
 
 class _Forget(ast.NodeTransformer):

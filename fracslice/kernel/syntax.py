@@ -20,16 +20,22 @@ class Folding(ast.NodeTransformer):
 
     def visit_If(self, node: ast.If) -> Any:
         node.test = self.visit(node.test)
-        if isinstance(node.test, ast.Constant):
-            return self.statements(node.body if node.test.value else node.orelse)
+        if isinstance(node.test, (ast.Constant, ast.Tuple)):
+            return self.statements(node.body if _is_true(node.test) else node.orelse)
         node.body, node.orelse = self.statements(node.body), self.statements(node.orelse)
         return node
 
     def visit_IfExp(self, node: ast.IfExp) -> Any:
         node.test = self.visit(node.test)
-        if isinstance(node.test, ast.Constant):
-            return self.visit(node.body if node.test.value else node.orelse)
+        if isinstance(node.test, (ast.Constant, ast.Tuple)):
+            return self.visit(node.body if _is_true(node.test) else node.orelse)
         return self.generic_visit(node)
+
+    def visit_Subscript(self, node: ast.Subscript) -> Any:
+        match self.generic_visit(node):
+            case ast.Subscript(ast.Tuple(elements), ast.Constant(int(index))) if index < len(elements):
+                return elements[index]
+        return node
 
     def folded(self, node: Any) -> Any:
         """Visit an operator, and evaluate it if its operands are known."""
@@ -40,6 +46,10 @@ class Folding(ast.NodeTransformer):
         return ast.copy_location(ast.Constant(eval(ast.unparse(node), {})), node)
 
     visit_UnaryOp = visit_BinOp = visit_Compare = folded  # noqa: N815
+
+
+def _is_true(node: ast.Constant | ast.Tuple) -> bool:
+    return bool(node.value if isinstance(node, ast.Constant) else node.elts)
 
 
 def stored_names(*trees: ast.AST) -> set[str]:

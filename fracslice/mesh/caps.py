@@ -297,4 +297,4 @@ def capped(mesh: Mesh, caps: list[Cap]) -> Mesh:
     fans = number[first[which[len(known) :]]].reshape(-1, 3)
     vertices = np.concatenate([mesh.vertices, corners[tips]])
     triangles = np.concatenate([mesh.triangles[keep], fans])
-    return Mesh(vertices, triangles).selected(np.ones(len(triangles), bool))
+    return Mesh(vertices, triangles).compact()

@@ -132,53 +132,28 @@ def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
     Raises
     ------
     MeshError
-        For a mesh without triangles, an index out of range or a coordinate that is not finite.
-    """
-    if not len(mesh.triangles):
-        raise MeshError("the mesh has no triangles")
-    return check_quantised(quantised(mesh, threads or 0), None, threads or 0)
-
-
-def check_quantised(mesh: Mesh, proved: NDArray[np.bool_] | None = None, threads: int = 0) -> MeshReport:
-    """Check a quantised, welded mesh, as `clean` returns it.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh, mm.
-    proved : ndarray of bool, shape (m,), optional
-        Triangles of which no two intersect. Only the others are searched for self-intersections.
-    threads : int, optional
-        Threads; 0 for all cores.
-
-    Returns
-    -------
-    MeshReport
-        Counts of defects, and measures.
-
-    Raises
-    ------
-    MeshError
-        If no triangle has an area.
+        For a mesh without triangles of an area, an index out of range or a coordinate that is not finite.
     """
     from fracslice.mesh.self_intersections import self_intersecting_triangles
     from fracslice.mesh.topology import component_sizes, connected_components, edge_topology
 
+    if not len(mesh.triangles):
+        raise MeshError("the mesh has no triangles")
+    threads = threads or 0
+    mesh = quantised(mesh, threads)
     area, _, flat = mesh.measured(threads)
-    whole, searched = mesh, None if proved is None else ~proved
+    whole = mesh
     if flat:
         a, b, c = mesh.triangles.T
-        distinct = (a != b) & (b != c) & (c != a)
-        whole = mesh.selected(distinct, threads)
-        searched = None if searched is None else searched[distinct]
+        whole = mesh.selected((a != b) & (b != c) & (c != a), threads)
     if not len(whole.triangles):
         raise MeshError("the mesh has only triangles without area")
     link = edge_topology(whole.triangles, len(whole.vertices), threads)
     labels, shells = connected_components(whole.triangles, len(whole.vertices), threads)
-    volumes, _ = component_sizes(whole.vertices, whole.triangles, labels, shells, threads)
+    volumes = component_sizes(whole.vertices, whole.triangles, labels, shells, threads).volumes
     closed = not (link.open_edges or link.misoriented_edges)
     misplaced = _misplaced(whole, labels, volumes, threads) if closed else 0
-    crossing = self_intersecting_triangles(whole, threads=threads, among=searched)
+    crossing = self_intersecting_triangles(whole, threads=threads)
     cavities = int((volumes < 0).sum()) if closed else 0
     return MeshReport(
         triangles=len(mesh.triangles),
@@ -187,7 +162,7 @@ def check_quantised(mesh: Mesh, proved: NDArray[np.bool_] | None = None, threads
         manifold=not (link.open_edges or link.non_manifold_edges or link.non_manifold_vertices),
         oriented=not (link.misoriented_edges or misplaced),
         self_intersections=int(crossing.sum()),
-        searched_triangles=len(whole.triangles) if searched is None else int(searched.sum()),
+        searched_triangles=len(whole.triangles),
         degenerate_triangles=flat,
         duplicate_triangles=duplicates(whole.triangles[crossing]),
         open_edges=link.open_edges,

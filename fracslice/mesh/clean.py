@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +9,18 @@ from numpy.typing import NDArray
 
 from fracslice._native import touching, turned
 from fracslice.formulas.algebra import dot, length
-from fracslice.mesh.certificate import Certificate
 from fracslice.mesh.model import Mesh
-from fracslice.mesh.quantisation import quantise, welded
+from fracslice.mesh.quantisation import (
+    NO_EDITS,
+    NO_PLANES,
+    UNMOVED,
+    Edits,
+    Frame,
+    placed,
+    quantise,
+    used,
+    welded,
+)
 
 PASSES = 8
 
@@ -42,7 +50,7 @@ def clean(mesh: Mesh) -> Mesh:
     MeshError
         If a coordinate is not finite or an index is out of range.
     """
-    return cleaned(mesh, Certificate.none(len(mesh.triangles))).mesh
+    return cleaned(mesh, used(mesh)).mesh
 
 
 class Cleaned(NamedTuple):
@@ -52,103 +60,122 @@ class Cleaned(NamedTuple):
     ----------
     mesh : Mesh
         Quantised and welded.
-    proved : ndarray of bool, shape (m,)
-        Triangles of which no two intersect.
-    exact : Mesh
-        The same triangles before quantisation.
-    certificate : Certificate
-        Certificate of `exact`.
+    suspects : ndarray of int64, shape (k,)
+        Triangles that may intersect others, ascending: those that are not as they were contoured.
+    edits : Edits
+        Triangles of the original mesh that were edited or removed.
     """
 
     mesh: Mesh
-    proved: NDArray[np.bool_]
-    exact: Mesh
-    certificate: Certificate
+    suspects: NDArray[np.int64]
+    edits: Edits
 
 
 def cleaned(
-    mesh: Mesh, certificate: Certificate, low: float = -np.inf, high: float = np.inf, threads: int = 0
+    mesh: Mesh,
+    keep: NDArray[np.bool_],
+    fresh: NDArray[np.int64] = NO_EDITS[0],
+    edited: NDArray[np.int64] = NO_EDITS[0],
+    planes: NDArray[np.float64] = NO_PLANES,
+    frame: Frame = UNMOVED,
+    between: tuple[float, float] = (-np.inf, np.inf),
+    threads: int = 0,
 ) -> Cleaned:
-    """Clean a mesh, or a piece of one, and update its certificate.
+    """Place, clean and quantise a mesh, or a piece of one.
 
     Parameters
     ----------
     mesh : Mesh
-        The mesh, mm.
-    certificate : Certificate
-        Certificate of its triangles.
-    low, high : float, optional
-        Only triangles whose largest x is in [low, high) are removed: elsewhere the surface may be cut open.
+        The mesh.
+    keep : ndarray of bool, shape (n,)
+        Vertices of the connected components that stay.
+    fresh : ndarray of int64, shape (k,), optional
+        Triangles that were not made by contouring, ascending.
+    edited : ndarray of int64, shape (k,), optional
+        Triangles that were edited before, ascending.
+    planes : ndarray of float64, shape (k, 3), optional
+        Placed planes of the grid; see `quantise`.
+    frame : Frame, optional
+        Placement; none by default.
+    between : tuple of float, optional
+        Only triangles whose largest x is in this range are removed, low <= x < high, in the units of the
+        mesh: elsewhere the surface may be cut open.
     threads : int, optional
         Threads; 0 for all cores.
 
     Returns
     -------
     Cleaned
-        The cleaned mesh, and the same triangles before quantisation.
+        The cleaned mesh.
 
     Raises
     ------
     MeshError
         If a coordinate is not finite or an index is out of range.
     """
-    points, displaced = quantise(mesh, certificate.planes, threads)
-    if not certificate.holds.all():
-        displaced[mesh.triangles[~certificate.holds]] = True
-    exact, certificate = _mended(mesh, points, certificate, low, high, threads)
-    proved, final = certificate.holds, Mesh(points, exact.triangles)
-    if not displaced.any():  # only displaced vertices can coincide with others
-        return Cleaned(final.selected(np.ones(len(proved), bool), threads), proved, exact, certificate)
-    proved = proved & ~displaced[exact.triangles].any(axis=1)
-    return Cleaned(welded(final, threads), proved, exact, certificate)
+    edits, gone = _mended(mesh, keep, frame, between, threads)
+    edits = _with_edited(edits, edited, mesh.triangles)
+    displaced, keep = np.zeros(len(keep), bool), keep.copy()
+    displaced[mesh.triangles[fresh]], keep[gone] = True, False
+    final, displaced, places = quantise(mesh, keep, displaced, edits, planes, frame, threads)
+    suspects = touching(final.triangles, displaced, threads)
+    suspects = np.union1d(suspects, places[places >= 0])
+    # Only displaced vertices can coincide with others.
+    return Cleaned(welded(final) if displaced.any() else final, suspects, edits)
+
+
+def _with_edited(edits: Edits, edited: NDArray[np.int64], triangles: NDArray[np.int32]) -> Edits:
+    """Edits, and triangles edited before, as they are."""
+    edited = np.setdiff1d(edited, edits[0])
+    rows = np.concatenate([edits[0], edited])
+    order = np.argsort(rows)
+    return rows[order], np.concatenate([edits[1], triangles[edited]])[order]
 
 
 def _mended(
-    mesh: Mesh,
-    points: NDArray[np.float64],
-    certificate: Certificate,
-    low: float,
-    high: float,
-    threads: int,
-) -> tuple[Mesh, Certificate]:
-    """Remove triangles that are flattened or turned over when the vertices move to `points`."""
-    suspects = turned(mesh.vertices, mesh.triangles, points, threads)
+    mesh: Mesh, keep: NDArray[np.bool_], frame: Frame, between: tuple[float, float], threads: int
+) -> tuple[Edits, list[int]]:
+    """Edits that remove triangles which quantisation flattens or turns over, and the vertices removed."""
+    suspects = turned(mesh.vertices, mesh.triangles, frame, threads)
+    suspects = suspects[keep[mesh.triangles[suspects, 0]]]
     top = mesh.vertices[mesh.triangles[suspects], 0].max(axis=1, initial=-np.inf)
-    bad = set(suspects[(low <= top) & (top < high)].tolist())
+    bad = set(suspects[(between[0] <= top) & (top < between[1])].tolist())
     if not bad:
-        return mesh, certificate
-    surface = _Surface(points, mesh.triangles, bad, threads)
+        return NO_EDITS, []
+    surface = _Surface(mesh, frame, bad, threads)
     for _ in range(PASSES):
         for triangle in sorted(bad):
             surface.mend(triangle)
-    holds = certificate.holds.copy()
-    holds[list(surface.changed)] = False
-    certificate = replace(certificate, holds=holds).selected(surface.alive)
-    return Mesh(mesh.vertices, surface.triangles[surface.alive]), certificate
+    return surface.edits, surface.gone
 
 
 class _Surface:
-    """A mesh under local edits. The triangles around a vertex are known near bad triangles only: at their
-    corners and at the neighbours of these.
+    """The surface around bad triangles under local edits: the triangles at their corners, and those at the
+    corners of these.
     """
 
-    def __init__(
-        self, points: NDArray[np.float64], triangles: NDArray[np.int32], bad: set[int], threads: int
-    ) -> None:
-        self.points = points
+    def __init__(self, mesh: Mesh, frame: Frame, bad: set[int], threads: int) -> None:
         self.bad = bad
-        self.triangles = triangles.copy()
-        self.alive = np.ones(len(triangles), dtype=bool)
         self.stars: dict[int, set[int]] = {}
-        self.changed: set[int] = set()
+        self.changed, self.removed, self.gone = set[int](), set[int](), list[int]()
         near = np.array(sorted(bad))
         for _ in range(2):
-            marked = np.zeros(len(points), bool)
-            marked[triangles[near]] = True
-            near = touching(triangles, marked, threads)
-        for triangle, corners in zip(near.tolist(), triangles[near].tolist(), strict=True):
-            for vertex in corners:
+            marked = np.zeros(len(mesh.vertices), bool)
+            marked[mesh.triangles[near]] = True
+            near = touching(mesh.triangles, marked, threads)
+        self.triangles = dict(zip(near.tolist(), mesh.triangles[near], strict=True))
+        for triangle, corners in self.triangles.items():
+            for vertex in corners.tolist():
                 self.stars.setdefault(vertex, set()).add(triangle)
+        vertices = np.array(list(self.stars))
+        self.points = dict(zip(vertices.tolist(), placed(mesh.vertices[vertices], frame), strict=True))
+
+    @property
+    def edits(self) -> Edits:
+        """Changed and removed triangles."""
+        rows = sorted(self.changed | self.removed)
+        corners = [(-1, -1, -1) if row in self.removed else self.triangles[row] for row in rows]
+        return np.array(rows, np.int64), np.array(corners, np.int32).reshape(-1, 3)
 
     def star(self, vertex: int) -> set[int]:
         """The triangles around a vertex."""
@@ -161,7 +188,7 @@ class _Surface:
 
     def normal(self, corners: NDArray[np.int32]) -> NDArray[np.float64]:
         """Normal of a triangle, of twice its area."""
-        a, b, c = self.points[corners]
+        a, b, c = (self.points[vertex] for vertex in corners.tolist())
         return np.cross(b - a, c - a)
 
     def mend(self, triangle: int) -> None:
@@ -228,7 +255,8 @@ class _Surface:
         self.star(kept).difference_update(shared)
         self.star(kept).update(moved)
         self.stars[gone] = set()
-        self.alive[list(shared)] = False
+        self.removed |= shared
+        self.gone.append(gone)
         return True
 
 

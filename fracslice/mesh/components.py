@@ -43,8 +43,8 @@ class Shells:
 
     Attributes
     ----------
-    labels : ndarray of int32, shape (m,)
-        Shell of each triangle.
+    labels : ndarray of int32, shape (n,)
+        Shell of each vertex.
     volumes : ndarray of float64, shape (s,)
         Signed volumes, negative for cavities.
     parent : ndarray of int64, shape (s,)
@@ -81,7 +81,7 @@ def shells(mesh: Mesh, threads: int = 0) -> Shells:
     Returns
     -------
     Shells
-        The shells, numbered by first appearance.
+        The shells, numbered by their first vertices.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def shells(mesh: Mesh, threads: int = 0) -> Shells:
     from fracslice.mesh.topology import component_sizes, connected_components
 
     labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
-    volumes, _ = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)
+    volumes = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads).volumes
     hollow = volumes < 0
     parent = np.full(count, -1, dtype=np.int64)
     if hollow.any():
@@ -141,7 +141,7 @@ def select(
     """
     found = shells(mesh)
     staying, removed = choose(found, keep=keep, dust_mm3=dust_mm3, cavities=cavities)
-    return (mesh if staying.all() else mesh.selected(staying[found.labels])), removed
+    return (mesh if staying.all() else mesh.selected(staying[found.labels[mesh.triangles[:, 0]]])), removed
 
 
 def choose(

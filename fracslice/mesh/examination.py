@@ -9,7 +9,7 @@ from fracslice.mesh.collapse import Collapsed
 from fracslice.mesh.model import Mesh
 from fracslice.mesh.nearest import Nearest
 from fracslice.mesh.self_intersections import self_intersecting_triangles
-from fracslice.mesh.topology import connected_components, shell_volumes
+from fracslice.mesh.topology import component_sizes, connected_components
 from fracslice.mesh.tree import build
 from fracslice.work import Work
 
@@ -150,9 +150,7 @@ class _Shells:
     """Shells of the original mesh, to compare with the simplified one."""
 
     def __init__(self, mesh: Mesh) -> None:
-        labels, self.count = connected_components(mesh.triangles, len(mesh.vertices))
-        self.of = np.zeros(len(mesh.vertices), labels.dtype)
-        self.of[mesh.triangles] = labels[:, None]
+        self.of, self.count = connected_components(mesh.triangles, len(mesh.vertices))
         self.outside = self._volumes(mesh) >= 0
 
     def turned(self, mesh: Mesh) -> NDArray[np.bool_]:
@@ -162,7 +160,7 @@ class _Shells:
 
     def _volumes(self, mesh: Mesh) -> NDArray[np.float64]:
         """Signed volumes of the shells."""
-        return shell_volumes(mesh.vertices, mesh.triangles, self.of[mesh.triangles[:, 0]], self.count)
+        return component_sizes(mesh.vertices, mesh.triangles, self.of, self.count).volumes
 
 
 def _edge(mesh: Mesh) -> float:

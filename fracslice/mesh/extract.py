@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -141,7 +141,7 @@ def contour_pieces(
     work = work or Work()
     signs = bricks.signs if isinstance(bricks, Bricks) else bricks
     cells = _called(Cells, signs.ijk, signs.signs, signs.index, work.threads)
-    origin, voxel, margin = _placement(signs)
+    placement = origin, voxel, margin = _placement(signs)
     refiner = Refiner(root, cells, origin, voxel, work)
     for first, last in _layers(signs, most):
         surface = Contouring(cells, first, last, origin, voxel, margin)
@@ -150,12 +150,12 @@ def contour_pieces(
             _called(surface.advance, end, known.first, known.t, known.normals)
         vertices, triangles, count, cases, to_means = surface.finish()
         features = vertices[count:]
-        trust_regions = partial(_trust_regions, features, cases, to_means, signs)
-        moved, places = project(root, features, trust_regions, signs.voxel, work)
+        regions = partial(_trust_regions, (features, cases, to_means), placement)
+        moved, places = project(root, features, regions, signs.voxel, work)
         features[moved] = places
         mesh, border = Mesh(vertices, triangles), np.inf
         if last < len(signs.index):  # Unused vertices belong to the next piece.
-            mesh = mesh.selected(np.ones(len(triangles), bool))
+            mesh = mesh.compact()
             border = signs.origin[0] + signs.voxel * BRICK * last
         yield Piece(mesh, border)
 
@@ -186,50 +186,15 @@ def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
 
 
 def _trust_regions(
-    features: np.ndarray,
-    cases: np.ndarray,
-    to_means: np.ndarray,
-    bricks: SignBricks,
+    features: tuple[np.ndarray, np.ndarray, np.ndarray],
+    placement: tuple[tuple[float, float, float], float, float],
     which: np.ndarray,
     inside: np.ndarray,
 ) -> TrustRegions:
-    """Trust regions of feature vertices: the interior of their cell or face, its nearest corner of the other
-    sign, and the mean of the crossings around them.
-    """
-    origin, voxel, margin = np.array(bricks.origin)[:, None], bricks.voxel, minimum_edge_parameter(bricks)
-    there = np.ascontiguousarray(features[which].T)
-    grid = (there - origin) / voxel
-    whole = np.round(grid)
-    flat = np.abs(grid - whole) < margin / 2
-    cell = np.where(flat, whole, np.floor(grid))
-    octant = ((grid - cell > 0.5) << np.arange(3)[:, None]).sum(0)
-    face = np.where(flat.any(0), flat.argmax(0), 3)
-    corner = _nearest_corners()[face, cases[which], octant, ~inside * 1]
-    low = np.where(flat, there, origin + voxel * (cell + margin))
-    high = np.where(flat, there, origin + voxel * (cell + (1 - margin)))
-    return TrustRegions(
-        low,
-        high,
-        origin + voxel * (cell + (corner >> np.arange(3)[:, None] & 1)),
-        np.clip(there + voxel * to_means[which].T, low, high),
-    )
+    """Trust regions of feature vertices."""
+    from .._native import trust_regions
 
-
-@lru_cache(maxsize=1)
-def _nearest_corners() -> np.ndarray:
-    """Nearest corner of a cell by edges, dx + 2 dy + 4 dz, uint8 [4, 256, 8, 2].
-
-    Indices: the axis across the lower face that must contain the corner (3: any corner), the case of the
-    cell, the start corner, and whether the corner is inside.
-    """
-    corner, axis = np.arange(8), np.arange(3)
-    away = ((corner[:, None] ^ corner)[..., None] >> axis & 1).sum(-1)
-    signs = np.arange(256)[:, None] >> corner & 1
-    right = np.stack([signs == 0, signs == 1], axis=1)
-    lower = np.vstack([corner >> axis[:, None] & 1 == 0, np.ones(8, bool)])
-    allowed = lower[:, None, None, None] & right[None, :, None]
-    found: np.ndarray = np.where(allowed, away[:, None], 4).argmin(-1).astype(np.uint8)
-    return found
+    return TrustRegions(*trust_regions(*features, which, inside, *placement))
 
 
 def _placement(bricks: Bricks | SignBricks) -> tuple[tuple[float, float, float], float, float]:

@@ -195,6 +195,16 @@ class Mesh(Exchange):
         found = selected(self.vertices, self.triangles, keep, threads)
         return Mesh(*found) if found else self
 
+    def compact(self) -> Mesh:
+        """Remove unused vertices.
+
+        Returns
+        -------
+        Mesh
+            All triangles; this mesh if there are no such vertices.
+        """
+        return self.selected(np.ones(len(self.triangles), bool), 0)
+
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Cross products of rows, three times as fast as np.cross."""

@@ -42,8 +42,8 @@ def nesting(
     ----------
     mesh : Mesh
         The mesh.
-    labels : ndarray of int32, shape (m,)
-        Shell of each triangle.
+    labels : ndarray of int32, shape (n,)
+        Shell of each vertex.
     volumes : ndarray of float64, shape (s,)
         Signed volumes.
     first : ndarray of int64, shape (s,), optional
@@ -66,5 +66,5 @@ def nesting(
         return Nesting(np.zeros(count, np.int64), np.full(count, -1, np.int64))
     if first is None:
         first = np.zeros(count, np.int64)
-        first[labels[::-1]] = mesh.triangles[::-1, 0]
+        first[labels[mesh.triangles[::-1, 0]]] = mesh.triangles[::-1, 0]
     return Nesting(*_nesting(mesh.vertices, mesh.triangles, labels, np.abs(volumes), first, threads))

@@ -17,7 +17,7 @@ NOTHING = Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))
 
 
 class Pieces:
-    """Pieces of a surface, in order, with labels of their triangles; scene units.
+    """Pieces of a surface, in order, with labels of their vertices; scene units.
 
     Parameters
     ----------
@@ -59,15 +59,15 @@ class Pieces:
         self.fresh.append(fresh)
         self._count += len(piece.mesh.triangles)
 
-    def label(self, number: int, labels: NDArray[np.int64]) -> None:
+    def label(self, number: int, labels: NDArray[np.int32]) -> None:
         """Store the labels of a piece.
 
         Parameters
         ----------
         number : int
             Index of the piece.
-        labels : ndarray of int64, shape (m,)
-            Label of each triangle.
+        labels : ndarray of int32, shape (n,)
+            Label of each vertex.
         """
         self._put(f"labels{number}", labels=labels)
 
@@ -86,7 +86,7 @@ class Pieces:
         """
         return Mesh(**self._get(f"mesh{number}"))
 
-    def labels(self, number: int) -> NDArray[np.int64]:
+    def labels(self, number: int) -> NDArray[np.int32]:
         """Load the labels of a piece.
 
         Parameters
@@ -96,8 +96,8 @@ class Pieces:
 
         Returns
         -------
-        ndarray of int64, shape (m,)
-            Label of each triangle.
+        ndarray of int32, shape (n,)
+            Label of each vertex.
         """
         return self._get(f"labels{number}")["labels"]
 
@@ -110,16 +110,6 @@ class Pieces:
             Pieces, by ascending x.
         """
         return (self.mesh(number) for number in range(len(self)))
-
-    def labelled(self) -> Iterator[tuple[Mesh, NDArray[np.int64]]]:
-        """Iterate over the pieces and their labels.
-
-        Returns
-        -------
-        iterator of (Mesh, ndarray of int64)
-            Pieces, by ascending x.
-        """
-        return ((self.mesh(number), self.labels(number)) for number in range(len(self)))
 
     def drop(self, number: int) -> None:
         """Release a piece that is held in memory.
@@ -182,14 +172,17 @@ class Pieces:
         if self.folder is None:
             self._held[name] = arrays
         else:
-            np.savez(self.folder / f"{name}.npz", **arrays)  # type: ignore[arg-type]
+            for part, array in arrays.items():
+                path = self.folder / f"{name}-{part}.npy"
+                path.unlink(missing_ok=True)  # the array may be the mapped file itself
+                np.save(path, array)
 
     def _get(self, name: str) -> Arrays:
         """Load arrays from memory or from the folder."""
         if self.folder is None:
             return self._held[name]
-        with np.load(self.folder / f"{name}.npz") as arrays:
-            return dict(arrays)
+        begin = len(name) + 1
+        return {path.stem[begin:]: np.load(path, "r") for path in self.folder.glob(f"{name}-*.npy")}
 
 
 def joined(one: Mesh, other: Mesh, seam: float, near: float) -> Mesh:
@@ -209,13 +202,51 @@ def joined(one: Mesh, other: Mesh, seam: float, near: float) -> Mesh:
     Mesh
         The joined mesh.
     """
-    vertices = np.concatenate([one.vertices, other.vertices])
-    triangles = np.concatenate([one.triangles, other.triangles + np.int32(len(one.vertices))])
-    close = np.flatnonzero(np.abs(vertices[:, 0] - seam) < near)
+    return seamed(one, other, seam, near)[0].compact()
+
+
+def seamed(one: Mesh, other: Mesh, seam: float, near: float) -> tuple[Mesh, NDArray[np.int32]]:
+    """Join two meshes as `joined` does, but keep all vertices.
+
+    Parameters
+    ----------
+    one, other, seam, near
+        As in `joined`.
+
+    Returns
+    -------
+    Mesh
+        The joined mesh.
+    ndarray of int32, shape (n,)
+        The first vertex with the same position, for each vertex; those of `other` come first.
+    """
+    vertices = np.concatenate([other.vertices, one.vertices])
+    close = beside(vertices, seam, near)
     _, first, which = np.unique(rows(vertices[close]), return_index=True, return_inverse=True)
     number = np.arange(len(vertices), dtype=np.int32)
     number[close] = close[first[which]]
-    return Mesh(vertices, number[triangles]).selected(np.ones(len(triangles), dtype=bool))
+    corners = number[one.triangles + np.int32(len(other.vertices))]
+    return Mesh(vertices, np.concatenate([corners, other.triangles])), number
+
+
+def beside(points: NDArray[np.float64], seam: float, near: float) -> NDArray[np.int64]:
+    """Points near a plane x = `seam`.
+
+    Parameters
+    ----------
+    points : ndarray of float64, shape (n, 3)
+        Points.
+    seam : float
+        x of the plane; no point is near an infinite one.
+    near : float
+        Maximum distance from the plane.
+
+    Returns
+    -------
+    ndarray of int64, shape (k,)
+        Their indices, ascending.
+    """
+    return np.flatnonzero(np.abs(points[:, 0] - seam) < near) if np.isfinite(seam) else np.empty(0, int)
 
 
 def rows(points: NDArray[np.float64]) -> NDArray[np.void]:

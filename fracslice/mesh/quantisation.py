@@ -2,13 +2,66 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice import _native
 from fracslice.errors import MeshError
 from fracslice.mesh.model import Mesh
+from fracslice.volume.bricks import SignBricks
+from fracslice.volume.lattice import BRICK
+
+Frame = tuple[float, tuple[float, float, float], float]
+"""Placement of vertices: scale, translation, and height below which they are moved to the bed, z = 0."""
+
+UNMOVED: Frame = (1.0, (0.0, 0.0, 0.0), -np.inf)
 
 NO_PLANES = np.empty((0, 3))
+
+Edits = tuple[NDArray[np.int64], NDArray[np.int32]]
+"""Edited triangles, ascending, and their corners, [k, 3]; -1 for removed ones."""
+
+NO_EDITS: Edits = np.empty(0, np.int64), np.empty((0, 3), np.int32)
+
+
+def grid_planes(signs: SignBricks) -> NDArray[np.float64]:
+    """Planes of the grid that a mesh was contoured on.
+
+    Contoured triangles do not intersect (`fracslice/native/mesh/contour.h`), nor do quantised ones if no
+    vertex changes its position relative to these planes (`quantise.h`).
+
+    Parameters
+    ----------
+    signs : SignBricks
+        Samples.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, 3)
+        Planes across each axis, ascending, scene units.
+    """
+    steps = np.arange(-BRICK, BRICK * (max(signs.index.shape) + 1) + 1)
+    return np.array(signs.origin) + signs.voxel * steps[:, None]
+
+
+class Quantised(NamedTuple):
+    """Result of `quantise`.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Quantised mesh.
+    displaced : ndarray of bool, shape (n,)
+        True for each displaced vertex: only these can coincide with others.
+    places : ndarray of int64, shape (k,)
+        Indices of the edited triangles; -1 for removed ones.
+    """
+
+    mesh: Mesh
+    displaced: NDArray[np.bool_]
+    places: NDArray[np.int64]
 
 
 def quantised(mesh: Mesh, threads: int = 0) -> Mesh:
@@ -34,56 +87,113 @@ def quantised(mesh: Mesh, threads: int = 0) -> Mesh:
     MeshError
         If a coordinate is not finite or an index is out of range.
     """
-    points, _ = quantise(mesh, NO_PLANES, threads)
-    return welded(Mesh(points, mesh.triangles), threads)
+    return welded(quantise(mesh, used(mesh), threads=threads).mesh)
 
 
-def quantise(
-    mesh: Mesh, planes: NDArray[np.float64] = NO_PLANES, threads: int = 0
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Round vertices to float32, without negative zeros.
+def used(mesh: Mesh) -> NDArray[np.bool_]:
+    """Vertices of triangles.
 
     Parameters
     ----------
     mesh : Mesh
         The mesh.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        True for each used vertex.
+
+    Raises
+    ------
+    MeshError
+        If an index is out of range.
+    """
+    if len(mesh.triangles) and not 0 <= mesh.triangles.min() <= mesh.triangles.max() < len(mesh.vertices):
+        raise MeshError("a triangle names a vertex that does not exist")
+    found = np.zeros(len(mesh.vertices), bool)
+    found[mesh.triangles] = True
+    return found
+
+
+def quantise(
+    mesh: Mesh,
+    keep: NDArray[np.bool_],
+    displaced: NDArray[np.bool_] | None = None,
+    edits: Edits = NO_EDITS,
+    planes: NDArray[np.float64] = NO_PLANES,
+    frame: Frame = UNMOVED,
+    threads: int = 0,
+) -> Quantised:
+    """Place the vertices of a mesh and round them to float32, without negative zeros.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    keep : ndarray of bool, shape (n,)
+        Vertices of the triangles that stay.
+    displaced : ndarray of bool, shape (n,), optional
+        Vertices that count as displaced.
+    edits : Edits, optional
+        Triangles with other corners, or removed ones.
     planes : ndarray of float64, shape (k, 3), optional
-        Planes of a grid across each axis, ascending.
+        Placed planes of a grid across each axis, ascending. A vertex that is no longer in the same planes and
+        strictly between the same ones is displaced; without planes all are.
+    frame : Frame, optional
+        Placement; none by default.
     threads : int, optional
         Threads; 0 for all cores.
 
     Returns
     -------
-    ndarray of float64, shape (n, 3)
-        Rounded vertices.
-    ndarray of bool, shape (n,)
-        True for each displaced vertex: one that is no longer in the same planes and strictly between the same
-        ones. Without planes all vertices are displaced.
+    Quantised
+        The triangles that stay, in order.
 
     Raises
     ------
     MeshError
-        If a coordinate is not finite or an index is out of range.
+        If a coordinate is not finite.
     """
-    from fracslice._native import quantise
-
-    if len(mesh.triangles) and not 0 <= mesh.triangles.min() <= mesh.triangles.max() < len(mesh.vertices):
-        raise MeshError("a triangle names a vertex that does not exist")
+    if displaced is None:
+        displaced = np.zeros(len(keep), bool)
     try:
-        return quantise(mesh.vertices, planes, threads)
+        vertices, triangles, moved, places = _native.quantise(
+            mesh.vertices, mesh.triangles, keep, displaced, *edits, planes, frame, threads
+        )
     except ValueError as error:
         raise MeshError(str(error)) from None
+    return Quantised(Mesh(vertices, triangles), moved, places)
 
 
-def welded(mesh: Mesh, threads: int = 0) -> Mesh:
-    """Weld equal positions and remove unused vertices.
+def placed(points: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
+    """Place points and round them, as `quantise` does.
+
+    Parameters
+    ----------
+    points : ndarray of float64, shape (n, 3)
+        Points.
+    frame : Frame
+        Placement.
+
+    Returns
+    -------
+    ndarray of float64, shape (n, 3)
+        Rounded points.
+    """
+    scale, offset, bed = frame
+    found = points * scale + np.array(offset)
+    found[found[:, 2] < bed, 2] = 0
+    rounded: NDArray[np.float64] = found.astype(np.float32).astype(np.float64) + 0.0
+    return rounded
+
+
+def welded(mesh: Mesh) -> Mesh:
+    """Weld equal positions.
 
     Parameters
     ----------
     mesh : Mesh
         Mesh with float32 coordinates.
-    threads : int, optional
-        Threads; 0 for all cores.
 
     Returns
     -------
@@ -93,6 +203,4 @@ def welded(mesh: Mesh, threads: int = 0) -> Mesh:
     from fracslice.mesh.weld import weld
 
     first, labels = weld(mesh.vertices.astype(np.float32))
-    if len(first) < len(mesh.vertices):
-        mesh = Mesh(mesh.vertices[first], labels[mesh.triangles])
-    return mesh.selected(np.ones(len(mesh.triangles), bool), threads)
+    return Mesh(mesh.vertices[first], labels[mesh.triangles]) if len(first) < len(mesh.vertices) else mesh

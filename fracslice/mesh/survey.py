@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from .components import PIECES, Shells
 from .model import Mesh
-from .pieces import Pieces, rows
+from .pieces import Pieces, beside, rows
 
 
 def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
@@ -42,44 +42,40 @@ class _Survey:
     """Sums over the components of pieces, in order. Labels count from the first piece on."""
 
     def __init__(self, voxel: float, threads: int) -> None:
-        self.voxel, self.threads, self.count, self.end = voxel, threads, 0, -np.inf
-        self.sizes: list[NDArray[np.float64]] = []
-        self.cones: list[NDArray[np.float64]] = []
+        self.voxel, self.threads, self.end = voxel, threads, -np.inf
+        self.starts = [0]
+        self.volumes: list[NDArray[np.float64]] = []
+        self.vectors: list[NDArray[np.float64]] = []
         self.areas: list[NDArray[np.float64]] = []
-        self.low: list[NDArray[np.float64]] = []
-        self.high: list[NDArray[np.float64]] = []
-        self.same: list[NDArray[np.int64]] = []
-        self.border: tuple[NDArray[np.void], NDArray[np.int64]] = rows(np.empty((0, 3))), np.empty(0, int)
+        self.extremes: list[NDArray[np.float64]] = []
+        self.first: list[NDArray[np.int32]] = []
+        self.same: list[NDArray[np.int32]] = []
+        self.border: tuple[NDArray[np.void], NDArray[np.int32]] = (
+            rows(np.empty((0, 3))),
+            np.empty(0, np.int32),
+        )
 
-    def add(self, mesh: Mesh, end: float) -> NDArray[np.int64]:
-        """Add a piece that ends at x = `end`; returns the label of each of its triangles, int64 [m]."""
+    def add(self, mesh: Mesh, end: float) -> NDArray[np.int32]:
+        """Add a piece that ends at x = `end`; returns the label of each of its vertices, int32 [n]."""
         from .topology import component_sizes, connected_components
 
-        local, count = connected_components(mesh.triangles, len(mesh.vertices), self.threads)
-        of_vertex = np.empty(len(mesh.vertices), np.int64)
-        of_vertex[mesh.triangles] = local[:, None]
-        low, high = _boxes(mesh.vertices, mesh.vertices, of_vertex, count)
-        whole = not np.isfinite([self.end, end]).any()
-        areas = np.zeros((count, 3)) if whole else _areas(mesh, local, count)
-        # Cones over a component's first corner, moved to the corner of its box: precise even for dust.
-        first = np.searchsorted(np.maximum.accumulate(local), np.arange(count))
-        tips = mesh.vertices[mesh.triangles[first, 0]]
-        cones, sizes = component_sizes(mesh.vertices, mesh.triangles, local, count, self.threads)
-        self.cones.append(cones + ((tips - low) * areas).sum(axis=1) / 3)
-        self.areas.append(areas)
-        self.low.append(low)
-        self.high.append(high)
-        self.sizes.append(sizes)
-        self._join_to_last(mesh, of_vertex + self.count, end)
-        self.count += count
-        return local + np.int64(self.count - count)
+        labels, count = connected_components(mesh.triangles, len(mesh.vertices), self.threads)
+        found = component_sizes(mesh.vertices, mesh.triangles, labels, count, self.threads)
+        self.volumes.append(found.volumes)
+        self.areas.append(found.areas)
+        self.vectors.append(found.vectors)
+        self.extremes.append(mesh.vertices[found.outermost])
+        self.first.append(found.outermost[:, 0])
+        labels = labels + np.int32(self.starts[-1])
+        self.starts.append(self.starts[-1] + count)
+        self._join_to_last(mesh, labels, end)
+        return labels
 
-    def _join_to_last(self, mesh: Mesh, labels: NDArray[np.int64], end: float) -> None:
+    def _join_to_last(self, mesh: Mesh, labels: NDArray[np.int32], end: float) -> None:
         """Unite components that share a vertex with the previous piece: no surface crosses a seam without
         one.
         """
-        x = mesh.vertices[:, 0]
-        here, there = (np.flatnonzero(np.abs(x - seam) < self.voxel / 2) for seam in (self.end, end))
+        here, there = (beside(mesh.vertices, seam, self.voxel / 2) for seam in (self.end, end))
         points, before = self.border
         _, theirs, mine = np.intersect1d(points, rows(mesh.vertices[here]), return_indices=True)
         pairs = np.stack([before[theirs], labels[here[mine]]], axis=1)
@@ -89,26 +85,30 @@ class _Survey:
 
     def shells(self) -> WholeShells:
         """Shells of all pieces together."""
-        of_label, count = self._united()
-        lows, areas = np.concatenate(self.low), np.concatenate(self.areas)
-        low, high = _boxes(lows, np.concatenate(self.high), of_label, count)
-        # Cones over the corner of a component's box, moved to the corner of its shell's box.
-        cones = np.concatenate(self.cones) + np.einsum("ij,ij->i", lows - low[of_label], areas) / 3
-        volumes = np.bincount(of_label, cones, minlength=count).astype(np.float64)
-        sizes = np.bincount(of_label, np.concatenate(self.sizes), minlength=count).astype(np.float64)
-        return WholeShells(of_label, volumes, sizes, low, high)
+        from .topology import connected_components
 
-    def _united(self) -> tuple[NDArray[np.int32], int]:
-        """Shell of each label, and the number of shells."""
-        from .topology import unite
-
-        parent: NDArray[np.int64] = np.arange(self.count)
-        for a, b in np.concatenate(self.same).tolist():
-            unite(parent, a, b)
-        while (parent != parent[parent]).any():
-            parent = parent[parent]
-        roots, shell = np.unique(parent, return_inverse=True)
-        return shell.astype(np.int32), len(roots)
+        own = np.arange(self.starts[-1], dtype=np.int32)
+        pairs = np.concatenate([np.stack([own, own], axis=1), *self.same])
+        of_label, count = connected_components(pairs[:, [0, 1, 1]], len(own))
+        extremes = np.concatenate(self.extremes)
+        outermost = np.empty((count, 6), np.int64)
+        for side in range(6):
+            height: NDArray[np.float64] = extremes[:, side, side % 3] * (1 if side < 3 else -1)
+            order = np.lexsort((height, of_label))
+            outermost[:, side] = order[np.searchsorted(of_label[order], np.arange(count))]
+        # Cones over a component's own vertex, moved to one of its shell: precise even for dust.
+        tips = extremes[outermost[:, 0], 0]
+        moved = ((extremes[:, 0] - tips[of_label]) * np.concatenate(self.vectors)).sum(axis=1) / 3
+        volumes = np.bincount(of_label, np.concatenate(self.volumes) + moved).astype(np.float64)
+        areas = np.bincount(of_label, np.concatenate(self.areas)).astype(np.float64)
+        return WholeShells(
+            of_label,
+            volumes,
+            areas,
+            extremes[outermost, np.arange(6)],
+            np.concatenate(self.first)[outermost[:, 0]],
+            np.searchsorted(self.starts, outermost[:, 0], side="right") - 1,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,15 +123,37 @@ class WholeShells:
         Signed volumes, negative for cavities.
     areas : ndarray of float64, shape (s,)
         Areas.
-    low, high : ndarray of float64, shape (s, 3)
-        Corners of the bounding boxes.
+    outermost : ndarray of float64, shape (s, 6, 3)
+        Vertices farthest out along -x, -y, -z, x, y and z.
+    first : ndarray of int32, shape (s,)
+        Index of the vertex of least x in its piece.
+    piece : ndarray of int64, shape (s,)
+        Index of that piece.
     """
 
     of_label: NDArray[np.int32]
     volumes: NDArray[np.float64]
     areas: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    outermost: NDArray[np.float64]
+    first: NDArray[np.int32]
+    piece: NDArray[np.int64]
+
+    def tips(self, which: NDArray[np.bool_] | slice = slice(None)) -> NDArray[np.float64]:
+        """Outermost vertices of some or all shells.
+
+        Parameters
+        ----------
+        which : ndarray of bool, shape (s,), or slice, optional
+            Shells; all by default.
+
+        Returns
+        -------
+        ndarray of float64, shape (6, 3)
+            Vertices farthest out along -x, -y, -z, x, y and z.
+        """
+        of, axes = self.outermost[which], np.arange(3)
+        low, high = of[:, axes, axes].argmin(axis=0), of[:, axes + 3, axes].argmax(axis=0)
+        return of[[*low, *high], np.arange(6)]
 
     def bounds(self, which: NDArray[np.bool_] | slice = slice(None)) -> NDArray[np.float64]:
         """Bounding box of some or all shells.
@@ -146,9 +168,9 @@ class WholeShells:
         ndarray of float64, shape (2, 3)
             Low and high corner.
         """
-        return np.stack([self.low[which].min(axis=0), self.high[which].max(axis=0)])
+        return self.tips(which).reshape(2, 3, 3).diagonal(axis1=1, axis2=2)
 
-    def nested(self, pieces: Pieces, threads: int = 0) -> tuple[Shells, int]:
+    def nested(self, pieces: Pieces, bodies: bool = True, threads: int = 0) -> tuple[Shells, int]:
         """Nesting of the shells, by rays.
 
         The ray of each shell starts at its point of least x. This point lies within a cell, so that a ray
@@ -158,6 +180,9 @@ class WholeShells:
         ----------
         pieces : Pieces
             Labelled pieces.
+        bodies : bool, optional
+            False for the nesting of cavities only. By the signs of the samples no body is in the material of
+            another one.
         threads : int, optional
             Threads; 0 for all cores.
 
@@ -177,20 +202,16 @@ class WholeShells:
 
         count, hollow = len(self.volumes), self.volumes < 0
         parent, winding = np.full(count, -1, np.int64), np.zeros(count, np.int64)
-        for mesh, labels in pieces.labelled() if count > 1 else ():
-            shell = self.of_label[labels]
-            first = np.full(count, -1, np.int64)
-            of_vertex = np.empty(len(mesh.vertices), np.int64)
-            of_vertex[mesh.triangles] = shell[:, None]
-            here = np.flatnonzero(mesh.vertices[:, 0] == self.low[of_vertex, 0])
-            first[of_vertex[here]] = here
-            if (first >= 0).any():
-                found = nesting(mesh, shell, self.volumes, first, threads)
-                parent = np.where(first >= 0, found.parent, parent)
-                winding = np.where(first >= 0, found.winding, winding)
+        searched = hollow | (bodies and count > 1)
+        for number in np.unique(self.piece[searched]).tolist():
+            mesh, own = pieces.mesh(number), searched & (self.piece == number)
+            first = np.where(own, self.first, -1)
+            shell = self.of_label[pieces.labels(number)]
+            found = nesting(mesh, shell, self.volumes, first, threads)
+            parent[own], winding[own] = found.parent[own], found.winding[own]
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
-        return Shells(np.empty(0, np.int32), self.volumes, parent), int((winding != hollow).sum())
+        return Shells(np.empty(0, np.int32), self.volumes, parent), int((winding != hollow)[searched].sum())
 
     def thin_walls(self, voxel: float) -> str:
         """Note on walls thinner than a voxel; empty if there are none.
@@ -214,20 +235,3 @@ class WholeShells:
         share, many = float(self.volumes[thin].sum() / whole), int(bodies.sum())
         holes = "have holes" if many == 1 else f"fell to pieces: {thin.sum()} of {many} bodies"
         return f"walls thinner than a voxel {holes}, {share:.0%} of the material" if share >= PIECES else ""
-
-
-def _boxes(
-    lows: NDArray[np.float64], highs: NDArray[np.float64], group: NDArray[np.integer], count: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Bounding boxes of groups of boxes: low and high corners, float64 [count, 3] each."""
-    low, high = np.full((3, count), np.inf), np.full((3, count), -np.inf)
-    for k in range(3):  # axis by axis: `ufunc.at` is fast in one dimension only
-        np.minimum.at(low[k], group, lows[:, k])
-        np.maximum.at(high[k], group, highs[:, k])
-    return low.T.copy(), high.T.copy()
-
-
-def _areas(mesh: Mesh, labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
-    """Vector area of each component, float64 [count, 3]: the sum of the vector areas of its triangles."""
-    normals = mesh.normals / 2
-    return np.stack([np.bincount(labels, normals[:, k], minlength=count) for k in range(3)], axis=1)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._native import pointed
+from .._native import pointed, touching
 from ..volume import Plan
 from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
@@ -19,7 +19,7 @@ from .extract import Piece
 from .fit import Fit
 from .model import Mesh
 from .pieces import NOTHING, Pieces, joined
-from .quantisation import quantise
+from .quantisation import quantise, used
 from .self_intersections import self_intersecting_triangles
 
 POINTED = 0.15
@@ -69,6 +69,8 @@ class Pointed:
         piece : Piece
             Pieces, by ascending x.
         """
+        if sum(map(len, self._points)) > MANY:
+            return
         mesh, voxel = piece.mesh, self._voxel
         if len(self._near.triangles):
             mesh = joined(self._near, mesh, self._seam, voxel / 2)
@@ -77,8 +79,8 @@ class Pointed:
         self._points.append(at if len(at) > MANY else at[(low <= at[:, 0]) & (at[:, 0] < high)])
         self._seam = piece.end
         if np.isfinite(piece.end):
-            top = mesh.vertices[mesh.triangles, 0].max(axis=1)
-            self._near = mesh.selected(top > piece.end - 5 * voxel)
+            near = touching(mesh.triangles, mesh.vertices[:, 0] > piece.end - 5 * voxel, self._threads)
+            self._near = Mesh(mesh.vertices, mesh.triangles[near]).compact()
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -161,7 +163,7 @@ def _crossing(mesh: Mesh, caps: list[Cap], work: Work) -> set[int]:
     made = capped(mesh, caps)
     of_cap = np.repeat(np.arange(len(caps)), [len(cap.fan) for cap in caps])
     of_cap = np.concatenate([np.full(len(made.triangles) - len(of_cap), -1), of_cap])
-    as_written = Mesh(quantise(made, threads=work.threads)[0], made.triangles)
+    as_written = quantise(made, used(made), threads=work.threads).mesh
     crossing = self_intersecting_triangles(as_written, threads=work.threads, among=of_cap >= 0)
     return set(of_cap[crossing].tolist()) - {-1}
 

@@ -128,12 +128,33 @@ def connected_components(
 
     Returns
     -------
-    ndarray of int32, shape (m,)
-        Component of each triangle, numbered by first appearance.
+    ndarray of int32, shape (n,)
+        Component of each vertex, numbered by their first vertices; -1 for unused vertices.
     int
         Number of components.
     """
     return _connected_components(triangles, vertices, threads)
+
+
+class Sizes(NamedTuple):
+    """Sizes of connected components.
+
+    Attributes
+    ----------
+    volumes : ndarray of float64, shape (count,)
+        Signed volumes, measured from `outermost[:, 0]`, which keeps the precision of small components.
+    areas : ndarray of float64, shape (count,)
+        Areas.
+    vectors : ndarray of float64, shape (count, 3)
+        Vector areas; zero for closed components.
+    outermost : ndarray of int32, shape (count, 6)
+        First vertices farthest out along -x, -y, -z, x, y and z.
+    """
+
+    volumes: NDArray[np.float64]
+    areas: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+    outermost: NDArray[np.int32]
 
 
 def component_sizes(
@@ -142,10 +163,8 @@ def component_sizes(
     labels: NDArray[np.int32],
     count: int,
     threads: int = 0,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Signed volumes and areas of connected components.
-
-    Volumes are measured from a vertex of the component, which keeps the precision of small ones.
+) -> Sizes:
+    """Sizes of connected components.
 
     Parameters
     ----------
@@ -153,8 +172,8 @@ def component_sizes(
         Vertices.
     triangles : ndarray of int32, shape (m, 3)
         Triangles.
-    labels : ndarray of int32, shape (m,)
-        Component of each triangle.
+    labels : ndarray of int32, shape (n,)
+        Component of each vertex; -1 for unused vertices.
     count : int
         Number of components.
     threads : int, optional
@@ -162,46 +181,7 @@ def component_sizes(
 
     Returns
     -------
-    volumes : ndarray of float64, shape (count,)
-        Signed volumes.
-    areas : ndarray of float64, shape (count,)
-        Areas.
+    Sizes
+        Their sizes.
     """
-    return _component_sizes(vertices, triangles, labels, count, threads)
-
-
-def shell_volumes(
-    vertices: NDArray[np.float64], triangles: NDArray[np.int32], labels: NDArray[np.int32], count: int
-) -> NDArray[np.float64]:
-    """Signed volumes of connected components; see `component_sizes`.
-
-    Parameters
-    ----------
-    vertices, triangles, labels, count
-        As in `component_sizes`.
-
-    Returns
-    -------
-    ndarray of float64, shape (count,)
-        Signed volumes.
-    """
-    return component_sizes(vertices, triangles, labels, count)[0]
-
-
-def unite(parent: NDArray[np.int64], a: int, b: int) -> None:
-    """Unite the sets of a and b in a disjoint-set forest, with path halving. Parents have lower indices.
-
-    Parameters
-    ----------
-    parent : ndarray of int64, shape (n,)
-        Parent of each element; modified in place.
-    a, b : int
-        Elements.
-    """
-    roots = []
-    for node in (a, b):
-        while parent[node] != node:
-            parent[node] = parent[parent[node]]
-            node = int(parent[node])
-        roots.append(node)
-    parent[max(roots)] = min(roots)
+    return Sizes(*_component_sizes(vertices, triangles, labels, count, threads))

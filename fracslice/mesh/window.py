@@ -7,16 +7,18 @@ they are cleaned, checked and handed on.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .certificate import Certificate
+from .._native import bounds, touching
 from .check import MeshReport, duplicates
 from .clean import cleaned
 from .model import Mesh
-from .pieces import NOTHING, joined
+from .pieces import NOTHING, seamed
+from .quantisation import NO_EDITS, NO_PLANES, UNMOVED, Frame
 
 WAITS, COUNTS, MENDS = 7.5, 4.0, 3.0
 """Distances from the end of a piece, voxels. Triangles with a vertex beyond the first wait for the next
@@ -33,29 +35,30 @@ class Finished:
     ----------
     mesh : Mesh
         Finished triangles and neighbours, mm, quantised.
-    proved : ndarray of bool, shape (m,)
-        Triangles of which no two intersect.
-    done : ndarray of bool, shape (m,)
-        Triangles finished with this piece. Each triangle is finished once, in the order of the pieces.
+    suspects : ndarray of int64, shape (k,)
+        Triangles that may intersect others, ascending.
+    done : int
+        The first triangles are finished with this piece, so many. Each triangle is finished once, in the
+        order of the pieces.
     counted : ndarray of bool, shape (n,)
         Vertices with all their triangles in `mesh`. Each vertex is counted once.
     """
 
     mesh: Mesh
-    proved: NDArray[np.bool_]
-    done: NDArray[np.bool_]
+    suspects: NDArray[np.int64]
+    done: int
     counted: NDArray[np.bool_]
 
     @classmethod
-    def whole(cls, mesh: Mesh, proved: NDArray[np.bool_] | None = None) -> Finished:
+    def whole(cls, mesh: Mesh, suspects: NDArray[np.int64] | None = None) -> Finished:
         """A whole mesh as one piece.
 
         Parameters
         ----------
         mesh : Mesh
             Quantised mesh, mm.
-        proved : ndarray of bool, shape (m,), optional
-            Triangles of which no two intersect; none by default.
+        suspects : ndarray of int64, shape (k,), optional
+            Triangles that may intersect others; all by default.
 
         Returns
         -------
@@ -63,13 +66,21 @@ class Finished:
             All triangles and vertices of the mesh.
         """
         count = len(mesh.triangles)
-        known = np.zeros(count, bool) if proved is None else proved
-        return cls(mesh, known, np.ones(count, bool), np.ones(len(mesh.vertices), bool))
+        return cls(
+            mesh, np.arange(count) if suspects is None else suspects, count, np.ones(len(mesh.vertices), bool)
+        )
 
-    @property
+    @cached_property
     def passed(self) -> Mesh:
-        """The finished triangles alone; open where neighbours belong to other pieces."""
-        return self.mesh if self.done.all() else self.mesh.selected(self.done)
+        """The finished triangles, among vertices of others too; open where their neighbours are."""
+        mesh = self.mesh
+        return mesh if self.done == len(mesh.triangles) else Mesh(mesh.vertices, mesh.triangles[: self.done])
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """The counted vertices, float64 [k, 3]."""
+        vertices = self.mesh.vertices
+        return vertices if self.counted.all() else vertices[self.counted]
 
 
 class Window:
@@ -78,26 +89,45 @@ class Window:
     Parameters
     ----------
     voxel : float
-        Voxel, mm.
+        Voxel, in the units of the pieces.
+    planes : ndarray of float64, shape (k, 3), optional
+        Placed planes of the grid that the pieces were contoured on.
+    frame : Frame, optional
+        Placement; none by default.
     threads : int, optional
         Threads; 0 for all cores.
     """
 
-    def __init__(self, voxel: float, threads: int = 0) -> None:
-        self._voxel, self._threads = voxel, threads
-        self._waiting, self._holds, self._end = NOTHING, np.zeros(0, bool), -np.inf
+    def __init__(
+        self,
+        voxel: float,
+        planes: NDArray[np.float64] = NO_PLANES,
+        frame: Frame = UNMOVED,
+        threads: int = 0,
+    ) -> None:
+        self._voxel, self._planes, self._frame, self._threads = voxel, planes, frame, threads
+        self._waiting, self._end = NOTHING, -np.inf
+        self._fresh = self._edited = NO_EDITS[0]
 
-    def add(self, piece: Mesh, end: float, known: Certificate | None = None) -> Finished:
+    def add(
+        self,
+        piece: Mesh,
+        end: float,
+        keep: NDArray[np.bool_] | None = None,
+        fresh: NDArray[np.int64] = NO_EDITS[0],
+    ) -> Finished:
         """Add a piece.
 
         Parameters
         ----------
         piece : Mesh
-            The piece, mm.
+            The piece.
         end : float
             x at which it ends; infinite for the last one.
-        known : Certificate, optional
-            Certificate of the piece. All pieces have the same grid.
+        keep : ndarray of bool, shape (n,), optional
+            Vertices of the connected components that stay; all by default.
+        fresh : ndarray of int64, shape (k,), optional
+            Triangles that were not made by contouring, ascending.
 
         Returns
         -------
@@ -105,20 +135,35 @@ class Window:
             Triangles that are finished with this piece.
         """
         before, self._end, voxel = self._end, end, self._voxel
-        known, whole = known or Certificate.none(len(piece.triangles)), piece
-        if len(self._waiting.triangles):
-            whole = joined(self._waiting, piece, before, voxel / 2)
-            known = replace(known, holds=np.concatenate([self._holds, known.holds]))
-        low, high = before - MENDS * voxel, end - MENDS * voxel
-        final, proved, whole, known = cleaned(whole, known, low, high, self._threads)
+        keep, waiting, whole = (
+            np.ones(len(piece.vertices), bool) if keep is None else keep,
+            self._waiting,
+            piece,
+        )
+        if len(waiting.triangles):
+            whole, number = seamed(waiting, piece, before, voxel / 2)
+            keep = np.concatenate([keep, np.ones(len(waiting.vertices), bool)])
+            keep &= number == np.arange(len(number))
+            fresh = np.concatenate([self._fresh, fresh + len(waiting.triangles)])
+        between = before - MENDS * voxel, end - MENDS * voxel
+        final, suspects, edits = cleaned(
+            whole, keep, fresh, self._edited, self._planes, self._frame, between, self._threads
+        )
         if -before == end == np.inf:
-            return Finished.whole(final, proved)
+            return Finished.whole(final, suspects)
+        low, high, wait = (
+            self._frame[0] * x + self._frame[1][0]
+            for x in (before - COUNTS * voxel, end - COUNTS * voxel, end - WAITS * voxel)
+        )
         x = final.vertices[:, 0]
-        waits = x[final.triangles].max(axis=1, initial=-np.inf) >= end - WAITS * voxel
-        done = np.logical_not(np.logical_or.accumulate(waits))
-        counted = (x >= before - COUNTS * voxel) & (x < end - COUNTS * voxel)
-        self._waiting, self._holds = whole.selected(~done), known.holds[~done]
-        return Finished(final, proved, done, counted)
+        waits = touching(final.triangles, x >= wait, self._threads)
+        done = int(waits[0]) if len(waits) else len(final.triangles)
+        triangles = whole.triangles.copy()
+        triangles[edits[0]] = edits[1]
+        rest = np.flatnonzero(keep[triangles[:, 0]] & (triangles[:, 0] >= 0))[done:]
+        self._waiting = Mesh(whole.vertices, triangles[rest]).compact()
+        self._fresh, self._edited = (np.flatnonzero(np.isin(rest, some)) for some in (fresh, edits[0]))
+        return Finished(final, suspects, done, (x >= low) & (x < high))
 
 
 @dataclass
@@ -153,26 +198,28 @@ class Tally:
         from .topology import edge_ends
 
         mesh, passed = piece.mesh, piece.passed
-        a, b, c = mesh.triangles.T
-        distinct = (a != b) & (b != c) & (c != a)
-        ends = edge_ends(mesh.triangles if distinct.all() else mesh.triangles[distinct], piece.counted)
-        searched = ~piece.proved
-        crossing = self_intersecting_triangles(mesh, threads=self.threads, among=searched) & piece.done
+        ends = edge_ends(mesh.triangles, piece.counted, self.threads)
+        crossing = np.empty(0, np.int64)
+        if len(piece.suspects):
+            among = np.zeros(len(mesh.triangles), bool)
+            among[piece.suspects] = True
+            found = self_intersecting_triangles(mesh, threads=self.threads, among=among)
+            crossing = np.flatnonzero(found[: piece.done])
         area, volume, flat = passed.measures_from((0.0, 0.0, 0.0), self.threads)
         self.triangles += len(passed.triangles)
-        self.vertices += int(piece.counted.sum())
+        self.vertices += len(piece.points)
         self.open_edges += ends.open_edges
         self.nonmanifold_edges += ends.non_manifold_edges
         self.misoriented_edges += ends.misoriented_edges
         self.nonmanifold_vertices += ends.non_manifold_vertices
-        self.self_intersections += int(crossing.sum())
-        self.searched_triangles += int((searched & piece.done).sum())
+        self.self_intersections += len(crossing)
+        self.searched_triangles += int(np.searchsorted(piece.suspects, piece.done))
         self.degenerate_triangles += flat
         self.duplicate_triangles += duplicates(mesh.triangles[crossing])
         self.volume += volume
         self.area += area
-        if len(passed.vertices):
-            low, high = passed.bounds
+        if len(piece.points):
+            low, high = bounds(piece.points, self.threads)
             self.low = tuple(np.minimum(self.low, low).tolist())
             self.high = tuple(np.maximum(self.high, high).tolist())
 

@@ -2,7 +2,6 @@
 #include <nanobind/nanobind.h>
 
 namespace fracslice::volume {
-void bind_grid(nanobind::module_& module);
 void bind_signs(nanobind::module_& module);
 }  // namespace fracslice::volume
 
@@ -13,7 +12,6 @@ void bind_reduction(nanobind::module_& module);
 }  // namespace fracslice::mesh
 
 NB_MODULE(_native, module) {
-    fracslice::volume::bind_grid(module);
     fracslice::volume::bind_signs(module);
     fracslice::mesh::bind_contour(module);
     fracslice::mesh::bind_mesh(module);

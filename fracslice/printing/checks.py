@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from ..errors import SceneError
 from ..formulas import Box
-from ..formulas.parameters import Number, validate
+from ..formulas.box import Triple
 from ..kernel import Field
-from ..scene.lengths import Length
 from ..volume import Bricks
 from ..work import Work
 from .components import components_of
 from .connectivity import resolved, shown
 from .faces import projected
+from .limits import Limits
+from .problems import Problem, counted
 from .samples import Samples
 from .thin_features import thin_features
 from .walls import Walls, walls
@@ -34,53 +33,16 @@ ACROSS = 4
 
 UP = (0.0, 0.0, 1.0)
 
+PARALLEL = -0.94
+"""Maximum cosine between the normals of the faces of a wall that is too thin: a wedge of more than 20 degrees
+is a sharp edge.
+"""
 
-@dataclass(frozen=True)
-class Limits:
-    """Limits of the checks. Lengths are numbers of mm, or text such as "0.4mm".
+THICKEN = 1 / 250
+"""Least thickness that can be restored, as a fraction of the longest side."""
 
-    Attributes
-    ----------
-    speck : float
-        Components with less area in every layer (mm^2), or less volume (mm^3), are counted as specks but are
-        not a problem.
-    cup : float
-        Minimum area of a suction cup or a resin trap, mm^2.
-    deep : float
-        Minimum height of a suction cup, mm; every hole in the first layers is a shallow one.
-    wall : float
-        Thinnest allowed wall, mm; layers are judged by their thinnest hundredth.
-    floor : float
-        Thinnest allowed floor or roof along z, mm.
-    thin : float
-        Minimum area of thin walls, or thin floors, that is a problem, mm^2.
-    density : float
-        Density of the resin, g/cm^3.
-
-    Raises
-    ------
-    SceneError
-        For an invalid value.
-    """
-
-    speck: float = 0.02
-    cup: float = 1.0
-    deep: float = 0.5
-    wall: float = 0.1
-    floor: float = 0.1
-    thin: float = 1.0
-    density: float = 1.1
-
-    def __post_init__(self) -> None:
-        validate(self, _KINDS, SceneError)
-
-
-_KINDS = {
-    **dict.fromkeys(("speck", "cup", "thin"), Number(0.0, "an area", least=0)),
-    "deep": Length(0.5, "a height", zero=True),
-    **dict.fromkeys(("wall", "floor"), Length(0.1, "a thickness", zero=True)),
-    "density": Number(1.1, "of the resin", above=0),
-}
+BRIDGE, FILL = (("bridge", "1mm"),), (("cavities", "fill"),)
+"""Print settings that join bodies and fill cavities."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +61,8 @@ class SolidReport:
         Surface below the limits, mm^2.
     unseen : str
         Walls that a mesh or layers may lose; empty if there are none.
-    problems : list of str
-        One line for each problem.
+    problems : list of Problem
+        The problems.
     """
 
     voxel: float
@@ -112,12 +74,12 @@ class SolidReport:
     thin_walls: float
     thin_floors: float
     unseen: str
-    problems: list[str]
+    problems: list[Problem]
 
     @property
-    def thin(self) -> list[str]:
+    def thin(self) -> list[Problem]:
         """Problems that neither a mesh nor layers reveal: thin walls and floors."""
-        return self.problems[int(len(self.bodies) > 1) + int(bool(self.cavities)) :]
+        return [problem for problem in self.problems if problem.kind in ("walls", "floors")]
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain JSON types.
@@ -137,6 +99,7 @@ def check_object(
     limits: Limits | None = None,
     work: Work | None = None,
     finest: float | None = None,
+    origin: Triple | None = None,
 ) -> SolidReport:
     """Check an object given by its field.
 
@@ -154,6 +117,8 @@ def check_object(
         Threads, progress and cancellation.
     finest : float, optional
         Width in mm below which a mesh or layers may lose walls; the sample spacing if not given.
+    origin : three floats, optional
+        Point from which places are measured, scene units; by default the middle of the samples' lower face.
 
     Returns
     -------
@@ -172,7 +137,7 @@ def check_object(
     wanted = ACROSS * longest * scale / max(min(limits.wall, limits.floor), 1e-6)
     samples = min(max(wanted, COARSE), FINE)
     bricks = shown(root, outer, longest, samples, work)
-    return check_solid(root, bricks, scale, limits, work, finest)
+    return check_solid(root, bricks, scale, limits, work, finest, origin)
 
 
 def check_solid(
@@ -182,6 +147,7 @@ def check_solid(
     limits: Limits | None = None,
     work: Work | None = None,
     finest: float | None = None,
+    origin: Triple | None = None,
 ) -> SolidReport:
     """Check a sampled solid: bodies, sealed cavities, thin walls and thin floors.
 
@@ -199,6 +165,8 @@ def check_solid(
         Threads, progress and cancellation.
     finest : float, optional
         Width in mm below which a mesh or layers may lose walls; the sample spacing if not given.
+    origin : three floats, optional
+        Point from which places are measured, scene units; by default the middle of the samples' lower face.
 
     Returns
     -------
@@ -225,8 +193,7 @@ def check_solid(
     thick = thin.beside(seen(), most)
     between = tight.beside(seen(gaps=True), most)
     floors = thin.beside(seen(direction=UP), most, UP)
-    bare = _under(floors, limits.floor, scale)
-    narrow = _under(thick, limits.wall, scale)
+    bare, narrow = _under(floors, limits.floor, scale), _under(thick, limits.wall, scale)
     speck = max(limits.speck, SPECK * (bricks.voxel * scale) ** 3) / scale**3
     found = _volumes(bricks, speck)
     missed = thin.walls + tight.walls
@@ -234,16 +201,20 @@ def check_solid(
     if fine is not bricks:
         found = _volumes(fine, speck)
     bodies, cavities = ([v * scale**3 for v in volumes] for volumes in found)
+    middle = np.array(origin or (*Samples(bricks).bounds.box.centre[:2], bricks.origin[2]))
     problems = []
     if len(bodies) > 1:
-        problems.append(f"{len(bodies)} loose bodies")
+        problems.append(loose(len(bodies)))
     if cavities:
         sealed = counted(cavities, "sealed cavity", "sealed cavities")
-        problems.append(f"{sealed} of {sum(cavities):.3g} mm3")
-    if narrow >= limits.thin:
-        problems.append(f"{narrow:.3g} mm2 of walls are thinner than {limits.wall:g} mm")
-    if bare >= limits.thin:
-        problems.append(f"{bare:.3g} mm2 of floors are thinner than {limits.floor:g} mm")
+        problems.append(Problem("cavities", f"{sealed} of {sum(cavities):.3g} mm3", mend=FILL))
+    for kind, under, limit in (("walls", narrow, limits.wall), ("floors", bare, limits.floor)):
+        if (area := float(under.area.sum()) * scale**2) >= limits.thin:
+            text = f"{area:.3g} mm2 of {kind} are thinner than {limit:g} mm"
+            x, y, z = (scale * (under.middle[under.width.argmin()] - middle)).tolist()
+            thickness = max(limit, THICKEN * scale * max(Samples(bricks).bounds.box.size))
+            mend = (("thickness", f"{thickness:.2g}mm"),)
+            problems.append(Problem(kind, text, at=(x, y, z), mend=mend))
     unseen = _unseen(thick, finest or bricks.voxel * scale, limits.thin, scale)
     return SolidReport(
         voxel=bricks.voxel * scale,
@@ -252,8 +223,8 @@ def check_solid(
         walls=_widths(thick, scale),
         gaps=_widths(between, scale),
         floors=_widths(floors, scale),
-        thin_walls=narrow,
-        thin_floors=bare,
+        thin_walls=float(narrow.area.sum()) * scale**2,
+        thin_floors=float(bare.area.sum()) * scale**2,
         unseen=unseen,
         problems=problems,
     )
@@ -281,24 +252,6 @@ def _unseen(found: Walls, finest: float, least: float, scale: float) -> str:
     )
 
 
-def counted(things: Sequence[object], one: str, more: str = "") -> str:
-    """Count with its noun: "1 suction cup", "2 suction cups".
-
-    Parameters
-    ----------
-    things : sequence
-        Things to count.
-    one, more : str
-        Singular and plural; the plural is the singular and an s if not given.
-
-    Returns
-    -------
-    str
-        The number and the noun.
-    """
-    return f"{len(things)} {one if len(things) == 1 else more or one + 's'}"
-
-
 def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
     """Volumes of bodies and of cavities of at least `speck`, the largest first, cubed scene units."""
     components = components_of(bricks)
@@ -309,6 +262,24 @@ def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
     return bodies, cavities
 
 
-def _under(found: Walls, limit: float, scale: float) -> float:
-    """Surface thinner than `limit` mm by more than a hundredth of it, mm^2."""
-    return float(np.sum(found.area[found.width * scale < 0.99 * limit]) * scale**2)
+def _under(found: Walls, limit: float, scale: float) -> Walls:
+    """Walls thinner than `limit` mm by more than a hundredth of it, the rims of wedges excepted."""
+    return found.chosen((found.width * scale < 0.99 * limit) & (found.facing < PARALLEL))
+
+
+def loose(count: int, **where: Any) -> Problem:
+    """Problem of several bodies.
+
+    Parameters
+    ----------
+    count : int
+        Number of bodies.
+    **where
+        Fields of `Problem`.
+
+    Returns
+    -------
+    Problem
+        The problem.
+    """
+    return Problem("bodies", f"{count} loose bodies", mend=BRIDGE, advice="--keep largest", **where)

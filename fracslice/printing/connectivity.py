@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import VolumeError
 from ..formulas import Box
-from ..kernel import Field
+from ..kernel import Field, Kernel
 from ..volume import Bricks, Lattice, sample
 from ..volume.lattice import BRICK
 from ..work import Work
@@ -18,7 +18,9 @@ FINEST = 768
 """Maximum number of samples along the longest side in the search for a surface."""
 
 MOST = 150_000
-"""Approximate maximum number of bricks in samples that resolve connectivity."""
+"""Approximate maximum number of bricks in samples that resolve connectivity, for a field whose batches are of
+the usual size; fewer if its values take longer.
+"""
 
 AGAIN = 3.0
 """Refinement factor for fractals that appear disconnected."""
@@ -102,20 +104,20 @@ def resolved(
         if thin is None:
             walls, gaps = thin_features(root, Samples(bricks), work)
             thin = walls.walls + gaps.walls
-        times = _times(bricks, thin, least)
+        times = _times(bricks, thin, least, MOST * root.kernel().batch / Kernel.batch)
     if times <= 1:
         return bricks
     lattice = Lattice.around(Samples(bricks).bounds.box, bricks.voxel / times)
     return sample(root.kernel(), root.bounds, lattice, work)
 
 
-def _times(bricks: Bricks, thin: Walls, least: float) -> float:
-    """Refinement factor for these walls and gaps, limited by `MOST`; 1 if fewer than `least` are thin."""
+def _times(bricks: Bricks, thin: Walls, least: float, most: float) -> float:
+    """Refinement factor for these walls and gaps, up to `most` bricks; 1 if fewer than `least` are thin."""
     voxel = bricks.voxel
     if thin.chosen(thin.width < 2 * voxel).area.sum() < least:
         return 1.0
     count = max(len(bricks), float(thin.area.sum()) / (BRICK * voxel) ** 2)
-    return float(min(2 * voxel / _thinnest(thin), (MOST / count) ** 0.5))
+    return float(min(2 * voxel / _thinnest(thin), (most / count) ** 0.5))
 
 
 def _thinnest(found: Walls) -> float:

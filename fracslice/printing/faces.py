@@ -55,7 +55,7 @@ def projected(root: Field, found: Walls, voxel: float, work: Work) -> Walls:
         ends.append(points + np.clip(shift, -AWAY * voxel, AWAY * voxel) * directions)
         normals.append(normal)
     across = [np.abs((normal * directions).sum(0)) > -OPPOSITE for normal in normals]
-    away = (normals[0] * normals[1]).sum(0) < OPPOSITE
+    facing = (normals[0] * normals[1]).sum(0)
     width = ((ends[1] - ends[0]) * directions).sum(0)
-    stays = np.where(across[0] & across[1], away, across[0] | across[1]) & (width > 0)
-    return Walls(ends[0].T, ends[1].T, width, found.area).chosen(stays)
+    stays = np.where(across[0] & across[1], facing < OPPOSITE, across[0] | across[1]) & (width > 0)
+    return Walls(ends[0].T, ends[1].T, width, found.area, facing).chosen(stays)

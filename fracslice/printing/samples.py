@@ -198,28 +198,28 @@ def _brick_bounds(bricks: Bricks) -> np.ndarray:
 @compiled
 def _interpolate(xs, ys, zs, grid, out):  # type: ignore[no-untyped-def]
     """Write the values at points."""
-    x0, y0, z0, voxel = grid.x0, grid.y0, grid.z0, grid.voxel
+    x0, y0, z0, voxel, _, index, values, bounds = grid
     for n in range(len(xs)):
-        out[n] = between((xs[n] - x0) / voxel, (ys[n] - y0) / voxel, (zs[n] - z0) / voxel, grid)
+        u, v, w = (xs[n] - x0) / voxel, (ys[n] - y0) / voxel, (zs[n] - z0) / voxel
+        out[n] = between(u, v, w, voxel, index, bounds, values)
 
 
 @compiled
-def between(u, v, w, grid):  # type: ignore[no-untyped-def]
+def between(u, v, w, voxel, index, bounds, values):  # type: ignore[no-untyped-def]
     """Value at a point in voxels from the origin of the grid.
 
     Parameters
     ----------
     u, v, w : float
         The point, voxels.
-    grid : Grid
-        The samples.
+    voxel, index, bounds, values
+        As of `Grid`; one by one, as a record in an inner loop costs three times the interpolation.
 
     Returns
     -------
     float
         The interpolated value, or a bound, scene units.
     """
-    index, values, bounds = grid.row, grid.values, grid.bounds
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
     u, v, w = u - i, v - j, w - k
     p, q, r = i & 7, j & 7, k & 7
@@ -227,7 +227,7 @@ def between(u, v, w, grid):  # type: ignore[no-untyped-def]
     nx, ny, nz = index.shape
     within = 0 <= bi < nx and 0 <= bj < ny and 0 <= bk < nz
     row = index[bi, bj, bk] if within else 0
-    if row < 0 and (max(p, q, r) < 7 or abs(bounds[bi, bj, bk]) > BRICK / 2 * grid.voxel):
+    if row < 0 and (max(p, q, r) < 7 or abs(bounds[bi, bj, bk]) > BRICK / 2 * voxel):
         return float(bounds[bi, bj, bk])
     if within and max(p, q, r) < 7:
         f, s = values[row], 64 * p + 8 * q + r
@@ -238,18 +238,18 @@ def between(u, v, w, grid):  # type: ignore[no-untyped-def]
     for corner in range(8):
         a, b, c = corner >> 2, (corner >> 1) & 1, corner & 1
         share = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w)
-        total += share * sample_at(grid, i + a, j + b, k + c)
+        total += share * sample_at(index, bounds, values, voxel, i + a, j + b, k + c)
     return total
 
 
 @compiled
-def sample_at(grid, i, j, k):  # type: ignore[no-untyped-def]
+def sample_at(index, bounds, values, voxel, i, j, k):  # type: ignore[no-untyped-def]
     """Sample at a grid point, or a bound if it has none.
 
     Parameters
     ----------
-    grid : Grid
-        The samples.
+    index, bounds, values, voxel
+        As of `Grid`.
     i, j, k : int
         Grid index, which may lie beyond the bricks.
 
@@ -259,14 +259,14 @@ def sample_at(grid, i, j, k):  # type: ignore[no-untyped-def]
         The sample; beyond the bricks, a bound from the distance to them.
     """
     bi, bj, bk = i >> 3, j >> 3, k >> 3
-    nx, ny, nz = grid.row.shape
+    nx, ny, nz = index.shape
     if min(bi, bj, bk) < 0 or bi >= nx or bj >= ny or bk >= nz:
         beyond = max(max(-i, i - 8 * nx + 1), max(max(-j, j - 8 * ny + 1), max(-k, k - 8 * nz + 1)))
-        return grid.voxel * (NEAR + beyond - 1)
-    row = grid.row[bi, bj, bk]
+        return voxel * (NEAR + beyond - 1)
+    row = index[bi, bj, bk]
     if row < 0:
-        return float(grid.bounds[bi, bj, bk])
-    return float(grid.values[row, (i & 7) * 64 + (j & 7) * 8 + (k & 7)])
+        return float(bounds[bi, bj, bk])
+    return float(values[row, (i & 7) * 64 + (j & 7) * 8 + (k & 7)])
 
 
 @compiled
@@ -321,41 +321,39 @@ def _beside(grid, found):  # type: ignore[no-untyped-def]
 @compiled
 def _free(start, directions, far, grid, beside, out):  # type: ignore[no-untyped-def]
     """Write `Samples.free`."""
-    x0, y0, z0, voxel = grid.x0, grid.y0, grid.z0, grid.voxel
+    x0, y0, z0, voxel, _, index, values, bounds = grid
     for n in range(len(far)):
         x, y, z = (start[n, 0] - x0) / voxel, (start[n, 1] - y0) / voxel, (start[n, 2] - z0) / voxel
         s = 0.0
         while s < far[n] / voxel:
             u, v, w = x + s * directions[n, 0], y + s * directions[n, 1], z + s * directions[n, 2]
-            if is_beside(u, v, w, grid, beside) and _is_mixed(u, v, w, grid):
+            if is_beside(u, v, w, index, beside) and _is_mixed(u, v, w, voxel, index, bounds, values):
                 break
             s += STRIDE
         out[n] = min(voxel * s, far[n])
 
 
 @compiled
-def _is_mixed(u, v, w, grid):  # type: ignore[no-untyped-def]
+def _is_mixed(u, v, w, voxel, index, bounds, values):  # type: ignore[no-untyped-def]
     """True if the cell around a point, in voxels from the origin, has corners on both sides."""
     i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
     inside = 0
     for corner in range(8):
         at = i + (corner >> 2), j + ((corner >> 1) & 1), k + (corner & 1)
-        inside += sample_at(grid, *at) < 0
+        inside += sample_at(index, bounds, values, voxel, *at) < 0
     return 0 < inside < 8
 
 
 @compiled
-def is_beside(u, v, w, grid, beside):  # type: ignore[no-untyped-def]
+def is_beside(u, v, w, index, beside):  # type: ignore[no-untyped-def]
     """True if the nearest sample of a point is `Samples.beside`.
 
     Parameters
     ----------
     u, v, w : float
         The point, voxels from the origin of the grid.
-    grid : Grid
-        The samples.
-    beside : bool [n, 512]
-        As of `Samples`.
+    index, beside
+        As of `Bricks` and `Samples`.
 
     Returns
     -------
@@ -363,9 +361,9 @@ def is_beside(u, v, w, grid, beside):  # type: ignore[no-untyped-def]
         False if the point has no sample.
     """
     i, j, k = int(np.floor(u + 0.5)), int(np.floor(v + 0.5)), int(np.floor(w + 0.5))
-    nx, ny, nz = grid.row.shape
+    nx, ny, nz = index.shape
     x, y, z = i >> 3, j >> 3, k >> 3
-    row = grid.row[x, y, z] if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz else -1
+    row = index[x, y, z] if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz else -1
     return row >= 0 and beside[row, ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)]
 
 

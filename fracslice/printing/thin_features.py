@@ -268,7 +268,7 @@ class _Look:
             some = rays.chosen(part)
             ends = [some.points(s) for s in (some.enter, some.leave)]
             facing = (self.normals(ends[0]) * self.normals(ends[1])).sum(0)
-            found = Walls(ends[0].T, ends[1].T, some.leave - some.enter, some.area)
+            found = Walls(ends[0].T, ends[1].T, some.leave - some.enter, some.area, facing)
             return found.chosen(facing < OPPOSITE)
 
         return gathered(look, len(rays.start), RAYS, self.work)

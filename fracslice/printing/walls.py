@@ -10,7 +10,7 @@ Rüegsegger 1997), and a plate is as thick at its rim as in its middle. This is 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -53,12 +53,15 @@ class Walls(Rows):
         Distance between them.
     area : float64 [n]
         Surface that each represents.
+    facing : float64 [n]
+        Cosine between the normals of the faces: -1 where they are parallel.
     """
 
     start: np.ndarray
     end: np.ndarray
     width: np.ndarray
     area: np.ndarray
+    facing: np.ndarray
 
     @property
     def middle(self) -> np.ndarray:
@@ -74,7 +77,7 @@ class Walls(Rows):
         Walls
             No walls.
         """
-        return cls(*np.empty((2, 0, 3)), *np.empty((2, 0)))
+        return cls(*np.empty((2, 0, 3)), *np.empty((3, 0)))
 
     def along(self, direction: Direction) -> Walls:
         """Walls whose faces look along a direction or against it, measured along it.
@@ -93,7 +96,7 @@ class Walls(Rows):
         share = (span * direction).sum(1) / np.linalg.norm(span, axis=1)
         width = self.width / np.maximum(np.abs(share), 1e-9)
         end = self.start + np.copysign(width, share)[:, None] * np.array(direction)
-        return Walls(self.start, end, width, self.area).chosen(np.abs(share) > -OPPOSITE)
+        return replace(self, end=end, width=width).chosen(np.abs(share) > -OPPOSITE)
 
 
 def walls(
@@ -144,8 +147,9 @@ def walls(
         thin = (width < limit) & (np.abs((normals * directions).sum(1)) > -OPPOSITE)
         ends = points + width[:, None] * directions
         opposite = slopes(exact, ends[thin].T, solid.bricks.voxel / 2, work)[1].T
-        thin[thin] = (opposite * normals[thin]).sum(1) < OPPOSITE
-        return Walls(points, ends, width, area).chosen(thin)
+        facing = np.ones(len(points))
+        facing[thin] = (opposite * normals[thin]).sum(1)
+        return Walls(points, ends, width, area, facing).chosen(facing < OPPOSITE)
 
     return gathered(look, len(solid.bricks), AT_ONCE, work)
 
@@ -290,7 +294,7 @@ def _across(f, at, axis, share, normal):  # type: ignore[no-untyped-def]
 @compiled
 def _through(points, directions, limit, towards, grid, beside, width):  # type: ignore[no-untyped-def]
     """Write the distance along each ray to the opposite surface; twice the limit if it is farther."""
-    x0, y0, z0, voxel = grid.x0, grid.y0, grid.z0, grid.voxel
+    x0, y0, z0, voxel, _, index, values, bounds = grid
     for n in range(len(points)):
         x, y, z = (points[n, 0] - x0) / voxel, (points[n, 1] - y0) / voxel, (points[n, 2] - z0) / voxel
         s, before = FIRST, 0.0
@@ -298,8 +302,8 @@ def _through(points, directions, limit, towards, grid, beside, width):  # type: 
         while s < limit / voxel + 1:
             u, v, w = x + s * directions[n, 0], y + s * directions[n, 1], z + s * directions[n, 2]
             f = -1.0
-            if is_beside(u, v, w, grid, beside):
-                f = towards * between(u, v, w, grid)
+            if is_beside(u, v, w, index, beside):
+                f = towards * between(u, v, w, voxel, index, bounds, values)
             if f >= 0:
                 width[n] = voxel * (s - (STRIDE * f / (f - before) if before < 0 else 0.0))
                 break

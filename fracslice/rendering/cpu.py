@@ -13,7 +13,7 @@ from ..work import Work, chunks
 from .accumulator import Plan
 from .linking import Frame
 from .packets import Lane, loops, workspace
-from .sequence import points
+from .sequence import Samples
 
 TILE = 2048
 """Maximum rays per tile; their workspace stays in the cache."""
@@ -45,7 +45,7 @@ class CpuTracer:
         functions = load_functions(frame.linked, bits, self.lanes, loops(frame))
         self._tile, self._cones = functions["tile"], functions.get("cones")
         self._own = threading.local()
-        self._points = np.empty((0, frame.samples), np.int32)
+        self.samples, self._points = Samples(), np.empty((0, frame.samples), np.int32)
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
@@ -95,7 +95,7 @@ class CpuTracer:
             Threads and cancellation.
         """
         if len(self._points) < plan.last:
-            self._points = points(2 * plan.last, self.frame.samples)
+            self._points = self.samples.points(2 * plan.last, self.frame.samples)
 
         def task(part: slice) -> None:
             pixels = plan.pixels[part].copy()

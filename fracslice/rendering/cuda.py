@@ -13,7 +13,7 @@ from .accumulator import Plan
 from .cpu import BLOCK, STEPS
 from .cuda_loops import loops
 from .linking import Frame
-from .sequence import points
+from .sequence import Samples
 
 
 class CudaTracer:
@@ -39,7 +39,7 @@ class CudaTracer:
         self.dtype, self.width, self.height = dtype, width, height
         self._precision: Precision = "float32" if dtype == np.float32 else "float64"
         self._loops = load_loops(frame.linked, self._precision, loops(frame))
-        self._points = np.empty((0, frame.samples), np.int32)
+        self.samples, self._points = Samples(), np.empty((0, frame.samples), np.int32)
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
@@ -87,7 +87,8 @@ class CudaTracer:
             If the work was cancelled.
         """
         if len(self._points) < plan.last:
-            self._points = self._cuda.to_device(points(2 * plan.last, self.frame.samples))
+            drawn = self.samples.points(2 * plan.last, self.frame.samples)
+            self._points = self._cuda.to_device(drawn)
         film = (plan.pixels, sums, self.width, self.dtype.type(STEPS), self.blocks)
         for _ in range((plan.last + 1) // 2):  # a goal is at most twice a count
             work.check()

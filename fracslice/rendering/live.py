@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,62 +15,20 @@ from ..scene.model import Scene
 from ..scene.reader import read
 from ..scene.view import Camera
 from ..work import Work
+from .draft import Follower, drafted
 from .progressive import Pass, Renderer
-from .setup import clearance
+from .steering import CameraInput
 
-WITHIN = 0.03
-"""Time budget of the first pass after a camera move, seconds."""
-AGAIN = 0.2
+WITHIN = 0.05
+"""Aim for the time of a draft, seconds."""
+COARSEST = 8
+"""Largest spacing of a draft's pixels."""
+READABLE = 4
+"""Samples per pixel from which the final picture replaces the draft: fewer are noisier."""
+POLL = 0.2
 """Interval between checks of the file, seconds."""
-NEARER = 2.0
-"""Ratio of surface distances, in either direction, at which depth and precision are chosen again."""
-BOLD = 0.5
-"""Maximum fraction of the distance to the surface per step."""
-
-
-@dataclass(frozen=True)
-class CameraInput:
-    """Steering input of the camera.
-
-    Attributes
-    ----------
-    forward, right, up : float
-        Direction of flight, -1 to 1 each.
-    pace : float
-        Speed, in distances to the surface per second.
-    """
-
-    forward: float = 0.0
-    right: float = 0.0
-    up: float = 0.0
-    pace: float = 1.0
-
-    def flown(self, camera: Camera, room: float, seconds: float) -> Camera:
-        """Move a camera for some time.
-
-        Speed is proportional to the distance of the surface, so the camera never reaches it.
-
-        Parameters
-        ----------
-        camera : Camera
-            Camera to move.
-        room : float
-            Distance to the surface, scene units.
-        seconds : float
-            Duration of the flight.
-
-        Returns
-        -------
-        Camera
-            The moved camera.
-        """
-        way = room * min(self.pace * seconds, BOLD) / max(1.0, math.hypot(self.forward, self.right, self.up))
-        return camera.moved(way * self.forward, way * self.right, way * self.up)
-
-    @property
-    def idle(self) -> bool:
-        """True if the camera does not move."""
-        return self.forward == self.right == self.up == 0
+LONGEST = 0.1
+"""Longest step of a flight, seconds: the camera rests while a kernel is compiled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,35 +38,29 @@ class Shown:
     Attributes
     ----------
     pixels : ndarray of uint8, shape (height, width, 3)
-        sRGB.
-    done : Pass
-        Last pass of the picture.
+        sRGB; a draft has fewer pixels than the window.
+    samples : float
+        Mean samples per pixel; 0 for a draft.
     camera : Camera
         Camera of the picture.
-    room : float
+    distance : float
         Lower bound of the distance from the camera to the surface, scene units.
-    trouble : str
+    problem : str
         Error message of the file's current version, or "".
     """
 
     pixels: np.ndarray = field(repr=False)
-    done: Pass
+    samples: float
     camera: Camera
-    room: float
-    trouble: str = ""
-
-    @property
-    def caption(self) -> str:
-        """Samples per pixel, surface distance and the file's error message, as text."""
-        text = f"{self.done.samples:.1f} samples a pixel, surface at {self.room:.2g}"
-        return f"{text}\n{self.trouble}" if self.trouble else text
+    distance: float
+    problem: str = ""
 
 
 class Live:
     """Live picture of a scene file, which is read again whenever it is saved.
 
-    If a later version of the file is invalid, the picture stays and the message is in `shown.trouble`. Call
-    `close` at the end.
+    While the camera moves, the picture is a draft with hard lights; at rest, it sharpens. If a later version
+    of the file is invalid, the picture stays and the message is in `shown.problem`. Call `close` at the end.
 
     Parameters
     ----------
@@ -120,7 +71,7 @@ class Live:
     size : tuple of int
         Picture width and height, pixels.
     work : Work, optional
-        Threads and progress; it is copied with a cancellation event of its own.
+        Threads and progress; it is copied with cancellation events of its own.
     device : {"cpu", "cuda", "auto"}
         Device that traces the rays.
 
@@ -130,6 +81,10 @@ class Live:
         Camera of the first picture.
     shown : Shown
         Latest picture.
+    scene : Scene
+        Latest valid version of the scene.
+    making : float or None
+        Time at which the renderer under way was begun, by `time.monotonic`: it may need compilation.
 
     Raises
     ------
@@ -146,29 +101,33 @@ class Live:
         device: str = "auto",
     ) -> None:
         self._path, self._settings, self._size, self._device = Path(path), settings, size, device
-        self._work = replace(work or Work(), cancel=threading.Event())  # ends a pass, not the caller's work
-        self._saved = self._stamp()
-        self._scene = self._read()
-        self._renderer = self._made(self._scene.view.camera)
-        self.first = self.camera
+        self._refining = replace(work or Work(), cancel=threading.Event())
+        self._drafting = replace(self._refining, cancel=threading.Event())  # input must not stop a draft
         self._lock = threading.Lock()
-        self._camera_input, self._aim, self._trouble = CameraInput(), self.camera, ""
-        self._looked = self._stepped = time.monotonic()
-        self._pass()
+        self._camera_input, self._spacing = CameraInput(), COARSEST // 2
+        self._checked = self._stepped = time.monotonic()
+        self.making: float | None = None
+        self._aim: Camera
+        self._saved = self._stamp()
+        self._load(self._read(), None)
+        self.first = self.camera
         self._open = True
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name="fracslice live", daemon=True)
         self._thread.start()
 
+    def _read(self) -> Scene:
+        return read(self._path).with_values(self._settings)
+
     @property
     def camera(self) -> Camera:
         """Camera of the picture."""
-        return self._renderer.setup.camera
+        return self.shown.camera
 
     @property
-    def scene(self) -> Scene:
-        """Latest valid version of the scene."""
-        return self._scene
+    def running(self) -> bool:
+        """True while the render thread is alive."""
+        return self._thread.is_alive()
 
     def steer(self, camera_input: CameraInput) -> None:
         """Set the steering input.
@@ -178,9 +137,11 @@ class Live:
         camera_input : CameraInput
             Input that holds until the next call.
         """
-        with self._lock:
-            self._camera_input = camera_input
-        self._work.cancel.set()
+        if camera_input != self._camera_input:
+            self._flown()  # a key held for less than the time of a draft counts, too
+            with self._lock:
+                self._camera_input = camera_input
+            self._refining.cancel.set()
 
     def turn(self, yaw: float, pitch: float) -> None:
         """Turn the camera.
@@ -192,7 +153,7 @@ class Live:
         """
         with self._lock:
             self._aim = self._aim.turned(yaw, pitch)
-        self._work.cancel.set()
+        self._refining.cancel.set()
 
     def look(self, camera: Camera) -> None:
         """Move the camera to a new place.
@@ -204,17 +165,25 @@ class Live:
         """
         with self._lock:
             self._aim = camera
-        self._work.cancel.set()
+        self._refining.cancel.set()
 
-    @property
-    def running(self) -> bool:
-        """True while the render thread is alive."""
-        return self._thread.is_alive()
+    def resize(self, size: tuple[int, int]) -> None:
+        """Render at another size.
+
+        Parameters
+        ----------
+        size : tuple of int
+            Picture width and height, pixels.
+        """
+        if size != self._size:
+            self._size = size
+            self._refining.cancel.set()
 
     def close(self) -> None:
         """Stop rendering. Raises the exception that ended the render thread, if any."""
         self._open = False
-        self._work.cancel.set()
+        for work in (self._refining, self._drafting):
+            work.cancel.set()
         self._thread.join()
         if self._failure:
             raise self._failure
@@ -223,79 +192,97 @@ class Live:
         """Body of the render thread; it keeps the exception that ends it."""
         try:
             while self._open:
-                self._work.cancel.clear()
+                self._refining.cancel.clear()
                 self._step()
         except BaseException as error:
             self._failure = error
 
     def _step(self) -> None:
-        """Follow the file and the camera; otherwise add a pass, or wait if the picture is complete."""
+        """Follow the file and the camera; otherwise refine the picture, or wait if it is complete."""
         self._follow_file()
+        aim, size = self._flown(), self._size
         try:
-            if not self._moved() and not self._pass():
-                self._work.cancel.wait(AGAIN)
-        except Cancelled:
-            return
-
-    def _pass(self) -> bool:
-        """Add a pass; False if the picture is complete."""
-        done = next(self._renderer.passes(), None)
-        if done is None:
-            return False
-        self.shown = Shown(done.shown, done, self.camera, self._room(), self._trouble)
-        return True
-
-    def _moved(self) -> bool:
-        """Apply the camera input. If the camera has moved, show the picture from its new place."""
-        now = time.monotonic()
-        with self._lock:
-            if not self._camera_input.idle:
-                self._aim = self._camera_input.flown(self._aim, self._room(), now - self._stepped)
-            aim = self._aim
-        self._stepped = now
-        if aim == self.camera:
-            return False
-        try:
-            self._look(aim)
+            if aim != self.camera or size != self._drawn:
+                self._draft(self._drafts, aim, size)
+            elif not self._refine():
+                self._refining.cancel.wait(POLL)
         except SceneError:  # the eye is inside the solid
             with self._lock:
                 self._aim = self.camera
-            return False
-        return self._pass()
+            self._refining.cancel.wait(POLL)
+        except Cancelled:
+            return
 
-    def _look(self, camera: Camera) -> None:
-        """Restart the picture from a camera.
+    def _flown(self) -> Camera:
+        """The camera after the time since the last step."""
+        with self._lock:
+            now = time.monotonic()
+            seconds, self._stepped = min(now - self._stepped, LONGEST), now
+            self._aim = self._camera_input.flown(self._aim, self.shown.distance, seconds)
+            return self._aim
 
-        A new renderer is made if the distance to the surface has changed much.
-        """
-        what = self._renderer.setup
-        room = clearance(what.roots[-1], camera)
-        if self._settled / NEARER < room < self._settled * NEARER:
-            self._renderer.look(camera, WITHIN)
-        else:
-            self._renderer = self._made(camera)
+    def _draft(self, drafts: Follower, camera: Camera | None, size: tuple[int, int]) -> None:
+        """Show a draft, and choose the spacing of the next one by the time that it took."""
+        coarse = max(size[0] // self._spacing, 1), max(size[1] // self._spacing, 1)
+        renderer = self._made(drafts, camera and replace(camera, aperture=0.0), coarse)
+        start = time.monotonic()
+        *_, done = renderer.passes(1)
+        seconds = time.monotonic() - start
+        seen = camera or renderer.setup.camera
+        self.shown = Shown(done.shown, 0.0, seen, drafts.distance, self._problem)
+        self._drafts, self._drawn, self._passes = drafts, size, self._sharpened(self._spacing > 1)
+        if seconds > 1.5 * WITHIN:
+            self._spacing = min(self._spacing + 1, COARSEST)
+        elif seconds < WITHIN / 2:
+            self._spacing = max(self._spacing - 1, 1)
 
-    def _made(self, camera: Camera | None) -> Renderer:
-        """A new renderer of the current scene."""
-        view = replace(self._scene.view, camera=camera)
-        made = Renderer(self._scene.root, view, self._size, self._work, self._device)
-        self._settled = clearance(made.setup.roots[-1], made.setup.camera)
-        return made
+    def _refine(self) -> bool:
+        """Add a pass to the picture at rest; False if it is complete."""
+        try:
+            return next(self._passes, None) is not None
+        except Cancelled:  # ends a generator
+            self._passes = self._sharpened(False)
+            raise
 
-    def _room(self) -> float:
-        """Lower bound of the distance from the camera to the surface."""
-        return clearance(self._renderer.setup.roots[-1], self.camera)
+    def _sharpened(self, coarse: bool) -> Iterator[Pass]:
+        """Show a draft of every pixel after a coarse one, then the final picture once it has less noise."""
+        if coarse:
+            sharp = replace(self.camera, aperture=0.0)
+            for done in self._made(self._stills, sharp, self._drawn).passes(1):
+                yield done
+            self.shown = replace(self.shown, pixels=done.shown)
+        for done in self._made(self._finals, self.camera, self._drawn).passes():
+            if done.samples >= min(READABLE, done.film.samples):
+                self.shown = replace(self.shown, pixels=done.shown, samples=done.samples)
+            yield done
 
-    def _read(self) -> Scene:
-        return read(self._path).with_values(self._settings)
+    def _made(self, follower: Follower, camera: Camera | None, size: tuple[int, int]) -> Renderer:
+        """Renderer of a follower; `making` has the time at which it was begun."""
+        self.making = time.monotonic()
+        try:
+            return follower.follow(camera, size)
+        finally:
+            self.making = None
+
+    def _load(self, scene: Scene, camera: Camera | None) -> None:
+        """Show a scene from a camera, or from its own; if that fails, the former scene stays."""
+        hard, device = drafted(scene.view), self._device
+        drafts = Follower(scene.root, hard, self._drafting, device)
+        self._problem = ""
+        self._draft(drafts, camera or scene.view.camera, self._size)
+        self._stills = Follower(scene.root, hard, self._refining, device)
+        self._finals = Follower(scene.root, scene.view, self._refining, device)
+        self.scene = scene
+        with self._lock:
+            self._aim = self.camera
 
     def _stamp(self) -> tuple[int, int] | None:
         """Modification time and size of the file; None while it is being replaced."""
         try:
-            found = self._path.stat()
+            status = self._path.stat()
         except OSError:
             return None
-        return found.st_mtime_ns, found.st_size
+        return status.st_mtime_ns, status.st_size
 
     def _follow_file(self) -> None:
         """Load a new version of the file.
@@ -303,19 +290,15 @@ class Live:
         Its camera is used only if it differs from the previous version's.
         """
         now, saved = time.monotonic(), self._saved
-        if now - self._looked < AGAIN:
+        if now - self._checked < POLL:
             return
-        self._looked, self._saved = now, self._stamp() or saved
+        self._checked, self._saved = now, self._stamp() or saved
         if self._saved == saved:
             return
-        before = self._scene
         try:
-            self._scene = self._read()
-            moved = self._scene.view.camera != before.view.camera
-            self._renderer = self._made(self._scene.view.camera if moved else self.camera)
-            self._trouble = ""
+            scene = self._read()
+            moved = scene.view.camera != self.scene.view.camera
+            self._load(scene, None if moved else self._aim)
         except FracsliceError as error:
-            self._scene, self._trouble = before, str(error)
-        with self._lock:
-            self._aim = self.camera
-        self.shown = replace(self.shown, trouble=self._trouble)
+            self._problem = str(error)
+            self.shown = replace(self.shown, problem=self._problem)

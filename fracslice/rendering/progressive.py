@@ -22,6 +22,8 @@ from .accumulator import COARSE, Accumulator, HostAccumulator, Plan
 from .cpu import BLOCK, CpuTracer
 from .linking import Frame, link_frame
 from .optics import optics
+from .parts import PoolTracer
+from .sequence import Samples
 from .setup import prepare
 from .state import load_state, save_state
 
@@ -151,6 +153,8 @@ class Renderer:
         Threads, progress and cancellation.
     device : {"cpu", "cuda", "auto"}
         Device that traces the rays.
+    samples : Samples, optional
+        Part of the sample sequence; its begin, without a shift, by default.
 
     Raises
     ------
@@ -167,16 +171,20 @@ class Renderer:
         size: tuple[int, int] | None = None,
         work: Work | None = None,
         device: str = "auto",
+        samples: Samples | None = None,
     ) -> None:
         pixels = (view.film.width, view.film.height) if size is None else size
         self.width, self.height = validated("size", pixels, SIZE, RenderError)
         self.work = work or Work()
-        self.device = chosen(device)
+        self.device = chosen(device if self.work.cluster is None else "cpu")
         self.setup = prepare(root, view, (self.width, self.height))
         self.dtype = np.dtype(self.setup.precision)
         tracer, self._placed = _backend(self.device)
         self._frame = self._linked()
         self.tracer = tracer(self._frame, self.dtype, self.width, self.height)
+        self.tracer.samples = samples or self.tracer.samples
+        if self.work.cluster is not None:
+            self.tracer = PoolTracer(root, view, self.tracer)
         self.accumulator = self._placed(self._empty)
         self._prepared = False
         self._rate = 0.0
@@ -196,8 +204,9 @@ class Renderer:
         str
             Equal keys mean equal pictures after equal passes.
         """
-        linked = self._frame.linked
-        return key(program(), self.width, self.height, self.setup.precision, linked.source, linked.parameters)
+        linked, samples = self._frame.linked, self.tracer.samples
+        about = self.width, self.height, self.setup.precision, samples
+        return key(program(), *about, linked.source, linked.parameters)
 
     def look(self, camera: Camera, within: float | None = None) -> None:
         """Restart the picture from another camera; depths and precision are kept.
@@ -287,18 +296,26 @@ class Renderer:
 
     def _pass(self, plan: Plan) -> Pass:
         start = time.perf_counter()
-        self._prepare()
+        self.prepare(self.accumulator.passes > 0 or self.accumulator.coarse < BLOCK)
         self.tracer.add(self.accumulator.sums, plan, self.work)
         self.accumulator.passes += 1
         samples, error = self.accumulator.statistics()
         self._rate = plan.samples / (time.perf_counter() - start)
         return self._seen(samples, error, plan.samples, self._rate)
 
-    def _prepare(self) -> None:
-        """Run the cone prepass of the camera once a block holds several rays."""
-        if not self._prepared and (self.accumulator.passes > 0 or self.accumulator.coarse < BLOCK):
-            self.tracer.look_ahead(self.work)
-            self._prepared = True
+    def prepare(self, ahead: bool) -> None:
+        """Load the frame into the tracer.
+
+        Parameters
+        ----------
+        ahead : bool
+            True to run the cone prepass, which pays if a block holds several rays.
+        """
+        if ahead != self._prepared:
+            self.tracer.aim(self._frame)
+            if ahead:
+                self.tracer.look_ahead(self.work)
+            self._prepared = ahead
 
     def _linked(self) -> Frame:
         setup = self.setup

@@ -16,6 +16,7 @@ with the constants of Vegdahl 2021, "Owen Scrambling Based on Dithered Blue Nois
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -32,8 +33,45 @@ bits in mask k.
 DIMENSIONS = len(_DIMENSIONS)
 
 
-def points(count: int, dimensions: int) -> np.ndarray:
-    """Return the first points of the sequence.
+@dataclass(frozen=True)
+class Samples:
+    """Part of the sequence that a picture takes.
+
+    Attributes
+    ----------
+    first : int
+        Index of the first point: pictures of other parts add up to one of more samples.
+    seed : int
+        Number of a digital shift (a constant that is added to all points, without carry); 0 for none.
+    """
+
+    first: int = 0
+    seed: int = 0
+
+    def points(self, count: int, dimensions: int) -> np.ndarray:
+        """Return the points of the part; see `points`.
+
+        Parameters
+        ----------
+        count : int
+            Number of points.
+        dimensions : int
+            Number of dimensions.
+
+        Returns
+        -------
+        ndarray of int32, shape (count, dimensions)
+            Bit patterns of 32-bit fractions with their bits REVERSED.
+        """
+        drawn = points(count, dimensions, self.first)
+        if not self.seed:
+            return drawn
+        shift = np.random.Philox(self.seed).random_raw(dimensions).astype(np.uint32)
+        return drawn ^ shift.view(np.int32)
+
+
+def points(count: int, dimensions: int, first: int = 0) -> np.ndarray:
+    """Return consecutive points of the sequence.
 
     Parameters
     ----------
@@ -41,15 +79,17 @@ def points(count: int, dimensions: int) -> np.ndarray:
         Number of points.
     dimensions : int
         Number of dimensions. Dimensions beyond the sixteenth repeat the first ones, with another scrambling.
+    first : int
+        Index of the first point.
 
     Returns
     -------
     ndarray of int32, shape (count, dimensions)
         Bit patterns of 32-bit fractions with their bits REVERSED.
     """
-    index = np.arange(count, dtype=np.uint32)[:, None]
+    index = np.arange(first, first + count, dtype=np.uint32)[:, None]
     found = np.zeros((count, DIMENSIONS), np.uint32)
-    for bit in range(max(count - 1, 0).bit_length()):
+    for bit in range(max(first + count - 1, 0).bit_length()):
         columns = np.array([_columns(d)[bit] for d in range(DIMENSIONS)], np.uint32)
         found ^= (index >> np.uint32(bit) & np.uint32(1)) * columns
     return np.ascontiguousarray(found[:, np.arange(dimensions) % DIMENSIONS]).view(np.int32)

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from ..formulas import get, names
 from ..formulas.parameters import REQUIRED, Choice, Parameter
 from ..formulas.registry import Formula
+from .animation import Animation, Track
 from .lengths import Length
 from .printing import Print
 from .view import PARTS, Part
@@ -67,7 +68,8 @@ def _section(part: type[Part]) -> TopElement:
 
 PRINT = _section(Print)
 PICTURE = [_section(part) for part in PARTS]
-SECTIONS = {section.name: section for section in (SOLID, PRINT, *PICTURE)}
+FILM = [_section(part) for part in (Animation, Track)]
+SECTIONS = {section.name: section for section in (SOLID, PRINT, *PICTURE, *FILM)}
 
 
 def formulas() -> list[Formula]:

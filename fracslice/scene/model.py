@@ -12,6 +12,7 @@ from typing import Any
 from ..errors import SceneError
 from ..formulas import Node, get
 from ..formulas.parameters import AUTO
+from .animation import Animation, Track
 from .lengths import parse_length
 from .printing import Print
 from .view import View
@@ -33,6 +34,10 @@ class Scene:
         View for pictures; meshes do not depend on it.
     printing : Print
         Changes for printing, which meshes and slices contain and the root does not.
+    animation : Animation or None
+        Length and frames of the film.
+    tracks : tuple of Track
+        Attributes that the film moves.
 
     Raises
     ------
@@ -45,10 +50,14 @@ class Scene:
     name: str = field(default="scene", compare=False)
     view: View = field(default_factory=View)
     printing: Print = field(default_factory=Print)
+    animation: Animation | None = None
+    tracks: tuple[Track, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size_mm", parse_length(self.size_mm, "size"))
         _refuse_impossible(self.root)
+        if self.tracks and self.animation is None:
+            raise self.tracks[0].fail("needs an <animation> in the scene")
 
     @cached_property
     def hash(self) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
@@ -18,6 +18,7 @@ from ..formulas import Node
 from ..formulas.parameters import REQUIRED
 from ..formulas.registry import DEEPEST, TOO_DEEP
 from ..nearest import hint
+from .animation import Animation, Track
 from .layout import SCENE, SECTIONS, SOLID, Element, TopElement, formulas
 from .model import Scene, computing, scene
 from .printing import Print
@@ -87,9 +88,14 @@ def _scene(data: bytes, source: str, name: str) -> Scene:
         raise SceneError(f'{source}: not a scene: expected XML that begins with <scene version="1">')
     builder = _Builder(source)
     solid = builder.sections(data)[SOLID.name]
+    others = (Print, Animation, Track)
     printing = next((part for part in builder.parts if isinstance(part, Print)), Print())
-    view = View.of(part for part in builder.parts if not isinstance(part, Print))
-    return scene(*solid.children, size=solid.values["size"], name=name, view=view, printing=printing)
+    view = View.of(part for part in builder.parts if not isinstance(part, others))
+    made = scene(*solid.children, size=solid.values["size"], name=name, view=view, printing=printing)
+    animation = next((part for part in builder.parts if isinstance(part, Animation)), None)
+    return replace(
+        made, animation=animation, tracks=tuple(part for part in builder.parts if isinstance(part, Track))
+    )
 
 
 @dataclass

@@ -13,6 +13,7 @@ from typing import Any
 from xml.etree import ElementTree as Tree
 
 from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
+from .animation import Keys, Seconds, Target
 from .layout import SCENE, SECTIONS, Element, formulas
 from .lengths import MILLIMETRES, Length
 
@@ -114,6 +115,10 @@ def _words(parent: Tree.Element, kind: Choice) -> None:
         Tree.SubElement(values, "value").text = word
 
 
+def _text(parent: Tree.Element, _: Seconds | Target | Keys) -> None:
+    Tree.SubElement(parent, "data", type="string")
+
+
 def _length(parent: Tree.Element, kind: Length) -> None:
     _param(Tree.SubElement(parent, "data", type="string"), "pattern", _LENGTH)
 
@@ -125,6 +130,9 @@ _PATTERNS: dict[type, Any] = {
     Axis: _words,
     Choice: _words,
     Length: _length,
+    Seconds: _text,
+    Target: _text,
+    Keys: _text,
 }
 
 

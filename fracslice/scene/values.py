@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -109,6 +109,41 @@ def changed(scene: Scene, settings: Iterable[str]) -> Scene:
     for source in settings:
         scene = _changed(scene, _parsed(source))
     return scene
+
+
+def kind_of(scene: Scene, of: str, fail: Callable[[str], SceneError]) -> Any:
+    """Return the parameter kind of an attribute, "ELEMENT.ATTRIBUTE".
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    of : str
+        Name of the attribute, as in a setting.
+    fail : callable
+        Makes the error to raise from a message.
+
+    Returns
+    -------
+    Parameter
+        The kind.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no such element, or the element no such attribute.
+    """
+    override = _parsed(f"{of}=")
+    elements: dict[str, Element] = {node.formula.name: node.formula for node in scene.root.walk()}
+    elements |= {section.name: section for section in (SOLID, PRINT, *PICTURE)}
+    if override.element not in elements:
+        raise fail(
+            f"of={of!r}: the scene has no <{override.element}>; {hint(override.element, elements, '<{}>')}"
+        )
+    kinds = elements[override.element].parameters
+    if override.attribute not in kinds:
+        raise fail(f"of={of!r}: has no attribute {override.attribute!r}; {hint(override.attribute, kinds)}")
+    return kinds[override.attribute]
 
 
 def _parsed(source: str) -> Override:

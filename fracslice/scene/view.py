@@ -216,6 +216,27 @@ class Camera(Part):
         turned = _turn(level, _unit(self.up), -math.radians(yaw))
         return replace(self, target=_along(self.eye, turned, math.dist(self.eye, self.target)))
 
+    def rolled(self, degrees: float) -> Camera:
+        """Return the camera rolled about its viewing direction; `up` becomes orthogonal to it.
+
+        Parameters
+        ----------
+        degrees : float
+            Angle, degrees; positive clockwise, so that the picture turns counter-clockwise.
+
+        Returns
+        -------
+        Camera
+            The rolled camera.
+
+        Raises
+        ------
+        SceneError
+            If the angle is invalid.
+        """
+        degrees = validated("degrees", degrees, Number(0.0, "an angle"), self.fail)
+        return replace(self, up=_turn(self.above, self.forward, math.radians(degrees)))
+
     def orbited(self, degrees: float) -> Camera:
         """Return the camera rotated around the target, about `up`.
 

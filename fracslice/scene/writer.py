@@ -53,7 +53,8 @@ def _lines(scene: Scene) -> Iterator[str]:
     yield from _element(scene.root, "    ")
     yield f"  </{SOLID.name}>"
     printing = () if scene.printing == Print() else (scene.printing,)
-    for part in (*printing, *scene.view.parts):
+    film = () if scene.animation is None else (scene.animation, *scene.tracks)
+    for part in (*printing, *scene.view.parts, *film):
         yield "  " + part_to_xml(part)
     yield f"</{SCENE.name}>"
 

@@ -10,15 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SliceError
-from ..printing.checks import Limits, SolidReport, check_object, counted
+from ..printing.checks import SolidReport, check_object
+from ..printing.limits import Limits
+from ..printing.problems import Problem
 from ..printing.widths import Widths, widths_of
 from ..work import Work
 from .graph import Found, Graph
 from .layers import Layer, Slicer
+from .necks import Neck, weakest
+from .overhangs import Overhang, farthest, unsupported
 from .printers import Printer
-from .raster import check_fits
-from .runs import LayerComponents, components_of, unsupported
+from .problems import misfit, problems_of
+from .runs import LayerComponents, components_of
 from .stack import Stack
 from .thickness import widths
 
@@ -55,12 +58,16 @@ class PrintReport:
         Suction cups, resin traps and sealed cavities.
     walls, gaps : Widths or None
         Widths in layers.
+    overhang : Overhang or None
+        The farthest flat overhang beyond the limits.
+    neck : Neck or None
+        The cross-section that is smallest for what it carries.
     worst : list of int
         Layers with the most overhang or the largest islands.
     solid : SolidReport
         Report on the solid, measured in space instead of in layers.
-    problems : list of str
-        One line for each problem.
+    problems : list of Problem
+        The problems.
     """
 
     layers: int
@@ -79,9 +86,11 @@ class PrintReport:
     cavities: list[Found]
     walls: Widths | None
     gaps: Widths | None
+    overhang: Overhang | None
+    neck: Neck | None
     worst: list[int]
     solid: SolidReport
-    problems: list[str] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain JSON types.
@@ -143,7 +152,8 @@ def check_layers(
         return _LayerFindings(*components_of(runs), layer.area, *measured)
 
     limits, work = limits or Limits(), work or Work()
-    solid = check_object(stack.root, stack.outer, stack.scale, limits, work, max(stack.pixel))
+    finest, origin = max(stack.pixel), stack.origin
+    solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin)
     return _Collector(stack, limits, printer, solid).report(Slicer(stack, work).map(make))
 
 
@@ -161,17 +171,22 @@ class _Collector:
         stack, solid, empty = self.stack, Graph(), Graph()
         square = stack.pixel[0] * stack.pixel[1]
         volume, overhangs, walls, gaps = 0.0, [], [np.empty((0, 2))], [np.empty((0, 2))]
+        limits, far = self.limits, list[Overhang]()
         for k, now in enumerate(findings):
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
-            overhangs.append(0.0 if below is None else square * unsupported(below, now.solid, reach))
+            bare = unsupported(below.runs, now.solid.runs, reach) if below else now.solid.runs.none
+            overhangs.append(square * float((bare.end - bare.begin).sum()))
+            if len(bare.begin):
+                worst = farthest(now.solid.runs, bare, k, stack.pixel, limits.overhang, limits.span)
+                far.extend([worst] if worst else [])
             solid.add(now.solid)
             empty.add(now.empty)
             volume += now.area * float(stack.heights[k])
             if now.walls is not None and now.gaps is not None:
                 walls.append(now.walls)
                 gaps.append(now.gaps)
-        unfit = misfit(self.stack, self.printer) if self.printer else ""
+        unfit = misfit(stack, self.printer)
         overhang = np.array(overhangs)
         islands = self.found(solid, solid.islands())
         bodies = self.found(solid, np.ones(solid.count, bool))
@@ -196,10 +211,12 @@ class _Collector:
             cavities=[c for c in self.found(empty, empty.sealed()) if c.area >= self.limits.speck],
             walls=widths_of(*np.concatenate(walls).T),
             gaps=widths_of(*np.concatenate(gaps).T),
-            worst=_worst(overhang, real),
+            overhang=max(far, key=lambda o: o.reach, default=None),
+            neck=weakest(solid, stack.pixel, stack.shape, limits.heavy),
+            worst=_worst(overhang, real, far),
             solid=self.solid,
         )
-        report.problems.extend([unfit] * bool(unfit) + _problems(report, self.limits))
+        report.problems.extend([*([unfit] if unfit else []), *problems_of(report, stack, self.limits)])
         return report
 
     def found(self, graph: Graph, chosen: np.ndarray) -> list[Found]:
@@ -216,53 +233,9 @@ class _Collector:
         return float(self.stack.heights[first : last + 1].sum())
 
 
-def misfit(stack: Stack, printer: Printer) -> str:
-    """Explain why a planned stack does not fit a printer, before any layer is sampled.
-
-    Parameters
-    ----------
-    stack : Stack
-        The planned layers.
-    printer : Printer
-        The printer.
-
-    Returns
-    -------
-    str
-        Empty if the stack fits.
-    """
-    try:
-        check_fits(stack, printer)
-    except SliceError:
-        mine, most = (" x ".join(f"{s:.4g}" for s in size) for size in (stack.size, printer.build_volume))
-        return f"does not fit the {printer.title}: {mine} mm, and it has {most} mm"
-    return ""
-
-
-def _worst(overhang: np.ndarray, islands: list[Found]) -> list[int]:
-    """Layers in which the largest islands begin, then those with the most overhang."""
+def _worst(overhang: np.ndarray, islands: list[Found], far: list[Overhang]) -> list[int]:
+    """Layers in which the largest islands begin, then those with the farthest and the most overhang."""
     first = [i.layers[0] for i in sorted(islands, key=lambda i: -i.area)[: WORST // 2]]
     most = [int(k) for k in np.argsort(-overhang, kind="stable")[:WORST] if overhang[k] > 0]
-    return sorted(list(dict.fromkeys([*first, *most]))[:WORST])
-
-
-def _problems(r: PrintReport, limits: Limits) -> list[str]:
-    """Problems of a report, one line each."""
-    found = []
-    if len(r.bodies) > 1:
-        found.append(f"{len(r.bodies)} loose bodies")
-    if r.islands:
-        first = min(i.layers[0] for i in r.islands)
-        found.append(f"{counted(r.islands, 'island')} in the air, the first from layer {first} on")
-    if r.cavities:
-        sealed = counted(r.cavities, "sealed cavity", "sealed cavities")
-        found.append(f"{sealed} with {sum(c.volume for c in r.cavities):.3g} mm3 of resin")
-    cups = [c for c in r.cups if c not in r.cavities]
-    if cups:
-        found.append(f"{counted(cups, 'suction cup')}, the largest {max(c.area for c in cups):.3g} mm2")
-    if r.traps:
-        resin = sum(t.volume for t in r.traps)
-        found.append(f"{counted(r.traps, 'resin trap')} with {resin:.3g} mm3 of resin")
-    if r.walls and r.walls.thinnest_hundredth < limits.wall:
-        found.append(f"walls of {r.walls.thinnest_hundredth:.3g} mm: the limit is {limits.wall:g} mm")
-    return found + r.solid.thin
+    reach = [o.layer for o in sorted(far, key=lambda o: -o.reach)]
+    return sorted(list(dict.fromkeys([*first, *reach, *most]))[:WORST])

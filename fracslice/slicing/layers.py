@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from .._slices import Slab
+from .._slices import Encoding, Slab
 from ..kernel import Kernel
 from ..work import Work
 from .contours import Contours, contours
@@ -70,6 +70,8 @@ class Layer:
         Its number in the slab.
     exact : Kernel
         float64 kernel of the field.
+    mean : (uint8 [ny, nx], float) or None
+        Mean coverage and area of several sections, in place of those of the one sampled, pixels and mm^2.
     """
 
     stack: Stack
@@ -78,6 +80,7 @@ class Layer:
     slab: Slab
     place: int
     exact: Kernel
+    mean: tuple[np.ndarray, float] | None = None
 
     @property
     def top(self) -> float:
@@ -89,22 +92,23 @@ class Layer:
         """Layer height, mm."""
         return float(self.stack.heights[self.index])
 
-    def deflated(self, view: ScreenView) -> bytes:
-        """Image data of a PNG file with the layer as a screen shows it.
+    def encoded(self, view: ScreenView, encoding: Encoding) -> bytes:
+        """Encode the layer as a screen shows it, from its tiles: the picture is never allocated.
 
         Parameters
         ----------
         view : ScreenView
             The screen.
+        encoding : Encoding
+            Encoding of the picture.
 
         Returns
         -------
         bytes
-            A zlib stream of rows, each after a byte 0.
+            Encoded picture.
         """
-        data, area, cut = self.slab.picture(
-            self.place, view.shape, view.transposed, view.backwards, view.at, self.stack.shape, view.levels
-        )
+        how = view.shape, view.transposed, view.backwards, view.at, self.stack.shape, view.levels
+        data, area, cut = self.slab.picture(self.place, *how, encoding)
         self._painted = area, cut
         return data
 
@@ -115,6 +119,8 @@ class Layer:
         It is the area cut off by the outline, which is straight between its crossings of the pixel's sides,
         with a corner where it turns.
         """
+        if self.mean is not None:
+            return self.mean[0]
         image = np.zeros(self.stack.shape, np.uint8)
         self._painted = self.slab.paint(self.place, image)
         return image
@@ -135,8 +141,15 @@ class Layer:
         return self.slab.paint(self.place, np.zeros(self.stack.shape, np.uint8))
 
     @property
+    def is_painted(self) -> bool:
+        """True if the area is known without further work."""
+        return "_painted" in vars(self)
+
+    @property
     def area(self) -> float:
         """Area in mm^2, from the coverage before rounding."""
+        if self.mean is not None:
+            return self.mean[1]
         return self._painted[0] * self.stack.pixel[0] * self.stack.pixel[1]
 
     @property
@@ -160,10 +173,13 @@ class Slicer:
         The planned layers.
     work : Work
         Threads, progress and cancellation.
+    areas : dict of int to float
+        Area of each layer that has been sampled and painted, mm^2.
     """
 
     stack: Stack
     work: Work = field(default_factory=Work)
+    areas: dict[int, float] = field(default_factory=dict, init=False)
 
     def map(self, make: Callable[[Layer], T], layers: Sequence[int] | None = None) -> Iterator[T]:
         """Yield ``make(layer)`` for every layer, or for chosen ones.
@@ -205,7 +221,10 @@ class Slicer:
                 before = found.evaluations
                 sampler.sample(found, index - first)
                 spent = found.evaluations - before
-                made.append(make(Layer(self.stack, index, spent, found, index - first, exact)))
+                layer = Layer(self.stack, index, spent, found, index - first, exact)
+                made.append(make(layer))
+                if layer.is_painted:
+                    self.areas[index] = layer.area
             return made
 
         groups = [list(g) for _, g in groupby(chosen, lambda index: index // SLAB)]

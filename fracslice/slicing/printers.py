@@ -1,11 +1,25 @@
-"""Resin printers and their screens, as published. Sources of the figures: docs/reference/printers.md."""
+"""Resin printers and their screens, as published; printers.csv names the sources."""
 
 from __future__ import annotations
 
+import csv
 import difflib
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
 
 from ..errors import SliceError
+from ..formulas.parameters import REQUIRED, Count, Number, Vector, validate
+
+KINDS = {
+    "pixels": Vector(REQUIRED, "pixels along x and y", sizes=(2,), least=1, most=65_536, whole=True),
+    "screen": Vector(REQUIRED, "size of the screen, mm", sizes=(2,), above=0, most=10_000),
+    "height": Number(REQUIRED, "highest print, mm", above=0, most=10_000),
+    "version": Count(1, "version of the format", most=65_536),
+    "motion": Vector((5.0, 65.0, 150.0, 0.5), "mm, mm/min, mm/min and s", sizes=(4,), least=0, most=10_000),
+}
 
 
 @dataclass(frozen=True)
@@ -26,6 +40,19 @@ class Printer:
         The picture is mirrored along x.
     portrait : bool
         Rows of the picture run along x of the bed.
+    file : str
+        Extension of the files that it prints; "encrypted.ctb" for those that are not written.
+    version : int
+        Version of the format.
+    motion : tuple of float
+        Lift, mm, its speed and that of the way back, mm/min, and rest before exposure, s.
+    settings : tuple
+        Names and values of the resin settings of a printer's own file.
+
+    Raises
+    ------
+    SliceError
+        For an invalid value.
     """
 
     name: str
@@ -35,6 +62,13 @@ class Printer:
     height: float
     mirror: bool = True
     portrait: bool = False
+    file: str = ""
+    version: int = 1
+    motion: tuple[float, float, float, float] = (5.0, 65.0, 150.0, 0.5)
+    settings: tuple[tuple[str, Any], ...] = ()
+
+    def __post_init__(self) -> None:
+        validate(self, KINDS, SliceError)
 
     @property
     def pixel(self) -> tuple[float, float]:
@@ -47,21 +81,26 @@ class Printer:
         return *self.screen, self.height
 
 
-PRINTERS = {
-    p.name: p
-    for p in (
-        Printer("sl1", "Original Prusa SL1", (2560, 1440), (120.96, 68.04), 150, portrait=True),
-        Printer("sl1s", "Original Prusa SL1S Speed", (2560, 1620), (128, 81), 150, portrait=True),
-        Printer("photon-mono-4k", "Anycubic Photon Mono 4K", (3840, 2400), (134.4, 84), 165),
-        Printer("photon-mono-4", "Anycubic Photon Mono 4", (9024, 5120), (153.408, 87.04), 165),
-        Printer("photon-mono-m7-pro", "Anycubic Photon Mono M7 Pro", (13312, 5120), (223.642, 126.976), 230),
-        Printer("mars-5-ultra", "Elegoo Mars 5 Ultra", (8520, 4320), (153.36, 77.76), 165),
-        Printer("saturn-4-ultra", "Elegoo Saturn 4 Ultra 12K", (11520, 5120), (218.88, 122.88), 220),
-        Printer("saturn-4-ultra-16k", "Elegoo Saturn 4 Ultra 16K", (15120, 6230), (211.68, 118.37), 220),
-        Printer("halot-mage-pro", "Creality Halot Mage Pro", (7680, 4320), (228.096, 128.304), 230),
-        Printer("sonic-mini-8k-s", "Phrozen Sonic Mini 8K S", (7536, 3240), (165.792, 71.28), 170),
-    )
-}
+def _table() -> Iterator[Printer]:
+    """Printers of the table, which states the source of each."""
+    lines = (Path(__file__).parent / "printers.csv").read_text(encoding="utf-8").splitlines()
+    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
+        lift, up, down, wait = (float(row[key]) for key in ("lift", "lift_speed", "retract_speed", "wait"))
+        yield Printer(
+            name=row["name"],
+            title=row["title"],
+            pixels=(int(row["pixels_x"]), int(row["pixels_y"])),
+            screen=(float(row["width"]), float(row["depth"])),
+            height=float(row["height"]),
+            mirror=row["mirror"] == "1",
+            portrait=row["portrait"] == "1",
+            file=row["file"],
+            version=int(row["version"]),
+            motion=(lift, up, down, wait),
+        )
+
+
+PRINTERS = {p.name: p for p in _table()}
 
 
 def printer(name: str) -> Printer:
@@ -70,7 +109,8 @@ def printer(name: str) -> Printer:
     Parameters
     ----------
     name : str
-        A key of `PRINTERS`.
+        A key of `PRINTERS`, or a .toml file with the attributes of `Printer`; its table `resin` has those of
+        `fracslice.export.resins.Resin`.
 
     Returns
     -------
@@ -80,8 +120,11 @@ def printer(name: str) -> Printer:
     Raises
     ------
     SliceError
-        For an unknown name; the message has the nearest known one.
+        For an unknown name; the message has the nearest known one. For a file that cannot be read or has an
+        invalid value.
     """
+    if name.lower().endswith(".toml"):
+        return _own(Path(name))
     if name in PRINTERS:
         return PRINTERS[name]
     near = difflib.get_close_matches(name.lower().replace(" ", "-"), PRINTERS, 1, 0.4)
@@ -89,3 +132,30 @@ def printer(name: str) -> Printer:
         f"printer {name!r}: unknown; "
         + (f"did you mean {near[0]}?" if near else f"known: {', '.join(PRINTERS)}")
     )
+
+
+def _own(path: Path) -> Printer:
+    """Printer of a file."""
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SliceError(f"{path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SliceError(f"{path}: {error}") from None
+    settings = values.pop("resin", {})
+    names = [f.name for f in fields(Printer) if f.name != "settings"]
+    if unknown := sorted(set(values) - set(names)):
+        raise SliceError(f"{path}: {unknown[0]!r}: unknown; expected {', '.join(names)} or a table resin")
+    if missing := [name for name in ("pixels", "screen", "height") if name not in values]:
+        raise SliceError(f"{path}: {missing[0]} is missing")
+    if not isinstance(settings, dict) or not all(isinstance(values.get(k, True), bool) for k in FLAGS):
+        raise SliceError(f"{path}: expected a table resin, and true or false for {' and '.join(FLAGS)}")
+    named: dict[str, Any] = {"name": path.stem, "title": path.stem, "settings": tuple(settings.items())}
+    named |= {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+    try:
+        return Printer(**named)
+    except SliceError as error:
+        raise SliceError(f"{path}: {error}") from None
+
+
+FLAGS = "mirror", "portrait"

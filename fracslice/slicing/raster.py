@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from .._slices import deflated
+from .._slices import Encoding, encoded
 from ..errors import SliceError
 from ..formulas.parameters import Number, validate
 from ..scene.lengths import Shift
@@ -85,23 +85,33 @@ class Screen:
         bed[mine.on_bed] = self._levels[bed[mine.on_bed]]
         return image
 
-    def deflated(self, layer: Layer) -> bytes:
-        """Image data of a PNG file with the picture of a layer.
+    def encoded(self, layer: Layer, encoding: Encoding, shown: np.ndarray | None = None) -> bytes:
+        """Encode the picture of a layer.
 
-        Without compensation it is encoded from the layer's tiles, as runs of equal pixels, and the picture is
-        never allocated.
+        A section without compensation is encoded from the layer's tiles, as runs of equal pixels, and the
+        picture is never allocated.
 
         Parameters
         ----------
         layer : Layer
             A layer of the stack.
+        encoding : Encoding
+            Encoding of the picture.
+        shown : uint8 [256], optional
+            Level for each grey level of the picture, the first 0, the last 255.
 
         Returns
         -------
         bytes
-            A zlib stream of rows, each after a byte 0 for no filter.
+            Encoded picture.
         """
-        return deflated(self.picture(layer)) if self.compensation else layer.deflated(self._view)
+        if self.compensation or layer.mean is not None:
+            image = self.picture(layer)
+            return encoded(image if shown is None else shown[image], encoding)
+        view = self._view
+        if shown is not None:
+            view = replace(view, levels=shown[self._levels].tobytes())
+        return layer.encoded(view, encoding)
 
     @cached_property
     def _view(self) -> ScreenView:

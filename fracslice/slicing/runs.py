@@ -36,6 +36,11 @@ class Runs:
         return len(self.rows) - 1
 
     @property
+    def none(self) -> Runs:
+        """No pixels, in the same window."""
+        return Runs(np.zeros_like(self.rows), self.begin[:0], self.end[:0], self.width)
+
+    @property
     def gaps(self) -> Runs:
         """Runs of the empty pixels."""
         rows = np.zeros(len(self.rows), np.int32)
@@ -171,60 +176,3 @@ def _touching(rows_a, begin_a, end_a, rows_b, begin_b, end_b, reach):  # type: i
             else:
                 b += 1
     return some[:n], others[:n]
-
-
-def unsupported(below: LayerComponents, above: LayerComponents, reach: float) -> int:
-    """Count the overhanging pixels of a layer.
-
-    Parameters
-    ----------
-    below, above : LayerComponents
-        Solid components of the layers.
-    reach : float
-        Pixels within this distance of a solid pixel of the layer below are supported, pixels.
-
-    Returns
-    -------
-    int
-        Number of unsupported pixels.
-    """
-    a, b = below.runs, above.runs
-    return int(_unsupported(a.rows, a.begin, a.end, b.rows, b.begin, b.end, reach, a.width))
-
-
-@compiled
-def _unsupported(rows_a, begin_a, end_a, rows_b, begin_b, end_b, reach, width):  # type: ignore[no-untyped-def]
-    """Count the pixels of runs farther than `reach` from all runs of the layer below."""
-    held = np.zeros(width + 1, np.int32)
-    total, far = 0, int(np.floor(reach))
-    for y in range(len(rows_b) - 1):
-        if _lies_on(rows_a, begin_a, end_a, rows_b, begin_b, end_b, y):
-            continue
-        held[:] = 0
-        for v in range(max(y - far, 0), min(y + far, len(rows_a) - 2) + 1):
-            side = int(np.floor(np.sqrt(reach * reach - (v - y) ** 2)))
-            for r in range(rows_a[v], rows_a[v + 1]):
-                held[max(begin_a[r] - side, 0)] += 1
-                held[min(end_a[r] + side, width)] -= 1
-        level, r = 0, rows_b[y]
-        for x in range(width):
-            level += held[x]
-            while r < rows_b[y + 1] and end_b[r] <= x:
-                r += 1
-            if r == rows_b[y + 1]:
-                break
-            if level == 0 and begin_b[r] <= x:
-                total += 1
-    return total
-
-
-@compiled
-def _lies_on(rows_a, begin_a, end_a, rows_b, begin_b, end_b, y):  # type: ignore[no-untyped-def]
-    """True if every run of a row lies on a run of the row below."""
-    a = rows_a[y]
-    for b in range(rows_b[y], rows_b[y + 1]):
-        while a < rows_a[y + 1] and end_a[a] < end_b[b]:
-            a += 1
-        if a == rows_a[y + 1] or begin_a[a] > begin_b[b]:
-            return False
-    return True

@@ -115,6 +115,14 @@ class Stack:
         return np.diff(self.tops, prepend=0.0)
 
     @property
+    def origin(self) -> tuple[float, float, float]:
+        """Middle of the object's lower face, scene units; places of problems are measured from it."""
+        x0, y0, dx, dy = self.frame.tolist()
+        ny, nx = self.shape
+        lowest = self.z[0] - float(self.tops[0]) / self.scale / 2
+        return x0 + dx * nx / 2, y0 + dy * ny / 2, float(lowest)
+
+    @property
     def frame(self) -> np.ndarray:
         """(x0, y0, dx, dy) of the lattice in scene units, float64 [4]."""
         return np.array([*self.corner, self.pixel[0] / self.scale, self.pixel[1] / self.scale])

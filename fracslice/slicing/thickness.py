@@ -51,7 +51,7 @@ def widths(solid: Runs, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
         return np.empty((0, 2)), np.empty((0, 2))
     times = max(int(min(WIDE / COARSE / max(pixel), max(solid.height, solid.width) / LAYER)), 1)
     count = np.zeros((-(-solid.height // times), -(-solid.width // times)), np.int32)
-    _count(solid.rows, solid.begin, solid.end, times, count)
+    count_pixels(solid.rows, solid.begin, solid.end, times, count)
     return _measured(solid, count, times, pixel, False), _measured(solid, count, times, pixel, True)
 
 
@@ -103,8 +103,18 @@ def _across(region: np.ndarray, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
 
 
 @compiled
-def _count(rows, begin, end, times, count):  # type: ignore[no-untyped-def]
-    """Count the pixels of runs in each coarse pixel."""
+def count_pixels(rows, begin, end, times, count):  # type: ignore[no-untyped-def]
+    """Count the pixels of runs in each coarse pixel.
+
+    Parameters
+    ----------
+    rows, begin, end
+        As of `Runs`.
+    times : int
+        Pixels along each side of a coarse pixel.
+    count : int32 [-(-height // times), -(-width // times)]
+        Receives the sums.
+    """
     for y in range(len(rows) - 1):
         line = count[y // times]
         for r in range(rows[y], rows[y + 1]):

@@ -3,32 +3,35 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from fracslice.rendering.live import CameraInput, Live, Shown
+from fracslice.errors import ExportError
+from fracslice.export import replacing
+from fracslice.rendering.live import Live
 from fracslice.scene.view import Camera
+from fracslice.scene.writer import to_xml
+from fracslice.viewer.canvas import Canvas
+from fracslice.viewer.controls import Controls
 from fracslice.viewer.screen import need_screen
 from fracslice.work import Work
 
-AXES = {
-    "w": ("forward", 1.0),
-    "s": ("forward", -1.0),
-    "d": ("right", 1.0),
-    "a": ("right", -1.0),
-    "r": ("up", 1.0),
-    "f": ("up", -1.0),
-}
 FASTER = 1.25
+"""Factor of the wheel on the pace."""
 TICK = 20
 """Timer interval, milliseconds."""
-LIFTED = 0.05
-"""Delay, in seconds, after which a key release counts: key repeat sends releases and presses continuously."""
-TEXT: dict[str, Any] = {"font_size": 9, "color": "#f4f5f5", "shadow": True}
-HELP = "drag: look around   W, S, A, D, R, F: fly   wheel: pace   V: first view   Q: close"
+PATIENCE = 0.2
+"""Time, in seconds, after which the making of a renderer is displayed."""
+NOTICE = 3.0
+"""Time, in seconds, for which a message is displayed."""
+EDGE = 0.1
+"""Margin of the window, as a fraction of its size, from which the pointer is put back to the middle."""
+HELP = """\
+W S A D R F: fly   Q E: roll   1 to 9, wheel: pace
+drag, arrows: look   M: mouse look   L: lock
+.: save the view   V: first view   Esc: close"""
 
 
 def fly(
@@ -40,9 +43,10 @@ def fly(
 ) -> Camera:
     """Open a window on a scene file.
 
-    Keys: W, S, A, D, R, F fly forward, back, left, right, up and down, more slowly near the surface; dragging
-    looks around, the wheel changes the pace, V returns to the first view, Q closes. The file is read again
-    whenever it is saved.
+    Keys: W, S, A, D, R, F fly forward, back, left, right, up and down, more slowly near the surface; the
+    arrows and dragging turn the camera, Q and E roll it. 1 to 9 and the wheel choose the pace. M toggles
+    mouse look, L locks the camera, "." saves the view as a scene file in the current folder, V returns to the
+    first view, Escape closes. The file is read again whenever it is saved.
 
     Parameters
     ----------
@@ -82,98 +86,75 @@ def fly(
     return live.camera
 
 
-def steered(held: Iterable[str], pace: float) -> CameraInput:
-    """Convert pressed keys to camera input.
-
-    Parameters
-    ----------
-    held : iterable of str
-        Keys of `AXES` that are held down.
-    pace : float
-        Speed, in distances to the surface per second.
-
-    Returns
-    -------
-    CameraInput
-        The input.
-    """
-    ways = {"forward": 0.0, "right": 0.0, "up": 0.0}
-    for key in held:
-        axis, way = AXES[key]
-        ways[axis] += way
-    return CameraInput(**ways, pace=pace)
-
-
 class Viewer:
-    """A pyvista window with its key bindings.
+    """Window of a live picture, with its controls.
 
     Parameters
     ----------
     live : Live
         The live picture.
     size : tuple of int
-        Picture width and height, pixels.
+        Window width and height, pixels.
     stopped : callable
         Returns True when the window must close.
     """
 
     def __init__(self, live: Live, size: tuple[int, int], stopped: Callable[[], bool]) -> None:
-        import pyvista
-
         self.live, self.stopped = live, stopped
-        self.pace, self.held = 1.0, set[str]()
-        self.lifted: dict[str, float] = {}
-        self.grip: tuple[int, int] | None = None
-        self.image = pyvista.ImageData(dimensions=(*size, 1))
-        self.plotter: Any = pyvista.Plotter(title=f"fracslice  {live.scene.name}", window_size=list(size))
-        self.plotter.add_actor(_whole_window(self.image), reset_camera=False)
-        self.caption = self.plotter.add_text("", position="upper_left", **TEXT)
-        self.plotter.add_text(HELP, position="lower_left", **TEXT)
-        self.put(live.shown)
+        self.controls = Controls()
+        self.canvas = Canvas(f"fracslice  {live.scene.name}", size, HELP)
+        self.message, self.since = "", 0.0
+        self.drawn: tuple[object, ...] = ()
+        self.actions: dict[str, Callable[[], None]] = {
+            "escape": self.canvas.close,
+            "v": self.reset,
+            "m": self.toggle_look,
+            "l": self.toggle_lock,
+            "period": self.save,
+        }
 
     def open(self) -> None:
         """Show the window until it is closed."""
-        interactor = self.plotter.iren.interactor
-        self.plotter.iren.initialize()
-        interactor.SetInteractorStyle(None)
+        interactor = self.canvas.interactor
         for event, act in {
             "TimerEvent": self.tick,
             "KeyPressEvent": lambda: self.press(interactor.GetKeySym().lower()),
-            "KeyReleaseEvent": lambda: self.lift(interactor.GetKeySym().lower()),
+            "KeyReleaseEvent": lambda: self.controls.release(interactor.GetKeySym().lower()),
             "LeftButtonPressEvent": lambda: self.grasp(interactor.GetEventPosition()),
             "LeftButtonReleaseEvent": lambda: self.grasp(None),
-            "MouseMoveEvent": lambda: self.drag(interactor.GetEventPosition()),
+            "MouseMoveEvent": lambda: self.move(interactor.GetEventPosition()),
             "MouseWheelForwardEvent": lambda: self.hurry(FASTER),
             "MouseWheelBackwardEvent": lambda: self.hurry(1 / FASTER),
         }.items():
-            interactor.AddObserver(event, lambda *_, act=act: act())
-        interactor.CreateRepeatingTimer(TICK)
-        self.plotter.show()
+            self.canvas.on(event, act)
+        self.tick()
+        self.canvas.open(TICK)
 
     def tick(self) -> None:
-        """Timer callback: release keys and show a new picture."""
-        now = time.monotonic()
-        for key in [key for key, since in self.lifted.items() if now - since > LIFTED]:
-            del self.lifted[key]
-            self.held.remove(key)
-            self.steer()
+        """Steer by the keys that are held, and draw what has changed."""
         if self.stopped() or not self.live.running:
-            self.plotter.iren.interactor.TerminateApp()
-        if self.live.shown is not self.shown:
-            self.put(self.live.shown)
-            self.plotter.render()
+            self.canvas.close()
+        self.live.steer(self.controls.input)
+        self.live.resize(self.canvas.size)
+        now = self.live.shown, self.canvas.size, self.caption
+        if now != self.drawn:
+            self.drawn = now
+            self.canvas.draw(now[0].pixels, now[2])
 
-    def put(self, shown: Shown) -> None:
-        """Display a picture.
-
-        Parameters
-        ----------
-        shown : Shown
-            The picture.
-        """
-        self.shown = shown
-        self.image.point_data["picture"] = np.ascontiguousarray(shown.pixels[::-1].reshape(-1, 3))
-        self.caption.set_text("upper_left", shown.caption)
+    @property
+    def caption(self) -> str:
+        """State of the picture and the controls, the last message and the file's error message."""
+        shown, making, now = self.live.shown, self.live.making, time.monotonic()
+        state = f"{shown.samples:.0f} samples per pixel" if shown.samples else "draft"
+        lines = [
+            f"{state}   surface at {shown.distance:.2g}   pace {self.controls.pace:.2g}",
+            *(["compiling ..."] if making and now - making > PATIENCE else []),
+            *(["camera locked"] if self.controls.locked else []),
+            *(["mouse look"] if self.controls.looking else []),
+            *([self.message] if now - self.since < NOTICE else []),
+            shown.problem,
+        ]
+        return "\n".join(filter(None, lines))
 
     def press(self, key: str) -> None:
         """Handle a key press, including key repeat.
@@ -183,26 +164,9 @@ class Viewer:
         key : str
             Key symbol, lower case.
         """
-        if key in ("q", "escape"):
-            self.plotter.iren.interactor.TerminateApp()
-        elif key == "v":
-            self.live.look(self.live.first)
-        elif key in AXES:
-            self.lifted.pop(key, None)
-            if key not in self.held:
-                self.held.add(key)
-                self.steer()
-
-    def lift(self, key: str) -> None:
-        """Handle a key release, including those of key repeat.
-
-        Parameters
-        ----------
-        key : str
-            Key symbol, lower case.
-        """
-        if key in self.held:
-            self.lifted[key] = time.monotonic()
+        self.controls.press(key)
+        if act := self.actions.get(key):
+            act()
 
     def hurry(self, factor: float) -> None:
         """Multiply the pace.
@@ -212,49 +176,57 @@ class Viewer:
         factor : float
             Factor on the pace.
         """
-        self.pace *= factor
-        self.steer()
-
-    def steer(self) -> None:
-        """Send the pressed keys to the live picture."""
-        self.live.steer(steered(self.held, self.pace))
+        self.controls.pace *= factor
 
     def grasp(self, at: tuple[int, int] | None) -> None:
-        """Begin or end a drag.
+        """Begin or end a drag; mouse look ends by its key only.
 
         Parameters
         ----------
         at : tuple of int or None
             Pointer position, pixels; None ends the drag.
         """
-        self.grip = at
+        if not self.controls.looking:
+            self.controls.grip = at
 
-    def drag(self, to: tuple[int, int]) -> None:
-        """Turn the camera so that the grasped point follows the pointer.
+    def move(self, to: tuple[int, int]) -> None:
+        """Follow the pointer; in mouse look, put it back to the middle before it leaves the window.
 
         Parameters
         ----------
         to : tuple of int
             Pointer position, pixels.
         """
-        if self.grip is None:
-            return
-        degrees = self.live.camera.fov / self.plotter.window_size[1]
-        self.live.turn((self.grip[0] - to[0]) * degrees, (self.grip[1] - to[1]) * degrees)
-        self.grip = to
+        size = self.canvas.size
+        yaw, pitch = self.controls.turn(to, self.live.camera.fov / size[1])
+        if yaw or pitch:
+            self.live.turn(yaw, pitch)
+        if self.controls.looking and any(not EDGE < p / s < 1 - EDGE for p, s in zip(to, size, strict=True)):
+            self.canvas.window.SetCursorPosition(size[0] // 2, size[1] // 2)
+            self.controls.grip = None
 
+    def toggle_look(self) -> None:
+        """Begin or end mouse look."""
+        self.controls.looking, self.controls.grip = not self.controls.looking, None
 
-def _whole_window(image: Any) -> Any:
-    """An actor that scales an image to the whole window."""
-    from vtkmodules.vtkRenderingCore import vtkActor2D, vtkImageMapper
+    def toggle_lock(self) -> None:
+        """Lock or release the camera."""
+        self.controls.locked = not self.controls.locked
 
-    mapper, actor = vtkImageMapper(), vtkActor2D()
-    mapper.SetInputData(image)
-    mapper.SetColorWindow(255)
-    mapper.SetColorLevel(127.5)
-    mapper.RenderToRectangleOn()
-    actor.SetMapper(mapper)
-    upper_right = actor.GetPosition2Coordinate()
-    upper_right.SetCoordinateSystemToNormalizedViewport()
-    upper_right.SetValue(1, 1)
-    return actor
+    def reset(self) -> None:
+        """Return to the first view, unless the camera is locked."""
+        if not self.controls.locked:
+            self.live.look(self.live.first)
+
+    def save(self) -> None:
+        """Save the view as a scene file in the current folder."""
+        scene, camera = self.live.scene, self.live.camera
+        view = replace(scene, view=replace(scene.view, camera=camera))
+        path = next(p for k in count(1) if not (p := Path(f"{scene.name}-view{k}.xml")).exists())
+        try:
+            with replacing(path) as file:
+                file.write(to_xml(view).encode())
+            self.message = f"saved {path}"
+        except ExportError as error:
+            self.message = str(error)
+        self.since = time.monotonic()

@@ -12,7 +12,7 @@ from ..errors import VolumeError
 from .bricks import Bricks
 
 if TYPE_CHECKING:
-    from .._native import Grid
+    from .._vdb import Grid
 
 NAME = "surface"
 """Grid name in a file: OpenVDB's name for the level set of a solid."""
@@ -38,7 +38,7 @@ def to_grid(bricks: Bricks) -> Grid:
     VolumeError
         If the arrays contradict each other.
     """
-    from .._native import Grid
+    from .._vdb import Grid
 
     x, y, z = (float(v) for v in bricks.origin)
     try:
@@ -123,7 +123,7 @@ def read_vdb(path: str | os.PathLike[str], name: str = "") -> Bricks:
     VolumeError
         If the file or the grid cannot be read.
     """
-    from .._native import Grid
+    from .._vdb import Grid
 
     try:
         grid = Grid.read(os.fspath(path), name)

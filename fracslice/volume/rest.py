@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ..formulas.box import Box
@@ -12,9 +10,7 @@ from . import Plan
 from .extent import reached
 
 
-def box_of_the_rest(
-    planned: Plan, whole: np.ndarray, rest: np.ndarray, tips: Callable[[], np.ndarray], work: Work
-) -> Box:
+def box_of_the_rest(planned: Plan, whole: np.ndarray, rest: np.ndarray, tips: np.ndarray, work: Work) -> Box:
     """Return the bounds of the remaining components, from the field: a mesh does not contain all tips.
 
     Parameters
@@ -24,7 +20,7 @@ def box_of_the_rest(
     whole, rest
         Bounds of the mesh with all components and with the remaining ones, [2, 3], scene units.
     tips
-        Returns the outermost remaining vertices, [n, 3], scene units. The search for a side starts there if a
+        Outermost remaining vertices, [n, 3], scene units. The search for a side starts there if a
         removed component reached farther.
     work
         Execution settings.
@@ -36,24 +32,7 @@ def box_of_the_rest(
     """
     if (rest == whole).all():
         return planned.box
-    found = reached(planned.root, tips().T, planned.voxel, work)
+    found = reached(planned.root, tips.T, planned.voxel, work)
     own = np.array([planned.box.lo, planned.box.hi])
     lo, hi = np.where(rest == whole, own, [found.lo, found.hi]).tolist()
     return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))
-
-
-def outermost(vertices: np.ndarray) -> np.ndarray:
-    """Return the outermost points along each axis.
-
-    Parameters
-    ----------
-    vertices
-        Points, [n, 3].
-
-    Returns
-    -------
-    ndarray
-        Lowest points along x, y and z, then highest, [6, 3].
-    """
-    found: np.ndarray = vertices[[*vertices.argmin(0), *vertices.argmax(0)]]
-    return found

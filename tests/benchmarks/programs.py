@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import subprocess
@@ -18,21 +19,24 @@ def program(name: str) -> Path:
 
     Raises
     ------
-    subprocess.CalledProcessError
-        What CMake or the compiler says goes to standard error.
+    SystemExit
+        If it cannot be built; the message is the compiler's.
     """
-    if not (BUILD / "build.ninja").exists():
-        _quietly("cmake", "-G", "Ninja", "-S", SOURCE, "-B", BUILD)
-    _quietly("cmake", "--build", BUILD, "--target", name)
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with (BUILD / ".lock").open("w") as lock:  # two processes do not build at the same time
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (BUILD / "build.ninja").exists():
+            _quietly("cmake", "-G", "Ninja", "-S", SOURCE, "-B", BUILD)
+        _quietly("cmake", "--build", BUILD, "--target", name)
     return BUILD / name
 
 
-def told(name: str, *arguments: object) -> list[dict[str, Any]]:
-    """Runs a peer; the lines of JSON that it prints."""
+def output(name: str, *arguments: object) -> list[dict[str, Any]]:
+    """Run a peer; the lines of JSON that it prints."""
     idle = {**os.environ, "OMP_WAIT_POLICY": "passive"}  # else threads that wait count as CPU seconds
     command = [program(name), *map(str, arguments)]
-    output = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=idle).stdout
-    return [json.loads(line) for line in output.splitlines()]
+    printed = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=idle).stdout
+    return [json.loads(line) for line in printed.splitlines()]
 
 
 def _quietly(*command: object) -> None:

@@ -87,6 +87,7 @@ def test_an_edited_scene_begins_afresh_and_says_so(
         '<cylinder radius="{}" height="3"/></difference></solid></scene>'
     )
     options = ("-o", target, "--layer", "1mm", "--printer", "sl1s", "--quiet")
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
 
     def stopped(self: Journal, data: bytes) -> None:
         if self.count == 8:

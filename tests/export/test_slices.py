@@ -9,7 +9,6 @@ import xml.etree.ElementTree as ET
 import zipfile
 from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from PIL import Image
 from fracslice.errors import Cancelled, ExportError, FracsliceWarning
 from fracslice.export import png
 from fracslice.export.jobs import SliceRun
+from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal
 from fracslice.export.slices import FORMATS, slice_format, write_slices
 from fracslice.formulas import Node, difference, menger, sphere
@@ -27,7 +27,7 @@ from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.printers import Printer
 from fracslice.slicing.raster import Screen
-from fracslice.stackmesh import stack_mesh
+from fracslice.stackmodel import StackModel
 from fracslice.work import Work
 
 MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
@@ -38,8 +38,8 @@ def run(work: Work | None = None, layer: float = 0.5, root: Node = ROOT) -> Slic
     job = SliceJob(size=12, layer=layer, pixel=MACHINE.pixel)
     stack = plan_stack(root, job)
     how, work = Screen(stack, MACHINE), work or Work()
-    mesh = partial(stack_mesh, scene(root, size=12), job, Work())
-    return SliceRun(stack, how, work, metadata={"Title": "test"}, mesh=mesh)
+    mesh = StackModel(scene(root, size=12), job, Work()).mesh
+    return SliceRun(stack, how, work, Resin(2, 20), {"Title": "test"}, mesh)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_sl1(tmp_path: Path) -> None:
         assert archive.testzip() is None
         config = dict(line.split(" = ") for line in archive.read("config.ini").decode().splitlines())
         settings = dict(line.split(" = ") for line in archive.read("prusaslicer.ini").decode().splitlines())
-        pictures = [n for n in archive.namelist() if n.endswith(".png")]
+        pictures = [n for n in archive.namelist() if n.startswith("part")]
         assert config["layerHeight"] == "0.5"
         assert config["numFast"] == "24"
         assert config["jobDir"] == "part"
@@ -271,7 +271,7 @@ def contents(path: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("cut", [1, 50, 700, 2000])
-@pytest.mark.parametrize("form", ["sl1", "cli", "3mf"])
+@pytest.mark.parametrize("form", ["sl1", "goo", "cli", "3mf"])
 def test_a_truncated_remainder_goes_on_from_what_is_whole(form: str, cut: int, tmp_path: Path) -> None:
     target, part = tmp_path / "part.sl1", tmp_path / ".part.sl1.part"
     with pytest.raises(Cancelled):
@@ -279,6 +279,20 @@ def test_a_truncated_remainder_goes_on_from_what_is_whole(form: str, cut: int, t
     part.write_bytes(part.read_bytes()[:-cut])
     write_slices(run(), target, form)
     assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1"), form))
+
+
+@pytest.mark.parametrize("form", ["goo", "png"])
+def test_a_damaged_layer_is_made_again(form: str, tmp_path: Path) -> None:
+    """One bit of a layer that looks whole: as long as it was, with the same end."""
+    target = tmp_path / "part"
+    with pytest.raises(Cancelled):
+        write_slices(run(cancelled_after(16)), target, form)
+    layer = target / "00003.png" if form == "png" else tmp_path / ".part.part"
+    data = bytearray(layer.read_bytes())
+    data[len(data) // 2] ^= 1
+    layer.write_bytes(data)
+    write_slices(run(), target, form)
+    assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part"), form))
 
 
 SMALLER = difference(menger(level=1), sphere(radius=0.8))
@@ -314,7 +328,7 @@ def test_a_job_is_known_by_all_that_its_layers_follow_from(monkeypatch: pytest.M
             {"notes": ("a",)},
         ],
         "screen": [{"gamma": 1.1}, {"compensation": 0.01}, {"mirror": True}, {"printer": None}],
-        "": [{"exposure": (8.0, 36.0)}, {"metadata": {"Title": "other"}}],
+        "": [{"resin": Resin(2, 21)}, {"metadata": {"Title": "other"}}],
     }
     jobs = [job]
     for part, values in changes.items():

@@ -1,6 +1,6 @@
 """The CUDA back end where there is no GPU: what it compiles to, and what it computes on Numba's simulator.
 
-On a real GPU: ``python -m tests.benchmarks.gpu.parity``.
+On a real GPU: ``python -m tests.benchmarks gpu.parity``.
 """
 
 from __future__ import annotations

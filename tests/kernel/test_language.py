@@ -20,6 +20,9 @@ import math
 import numpy as np
 from fracslice.formulas import Box, Number, csg_operator, domain_operator, shape
 TURN = 0.5
+POWER = 3
+CORNERS = ((1.0, 0.5), (-0.5, 2.0))
+SIZES = (0.5, 2.0, 4.0)
 @shape(radius=Number(1.0, "the radius", above=0))
 def mine(x, y, z, radius):
 """
@@ -56,6 +59,18 @@ SAME = {
     "return (x * x) ** 0.5 + np.abs(np.sin(y)) - math.pi": abs(X) + abs(np.sin(Y)) - math.pi,
     "f = x\n    f += TURN\n    f *= 2.0\n    return f": 2 * (X + 0.5),
     "return max(radius, 0.5) * x": 0.7 * X,
+    "return x % 1.0 - (y * z) // radius": X % 1.0 - (Y * Z) // 0.7,
+    "return where((x != y) & ~(x > z), y, z)": np.where(X > Z, Z, Y),
+    "return where(-0.5 < x <= y, y, z)": np.where((X > -0.5) & (X <= Y), Y, Z),
+    "f = 0.0\n    for k in range(3):\n        f += k * x\n    return f": 3 * X,
+    "n = 0\n    for _ in range(3):\n        n += 1\n    return n * x": 3 * X,
+    "f = 1.0\n    for s in (0.5, -2.0):\n        f = f * s + x\n    return f": (0.5 + X) * -2.0 + X,
+    "f = x\n    for a, b in CORNERS:\n        f = max(f, a * y + b * z)\n    return f": np.maximum(
+        np.maximum(X, Y + 0.5 * Z), -0.5 * Y + 2 * Z
+    ),
+    "a, b, c = SIZES\n    return a * x + b * y + c * z": 0.5 * X + 2 * Y + 4 * Z,
+    "f = x\n    for k in range(3):\n        f = f + SIZES[k] * y\n    return f - SIZES[1]": X + 6.5 * Y - 2,
+    "return x ** POWER - y ** 2.0": X**3 - Y**2,
 }
 
 
@@ -68,20 +83,22 @@ def test_pythons_own_words_are_those_of_the_vocabulary(module, body: str) -> Non
 
 
 REFUSED = {
-    "return sqr(x) - radius": "8: formula mine: 'sqr' is not a word .*did you mean sqrt?",
-    "return np.arcsinh(x)": "8: formula mine: 'np.arcsinh' is not a word",
-    "y = x % 1.0\n    return y": "8: formula mine: 'x % 1.0' is not in the language.*floor",
-    "q = x\n    if q > 0:\n        q = y\n    return q": "9: formula mine: if 'q > 0' may differ.*where",
-    "return x if x > y else y": "8: formula mine: if 'x > y' may differ",
-    "return x if 0 < radius and y < z else y": "8: .*expected where",
-    "while radius:\n        x = y\n    return x": "8: .*not in the language",
-    "return [x][0]": "8: .*not in the language",
-    "return x ** radius": "8: .*whole exponent",
-    "return x.sum()": "8: .*'x.sum' is not a word",
-    "return (lambda a: a)(x)": "8: .*not in the language",
-    "return 'radius'": "8: .*not in the language",
-    "return max(a=x, b=y)": "8: .*by their place",
-    "P0 = x\n    return P0": "8: .*another name",
+    "return sqr(x) - radius": "11: formula mine: 'sqr' is not a word .*did you mean sqrt?",
+    "return np.arcsinh(x)": "11: formula mine: 'np.arcsinh' is not a word",
+    "for s in x:\n        y = s\n    return y": "11: formula mine: 'for s in x: y = s' .*a range or a tuple",
+    "for s in (1.0, 2.0):\n        break\n    return x": "12: formula mine: 'break' .*a loop over a range",
+    "return not (x > y)": "11: .*expected ~",
+    "q = x\n    if q > 0:\n        q = y\n    return q": "12: formula mine: if 'q > 0' may differ.*where",
+    "return x if x > y else y": "11: formula mine: if 'x > y' may differ",
+    "return x if 0 < radius and y < z else y": "11: .*expected where",
+    "while radius:\n        x = y\n    return x": "11: .*not in the language",
+    "return [x][0]": "11: .*not in the language",
+    "return x ** radius": "11: .*whole exponent",
+    "return x.sum()": "11: .*'x.sum' is not a word",
+    "return (lambda a: a)(x)": "11: .*not in the language",
+    "return 'radius'": "11: .*not in the language",
+    "return max(a=x, b=y)": "11: .*by their place",
+    "P0 = x\n    return P0": "11: .*another name",
 }
 
 
@@ -144,7 +161,7 @@ def test_an_argument_that_is_not_given_is_named(module) -> None:  # type: ignore
 
 
 def test_one_name_is_one_formula(module) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(SceneError, match=r"own_formulas.py:5: formula 'sphere': expected another name"):
+    with pytest.raises(SceneError, match=r"own_formulas.py:8: formula 'sphere': expected another name"):
         module(HEAD.replace("mine", "sphere") + "    return x")
 
 

@@ -60,7 +60,7 @@ def test_it_is_known_by_all_that_it_was_made_of(
     code(bits=64)
     code(loops=[replace(points, arguments="rrrrin")])
     code(Linked(LINKED.source + "#", LINKED.parameters))
-    monkeypatch.setattr(objects, "version", lambda _: "another")
+    monkeypatch.setattr(objects.llvmlite, "__version__", "another")
     objects.toolchain.cache_clear()
     code()
     objects.toolchain.cache_clear()

@@ -20,7 +20,7 @@ from fracslice.mesh.nesting import nesting
 from fracslice.mesh.predicates import side_of_line, side_of_plane
 from fracslice.mesh.reading import joined
 from fracslice.mesh.self_intersections import self_intersecting_triangles
-from fracslice.mesh.topology import connected_components, edge_topology, shell_volumes
+from fracslice.mesh.topology import component_sizes, connected_components, edge_topology
 from fracslice.mesh.tree import build
 
 from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved
@@ -102,19 +102,20 @@ def test_empty_and_nonsense_meshes() -> None:
 def test_arrays_that_contradict_each_other_are_refused() -> None:
     """Nothing reads beyond an array, whoever calls."""
     mesh, beyond = cube(), np.array([[0, 1, 8]], np.int32)
-    tree, labels = build(mesh), np.zeros(12, np.int32)
+    tree, labels = build(mesh), np.zeros(8, np.int32)
     calls: list[Callable[[], object]] = [
         lambda: edge_topology(beyond, 8),
         lambda: connected_components(-beyond, 9),
-        lambda: shell_volumes(mesh.vertices, mesh.triangles, labels + 1, 1),
+        lambda: component_sizes(mesh.vertices, mesh.triangles, labels + 1, 1),
         lambda: build(Mesh(mesh.vertices, beyond)),
         lambda: self_intersecting_triangles(mesh, tree._replace(order=tree.order + 1)),
         lambda: self_intersecting_triangles(sphere(), tree),
+        lambda: component_sizes(mesh.vertices, mesh.triangles, labels - 1, 1),
         lambda: nesting(mesh, labels[1:], np.ones(2), np.array([-1, 0])),
         lambda: nesting(mesh, labels, np.ones(2), np.array([-2, 0])),
     ]
     for call in calls:
-        with pytest.raises(ValueError, match=r"does not exist|differ in length|not of this mesh"):
+        with pytest.raises(ValueError, match=r"does not exist|differ in length|not of this mesh|no label"):
             call()
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from fracslice._native import bounds, measures, turned
 from fracslice.mesh import Mesh
+from fracslice.mesh.quantisation import placed
 
 RNG = np.random.default_rng(5)
 SOUP = Mesh(RNG.normal(size=(9000, 3)), RNG.integers(0, 9000, (40000, 3)).astype(np.int32))
@@ -35,9 +36,9 @@ def test_bounds() -> None:
 
 
 def test_turned() -> None:
-    points = SOUP.vertices + RNG.normal(0, 0.5, SOUP.vertices.shape)
-    expected = np.flatnonzero((normals(SOUP.vertices) * normals(points)).sum(1) <= 0)
-    assert 1000 < len(expected) < 39000
-    assert turned(SOUP.vertices, SOUP.triangles, points).tolist() == expected.tolist()
-    with pytest.raises(ValueError, match="length"):
-        turned(SOUP.vertices, SOUP.triangles, points[1:])
+    frame = 0.5, (2.0**24, 0.0, 1.0), 0.8
+    points = 0.5 * SOUP.vertices + frame[1]
+    points[points[:, 2] < 0.8, 2] = 0
+    expected = np.flatnonzero((normals(points) * normals(placed(SOUP.vertices, frame))).sum(1) <= 0)
+    assert 300 < len(expected) < 39000
+    assert turned(SOUP.vertices, SOUP.triangles, frame).tolist() == expected.tolist()

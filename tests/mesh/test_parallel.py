@@ -9,9 +9,10 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components as components_of_a_graph
 
-from fracslice._native import near, pointed, quantise, selected, stl, surroundings, touching
+from fracslice._native import near, pointed, selected, stl, surroundings, touching
 from fracslice.mesh import Mesh
 from fracslice.mesh.nesting import nesting
+from fracslice.mesh.quantisation import placed, quantise
 from fracslice.mesh.reading import joined
 from fracslice.mesh.self_intersections import self_intersecting_triangles
 from fracslice.mesh.topology import component_sizes, connected_components, corners_by_vertex
@@ -31,22 +32,30 @@ SOME = RNG.random(M) < 0.4
 def test_connected_components(threads: int) -> None:
     labels, count = connected_components(LOOSE.triangles, N, threads)
     edges = np.concatenate([LOOSE.triangles[:, :2], LOOSE.triangles[:, 1:]])
-    _, of_vertex = components_of_a_graph(coo_array((np.ones(2 * M), edges.T), shape=(N, N)))
-    _, first, which = np.unique(of_vertex[LOOSE.triangles[:, 0]], return_index=True, return_inverse=True)
+    _, expected = components_of_a_graph(coo_array((np.ones(2 * M), edges.T), shape=(N, N)))
+    used = np.unique(LOOSE.triangles)
+    _, first, which = np.unique(expected[used], return_index=True, return_inverse=True)
     assert 1000 < count == len(first)
-    assert (labels == np.argsort(np.argsort(first))[which]).all()
+    assert (labels[used] == np.argsort(np.argsort(first))[which]).all()
+    assert (np.delete(labels, used) == -1).all()
 
 
 def test_sizes_of_components() -> None:
     labels, count = connected_components(LOOSE.triangles, N)
-    a, b, c = (LOOSE.vertices[LOOSE.triangles[:, k]] for k in range(3))
-    origin = a[np.unique(labels, return_index=True)[1]][labels]
-    expected = np.bincount(labels, (np.cross(a - origin, b - origin) * (c - origin)).sum(1)) / 6
     found = [component_sizes(LOOSE.vertices, LOOSE.triangles, labels, count, k) for k in THREADS]
-    for volumes, areas in found:
+    of = labels[LOOSE.triangles[:, 0]]
+    a, b, c = (LOOSE.vertices[LOOSE.triangles[:, k]] for k in range(3))
+    origin = LOOSE.vertices[found[0].outermost[of, 0]]
+    expected = np.bincount(of, (np.cross(a - origin, b - origin) * (c - origin)).sum(1)) / 6
+    for side in range(6):
+        heights = (1 if side < 3 else -1) * LOOSE.vertices[:, side % 3]
+        order = np.lexsort([heights, labels])
+        assert (found[0].outermost[:, side] == order[np.searchsorted(labels[order], np.arange(count))]).all()
+    for volumes, areas, vectors, _ in found:
         assert np.allclose(volumes, expected, rtol=1e-9, atol=1e-9)
-        assert np.allclose(areas, np.bincount(labels, np.linalg.norm(LOOSE.normals, axis=1)) / 2)
-        assert (volumes.tobytes(), areas.tobytes()) == (found[0][0].tobytes(), found[0][1].tobytes())
+        assert np.allclose(areas, np.bincount(of, np.linalg.norm(LOOSE.normals, axis=1)) / 2)
+        assert np.allclose(vectors[:, 2], np.bincount(of, LOOSE.normals[:, 2]) / 2)
+    assert len({b"".join(array.tobytes() for array in sizes) for sizes in found}) == 1
 
 
 @pytest.mark.parametrize("threads", THREADS)
@@ -116,14 +125,36 @@ def test_quantised_coordinates_and_what_is_displaced(threads: int) -> None:
     points = LOOSE.vertices.copy()
     points[:1000, 0] = planes[RNG.integers(len(planes), size=1000), 0]
     points[1000:2000] = -0.0
-    found, displaced = quantise(points, planes, threads)
+    mesh, keep = Mesh(points, LOOSE.triangles), np.ones(N, bool)
+    quantised, displaced, _ = quantise(mesh, keep, planes=planes, threads=threads)
+    found = quantised.vertices
     assert (found == points.astype(np.float32)).all() and not np.signbit(found[1000:2000]).any()
     low = planes[np.searchsorted(planes[:, 0], points, "right") - 1, 0].astype(np.float32)
     high = planes[np.searchsorted(planes[:, 0], points, "left"), 0].astype(np.float32)
     kept = np.where(low == high, found == low, (low < found) & (found < high)).all(axis=1)
     assert 0 < displaced.sum() < N / 2 and (displaced == ~kept).all()
-    assert quantise(points, np.empty((0, 3)), threads)[1].all()
-    assert quantise(points * 10, planes, threads)[1][np.abs(points).max(axis=1) > 0.8].all()
+    assert quantise(mesh, keep, threads=threads).displaced.all()
+    far = quantise(mesh, keep, planes=planes, frame=(10, (0, 0, 0), -np.inf), threads=threads)
+    assert far.displaced[np.abs(points).max(axis=1) > 0.8].all()
+
+
+@pytest.mark.parametrize("threads", THREADS)
+def test_quantised_are_the_triangles_that_stay_with_their_edits(threads: int) -> None:
+    labels, _ = connected_components(LOOSE.triangles, N)
+    keep = (labels % 2 == 0) & (labels >= 0)
+    of = labels[LOOSE.triangles[:, 0]]
+    rows = np.sort(np.random.default_rng(3).choice(M, 1000, replace=False))
+    corners = LOOSE.triangles[rows][:, [1, 2, 0]].copy()
+    corners[::3] = -1
+    found = quantise(LOOSE, keep, edits=(rows, corners), frame=(2, (1, 2, 3), 0.5), threads=threads)
+    edited = LOOSE.triangles.copy()
+    edited[rows] = corners
+    stay = np.flatnonzero((edited[:, 0] >= 0) & (of % 2 == 0))
+    number = np.cumsum(keep) - 1
+    assert (found.mesh.triangles == number[edited[stay]]).all()
+    assert (found.mesh.vertices == placed(LOOSE.vertices[keep], (2, (1, 2, 3), 0.5))).all()
+    there = np.flatnonzero(np.isin(rows, stay))
+    assert (stay[found.places[there]] == rows[there]).all() and (np.delete(found.places, there) == -1).all()
 
 
 def test_shells_in_shells() -> None:
@@ -138,7 +169,7 @@ def test_shells_in_shells() -> None:
     order = RNG.permutation(len(parts))
     mesh = joined([parts[k] for k in order])
     labels, count = connected_components(mesh.triangles, len(mesh.vertices))
-    volumes, _ = component_sizes(mesh.vertices, mesh.triangles, labels, count)
+    volumes = component_sizes(mesh.vertices, mesh.triangles, labels, count).volumes
     at = np.empty(count, int)
     at[order] = np.arange(count)
     outside = np.where(order % depth == 0, -1, at[order - 1])

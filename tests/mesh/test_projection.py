@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice._native import trust_regions
 from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
 from fracslice.kernel import compile_scene
 from fracslice.mesh.projection import TrustRegions, project
@@ -97,3 +98,30 @@ def test_surface_error_is_a_distance_also_where_solids_touch_in_an_edge() -> Non
     halves = [transform(box(), translate=(d, d, 0)) for d in (-0.5, 0.5)]
     points = np.array([[1e-9, -1e-9, 0.1], [0.003, 0.003, -0.2]])
     assert (surface_error(union(*halves), points, 0.1) < [2e-9, 0.004]).all()
+
+
+def test_trust_regions_are_the_interiors_of_cells_and_faces() -> None:
+    """Against NumPy: of vertices in cells, and of some in faces."""
+    rng, origin, voxel, margin = np.random.default_rng(4), np.array([0.3, -1.0, 2.0]), 0.1, 0.01
+    grid = rng.integers(0, 9, (500, 3)) + rng.uniform(0.1, 0.9, (500, 3))
+    face = rng.integers(0, 4, 500)
+    grid[face < 3, face[face < 3]] = np.floor(grid[face < 3, face[face < 3]])
+    features, cases = origin + voxel * grid, rng.integers(1, 255, 500).astype(np.uint8)
+    to_means = rng.normal(0, 0.2, (500, 3)).astype(np.float32)
+    which, inside = rng.permutation(500)[:200], rng.random(200) < 0.5
+    found = trust_regions(features, cases, to_means, which, inside, tuple(origin.tolist()), voxel, margin)
+    flat = np.arange(3) == face[:, None]
+    cell = np.floor(np.round(grid, 9))
+    expected = origin + voxel * (cell + np.where(flat, 0, margin))
+    assert np.allclose(found[0].T, expected[which])
+    expected = origin + voxel * (cell + np.where(flat, 0, 1 - margin))
+    assert np.allclose(found[1].T, expected[which])
+    middle = np.clip((features + voxel * to_means)[which], found[0].T, found[1].T)
+    assert np.allclose(found[3].T, middle)
+    for k, row in enumerate(which):
+        corner = np.round((found[2][:, k] - origin) / voxel - cell[row]).astype(int)
+        corners = [c for c in np.ndindex(2, 2, 2) if face[row] == 3 or c[face[row]] == 0]
+        signs = {c: bool(cases[row] >> (c[0] + 2 * c[1] + 4 * c[2]) & 1) for c in corners}
+        other = [c for c in corners if signs[c] != inside[k]]
+        away = [np.abs(np.array(c) - (grid[row] - cell[row] > 0.5)).sum() for c in other]
+        assert not other or (tuple(corner) in other and away[other.index(tuple(corner))] == min(away))

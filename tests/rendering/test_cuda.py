@@ -1,4 +1,4 @@
-"""The CUDA renderer where there is no GPU. On a real one: ``python -m tests.benchmarks.gpu.frame``."""
+"""The CUDA renderer where there is no GPU. On a real one: ``python -m tests.benchmarks gpu.frame``."""
 
 from __future__ import annotations
 

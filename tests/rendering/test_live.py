@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
-from fracslice.rendering.live import CameraInput, Live
+from fracslice.rendering.live import Live
+from fracslice.rendering.steering import CameraInput
 from fracslice.scene.view import Camera
 from fracslice.work import Work
 
@@ -45,21 +46,21 @@ def within(holds: Callable[[], bool], seconds: float = 60) -> None:
 
 def sharp(live: Live, camera: Camera) -> np.ndarray:
     """The picture from there, when it has all of its samples."""
-    within(lambda: live.shown.camera == camera and live.shown.done.samples == 4)
+    within(lambda: live.shown.camera == camera and live.shown.samples == 4)
     return live.shown.pixels
 
 
 def test_a_flight_never_gets_there() -> None:
     camera, ahead = Camera(eye=(3, 0, 0), target=(0, 0, 0)), CameraInput(forward=1, pace=40)
-    ways = [3.0]
+    places = [3.0]
     for _ in range(30):
         camera = ahead.flown(camera, np.hypot.reduce(camera.eye) - 1, 0.1)
-        ways.append(camera.eye[0])
-    assert 1 < min(ways) < 1 + 1e-6
-    assert all(a > b for a, b in pairwise(ways))
+        places.append(camera.eye[0])
+    assert 1 < min(places) < 1 + 1e-6
+    assert all(a > b for a, b in pairwise(places))
     aside = CameraInput(1, 1, 1, pace=1e3).flown(Camera(eye=(3, 0, 0), target=(0, 0, 0)), 2.0, 1.0)
     assert np.hypot.reduce(np.subtract(aside.eye, (3, 0, 0))) == pytest.approx(1.0)
-    assert CameraInput(pace=3).idle and not ahead.idle
+    assert CameraInput(pace=3).flown(camera, 1.0, 1.0) == camera
 
 
 def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
@@ -67,10 +68,10 @@ def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
     first = sharp(live, before)
     assert first.shape == (32, 48, 3) and np.ptp(first) > 50
     live.steer(CameraInput(forward=1, pace=5))
-    within(lambda: 0 < live.shown.room < 0.1)
+    within(lambda: 0 < live.shown.distance < 0.1)
     live.steer(CameraInput())
     assert np.linalg.norm(np.cross(live.camera.forward, before.forward)) < 1e-9, "straight ahead"
-    within(lambda: live.shown.done.samples == 4)  # it has come to rest
+    within(lambda: live.shown.samples == 4)  # it has come to rest
     near = live.shown.pixels
     assert abs(near.astype(int) - first).mean() > 5
     aside = live.camera.turned(90, 10)
@@ -79,6 +80,48 @@ def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
     live.look(live.first)
     within(lambda: live.camera == before)
     assert abs(sharp(live, before).astype(int) - first).mean() < 1
+
+
+def test_a_moving_picture_is_a_draft_without_noise(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path.write_text(SCENE.format('<box size="9 9 1"/>').replace("3 -2 1", "3 -2 4"))
+    monkeypatch.setattr("fracslice.rendering.live.READABLE", 1e9)  # nothing but drafts
+    live = Live(path, size=(48, 32), work=Work(threads=1), device="cpu")
+    try:
+        assert live.shown.samples == 0 and live.shown.pixels.shape == (8, 12, 3)
+        within(lambda: live.shown.pixels.shape == (32, 48, 3))
+        top = live.shown.pixels[12:20, 16:32].astype(int)
+        assert np.ptp(top, axis=(0, 1)).max() <= 2, "one plane, lit evenly"
+        live.resize((20, 30))
+        within(lambda: live.shown.pixels.shape == (30, 20, 3))
+        assert live.shown.camera == live.first
+    finally:
+        live.close()
+
+
+def test_a_tap_on_a_key_is_never_lost(live: Live) -> None:
+    sharp(live, live.first)
+    live.steer(CameraInput(yaw=1))
+    time.sleep(0.02)
+    live.steer(CameraInput())
+    within(lambda: live.camera != live.first)
+
+
+def test_a_new_kernel_shows_that_it_compiles(
+    live: Live, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "kernels"))
+    for solid in (
+        '<mandelbulb power="5"/>',
+        '<mandelbulb power="6"/>',
+        '<material colour="1 0 0 0 1 0 0 0 1"><union><mandelbulb power="6"/><box/></union></material>',
+    ):
+        sharp(live, live.first)
+        shown, making = live.shown, set[float | None]()
+        path.write_text(SCENE.format(solid))
+        while live.shown is shown or live.shown.samples < 4:
+            making.add(live.making)
+            time.sleep(0.005)
+        assert len(making - {None}) >= 2, "of the draft and of the final picture"
 
 
 def test_there_is_no_looking_from_inside(live: Live) -> None:
@@ -96,15 +139,16 @@ def test_a_saved_file_is_looked_at_from_the_same_place(live: Live, path: Path) -
     turned = live.first.turned(5, 0)
     before = sharp(live, turned)
     path.write_text(SCENE.format(BOX))
-    within(lambda: abs(live.shown.pixels.astype(int) - before).mean() > 3)
+    within(lambda: live.shown.samples == 0)
     boxed = sharp(live, turned)
+    assert abs(boxed.astype(int) - before).mean() > 3
     path.write_text(SCENE.format('<sphere radius="x"/>'))
-    within(lambda: "ball.xml:1" in live.shown.trouble)
-    assert "radius" in live.shown.caption and live.running
+    within(lambda: "ball.xml:1" in live.shown.problem)
+    assert "radius" in live.shown.problem and live.running
     np.testing.assert_array_equal(live.shown.pixels, boxed)
     path.write_text(SCENE.format(SPHERE).replace("3 -2 1", "-3 -2 1"))
     other = sharp(live, replace(live.first, eye=(-3, -2, 1)))
-    assert live.shown.trouble == ""
+    assert live.shown.problem == ""
     assert abs(other.astype(int) - first).mean() > 1, "seen from the other side"
 
 

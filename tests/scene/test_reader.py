@@ -85,7 +85,7 @@ def refused(text: str | bytes) -> str:
         ("<box>\n<sphere/></box>", "f.xml:3: <box> takes no elements inside it, found <sphere>"),
         ("<box/>\nmore", "f.xml:2: <solid> holds the text 'more': expected elements only"),
         ("", "f.xml:2: <solid> expected at least one element inside it"),
-        ("<solid size='1mm'><box/></solid>", "f.xml:3: <solid> cannot stand here; expected <bend>, <bounds>"),
+        ("<solid size='1mm'><box/></solid>", "f.xml:3: <solid> cannot stand here; expected <abox>, <bend>"),
         ("<box>", "f.xml:4: not well-formed XML: mismatched tag"),
         ("<box size='1 1 1' size='1 1 1'/>", "f.xml:3: not well-formed XML: duplicate attribute"),
         ("<box", "f.xml:4: not well-formed XML"),
@@ -123,7 +123,7 @@ def test_wrong_sizes(size):
         (
             "<scene version='1'><box/></scene>",
             "f.xml:1: <box> cannot stand here; "
-            "expected <camera>, <film>, <fog>, <light>, <print>, <shading> or <solid>",
+            "expected <animation>, <camera>, <film>, <fog>, <light>, <print>, <shading>, <solid> or <track>",
         ),
         (
             "<scene version='1'><solid><box/></solid></scene>",

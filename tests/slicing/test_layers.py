@@ -28,6 +28,7 @@ from fracslice.formulas import (
 )
 from fracslice.formulas.field import Bounds
 from fracslice.scene import scene
+from fracslice.shown import layers_amount
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.slab import Sampler
 from fracslice.work import Work
@@ -86,7 +87,7 @@ def test_closed_and_equal_to_dense_sampling(name: str) -> None:
 @pytest.mark.parametrize("root", [mandelbulb(), julia(), mandelbulb(iterations=4)])
 def test_what_fractals_cost_and_what_is_lost(root: Node) -> None:
     """Little more than three evaluations per pixel that the contour cuts (under three where pictures are
-    larger: `tests.benchmarks.slices.peer`); samples of the wrong sign make up less than 0.1 % of the area.
+    larger: `tests.benchmarks slices.peer`); samples of the wrong sign make up less than 0.1 % of the area.
     """
     stack = stack_of(root, 512, 0.4)
     layers = range(len(stack.z) // 8 * 4, len(stack.z) // 8 * 4 + 8)
@@ -388,3 +389,13 @@ def test_whole_layers_of_another_height_are_told() -> None:
     low, fine = (plan_stack(of, SliceJob(50, layer, (0.5, 0.5))) for layer in (1.04, 0.01))
     assert low.notes == ("whole layers are 17.68 mm high, the object 18.1 mm; expected lower layers",)
     assert fine.notes == ()
+
+
+def test_layers_that_were_written_are_not_sampled_again_for_their_volume(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slicer = Slicer(stack_of(sphere(), layer=0.4), Work(2))
+    fresh = layers_amount(Slicer(slicer.stack, Work(2)), Work(2))
+    assert len(list(slicer.map(lambda layer: layer.coverage.any()))) == len(slicer.areas)
+    monkeypatch.setattr(Sampler, "sample", None)
+    assert layers_amount(slicer, Work(2)) == fresh

@@ -8,6 +8,7 @@ import sys
 
 SCRIPT = """
 import zlib
+from fracslice._slices import Encoding
 from fracslice.formulas import box, difference, mandelbulb, sphere
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.printers import printer
@@ -16,7 +17,8 @@ for root in (mandelbulb(), difference(box(), sphere(radius=0.6))):
     stack = plan_stack(root, SliceJob(size=20, layer=1.5, pixel=(0.1, 0.1)))
     screen = Screen(stack, printer("sl1"), gamma=1.5)
     def made(layer):
-        return zlib.crc32(layer.coverage.tobytes()), zlib.crc32(screen.deflated(layer)), layer.evaluations
+        picture = screen.encoded(layer, Encoding.PNG)
+        return zlib.crc32(layer.coverage.tobytes()), zlib.crc32(picture), layer.evaluations
     for numbers in Slicer(stack).map(made):
         print(*numbers)
 """

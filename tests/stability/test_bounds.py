@@ -1,4 +1,4 @@
-"""The bounds that formulas state, at few points; `tests.benchmarks.stability.bounds` tries 10^7."""
+"""The bounds that formulas state, at few points; `tests.benchmarks stability.bounds` tries 10^7."""
 
 from __future__ import annotations
 

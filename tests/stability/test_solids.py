@@ -1,4 +1,4 @@
-"""Shipped scenes with other numbers are solids too; `tests.benchmarks.stability.scenes` tries hundreds."""
+"""Shipped scenes with other numbers are solids too; `tests.benchmarks stability.scenes` tries hundreds."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import pytest
 from fracslice.formulas import intersection, sphere, transform
 from fracslice.kernel.depth import resolve_depths
 from fracslice.scene import library
-from tests.benchmarks.stability.scenes import settings
+from tests.benchmarks.stability.scenes import drawn_settings
 
 from .solids import Outcome, outcome
 
 
 @pytest.mark.parametrize("name", library.names())
 def test_other_numbers_make_a_solid(name: str) -> None:
-    root = settings(name, 1)[1]
+    root = drawn_settings(name, 1)[1]
     found = outcome(root, 24, threads=2)
     assert found == Outcome() or "there is no surface" in found.refused
 
@@ -22,7 +22,7 @@ def test_other_numbers_make_a_solid(name: str) -> None:
 @pytest.mark.parametrize(("name", "setup"), [("raspberry", 20), ("spinning-top", 7), ("spinning-top", 12)])
 def test_nothing_to_repair_where_there_was(name: str, setup: int) -> None:
     """Dust of powers 18 and 27, and torn dust of power 7.5: 22, 92 and 34 violations once."""
-    root = settings(name, setup)[setup]
+    root = drawn_settings(name, setup)[setup]
     shown = resolve_depths(root, max(root.bounds.box.size) / 48)  # a deeper solid is finer than these voxels
     assert outcome(shown, 48, threads=2) == Outcome()
 

@@ -65,7 +65,7 @@ def volumes(root: Node, resolution: float) -> Volumes:
     stack = plan_stack(root, SliceJob(SIZE, report.voxel_mm, (report.voxel_mm,) * 2), work)
     areas = np.array(list(Slicer(stack, work).map(lambda layer: layer.area)))
     of_layers = float(areas @ stack.heights) / stack.scale**3
-    of_stack, note = layers_amount(stack, work)
+    of_stack, note = layers_amount(Slicer(stack, work), work)
     if stack.root != made.root:
         faults.append(f"the mesh is of {made.root}, the layers are of {stack.root}")
     quantised = tuple(line for line in stack.notes if line.startswith("whole layers"))

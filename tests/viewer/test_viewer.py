@@ -1,95 +1,220 @@
-"""What keys and the pointer mean in the window to fly in; no screen is needed."""
+"""The flight window under real keys, pointer and resizing: every event comes from an X server."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import SimpleNamespace
-from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 
+from fracslice import read
 from fracslice.errors import RenderError
-from fracslice.rendering.live import CameraInput
 from fracslice.scene.view import Camera
 from fracslice.viewer import fly, screen, viewer
+from tests.viewer.xserver import AVAILABLE, XServer, xserver
 
-pyvista = pytest.importorskip("pyvista")
+pytest.importorskip("pyvista")
+real = pytest.mark.skipif(not AVAILABLE, reason="Xvfb and libXtst are not installed")
+
+SCENE = """<scene version="1"><solid size="80mm"><material colour="1 0 0"><sphere/></material></solid>
+<camera eye="4 0 0" target="0 0 0"/><shading ambient="0.5"/><film samples="4" background="0 0 1"/>
+<light kind="sun"/></scene>"""
+SIZE = (320, 240)
 
 
-def shown(level: int) -> SimpleNamespace:
-    pixels = np.full((4, 6, 3), level, np.uint8)
-    pixels[0] = 0  # the upper row
-    return SimpleNamespace(pixels=pixels, caption=f"{level}")
+class Window:
+    """A flight window in a process of its own."""
+
+    def __init__(self, server: XServer, folder: Path) -> None:
+        self.server, self.folder, self.saved = server, folder, 0
+        (folder / "ball.xml").write_text(SCENE)
+        size = "{}x{}".format(*SIZE)
+        command = [sys.executable, "-m", "fracslice.cli", "fly", "ball.xml", "--size", size]
+        self.process = subprocess.Popen(
+            [*command, "--device", "cpu"],
+            cwd=folder,
+            env=os.environ | {"DISPLAY": server.display},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        wait(lambda: server.windows() != [] and self.ball() is not None)
+        server.point(150, 120)  # keys go to the window under the pointer
+
+    def camera(self, other_than: Camera | None = None) -> Camera:
+        """The camera at rest, by the key that saves the view."""
+        views: list[Camera | None] = [other_than]
+        while views[-1] == other_than or views[-3:] != 3 * views[-1:]:
+            assert len(views) < 100, "the camera does not come to rest, or does not move"
+            self.saved += 1
+            path = self.folder / f"ball-view{self.saved}.xml"
+            self.server.key("period")
+            wait(path.exists)
+            views.append(read(path).view.camera)
+            time.sleep(0.1)
+        assert views[-1] is not None
+        return views[-1]
+
+    def ball(self) -> tuple[int, int] | None:
+        """Width and height of the ball's picture, pixels: all that is red; the text is white."""
+        pixels = self.server.pixels().astype(int)
+        red = pixels[..., 0] > 60 + 2 * pixels[..., 1]
+        if not red.any():
+            return None
+        rows, columns = np.flatnonzero(red.any(1)), np.flatnonzero(red.any(0))
+        return int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
+
+
+def wait(holds: Callable[[], bool], seconds: float = 60) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Window]:
+    folder = tmp_path_factory.mktemp("flight")
+    with xserver(folder) as server:
+        window = Window(server, folder)
+        yield window
+        window.process.kill()
+        window.process.wait()
 
 
 @pytest.fixture
-def window(monkeypatch: pytest.MonkeyPatch) -> viewer.Viewer:
-    monkeypatch.setattr(pyvista, "Plotter", lambda **_: MagicMock(window_size=(6, 40)))
-    live = MagicMock(camera=Camera(fov=40.0), running=True, shown=shown(10))
-    return viewer.Viewer(live, (6, 4), lambda: False)
+def first(window: Window) -> Camera:
+    """The first camera, to which the window has returned."""
+    window.server.key("v")
+    camera = window.camera(first)
+    assert camera.eye == (4, 0, 0)
+    return camera
 
 
-def camera_input(window: viewer.Viewer) -> CameraInput:
-    steered: CameraInput = window.live.steer.call_args.args[0]  # type: ignore[attr-defined]
-    return steered
+@real
+def test_dragging_turns_the_camera_and_ends_with_the_button(window: Window, first: Camera) -> None:
+    def stroke() -> None:
+        for step in range(11):
+            window.server.point(150 + 4 * step, 120 - 2 * step)
+
+    window.server.point(150, 120)
+    window.server.button(1, True)
+    stroke()
+    window.server.button(1, False)
+    turned, degree = window.camera(first), first.fov / SIZE[1]
+    expected = first.turned(-40 * degree, -20 * degree)
+    assert np.allclose(turned.forward, expected.forward, atol=2e-3)
+    stroke()
+    assert window.camera() == turned, "no button is held"
 
 
-def test_keys_that_are_held_steer(window: viewer.Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = 100.0
-    monkeypatch.setattr("time.monotonic", lambda: now)
-    for key in ("w", "d"):
-        window.press(key)
-    assert (camera_input(window).forward, camera_input(window).right, camera_input(window).up) == (1, 1, 0)
-    window.press("s")
-    assert camera_input(window).forward == 0
-    window.lift("s")
-    window.press("s")  # that is how a key repeats itself
-    now += 1
-    window.tick()
-    assert camera_input(window).forward == 0
-    window.lift("s")
-    window.lift("d")
-    now += 1
-    window.tick()
-    assert (camera_input(window).forward, camera_input(window).right) == (1, 0)
-    window.hurry(2.0)
-    assert (camera_input(window).forward, camera_input(window).pace) == (1, 2)
-    window.press("v")
-    window.live.look.assert_called_once_with(window.live.first)  # type: ignore[attr-defined]
+@real
+@pytest.mark.parametrize(
+    ("key", "axis", "sign"),
+    [("w", "forward", 1), ("s", "forward", -1), ("d", "right", 1), ("a", "right", -1)]
+    + [("r", "above", 1), ("f", "above", -1)],
+)
+def test_keys_fly_along_the_axes(window: Window, first: Camera, key: str, axis: str, sign: int) -> None:
+    window.server.key(key, 0.2)
+    moved = np.subtract(window.camera(first).eye, first.eye)
+    assert np.linalg.norm(moved) > 0.05
+    assert np.allclose(moved / np.linalg.norm(moved), sign * np.array(getattr(first, axis)), atol=1e-6)
 
 
-def test_what_is_grasped_follows_the_pointer(window: viewer.Viewer) -> None:
-    window.drag((9, 9))
-    window.live.turn.assert_not_called()  # type: ignore[attr-defined]
-    window.grasp((10, 20))
-    window.drag((13, 18))
-    window.live.turn.assert_called_once_with(-3, 2)  # type: ignore[attr-defined]
+@real
+@pytest.mark.parametrize(
+    ("key", "turned"),
+    [
+        ("Left", lambda a, b: -np.dot(b.forward, a.right)),
+        ("Right", lambda a, b: np.dot(b.forward, a.right)),
+        ("Up", lambda a, b: np.dot(b.forward, a.above)),
+        ("Down", lambda a, b: -np.dot(b.forward, a.above)),
+        ("e", lambda a, b: np.dot(b.above, a.right)),
+        ("q", lambda a, b: -np.dot(b.above, a.right)),
+    ],
+)
+def test_arrows_turn_and_q_and_e_roll(
+    window: Window, first: Camera, key: str, turned: Callable[[Camera, Camera], float]
+) -> None:
+    window.server.key(key, 0.2)
+    camera = window.camera(first)
+    assert camera.eye == first.eye and turned(first, camera) > 0.05
+    assert window.process.poll() is None
 
 
-def test_the_newest_picture_is_shown_upright(window: viewer.Viewer) -> None:
-    window.live.shown = shown(20)
-    window.tick()
-    rows = np.asarray(window.image.point_data["picture"]).reshape(4, 6, 3)
-    assert (rows[3] == 0).all() and (rows[:3] == 20).all(), "VTK counts rows from below"
-    window.caption.set_text.assert_called_with("upper_left", "20")
-    window.plotter.render.assert_called_once()
-    window.tick()
-    window.plotter.render.assert_called_once()
+@real
+def test_mouse_look_needs_no_button_and_lock_stops_everything(window: Window, first: Camera) -> None:
+    window.server.point(150, 120)
+    window.server.key("m")
+    for step in range(5):
+        window.server.point(150 + 8 * step, 120)
+    turned = window.camera(first)
+    assert np.dot(turned.forward, first.right) > 0.03, "the camera follows the pointer"
+    window.server.key("l")
+    for key in ("w", "Left", "q", "v"):
+        window.server.key(key, 0.1)
+    window.server.point(150, 100)
+    assert window.camera() == turned
+    window.server.key("l")
+    window.server.key("m")
+    window.server.point(190, 120)
+    assert window.camera() == turned
 
 
-@pytest.mark.parametrize("how", ["key", "outside", "failure"])
-def test_it_closes(window: viewer.Viewer, how: str) -> None:
-    window.tick()
-    close = window.plotter.iren.interactor.TerminateApp
-    close.assert_not_called()
-    if how == "key":
-        window.press("q")
-    elif how == "outside":
-        window.stopped = lambda: True
-    else:
-        window.live.running = False  # type: ignore[misc]
-    window.tick()
-    close.assert_called()
+@real
+def test_speed_keys_change_the_pace(window: Window, first: Camera) -> None:
+    lengths = []
+    for pace in ("2", "7"):
+        window.server.key("v")
+        window.server.key(pace)
+        window.server.key("s", 0.2)
+        lengths.append(np.linalg.norm(np.subtract(window.camera(first).eye, first.eye)))
+    window.server.key("5")
+    assert 4 * lengths[0] < lengths[1]
+
+
+@real
+def test_no_key_changes_the_colours(window: Window, first: Camera) -> None:
+    before = window.server.pixels()[30:200].mean((0, 1))
+    window.server.key("3")  # stereo in VTK's own styles
+    assert window.camera() == first
+    assert np.allclose(window.server.pixels()[30:200].mean((0, 1)), before, atol=8)
+    window.server.key("5")
+
+
+@real
+def test_resizing_does_not_stretch(window: Window, first: Camera) -> None:
+    try:
+        for size in ((500, 300), (300, 400)):
+            window.server.resize(*size)
+            wait(lambda size=size: abs((window.ball() or (0, 0))[1] - 0.71 * size[1]) < 0.02 * size[1], 20)  # type: ignore[misc]
+            width, height = window.ball() or (0, 0)
+            assert abs(width - height) <= 3
+    finally:
+        window.server.resize(*SIZE)
+
+
+@real
+def test_escape_closes_and_the_view_is_printed(window: Window, first: Camera) -> None:
+    window.server.key("Escape")
+    output, _ = window.process.communicate(timeout=60)
+    assert output == '<camera eye="4 0 0"/>\n' and window.process.returncode == 0
+
+
+def test_compilation_and_problems_are_displayed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viewer, "Canvas", lambda *_: SimpleNamespace(close=None))
+    monkeypatch.setattr("time.monotonic", lambda: 100.0)
+    shown = SimpleNamespace(samples=0.0, distance=0.5, problem="ball.xml:3: no")
+    live = SimpleNamespace(scene=SimpleNamespace(name="ball"), shown=shown, making=99.9)
+    window = viewer.Viewer(live, SIZE, lambda: False)  # type: ignore[arg-type]
+    assert window.caption.splitlines() == ["draft   surface at 0.5   pace 1", "ball.xml:3: no"]
+    live.making = 99.0
+    assert "compiling ..." in window.caption.splitlines()
 
 
 def test_flying_needs_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:

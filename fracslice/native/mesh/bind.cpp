@@ -1,5 +1,6 @@
 // Functions of fracslice._native on triangle meshes.
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
 
 #include "../unlocked.h"
 #include "components.h"
@@ -26,9 +27,20 @@ std::span<const T> span_of(const Vector<T>& values) {
 }
 
 void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t components) {
-    if (labels.size() != mesh.count) throw std::invalid_argument("triangles and labels differ in length");
-    require_below(labels.data(), labels.size(), components, "a label names a component that does not exist");
+    if (labels.size() != mesh.vertices) throw std::invalid_argument("vertices and labels differ in length");
+    require_below(labels.data(), labels.size(), components, "a label names a component that does not exist", -1);
+    std::atomic<bool> unknown = false;
+    for_each_block(mesh.count, [&](size_t, size_t first, size_t last) {
+        for (size_t t = first; t < last; ++t) {
+            if (labels.data()[mesh[t][0]] < 0) unknown.store(true, std::memory_order_relaxed);
+        }
+    });
+    if (unknown) throw std::invalid_argument("a triangle has no label");
 }
+
+using FrameTuple = std::tuple<double, Point, double>;
+
+Frame frame_of(const FrameTuple& frame) { return {std::get<0>(frame), std::get<1>(frame), std::get<2>(frame)}; }
 
 std::span<const bool> marks_of(const Vector<bool>& marks, size_t count) {
     if (marks.size() != count) throw std::invalid_argument("marks differ in length from what they mark");
@@ -48,7 +60,7 @@ nb::tuple bind_corners(const Rows<int32_t>& triangles, size_t vertices, int thre
 
 nb::tuple bind_components(const Rows<int32_t>& triangles, size_t vertices, int threads) {
     Components found = unlocked(threads, [&] { return connected_components(triangles_of(triangles, vertices)); });
-    return nb::make_tuple(to_numpy(std::move(found.labels), {triangles.shape(0)}), found.count);
+    return nb::make_tuple(to_numpy(std::move(found.labels), {vertices}), found.count);
 }
 
 nb::tuple bind_sizes(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int32_t>& labels, size_t count,
@@ -58,7 +70,8 @@ nb::tuple bind_sizes(const Rows<double>& vertices, const Rows<int32_t>& triangle
         require_labels(mesh, labels, count);
         return component_sizes(mesh, span_of(labels), count);
     });
-    return nb::make_tuple(to_numpy(std::move(found.volumes), {count}), to_numpy(std::move(found.areas), {count}));
+    return nb::make_tuple(to_numpy(std::move(found.volumes), {count}), to_numpy(std::move(found.areas), {count}),
+                          to_numpy(std::move(found.vectors), {count, 3}), to_numpy(std::move(found.outermost), {count, 6}));
 }
 
 nb::tuple bind_measures(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Point& point, int threads) {
@@ -72,9 +85,8 @@ nb::object numbers(const std::vector<int64_t>& found) {
     return to_numpy(std::move(rows), {found.size()});
 }
 
-nb::object bind_turned(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<double>& points, int threads) {
-    if (points.shape(0) != vertices.shape(0)) throw nb::value_error("vertices and points differ in length");
-    return numbers(unlocked(threads, [&] { return turned(mesh_of(vertices, triangles), points.data()); }));
+nb::object bind_turned(const Rows<double>& vertices, const Rows<int32_t>& triangles, const FrameTuple& frame, int threads) {
+    return numbers(unlocked(threads, [&] { return turned(mesh_of(vertices, triangles), frame_of(frame)); }));
 }
 
 nb::object bind_pointed(const Rows<double>& vertices, const Rows<int32_t>& triangles, double sine, size_t most, int threads) {
@@ -87,11 +99,22 @@ nb::tuple bind_bounds(const Rows<double>& points, int threads) {
     return nb::make_tuple(found.low, found.high);
 }
 
-nb::object bind_quantise(const Rows<double>& points, const Rows<double>& planes, int threads) {
-    size_t count = points.shape(0);
-    Quantised found = unlocked(threads, [&] { return quantise(points.data(), count, {planes.data(), planes.shape(0)}); });
+nb::tuple bind_quantise(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<bool>& keep,
+                        const Vector<bool>& displaced, const Vector<int64_t>& rows, const Rows<int32_t>& corners,
+                        const Rows<double>& planes, const FrameTuple& frame, int threads) {
+    Quantised found = unlocked(threads, [&] {
+        MeshView mesh = mesh_of(vertices, triangles);
+        if (rows.size() != corners.shape(0)) throw std::invalid_argument("rows and corners differ in length");
+        require_below(rows.data(), rows.size(), mesh.count, "an edit names a triangle that does not exist");
+        require_below(corners.data(), corners.size(), mesh.vertices, "an edit names a vertex that does not exist", -1);
+        Edits edits{span_of(rows), corners.data()};
+        return quantise(mesh, marks_of(keep, mesh.vertices), marks_of(displaced, mesh.vertices), edits,
+                        {planes.data(), planes.shape(0)}, frame_of(frame));
+    });
     if (!found.finite) throw nb::value_error("the mesh has a coordinate that is not a finite number");
-    return nb::make_tuple(to_numpy(std::move(found.points), {count, 3}), to_numpy(std::move(found.displaced), {count}));
+    size_t n = found.points.rows, m = found.triangles.rows;
+    return nb::make_tuple(to_numpy(std::move(found.points), {n, 3}), to_numpy(std::move(found.triangles), {m, 3}),
+                          to_numpy(std::move(found.displaced), {n}), numbers(found.places));
 }
 
 nb::object bind_selected(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<bool>& keep, int threads) {
@@ -177,10 +200,11 @@ void bind_mesh(nb::module_& module) {
     module.def("connected_components", &bind_components, "triangles"_a, "vertices"_a, "threads"_a = 0);
     module.def("component_sizes", &bind_sizes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a, "threads"_a = 0);
     module.def("measures", &bind_measures, "vertices"_a, "triangles"_a, "point"_a, "threads"_a = 0);
-    module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "points"_a, "threads"_a = 0);
+    module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "frame"_a, "threads"_a = 0);
     module.def("pointed", &bind_pointed, "vertices"_a, "triangles"_a, "sine"_a, "most"_a, "threads"_a = 0);
     module.def("bounds", &bind_bounds, "points"_a, "threads"_a = 0);
-    module.def("quantise", &bind_quantise, "points"_a, "planes"_a, "threads"_a = 0);
+    module.def("quantise", &bind_quantise, "vertices"_a, "triangles"_a, "keep"_a, "displaced"_a, "rows"_a, "corners"_a, "planes"_a,
+               "frame"_a, "threads"_a = 0);
     module.def("selected", &bind_selected, "vertices"_a, "triangles"_a, "keep"_a, "threads"_a = 0);
     module.def("touching", &bind_touching, "triangles"_a, "vertices"_a, "threads"_a = 0);
     module.def("near", &bind_near, "vertices"_a, "triangles"_a, "points"_a, "reach"_a, "threads"_a = 0);

@@ -5,6 +5,7 @@
 #include "../volume/brick_arrays.h"
 #include "bind_roots.h"
 #include "contour.h"
+#include "trust_regions.h"
 
 namespace fracslice::mesh {
 namespace {
@@ -103,12 +104,35 @@ class Surfacing {
     Contouring made_;
 };
 
+template <class T, class Shape>
+using In = nb::ndarray<const T, Shape, nb::c_contig, nb::device::cpu>;
+
+nb::object bind_trust_regions(const In<double, nb::shape<-1, 3>>& points, const In<uint8_t, nb::ndim<1>>& cases,
+                              const In<float, nb::shape<-1, 3>>& to_means, const In<int64_t, nb::ndim<1>>& which,
+                              const In<bool, nb::ndim<1>>& inside, const std::array<double, 3>& origin, double voxel,
+                              double margin) {
+    size_t rows = points.shape(0), count = which.size();
+    if (cases.size() != rows || to_means.shape(0) != rows || inside.size() != count) throw nb::value_error("differ in length");
+    Array<double> out(12, count);
+    {
+        nb::gil_scoped_release released;
+        for (size_t i = 0; i < count; ++i) {
+            if (which.data()[i] < 0 || size_t(which.data()[i]) >= rows) throw std::invalid_argument("no such feature");
+        }
+        trust_regions({points.data(), to_means.data(), cases.data()}, which.data(), inside.data(), count,
+                      {origin, voxel, margin}, out.data.get());
+    }
+    return to_numpy(std::move(out), {4, 3, count});
+}
+
 }  // namespace
 
 void bind_contour(nb::module_& module) {
     using namespace nanobind::literals;
     module.def("marching_cubes", &bind_marching_cubes, "ijk"_a, "values"_a, "index"_a, "origin"_a, "voxel"_a,
                "minimum_edge_parameter"_a, "threads"_a = 0);
+    module.def("trust_regions", &bind_trust_regions, "features"_a, "cases"_a, "to_means"_a, "which"_a, "inside"_a, "origin"_a,
+               "voxel"_a, "minimum_edge_parameter"_a);
     nb::class_<RootLoops>(module, "RootLoops")
         .def(nb::new_(&root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "field"_a,
              "steps"_a, "sure"_a);

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace fracslice::mesh {
@@ -48,11 +49,18 @@ std::vector<int64_t> chosen(size_t count, const Do& choose) {
     }));
 }
 
-// Lowers a number to another, whichever thread comes first.
-template <class T>
-void lower(std::atomic<T>& number, T to) {
-    T now = number.load(std::memory_order_relaxed);
-    while (to < now && !number.compare_exchange_weak(now, to, std::memory_order_relaxed)) {}
+// Of each block of `count` things how many before it hold, and behind the last how many in all.
+template <class Do>
+std::vector<size_t> counted(size_t count, const Do& holds) {
+    std::vector<size_t> before = in_blocks<size_t>(count, [&](size_t first, size_t last) {
+        size_t found = 0;
+        for (size_t i = first; i < last; ++i) found += holds(i);
+        return found;
+    });
+    size_t total = 0;
+    for (size_t& number : before) total += std::exchange(number, total);
+    before.push_back(total);
+    return before;
 }
 
 }  // namespace fracslice::mesh

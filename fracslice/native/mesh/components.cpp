@@ -2,17 +2,12 @@
 
 #include <cassert>
 #include <cmath>
-#include <limits>
 
 #include "blocks.h"
 #include "vec3.h"
 
 namespace fracslice::mesh {
 namespace {
-
-constexpr int32_t kNever = std::numeric_limits<int32_t>::max();
-
-using Atomics = std::vector<std::atomic<int32_t>>;
 
 int32_t get(const std::atomic<int32_t>& number) { return number.load(std::memory_order_relaxed); }
 
@@ -44,24 +39,49 @@ class Forest {
     }
 
   private:
-    Atomics parent_;
+    std::vector<std::atomic<int32_t>> parent_;
 };
-
-Atomics never(size_t count) {
-    Atomics numbers(count);
-    for_each_block(count, [&](size_t, size_t first, size_t last) {
-        for (size_t i = first; i < last; ++i) numbers[i].store(kNever, std::memory_order_relaxed);
-    });
-    return numbers;
-}
 
 Vec3 at(const double* p) { return {p[0], p[1], p[2]}; }
 
 // Of consecutive triangles of a component.
 struct Run {
     int32_t label;
-    double volume, area;
+    double volume = 0, area = 0;
+    Vec3 vector{0, 0, 0};
 };
+
+// Of consecutive vertices of a component: those farthest out.
+struct Reach {
+    int32_t label;
+    std::array<int32_t, 6> vertex{-1, -1, -1, -1, -1, -1};
+    Vec3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+
+    void add(size_t k, double low_here, int32_t low_vertex, double high_here, int32_t high_vertex) {
+        if (low_here < low[k]) low[k] = low_here, vertex[k] = low_vertex;
+        if (high_here > high[k]) high[k] = high_here, vertex[k + 3] = high_vertex;
+    }
+};
+
+std::vector<Reach> reaches(const MeshView& mesh, std::span<const int32_t> labels, size_t count) {
+    std::vector<Reach> all(count);
+    for (const auto& part : in_blocks<std::vector<Reach>>(mesh.vertices, [&](size_t first, size_t last) {
+             std::vector<Reach> found;
+             for (size_t v = first; v < last; ++v) {
+                 if (labels[v] < 0) continue;
+                 if (found.empty() || found.back().label != labels[v]) found.push_back({labels[v]});
+                 const double* p = mesh.point(int32_t(v));
+                 for (size_t k = 0; k < 3; ++k) found.back().add(k, p[k], int32_t(v), p[k], int32_t(v));
+             }
+             return found;
+         })) {
+        for (const Reach& found : part) {
+            Reach& to = all[size_t(found.label)];
+            for (size_t k = 0; k < 3; ++k) to.add(k, found.low[k], found.vertex[k], found.high[k], found.vertex[k + 3]);
+        }
+    }
+    return all;
+}
 
 }  // namespace
 
@@ -73,53 +93,61 @@ Components connected_components(const Triangles& triangles) {
             forest.unite(triangles[t][0], triangles[t][2]);
         }
     });
-    Components found{{triangles.count, 1}};
-    Atomics number = never(triangles.vertices);  // of a root: its first triangle, then its component
+    std::vector<std::atomic<bool>> used(triangles.vertices);  // roots
     for_each_block(triangles.count, [&](size_t, size_t first, size_t last) {
         for (size_t t = first; t < last; ++t) {
-            int32_t root = found.labels.data[t] = forest.root(triangles[t][0]);
-            lower(number[root], int32_t(t));
+            std::atomic<bool>& mark = used[size_t(forest.root(triangles[t][0]))];
+            if (!mark.load(std::memory_order_relaxed)) mark.store(true, std::memory_order_relaxed);
         }
     });
-    std::vector<int64_t> roots = chosen(triangles.vertices, [&](size_t v) { return get(number[v]) != kNever; });
-    std::sort(roots.begin(), roots.end(), [&](int64_t a, int64_t b) { return get(number[a]) < get(number[b]); });
-    for (int64_t root : roots) number[root].store(found.count++, std::memory_order_relaxed);
-    for_each_block(triangles.count, [&](size_t, size_t first, size_t last) {
-        for (size_t t = first; t < last; ++t) found.labels.data[t] = get(number[found.labels.data[t]]);
+    auto is_root = [&](size_t v) { return used[v].load(std::memory_order_relaxed); };
+    std::vector<size_t> before = counted(triangles.vertices, is_root);
+    Components found{{triangles.vertices, 1}, int32_t(before.back())};
+    int32_t* labels = found.labels.data.get();
+    for_each_block(triangles.vertices, [&](size_t block, size_t first, size_t last) {
+        for (size_t v = first, next = before[block]; v < last; ++v) labels[v] = is_root(v) ? int32_t(next++) : -1;
+    });
+    for_each_block(triangles.vertices, [&](size_t, size_t first, size_t last) {
+        for (size_t v = first; v < last; ++v) {
+            if (!is_root(v)) labels[v] = labels[forest.root(int32_t(v))];
+        }
     });
     return found;
 }
 
 Sizes component_sizes(const MeshView& mesh, std::span<const int32_t> labels, size_t count) {
-    assert(labels.size() == mesh.count);
-    Atomics origin = never(count);  // the first triangle
-    for_each_block(mesh.count, [&](size_t, size_t first, size_t last) {
-        for (size_t t = first; t < last; ++t) {
-            if (t == first || labels[t] != labels[t - 1]) lower(origin[labels[t]], int32_t(t));
-        }
-    });
+    assert(labels.size() == mesh.vertices);
+    std::vector<Reach> reach = reaches(mesh, labels, count);
     auto parts = in_blocks<std::vector<Run>>(mesh.count, [&](size_t first, size_t last) {
         std::vector<Run> runs;
         Vec3 o{};
         for (size_t t = first; t < last; ++t) {
-            if (t == first || labels[t] != labels[t - 1]) {
-                runs.push_back({labels[t], 0, 0});
-                o = at(mesh.corner(size_t(get(origin[labels[t]])), 0));
+            int32_t label = labels[size_t(mesh[t][0])];
+            if (runs.empty() || label != runs.back().label) {
+                runs.push_back({label});
+                o = at(mesh.point(reach[size_t(label)].vertex[0]));
             }
             Vec3 a = at(mesh.corner(t, 0)), b = at(mesh.corner(t, 1)), c = at(mesh.corner(t, 2));
             Vec3 normal = cross(b - a, c - a);
-            runs.back().volume += dot(cross(a - o, b - o), c - o);
+            runs.back().volume += dot(normal, a - o);
             runs.back().area += std::sqrt(dot(normal, normal));
+            runs.back().vector = runs.back().vector + normal;
         }
         return runs;
     });
-    Sizes sizes{{count, 1}, {count, 1}};
-    double *volumes = sizes.volumes.data.get(), *areas = sizes.areas.data.get();
-    std::fill_n(volumes, count, 0.0), std::fill_n(areas, count, 0.0);
+    std::vector<Run> sums(count);
     for (const std::vector<Run>& runs : parts) {
-        for (const Run& run : runs) volumes[run.label] += run.volume, areas[run.label] += run.area;
+        for (const Run& run : runs) {
+            Run& sum = sums[size_t(run.label)];
+            sum.volume += run.volume, sum.area += run.area, sum.vector = sum.vector + run.vector;
+        }
     }
-    for (size_t k = 0; k < count; ++k) volumes[k] /= 6, areas[k] /= 2;
+    Sizes sizes{{count, 1}, {count, 1}, {count, 3}, {count, 6}};
+    for (size_t i = 0; i < count; ++i) {
+        sizes.volumes.data[i] = sums[i].volume / 6, sizes.areas.data[i] = sums[i].area / 2;
+        for (size_t k = 0; k < 3; ++k) sizes.vectors.data[3 * i + k] = sums[i].vector[k] / 2;
+        std::copy(reach[i].vertex.begin(), reach[i].vertex.end(), &sizes.outermost.data[6 * i]);
+    }
     return sizes;
 }
 

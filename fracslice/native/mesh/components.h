@@ -1,5 +1,6 @@
 // The connected components of a mesh, and how large each is.
 #pragma once
+#include <array>
 #include <span>
 
 #include "../array.h"
@@ -8,7 +9,7 @@
 namespace fracslice::mesh {
 
 struct Components {
-    Array<int32_t> labels;  // of triangles, numbered by first appearance
+    Array<int32_t> labels;  // of vertices, components numbered by their first vertices; -1 for vertices of no triangle
     int32_t count = 0;
 };
 
@@ -16,11 +17,13 @@ struct Components {
 Components connected_components(const Triangles& triangles);
 
 struct Sizes {
-    Array<double> volumes;  // signed, from a vertex of the component's own: dust keeps its digits
+    Array<double> volumes;     // signed, from outermost[0]: dust keeps its digits
     Array<double> areas;
+    Array<double> vectors;     // [count, 3], sums of the triangles' vector areas
+    Array<int32_t> outermost;  // [count, 6], the first vertices farthest out along -x, -y, -z, x, y and z
 };
 
-// labels: of the triangles, each below count.
+// labels: of the vertices, each below count.
 Sizes component_sizes(const MeshView& mesh, std::span<const int32_t> labels, size_t count);
 
 }  // namespace fracslice::mesh

@@ -24,13 +24,21 @@ class Fans {
   public:
     explicit Fans(const Triangles& triangles) : triangles_(triangles) {}
 
-    void add(const int64_t* corners, size_t degree) {
-        if (ring(corners, degree)) {
-            counts.edges += int64_t(degree);
+    // Of the triangles around a vertex those with three different corners count.
+    void add(int32_t v, std::span<const int64_t> corners) {
+        arrows_.clear();
+        for (int64_t corner : corners) {
+            const int32_t* t = triangles_[size_t(corner / 3)];
+            int32_t from = t[(corner + 1) % 3], to = t[(corner + 2) % 3];
+            if (from != to && from != v && to != v) arrows_.push_back({from, to});
+        }
+        if (arrows_.empty()) return;
+        if (ring()) {
+            counts.edges += int64_t(arrows_.size());
             return;
         }
-        set_spokes(corners, degree);
-        int64_t fans = int64_t(degree);
+        set_spokes();
+        int64_t fans = int64_t(arrows_.size());
         for (size_t i = 0, j; i < spokes_.size(); i = j) {  // one neighbour after the other
             size_t outward = 0;
             for (j = i; j < spokes_.size() && spokes_[j] >> 32 == spokes_[i] >> 32; ++j) {
@@ -49,15 +57,9 @@ class Fans {
 
   private:
     // Whether all arrows form one ring, as nearly everywhere: then nothing needs to be sorted.
-    bool ring(const int64_t* corners, size_t degree) {
-        arrows_.resize(degree);
-        for (size_t i = 0; i < degree; ++i) {
-            const int32_t* t = triangles_[size_t(corners[i] / 3)];
-            int k = int(corners[i] % 3);
-            arrows_[i] = {t[(k + 1) % 3], t[(k + 2) % 3]};
-        }
+    bool ring() const {
         int32_t first = arrows_[0].from, at = arrows_[0].to;
-        size_t length = 1;
+        size_t length = 1, degree = arrows_.size();
         for (; at != first && length < degree; ++length) {
             size_t next = 1;
             while (next < degree && arrows_[next].from != at) ++next;
@@ -68,14 +70,12 @@ class Fans {
     }
 
     // The two edges of each corner that meet at the vertex, by neighbour: neighbour, corner, whether inward, as one number.
-    void set_spokes(const int64_t* corners, size_t degree) {
-        spokes_.resize(2 * degree);
-        fan_.resize(degree);
-        for (size_t i = 0; i < degree; ++i) {
-            const int32_t* t = triangles_[size_t(corners[i] / 3)];
-            int k = int(corners[i] % 3);
-            spokes_[2 * i] = uint64_t(t[(k + 1) % 3]) << 32 | 2 * i;
-            spokes_[2 * i + 1] = uint64_t(t[(k + 2) % 3]) << 32 | 2 * i | 1;
+    void set_spokes() {
+        spokes_.resize(2 * arrows_.size());
+        fan_.resize(arrows_.size());
+        for (size_t i = 0; i < arrows_.size(); ++i) {
+            spokes_[2 * i] = uint64_t(arrows_[i].from) << 32 | 2 * i;
+            spokes_[2 * i + 1] = uint64_t(arrows_[i].to) << 32 | 2 * i | 1;
             fan_[i] = int32_t(i);
         }
         std::sort(spokes_.begin(), spokes_.end());
@@ -124,7 +124,7 @@ Links links(const Triangles& triangles, const bool* counted) {
             Fans fans(triangles);
             for (size_t block = range.begin(); block < range.end(); ++block) {
                 stars.for_each(block, [&](size_t v, std::span<const int64_t> corners) {
-                    if (!corners.empty() && counted[v]) fans.add(corners.data(), corners.size());
+                    if (counted[v]) fans.add(int32_t(v), corners);
                 });
             }
             return before + fans.counts;

@@ -19,7 +19,7 @@ struct Links {
     int64_t edges = 0, open = 0, crowded = 0, misoriented = 0, extra_fans = 0;
 };
 
-// At the vertices where counted is true: [vertices]. Triangles have three different corners.
+// At the vertices where counted is true: [vertices]. Triangles with two equal corners do not count.
 Links links(const Triangles& triangles, const bool* counted);
 
 }  // namespace fracslice::mesh

@@ -14,9 +14,11 @@ constexpr size_t kRough = size_t(1) << 18;
 Vec3 at(const double* p) { return {p[0], p[1], p[2]}; }
 
 // Twice a triangle's area long.
+Vec3 normal(const Vec3* corners) { return cross(corners[1] - corners[0], corners[2] - corners[0]); }
+
 Vec3 normal(const MeshView& mesh, size_t t) {
-    Vec3 a = at(mesh.corner(t, 0));
-    return cross(at(mesh.corner(t, 1)) - a, at(mesh.corner(t, 2)) - a);
+    Vec3 corners[] = {at(mesh.corner(t, 0)), at(mesh.corner(t, 1)), at(mesh.corner(t, 2))};
+    return normal(corners);
 }
 
 }  // namespace
@@ -39,10 +41,15 @@ Measures measures(const MeshView& mesh, const Vec3& point) {
     return all;
 }
 
-std::vector<int64_t> turned(const MeshView& mesh, const double* points) {
-    MeshView moved = mesh;
-    moved.positions = points;
-    return chosen(mesh.count, [&](size_t t) { return !(dot(normal(mesh, t), normal(moved, t)) > 0); });
+std::vector<int64_t> turned(const MeshView& mesh, const Frame& frame) {
+    return chosen(mesh.count, [&](size_t t) {
+        Vec3 exact[3], moved[3];
+        for (int k = 0; k < 3; ++k) {
+            exact[k] = frame(mesh.corner(t, k));
+            for (size_t i = 0; i < 3; ++i) moved[k][i] = rounded(exact[k][i]);
+        }
+        return !(dot(normal(exact), normal(moved)) > 0);
+    });
 }
 
 std::vector<int64_t> pointed(const MeshView& mesh, double sine, size_t most) {

@@ -3,8 +3,7 @@
 #include <limits>
 #include <vector>
 
-#include "vec3.h"
-#include "triangles.h"
+#include "quantise.h"
 
 namespace fracslice::mesh {
 
@@ -17,8 +16,8 @@ struct Measures {
 // Sums are over blocks of equal size, and so the same for any number of threads.
 Measures measures(const MeshView& mesh, const Vec3& point);
 
-// The triangles, in order, that are flat or turn by a right angle or more when the vertices move to `points`.
-std::vector<int64_t> turned(const MeshView& mesh, const double* points);
+// The triangles, in order, that are flat or turn by a right angle or more when they are quantised.
+std::vector<int64_t> turned(const MeshView& mesh, const Frame& frame);
 
 // The vertices, in order, from which all edges fall off, at an angle of at least that sine. On a surface that has more than
 // `most` of them, only some.

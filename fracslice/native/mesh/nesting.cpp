@@ -104,9 +104,10 @@ std::vector<Hit> hits(const MeshView& mesh, std::span<const int32_t> labels, con
         std::vector<Hit> found;
         for (size_t t = begin; t < end; ++t) {
             starts.for_each_at(t, [&](const Start& start) {
-                if (size_t(labels[t]) == start.shell || !below(mesh, t, start.at)) return;
+                int32_t label = labels[size_t(mesh[t][0])];
+                if (size_t(label) == start.shell || !below(mesh, t, start.at)) return;
                 int winding = winding_of(mesh, t, start.at);
-                if (winding != 0) found.push_back({start.shell, labels[t], winding});
+                if (winding != 0) found.push_back({start.shell, label, winding});
             });
         }
         return found;
@@ -117,7 +118,7 @@ std::vector<Hit> hits(const MeshView& mesh, std::span<const int32_t> labels, con
 
 Nesting nesting(const MeshView& mesh, std::span<const int32_t> labels, std::span<const double> sizes,
                 std::span<const int64_t> first) {
-    assert(labels.size() == mesh.count && sizes.size() == first.size());
+    assert(labels.size() == mesh.vertices && sizes.size() == first.size());
     Nesting nested{{first.size(), 1}, {first.size(), 1}};
     int64_t *winding = nested.winding.data.get(), *parent = nested.parent.data.get();
     std::fill_n(winding, first.size(), 0), std::fill_n(parent, first.size(), -1);

@@ -14,7 +14,7 @@ struct Nesting {
 
 // A ray from one vertex of each shell, first[shell], goes up and adds the winding of every triangle it passes; edges and
 // vertices on the ray count once (half-open edges). Shells with -1 for a vertex are not looked at. labels: the shell of each
-// triangle; sizes: the volume of each shell.
+// vertex; sizes: the volume of each shell.
 Nesting nesting(const MeshView& mesh, std::span<const int32_t> labels, std::span<const double> sizes,
                 std::span<const int64_t> first);
 

@@ -1,27 +1,12 @@
 #include "selection.h"
 
 #include <cassert>
-#include <utility>
 
 #include "blocks.h"
 #include "measures.h"
 
 namespace fracslice::mesh {
 namespace {
-
-// Of each block of `count` things how many before it hold, and behind the last how many in all.
-template <class Do>
-std::vector<size_t> counted(size_t count, const Do& holds) {
-    std::vector<size_t> before = in_blocks<size_t>(count, [&](size_t first, size_t last) {
-        size_t found = 0;
-        for (size_t i = first; i < last; ++i) found += holds(i);
-        return found;
-    });
-    size_t total = 0;
-    for (size_t& number : before) total += std::exchange(number, total);
-    before.push_back(total);
-    return before;
-}
 
 // Cells of a grid around a mesh, some of them marked.
 class CoarseGrid {

@@ -97,7 +97,7 @@ nb::tuple bind_runs(const Slab& slab, int layer, std::array<int, 2> shape) {
 nb::bytes bytes(const Rows<uint8_t>& data) { return nb::bytes(data.data(), data.size()); }
 
 nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_columns, bool transposed, bool backwards,
-                       std::array<int, 2> at, std::array<int, 2> shape, const nb::bytes& levels) {
+                       std::array<int, 2> at, std::array<int, 2> shape, const nb::bytes& levels, Encoding encoding) {
     held(slab, layer);
     View view{rows_columns[0], rows_columns[1], transposed, backwards, at, shape, {}};
     if (levels.size() != view.levels.size()) throw nb::value_error("256 levels were expected");
@@ -105,17 +105,17 @@ nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_colu
     Picture shown;
     {
         nb::gil_scoped_release released;
-        shown = picture(slab, view);
+        shown = picture(slab, view, encoding);
     }
     return nb::make_tuple(bytes(*shown.data), shown.painted.area, shown.painted.partly);
 }
 
-nb::bytes bind_deflated(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device::cpu>& image) {
+nb::bytes bind_encoded(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device::cpu>& image, Encoding encoding) {
     const Rows<uint8_t>* data;
     {
         nb::gil_scoped_release released;
         auto* first = const_cast<uint8_t*>(image.data());
-        data = &deflated({first, int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)});
+        data = &encoded({first, int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)}, encoding);
     }
     return bytes(*data);
 }
@@ -153,7 +153,13 @@ NB_MODULE(_slices, module) {
     nb::class_<ProbeBounds>(module, "ProbeBounds")
         .def(nb::init<double, double, double, int, int, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
              "stop_inside"_a, "escape_time_only"_a);
-    module.def("deflated", &bind_deflated, "image"_a);
+    nb::enum_<Encoding>(module, "Encoding")
+        .value("PNG", Encoding::png)
+        .value("GOO", Encoding::goo)
+        .value("RLE7", Encoding::rle7)
+        .value("RLE4", Encoding::rle4)
+        .value("RLE1", Encoding::rle1);
+    module.def("encoded", &bind_encoded, "image"_a, "encoding"_a);
     nb::class_<Memory>(module, "Memory").def(nb::init<>());
     nb::class_<Slab>(module, "Slab")
         .def("__init__",
@@ -167,7 +173,8 @@ NB_MODULE(_slices, module) {
         .def_prop_ro("evaluations", &Slab::evaluations)
         .def("paint", &bind_paint, "layer"_a, "image"_a)
         .def("runs", &bind_runs, "layer"_a, "shape"_a)
-        .def("picture", &bind_picture, "layer"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a)
+        .def("picture", &bind_picture, "layer"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a,
+             "encoding"_a)
         .def("crossings", &bind_crossings, "layer"_a)
         .def("signs", &bind_signs);
 }

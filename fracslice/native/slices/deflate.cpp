@@ -126,11 +126,6 @@ void put_head(Bits& out, const Sizes& sizes) {
     out.put({reversed(1, 4), 4});
 }
 
-// A symbol of `Runs`: so many times a byte, then so many matches of a length.
-struct Meaning {
-    uint8_t byte, bytes, matches;
-    uint16_t length;
-};
 const std::array<Meaning, Runs::kSymbols> kMeanings = [] {
     std::array<Meaning, Runs::kSymbols> meanings{};
     for (int value = 0; value < 256; ++value) meanings[value] = {uint8_t(value), 1, 0, 0};
@@ -215,11 +210,17 @@ Runs::End Runs::room(size_t symbols, uint64_t n) {
     return end_;
 }
 
-const Rows<uint8_t>& Runs::zlib(uint32_t checksum) {
+const Meaning* Runs::meanings() { return kMeanings.data(); }
+
+const uint16_t* Runs::finish() {
     End last = room(kAtOnce, 0);
     last.close();
     while ((last.symbol - symbols_.data()) % 4) *last.symbol++ = kNothing;
-    const uint16_t *symbols = symbols_.data(), *end = last.symbol;
+    return last.symbol;
+}
+
+const Rows<uint8_t>& Runs::zlib(uint32_t checksum) {
+    const uint16_t *end = finish(), *symbols = symbols_.data();
     const Sizes sizes = sizes_of(counts_of(symbols, end));
     const std::array<Code, kCodes> codes = codes_of(sizes);
     const Words words = words_of(codes);

@@ -10,7 +10,13 @@ namespace fracslice::slices {
 
 constexpr int kShortest = 3, kLongest = 258;  // bytes that a match repeats
 
-// A string of bytes, said run by run; `zlib` writes it as RFC 1950 and 1951 have it, in one block with codes of its own.
+// A symbol of `Runs`: so many times a byte, then so many matches of a length.
+struct Meaning {
+    uint8_t byte, bytes, matches;
+    uint16_t length;
+};
+
+// A string of bytes, given run by run; `zlib` writes it as RFC 1950 and 1951 have it, in one block with codes of its own.
 // Matches repeat the byte before them, no other is looked for. Its memory can be used again.
 class Runs {
  public:
@@ -85,8 +91,23 @@ class Runs {
     }
     // Ends; checksum: of all bytes. The result stays until another is asked for.
     const Rows<uint8_t>& zlib(uint32_t checksum);
+    // Ends; visit(value, n): each run, which may go on in the next one.
+    template <class Visit>
+    void each(const Visit& visit) {
+        const uint16_t* end = finish();
+        uint8_t value = 0;
+        for (const uint16_t* s = symbols_.data(); s != end; ++s) {
+            const Meaning& meaning = meanings()[*s];
+            if (meaning.bytes) value = meaning.byte;
+            if (const uint64_t n = meaning.bytes + uint64_t(meaning.matches) * meaning.length) visit(value, n);
+        }
+    }
 
  private:
+    // Ends the last run; the end of the symbols, whose number is a multiple of 4.
+    const uint16_t* finish();
+    static const Meaning* meanings();
+
     Rows<uint16_t> symbols_;
     Rows<uint8_t> data_;
     End end_;

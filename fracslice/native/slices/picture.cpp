@@ -40,16 +40,16 @@ thread_local Runs runs_of_thread;
 // A layer on its way to a picture.
 class Shown {
  public:
-    Shown(const Slab& slab, const View& view)
-        : slab_(slab), view_(view),
+    Shown(const Slab& slab, const View& view, Encoding encoding)
+        : slab_(slab), view_(view), encoding_(encoding), filter_(encoding == Encoding::png),
           down_(side(view.transposed), view.shape[view.transposed], view.at[view.transposed], view.rows, true),
           across_(side(!view.transposed), view.shape[!view.transposed], view.at[!view.transposed], view.columns, view.backwards),
           band_(Orientation(view.transposed, view.backwards, view.levels), across_.tiles, across_.first, across_.last), coverage_(slab),
           rows_(slab, view, down_.tiles, across_.tiles) {}
 
     Picture picture() {
-        const uint64_t row = uint64_t(view_.columns) + 1;
-        uint64_t at = row * down_.at + 1 + across_.at;  // place of a row's first pixel among all bytes
+        const uint64_t row = uint64_t(view_.columns) + filter_;
+        uint64_t at = row * down_.at + filter_ + across_.at;  // place of a row's first pixel among all bytes
         runs_.clear();
         runs_.add(0, row * down_.at);
         for (int tile = down_.first / kTile; tile * kTile < down_.last; ++tile) {
@@ -57,12 +57,13 @@ class Shown {
             band_.clear(from, to, at, row);
             at += row * (to - from);
             if (read(tile))
-                band_.write(uint32_t(across_.at) + 1, uint32_t(view_.columns - across_.at - across_.count()), runs_);
+                band_.write(uint32_t(across_.at) + filter_, uint32_t(view_.columns - across_.at - across_.count()), runs_);
             else
                 runs_.add(0, row * (to - from));
         }
         runs_.add(0, row * (view_.rows - down_.at - down_.count()));
         painted_.area += coverage_.area();
+        if (encoding_ != Encoding::png) return {&run_lengths(runs_, encoding_), painted_};
         return {&runs_.zlib(band_.checksum(row * uint64_t(view_.rows))), painted_};
     }
 
@@ -115,6 +116,8 @@ class Shown {
 
     const Slab& slab_;
     const View& view_;
+    Encoding encoding_;
+    uint32_t filter_;  // bytes before each row
     Axis down_, across_;
     Band band_;
     Coverage coverage_;
@@ -126,23 +129,25 @@ class Shown {
 
 }  // namespace
 
-Picture picture(const Slab& slab, const View& view) { return Shown(slab, view).picture(); }
+Picture picture(const Slab& slab, const View& view, Encoding encoding) { return Shown(slab, view, encoding).picture(); }
 
-const Rows<uint8_t>& deflated(const Canvas& image) {
+const Rows<uint8_t>& encoded(const Canvas& image, Encoding encoding) {
     Runs& runs = runs_of_thread;
     runs.clear();
     Adler sum;
-    const int64_t stride = image.columns + 1;
+    const int filter = encoding == Encoding::png;
+    const int64_t stride = image.columns + filter;
     for (int y = 0; y < image.rows; ++y) {
-        runs.add(0, 1);
+        runs.add(0, uint64_t(filter));
         const uint8_t* row = image.data + y * image.down;
         for (int x = 0, begin = 0; x < image.columns; begin = x) {
             const uint8_t value = row[x * image.across];
             while (++x < image.columns && row[x * image.across] == value) {}
             runs.add(value, uint64_t(x - begin));
-            sum.add(value, uint64_t(y * stride + 1 + begin), uint64_t(x - begin));
+            sum.add(value, uint64_t(y * stride + filter + begin), uint64_t(x - begin));
         }
     }
+    if (encoding != Encoding::png) return run_lengths(runs, encoding);
     return runs.zlib(sum.value(uint64_t(stride) * uint64_t(image.rows)));
 }
 

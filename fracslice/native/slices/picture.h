@@ -1,10 +1,11 @@
-// Layers and images as what a PNG file holds of them: rows, each after the byte 0 for no filter, deflated.
+// Layers and images as the files of printers hold them.
 #pragma once
 #include <array>
 #include <cstdint>
 #include <vector>
 
 #include "marching_squares.h"
+#include "run_lengths.h"
 
 namespace fracslice::slices {
 
@@ -23,8 +24,8 @@ struct Picture {
     Painted painted;
 };
 
-Picture picture(const Slab& slab, const View& view);
+Picture picture(const Slab& slab, const View& view, Encoding encoding);
 // Until this thread makes another.
-const Rows<uint8_t>& deflated(const Canvas& image);
+const Rows<uint8_t>& encoded(const Canvas& image, Encoding encoding);
 
 }  // namespace fracslice::slices

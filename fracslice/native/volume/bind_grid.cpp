@@ -1,3 +1,4 @@
+// The extension module fracslice._vdb. Its Python face and its documentation are in ../../_vdb.pyi.
 #include "brick_arrays.h"
 #include "grid.h"
 
@@ -52,8 +53,11 @@ std::vector<Grid> parts(const Grid& grid) {
 }
 
 }  // namespace
+}  // namespace fracslice::volume
 
-void bind_grid(nb::module_& module) {
+NB_MODULE(_vdb, module) {
+    namespace nb = nanobind;
+    using namespace fracslice::volume;
     using namespace nanobind::literals;
     using released = nb::call_guard<nb::gil_scoped_release>;
     openvdb::initialize();
@@ -76,5 +80,3 @@ void bind_grid(nb::module_& module) {
         .def_prop_ro("leaves", [](const Grid& g) { return g.vdb->tree().leafCount(); })
         .def_prop_ro("memory", [](const Grid& g) { return g.vdb->memUsage(); });
 }
-
-}  // namespace fracslice::volume

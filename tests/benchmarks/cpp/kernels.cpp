@@ -1,6 +1,7 @@
 // Evaluations per second on one thread: `kernels [N]` prints a line of JSON for each workload, form and set of points.
 //
 // Sets: "grid", the N^3 cell centres of the workload; "band", those of them whose estimate is under four voxels and not 0.
+// --points FOLDER: writes each set, e.g. W1-band: float64, all x, then all y, then all z.
 #include <cstdlib>
 #include <random>
 
@@ -10,8 +11,6 @@
 using namespace peers;
 
 namespace {
-
-constexpr int REPEATS = 5;
 
 template <class T> struct Points {
     std::vector<T> x, y, z;
@@ -52,11 +51,11 @@ template <class V, class T> void evaluate_lanes(Shape shape, const Points<T>& p,
 }
 
 template <class T, class F> void measure(const std::string& work, const char* form, const char* set,
-                                         const Points<T>& points, F evaluation) {
+                                         const Points<T>& points, int runs, F evaluation) {
     if (points.x.empty()) return;
     std::vector<T> out(points.x.size());
     std::vector<double> seconds;
-    for (int repeat = 0; repeat < REPEATS; ++repeat) {
+    for (int run = 0; run < runs; ++run) {
         const double start = cpu();
         evaluation(points, out);
         seconds.push_back(cpu() - start);
@@ -66,17 +65,24 @@ template <class T, class F> void measure(const std::string& work, const char* fo
     line.add("million_per_s", out.size() / median(seconds) / 1e6).print();
 }
 
-template <class T, class V, class Two> void suite(const std::string& name, int n, const char* kind) {
+void write_points(const std::string& path, const Points<double>& points) {
+    std::ofstream file(path, std::ios::binary);
+    for (const auto* axis : {&points.x, &points.y, &points.z})
+        file.write(reinterpret_cast<const char*>(axis->data()), std::streamsize(axis->size() * sizeof(double)));
+    if (!file.flush()) throw std::runtime_error(path + ": cannot be written");
+}
+
+template <class T, class V, class Two> void suite(const std::string& name, int n, int runs, const char* kind) {
     const Workload work = workload(name);
     for (const double band : {0.0, 4.0}) {
         const Points<T> points = grid<T>(work, n, band);
         const char* set = band > 0 ? "band" : "grid";
         const auto form = [&](const char* shape) { return std::string(shape) + "_" + kind; };
-        measure(name, form("scalar").c_str(), set, points,
+        measure(name, form("scalar").c_str(), set, points, runs,
                 [&](const Points<T>& p, std::vector<T>& out) { evaluate(work.shape, p, out, T()); });
-        measure(name, form("lanes").c_str(), set, points,
+        measure(name, form("lanes").c_str(), set, points, runs,
                 [&](const Points<T>& p, std::vector<T>& out) { evaluate_lanes<V>(work.shape, p, out); });
-        measure(name, form("two_lanes").c_str(), set, points,
+        measure(name, form("two_lanes").c_str(), set, points, runs,
                 [&](const Points<T>& p, std::vector<T>& out) { evaluate_lanes<Two>(work.shape, p, out); });
     }
 }
@@ -103,14 +109,20 @@ template <class V> double worst_difference(Shape shape) {
 }  // namespace
 
 int main(int count, char** given) {
-    return run(count, given, "[N]", [](const Options& options) {
+    return run(count, given, "[N] [--runs 5] [--points FOLDER]", [](const Options& options) {
         const int n = options.words.empty() ? 128 : std::stoi(options.words[0]);
-        for (const char* name : {"W1", "W2", "W3", "W4"}) {
+        const int runs = options.whole("runs", 5);
+        const auto folder = options.named.find("points");
+        for (const std::string name : {"W1", "W2", "W3", "W4"}) {
             const Shape shape = workload(name).shape;
+            if (folder != options.named.end())
+                for (const double band : {0.0, 4.0})
+                    write_points(folder->second + "/" + name + (band > 0 ? "-band" : "-grid"),
+                                 grid<double>(workload(name), n, band));
             Line().name("workload", name).add("worst_float32", worst_difference<FloatLanes>(shape))
                 .add("worst_float64", worst_difference<DoubleLanes>(shape)).print();
-            suite<float, FloatLanes, Floats>(name, n, "float32");
-            suite<double, DoubleLanes, Doubles>(name, n, "float64");
+            suite<float, FloatLanes, Floats>(name, n, runs, "float32");
+            suite<double, DoubleLanes, Doubles>(name, n, runs, "float64");
         }
     });
 }

@@ -1,18 +1,13 @@
-"""How quickly pictures become clean: error against samples and seconds, for the renderer's samples and
-random ones.
+"""Samples and CPU time until a picture is clean, for the renderer's samples and random ones.
 
-    python -m tests.benchmarks.frame.convergence [PLOT.png]
-
-Random: every round one uniform sample of each pixel, as in the paper's 1000 rounds. Ours: the renderer as
-it is, with so low a tolerance that no pixel is ever done; samples are the pixels' average. The true picture
-is the mean of another 4096 samples of each pixel. The error is the root mean square over pixels and
-colours, in linear light. Prints after how many samples, and in which part of the CPU time, ours has the error
-of 1000 random rounds.
+Random: every round one uniform sample of each pixel. Ours: the renderer as it is, with a tolerance of 0, so
+that no pixel is ever done; samples are the pixels' average. The reference is the mean of another 4096 samples
+of each pixel; errors are root mean squares over pixels and colours, in linear light. A row says after how
+many samples, and in which share of the CPU time, ours has the error of all random rounds.
 """
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 
@@ -26,8 +21,10 @@ from fracslice.rendering.units.random import hashed
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work
 
+from ..runner import Row, Run
+
 SIZE = (96, 64)
-TRUTH, ROUNDS, MOST = 4096, 1000, 300
+SMALLEST = {"scenes": ("mandelbulb",), "rounds": 4, "truth": 8}
 GROUND = plane(offset=-1.1)
 SUN = Light(position=(-1, -1.4, 1.2), size=3)
 SCENES: dict[str, tuple[Node, View]] = {
@@ -47,8 +44,7 @@ Curve = list[tuple[float, float, float]]
 
 
 def sample(a, pixel, dimension):  # type: ignore[no-untyped-def]
-    """A number of its own for every sample, pixel and dimension: what replaces the renderer's in the random
-    way."""
+    """A number of its own for every sample, pixel and dimension: the random rounds' own."""
     seed = hashed((pixel * 64 + dimension) & 0xFFFFFFFF)
     return (hashed((a ^ seed) & 0xFFFFFFFF) >> 8) * 5.9604644775390625e-08
 
@@ -63,7 +59,7 @@ def renderer(root: Node, view: View) -> Renderer:
     return made
 
 
-def rounds(of: Renderer, count: int, first: int = 0) -> Iterator[np.ndarray]:
+def mean_of_rounds(of: Renderer, count: int, first: int = 0) -> Iterator[np.ndarray]:
     """The mean after every round of one sample in each pixel, from sample `first` on; float64 [pixels, 3]."""
     sums, pixels, total = np.zeros((SIZE[0] * SIZE[1], CHANNELS), np.float32), ordered(*SIZE), 0.0
     for n in range(first, first + count):
@@ -74,35 +70,35 @@ def rounds(of: Renderer, count: int, first: int = 0) -> Iterator[np.ndarray]:
         yield total / (n - first + 1)
 
 
-def truth(root: Node, view: View) -> np.ndarray:
-    *_, last = rounds(renderer(root, view), TRUTH, TRUTH)
+def reference(root: Node, view: View, count: int) -> np.ndarray:
+    *_, last = mean_of_rounds(renderer(root, view), count, count)
     return last
 
 
-def ours(root: Node, view: View, exact: np.ndarray) -> Curve:
+def ours(root: Node, view: View, exact: np.ndarray, most: int) -> Curve:
     made, curve, spent = Renderer(root, view, SIZE, Work(threads=2), "cpu"), [], 0.0
     start = time.process_time()
-    for done in made.passes(10 * MOST, 0.0):
+    for done in made.passes(10 * most, 0.0):
         spent += time.process_time() - start
         if done.number > 1:
             curve.append((done.samples, spent, error(done.image.reshape(-1, 3), exact)))
-        if done.samples > MOST:
+        if done.samples > most:
             return curve
         start = time.process_time()
     return curve
 
 
-def random(root: Node, view: View, exact: np.ndarray) -> Curve:
+def random(root: Node, view: View, exact: np.ndarray, count: int) -> Curve:
     """By the same units, but for the two that make the numbers."""
     kept, packets.sample, packets.centred = (packets.sample, packets.centred), sample, centred
     link_loops.cache_clear()
     made = renderer(root, view)
-    table = np.random.default_rng(1).integers(0, 2**32, (ROUNDS + 1, 64), np.uint32)
+    table = np.random.default_rng(1).integers(0, 2**32, (count + 1, 64), np.uint32)
     packets.sample, packets.centred = kept
     link_loops.cache_clear()
     made.tracer._points = np.ascontiguousarray(table[:, : made.tracer.frame.samples]).view(np.int32)
     curve, spent, start = [], 0.0, time.process_time()
-    for n, mean in enumerate(rounds(made, ROUNDS), 1):
+    for n, mean in enumerate(mean_of_rounds(made, count), 1):
         spent += time.process_time() - start
         curve.append((float(n), spent, error(mean, exact)))
         start = time.process_time()
@@ -113,17 +109,17 @@ def error(picture: np.ndarray, exact: np.ndarray) -> float:
     return float(np.sqrt(((picture - exact) ** 2).mean()))
 
 
-def main(plot: str | None = None) -> None:
+def rows(
+    run: Run, scenes: tuple[str, ...] = tuple(SCENES), rounds: int = 1000, truth: int = 4096, plot: str = ""
+) -> Iterator[Row]:
     curves = {}
-    for name, (root, view) in SCENES.items():
-        exact = truth(root, view)
-        mine, other = curves[name] = ours(root, view, exact), random(root, view, exact)
+    for name in scenes:
+        root, view = SCENES[name]
+        exact = reference(root, view, truth)
+        mine, other = curves[name] = ours(root, view, exact, rounds), random(root, view, exact, rounds)
         samples, seconds, _ = next((c for c in mine if c[2] <= other[-1][2]), (np.inf,) * 3)
-        print(
-            f"{name:12} error after {ROUNDS} random rounds {other[-1][2]:.5f}: "
-            f"ours after {samples:.0f} samples a pixel, {seconds / other[-1][1]:.3f} of the time",
-            flush=True,
-        )
+        row = {"": name, "error of the random rounds": other[-1][2], "samples": float(samples)}
+        yield {**row, "share of their CPU time": float(seconds / other[-1][1])}
     if plot:
         draw(curves, plot)
 
@@ -136,7 +132,7 @@ def draw(curves: dict[str, tuple[Curve, Curve]], path: str) -> None:
 
     _, axes = pyplot.subplots(2, len(curves), figsize=(3.2 * len(curves), 5.6), sharey="col")
     for column, (name, pair) in zip(axes.T, curves.items(), strict=True):
-        for label, curve in zip(("fracslice", "random, 1000 rounds"), pair, strict=True):
+        for label, curve in zip(("fracslice", "random"), pair, strict=True):
             samples, seconds, errors = np.array(curve).T
             for axis, along in zip(column, (samples, seconds), strict=True):
                 axis.loglog(along, errors, label=label, linewidth=1.3)
@@ -149,7 +145,3 @@ def draw(curves: dict[str, tuple[Curve, Curve]], path: str) -> None:
     axes[0, 0].legend(fontsize=8)
     pyplot.tight_layout()
     pyplot.savefig(path, dpi=80)
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

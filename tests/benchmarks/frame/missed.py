@@ -1,14 +1,12 @@
-"""Rays that pass through a surface: none may, by the safe step rule. A million random rays for every formula.
+"""Random rays that pass through a surface, for every formula and combination: the step rule allows none.
 
-    python -m tests.benchmarks.frame.missed [rays a formula] [name ...]
-
-A ray is missed if one of 500 points along it is inside the solid, and the renderer found nothing or something
-behind it. Prints a line for each formula; those with any are the unsafe ones.
+A ray is missed if one of 500 points along it is inside the solid, and the renderer reports no hit or one
+behind.
 """
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -18,16 +16,19 @@ from fracslice.scene.view import Camera
 from tests.examples import EXAMPLES
 from tests.rendering.rays import directions, distances
 
-SIDE, POINTS = 320, 500
-PIXEL = 2 * np.tan(np.radians(25)) / SIDE
+from ..runner import Row, Run
+
+POINTS = 500
+SMALLEST = {"formulas": ("sphere",), "rays": 100, "side": 16}
 
 
-def missed(root: Node, camera: Camera) -> tuple[int, int]:
+def missed(root: Node, camera: Camera, side: int) -> tuple[int, int]:
     """How many rays were missed, and how many hit anything."""
-    found, d = distances(root, camera, (SIDE, SIDE)), directions(camera, (SIDE, SIDE))
+    found, d = distances(root, camera, (side, side)), directions(camera, (side, side))
     first = first_inside(root, np.array(camera.eye), d)
     hit = np.isfinite(first)
-    return int((np.isnan(found[hit]) | (found[hit] > first[hit] * (1 + 2 * PIXEL))).sum()), int(hit.sum())
+    pixel = 2 * np.tan(np.radians(25)) / side * first[hit]
+    return int((np.isnan(found[hit]) | (found[hit] > first[hit] + pixel)).sum()), int(hit.sum())
 
 
 def first_inside(root: Node, eye: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -42,19 +43,17 @@ def first_inside(root: Node, eye: np.ndarray, d: np.ndarray) -> np.ndarray:
     return first
 
 
-def main(rays: int = 1_000_000, *names: str) -> None:
+def rows(
+    run: Run, formulas: tuple[str, ...] = tuple(EXAMPLES), rays: int = 1_000_000, side: int = 320
+) -> Iterator[Row]:
     rng = np.random.default_rng(7)
-    for name in names or EXAMPLES:
+    for name in formulas:
         root, lost, hits, done = EXAMPLES[name], 0, 0, 0
         while done < rays:
             eye = rng.normal(size=3)
             camera = Camera(eye=tuple((3 + rng.uniform()) * eye / np.linalg.norm(eye)), fov=50)
             if float(compile_scene(root, "float64").points(*(np.array([c]) for c in camera.eye))[0]) <= 0:
                 continue
-            counts = missed(root, camera)
-            lost, hits, done = lost + counts[0], hits + counts[1], done + SIDE * SIDE
-        print(f"{name:30} {done:9,} rays, {hits:9,} hit, {lost} missed", flush=True)
-
-
-if __name__ == "__main__":
-    main(*(int(a) if a.isdigit() else a for a in sys.argv[1:]))  # type: ignore[arg-type]
+            counts = missed(root, camera, side)
+            lost, hits, done = lost + counts[0], hits + counts[1], done + side * side
+        yield {"": name, "rays": done, "hit": hits, "missed": lost}

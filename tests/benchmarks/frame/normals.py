@@ -1,16 +1,14 @@
-"""Normals by 4, 6 and 3 more samples, and by derivatives: how wrong, at what cost.
+"""Normals by 4, 6 and 3 more samples: angle to the mean gradient, and cost.
 
-    python -m tests.benchmarks.frame.normals
-
-On points that rays hit, with the spacing that the renderer takes (half a pixel's width): the mean and the
-worst hundredth of the angles to the gradient of the same field over a sphere of that size (26 directions,
-float64). Cost: the time of the same reference on NumPy, as a multiple of one evaluation.
+On points that rays hit, with the spacing that the renderer takes (half a pixel's width): degrees to the
+gradient of the field over a sphere of that size (26 directions, float64). Cost: CPU time on NumPy in
+evaluations.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from collections.abc import Iterator
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -18,9 +16,10 @@ import numpy as np
 from fracslice.formulas import Node, julia, mandelbulb, menger, sphere
 from fracslice.kernel import reference
 
-from .duals import gradients
+from ..runner import Row, Run
 
 HALF = 1e-3
+SMALLEST = {"scenes": ("sphere",), "count": 50}
 SCENES: dict[str, Node] = {
     "sphere": sphere(),
     "menger": menger(level=3),
@@ -32,7 +31,7 @@ AXES = np.vstack([np.eye(3), -np.eye(3)])
 AROUND = np.array([d for d in product((-1, 0, 1), repeat=3) if any(d)], float)
 
 
-def surface(root: Node, count: int = 4000) -> np.ndarray:
+def surface(root: Node, count: int) -> np.ndarray:
     """Points outside, about half a pixel from the surface: where rays stop."""
     field, rng = reference(root), np.random.default_rng(1)
     o = rng.normal(size=(count, 3))
@@ -58,34 +57,24 @@ def unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
 
 
-def cost(run: Callable[[], object]) -> float:
-    times = []
-    for _ in range(5):
-        start = time.process_time()
-        run()
-        times.append(time.process_time() - start)
-    return min(times)
-
-
-def main() -> None:
-    for name, root in SCENES.items():
-        points, field, derived = surface(root), reference(root), gradients(root)
-        wanted = gradient(root, points, unit(AROUND))
-        once = cost(lambda f=field, p=points: f(*p.T))  # type: ignore[misc]
-        ways: dict[str, Callable[[], np.ndarray]] = {
-            "tetrahedron, 4": lambda r=root, p=points: gradient(r, p, unit(TETRAHEDRON)),  # type: ignore[misc]
-            "central, 6": lambda r=root, p=points: gradient(r, p, AXES),  # type: ignore[misc]
-            "forward, 3": lambda r=root, p=points: gradient(r, p, np.eye(3), True),  # type: ignore[misc]
-            "derivatives": lambda d=derived, p=points: unit(d(p)),  # type: ignore[misc]
+def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES), count: int = 4000) -> Iterator[Row]:
+    for name in scenes:
+        root = SCENES[name]
+        points = surface(root, count)
+        expected = gradient(root, points, unit(AROUND))
+        acts = {
+            "tetrahedron, 4 samples": partial(gradient, root, points, unit(TETRAHEDRON)),
+            "central, 6 samples": partial(gradient, root, points, AXES),
+            "forward, 3 samples": partial(gradient, root, points, np.eye(3), True),
         }
-        for way, found in ways.items():
-            cosine = (found() * wanted).sum(1)
+        found = run.interleaved({**acts, "once": partial(reference(root), *points.T)})
+        for how, act in acts.items():
+            cosine = (act() * expected).sum(1)
             angle = np.degrees(np.arccos(np.clip(np.nan_to_num(cosine), -1, 1)))
-            print(
-                f"{name:12}{way:16} mean {angle.mean():7.3f}  worst 1 % {np.quantile(angle, 0.99):7.2f}  "
-                f"cost {cost(found) / once:5.1f}"
-            )
-
-
-if __name__ == "__main__":
-    main()
+            row = {
+                "": name,
+                "by": how,
+                "mean": float(angle.mean()),
+                "worst hundredth": float(np.quantile(angle, 0.99)),
+            }
+            yield {**row, "cost": found.ratio(how, "once", "cpu_s")}

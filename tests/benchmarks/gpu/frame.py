@@ -1,13 +1,12 @@
-"""A 1080p frame of the Mandelbulb on a real GPU: ``python -m tests.benchmarks.gpu.frame [picture.npy]``.
+"""A 1080p frame of the Mandelbulb on a real GPU: the renderer's kernel against nvcc on the same arithmetic.
 
-The renderer's kernel against nvcc on the same arithmetic: the same units word for word, and the same loop.
+The same units word for word, and the same loop; least of fifty times on the GPU.
 """
 
 from __future__ import annotations
 
-import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,7 @@ from fracslice.rendering.optics import optics
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 
+from ..runner import Row, Run
 from . import native
 from .sampling import best
 
@@ -128,7 +128,7 @@ int main(int, char **argument) {
 """Takes the file of the pixels; prints the best time of fifty in ms, the mean brightness, the error code."""
 
 
-def main() -> None:
+def rows(run: Run) -> Iterator[Row]:
     numba_cuda, seen, pixels = cuda.require(), frame(WIDTH, HEIGHT), ordered(WIDTH, HEIGHT)
     tracer = CudaTracer(seen, SINGLE, WIDTH, HEIGHT)
     placed = numba_cuda.to_device(pixels)
@@ -137,23 +137,22 @@ def main() -> None:
     picture = sums.copy_to_host().reshape(-1, CHANNELS)
     tracer.add(sums, Plan(placed, pixels.size, ROUNDS), work)
     one = Plan(placed, pixels.size, 1)
-    timed: dict[str, Callable[[], None]] = {
+    acts: dict[str, Callable[[], None]] = {
         "frame": lambda: tracer.add(sums, one, work),
         "cones": lambda: tracer.look_ahead(work),
         "frame after cones": lambda: tracer.add(sums, one, work),
     }
-    for name, run in timed.items():
-        print(f"fracslice {name:<20} {best(run, 50):.3f} ms")
-    print(f"fracslice mean {picture[:, 3].mean():.7f}, CPU mean {on_cpu(seen, pixels)[:, 3].mean():.7f}")
+    for name, act in acts.items():
+        mean = float(picture[:, 3].mean()) if name == "frame" else None
+        yield {"": f"fracslice, {name}", "ms": best(act, 50), "mean brightness": mean}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "pixels"
         pixels.tofile(path)
         for name, flags in native.FLAGS.items():
             took, mean, error = native.run(seen.linked, FRAME, flags, str(path))
             assert error == 0
-            print(f"{name:<30} {took:.3f} ms, mean {mean:.7f}")
-    if len(sys.argv) > 1:
-        np.save(sys.argv[1], picture[:, :3].reshape(HEIGHT, WIDTH, 3).astype(np.float16))
+            yield {"": name, "ms": took, "mean brightness": mean}
+    yield {"": "CPU", "mean brightness": float(on_cpu(seen, pixels)[:, 3].mean())}
 
 
 def on_cpu(seen: Frame, pixels: np.ndarray) -> np.ndarray:
@@ -169,7 +168,3 @@ def empty() -> np.ndarray:
     sums = np.zeros((WIDTH * HEIGHT, CHANNELS), SINGLE)
     sums[:, GOAL] = ROUNDS
     return sums.ravel()
-
-
-if __name__ == "__main__":
-    main()

@@ -1,11 +1,10 @@
-"""Every example on a real GPU against the NumPy reference: ``python -m tests.benchmarks.gpu.parity``.
+"""Every example on a real GPU against the NumPy reference: the worst error as a share of what is allowed.
 
-Random points, poles and axes, denormals, far points, NaN and infinity, bricks against points. Prints the
-worst error of each example as a share of what is allowed, and exits with 1 if one is above 1."""
+Random points, poles and axes, denormals, far points, NaN and infinity, bricks against points.
+"""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 
 import numpy as np
@@ -13,6 +12,8 @@ import numpy as np
 from fracslice.formulas import Node
 from fracslice.kernel import cuda, reference
 from tests.examples import EXAMPLES
+
+from ..runner import Row, Run
 
 TOLERANCE = {"float32": 2e-5, "float64": 1e-13}
 ORIGIN, VOXEL = (-1.5, -1.25, -1.375), 0.125
@@ -64,18 +65,19 @@ def bricks(kernel: cuda.CudaKernel) -> float:
     return share(kernel.points(*np.moveaxis(ORIGIN + VOXEL * index, -1, 0)), out, small, small)
 
 
-def main() -> int:
-    worst = 0.0
-    for name, root in EXAMPLES.items():
+def rows(run: Run, names: tuple[str, ...] = tuple(EXAMPLES)) -> Iterator[Row]:
+    for name in names:
         for precision in TOLERANCE:
             with np.errstate(all="ignore"):
-                found = dict(checks(root, precision))
-            worst = max(worst, *found.values())
-            listed = "  ".join(f"{check} {error:.2g}" for check, error in found.items())
-            print(f"{name:<30} {precision}  {'ok' if max(found.values()) <= 1 else 'WRONG'}  {listed}")
-    print(f"worst error: {worst:.3g} of the allowed")
-    return int(not worst <= 1)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+                found = dict(checks(EXAMPLES[name], precision))
+            wrong = [
+                f"{name}, {precision}, {check}: {share:.2g}"
+                for check, share in found.items()
+                if not share <= 1
+            ]
+            run.faults.extend(wrong)
+            yield {
+                "": name,
+                "precision": precision,
+                **{check: f"{share:.2g}" for check, share in found.items()},
+            }

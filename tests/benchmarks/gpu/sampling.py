@@ -1,13 +1,13 @@
-"""Sampling of bricks on a real GPU: ``python -m tests.benchmarks.gpu.sampling``.
+"""Sampling of bricks on a real GPU: the kernel against nvcc on the same arithmetic, and the whole sampler.
 
-The kernel alone, on arrays of the GPU, against nvcc on the same arithmetic; then whole runs of the sampler.
+The kernel runs on arrays of the GPU; the sampler has its results in the computer's memory.
 """
 
 from __future__ import annotations
 
 import tempfile
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from fracslice.formulas import Node, mandelbulb, menger
 from fracslice.kernel import cuda, link
 from fracslice.volume import Lattice, sample
 
+from ..runner import Row, Run
 from . import native
 
 SCENES: dict[str, Node] = {"mandelbulb": mandelbulb(iterations=8), "menger": menger(level=5)}
@@ -68,19 +69,14 @@ def rates(root: Node, corners: np.ndarray) -> dict[str, tuple[float, int]]:
     return found
 
 
-def main() -> None:
-    for name, root in SCENES.items():
+def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES)) -> Iterator[Row]:
+    for name in scenes:
+        root = SCENES[name]
         for part, corners in {"dense": dense(), "surface": surface(root)}.items():
             for back_end, (rate, inside) in rates(root, corners).items():
-                print(f"{name} {part:<8} {back_end:<20} {rate:8.2f} G evaluations/s, {inside} inside")
-        for back_end, kernel in {"CPU": cpu.compile_scene(root), "CUDA": cuda.compile_scene(root)}.items():
-            sample(kernel, root.bounds, LATTICE)  # type: ignore[arg-type]
-            start = time.perf_counter()
-            bricks = sample(kernel, root.bounds, LATTICE)  # type: ignore[arg-type]
-            took = time.perf_counter() - start
-            counts = f"{len(bricks)} bricks, {bricks.evaluations} evaluations"
-            print(f"{name} sampler on {back_end}: {took:.3f} s, {counts}")
-
-
-if __name__ == "__main__":
-    main()
+                yield {"": name, "samples": part, "by": back_end, "G evaluations/s": rate, "inside": inside}
+        kernels = {"CPU": cpu.compile_scene(root), "CUDA": cuda.compile_scene(root)}
+        acts = {key: partial(sample, kernel, root.bounds, LATTICE) for key, kernel in kernels.items()}
+        found = run.interleaved(acts)
+        for key in kernels:
+            yield {"": name, "samples": "sampler", "by": key, "s": found.spread(key, "wall_s")}

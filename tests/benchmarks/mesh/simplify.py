@@ -1,4 +1,4 @@
-"""Triangles left within a tolerance, beside libraries: ``python -m tests.benchmarks.mesh.simplify``.
+"""Triangles left within a tolerance, CPU seconds and defects, beside manifold3d and pymeshlab.
 
 manifold3d takes a tolerance; pymeshlab's quadric edge collapse takes a number of triangles and is given ours.
 Off: the greatest distance of the original's vertices from the result, in tolerances.
@@ -6,8 +6,8 @@ Off: the greatest distance of the original's vertices from the result, in tolera
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -22,14 +22,19 @@ from fracslice.mesh.solid import to_manifold
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 
+from ..runner import Row, Run
+
 SCENES = {
-    "sphere, 128": (sphere(), 128),
-    "Menger level 3, 101.3": (menger(level=3), 101.3),
-    "Mandelbulb, 64": (mandelbulb(iterations=8), 64),
-    "Julia, 64": (julia(iterations=10), 64),
+    "sphere": (sphere(), 128.0),
+    "Menger level 3": (menger(level=3), 101.3),
+    "Mandelbulb": (mandelbulb(iterations=8), 64.0),
+    "Julia": (julia(iterations=10), 64.0),
 }
 TOLERANCE = 0.05
 """In voxels."""
+
+RUNS = 1
+SMALLEST = {"scenes": ("sphere",), "share": 0.1}
 
 
 def by_manifold3d(mesh: Mesh, tolerance: float, count: int) -> Mesh:
@@ -53,23 +58,27 @@ def by_us(mesh: Mesh, tolerance: float, count: int) -> Mesh:
     return simplify(mesh, tolerance)[0]
 
 
-def main() -> None:
-    ways: tuple[Callable[[Mesh, float, int], Mesh], ...] = (by_us, by_manifold3d, by_pymeshlab)
-    simplify(quantised(contour(sphere(), sample_scene(plan(sphere(), 16)))), 0.01)
-    print(f"{'':22}{'':15}{'triangles':>10}{'of all':>8}{'off':>8}{'CPU s':>8}  defects")
-    for name, (root, resolution) in SCENES.items():
-        planned, count = plan(root, resolution), 0
+METHODS = {"fracslice": by_us, "manifold3d": by_manifold3d, "pymeshlab": by_pymeshlab}
+
+
+def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES), share: float = 1.0) -> Iterator[Row]:
+    for name in scenes:
+        root, resolution = SCENES[name]
+        planned = plan(root, share * resolution)
         mesh, tolerance = quantised(contour(root, sample_scene(planned))), TOLERANCE * planned.voxel
-        for way in ways:
-            start = time.process_time()
-            few = way(mesh, tolerance, count)
-            spent, count = time.process_time() - start, count or len(few.triangles)
-            off = Nearest(few).samples(mesh, 10 * planned.voxel, Work()).max() / tolerance
-            share = len(few.triangles) / len(mesh.triangles)
-            defects = ", ".join(check_mesh(few).problems) or "none"
-            numbers = f"{len(few.triangles):10}{share:8.1%}{off:8.2f}{spent:8.1f}"
-            print(f"{name:22}{way.__name__[3:]:15}{numbers}  {defects}", flush=True)
-
-
-if __name__ == "__main__":
-    main()
+        count = len(by_us(mesh, tolerance, 0).triangles)
+        acts = {how: partial(method, mesh, tolerance, count) for how, method in METHODS.items()}
+        found = run.interleaved(acts, warm=False)
+        for how, act in acts.items():
+            few = act()
+            off = Nearest(few).samples(mesh, 10 * planned.voxel, Work(run.threads[0])).max() / tolerance
+            sizes = {
+                "triangles": len(few.triangles),
+                "of all": f"{len(few.triangles) / len(mesh.triangles):.1%}",
+            }
+            row = {"": name, "voxels": share * resolution, "by": how, **sizes, "off": float(off)}
+            yield {
+                **row,
+                "CPU s": found.spread(how, "cpu_s"),
+                "defects": ", ".join(check_mesh(few).problems) or "none",
+            }

@@ -1,57 +1,55 @@
-"""How the cost of slicing grows: ``python -m tests.benchmarks.slices.growth [FINEST]``.
+"""How the cost of slicing grows with the pixels: cut pixels, evaluations and CPU seconds, pictures included.
 
-Each scene at 256, 512, ... FINEST (1024) pixels and half as many layers, with pictures; prints the pixels
-that contours cut, evaluations and processor time, and how many times more each doubling takes. The surface
-grows four times, the volume eight times; a fractal's surface a little more than four.
+Half as many layers as pixels. A doubling makes four times the surface and eight times the volume; a fractal's
+surface grows a little more than four times.
 """
 
 from __future__ import annotations
 
-import sys
-import time
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from fracslice.export import png
-from fracslice.formulas import Node, julia, mandelbulb, menger, torus
+from fracslice.formulas import julia, mandelbulb, menger, torus
 from fracslice.slicing import Layer, SliceJob, Slicer, plan_stack
 from fracslice.slicing.raster import Screen
 
+from ..runner import Figures, Row, Run, timed
+
 SCENES = {
     "torus": torus(),
-    "menger 3": menger(level=3),
+    "menger": menger(level=3),
     "mandelbulb": mandelbulb(iterations=6),
     "julia": julia(iterations=12),
 }
+RUNS = 1
+SMALLEST = {"scenes": ("torus",), "pixels": (32, 64)}
 
 
-def cost(root: Node, pixels: int) -> tuple[float, float, float]:
-    """Cut pixels, evaluations, and processor seconds."""
-    stack = plan_stack(root, SliceJob(size=0.05 * pixels, layer=0.1, pixel=(0.05, 0.05)))
-    screen = Screen(stack)
+def cost(name: str, pixels: int) -> Figures:
+    """Cut pixels, evaluations and CPU seconds of a whole stack."""
+    stack = plan_stack(SCENES[name], SliceJob(size=0.05 * pixels, layer=0.1, pixel=(0.05, 0.05)))
+    screen, totals = Screen(stack), []
 
     def make(layer: Layer) -> tuple[float, float]:
         png.encode_layer(screen, layer)
         return layer.boundary, layer.evaluations
 
-    list(Slicer(stack).map(make, range(8)))  # compiles
-    begin = time.process_time()
-    boundary, evaluations = np.sum(list(Slicer(stack).map(make)), axis=0)
-    return boundary, evaluations, time.process_time() - begin
+    figures = timed(lambda: totals.extend(Slicer(stack).map(make)))
+    cut, evaluations = np.sum(totals, axis=0).tolist()
+    return {**figures, "cut": cut, "evals": evaluations}
 
 
-def main() -> None:
-    finest = int(sys.argv[1]) if sys.argv[1:] else 1024
-    for name, root in SCENES.items():
-        last, pixels = None, 256
-        while pixels <= finest:
-            found = np.array(cost(root, pixels))
-            line = f"{name:10} {pixels:5} cut {found[0]:8.0f}  evaluations {found[1]:9.0f}  {found[2]:6.2f} s"
-            if last is not None:
-                line += "  times " + " ".join(f"{t:.2f}" for t in found / last)
-            print(line)
-            last, pixels = found, 2 * pixels
-
-
-if __name__ == "__main__":
-    main()
+def rows(
+    run: Run, scenes: tuple[str, ...] = tuple(SCENES), pixels: tuple[int, ...] = (256, 512, 1024)
+) -> Iterator[Row]:
+    for name in scenes:
+        found = run.interleaved({str(n): partial(cost, name, n) for n in pixels})
+        for n, last in zip(pixels, (0, *pixels), strict=False):
+            row: Row = {"": name, "pixels": n}
+            for key, title in {"cut": "cut pixels", "evals": "evaluations", "cpu_s": "CPU s"}.items():
+                row[title] = found.spread(str(n), key)
+                row[f"times, {title}"] = found.ratio(str(n), str(last), key) if last else None
+            yield {**row, "evaluations per cut pixel": found.ratio(str(n), str(n), "evals", "cut")}

@@ -1,16 +1,13 @@
-"""512 slices of 1024 x 1024 of a Mandelbulb, beside hand-written C++: ``python -m
-tests.benchmarks.slices.peer``.
+"""512 slices of 1024 x 1024 of a Mandelbulb with 10 iterations in [-1.2, 1.2]^3, beside hand-written C++.
 
-Both run in turn, five times; medians and their ratio are printed. The bulb fills [-1.2, 1.2]^3 and has 10
-iterations.
+Ratios are C++ / fracslice. The C++ marks the pixels whose centre is inside; ours have grey rims.
 """
 
 from __future__ import annotations
 
 import tempfile
-import time
+from collections.abc import Iterator
 from pathlib import Path
-from statistics import median
 
 import numpy as np
 
@@ -19,13 +16,16 @@ from fracslice.formulas import mandelbulb
 from fracslice.formulas.box import Box
 from fracslice.slicing import Layer, Slicer, Stack
 from fracslice.slicing.raster import Screen
+from fracslice.work import Work
 
-from ..programs import told
+from ..programs import output
+from ..runner import Figures, Row, Run, timed
 
-SIDE, LAYERS, REACH, RUNS = 1024, 512, 1.2, 5
+REACH = 1.2
+SMALLEST = {"side": 64, "layers": 8}
 
 
-def stack(side: int = SIDE, layers: int = LAYERS) -> Stack:
+def stack(side: int, layers: int) -> Stack:
     """The job as a stack: the same lattice as the peer's, half a pixel aside."""
     width, height = 2 * REACH / side, 2 * REACH / layers
     z = -REACH + height * (np.arange(layers) + 0.5)
@@ -34,36 +34,37 @@ def stack(side: int = SIDE, layers: int = LAYERS) -> Stack:
     return Stack(root, 1.0, corner, (width, width), (side, side), z, tops, size, Box.centred(REACH))
 
 
-def ours(job: Stack, folder: Path) -> dict[str, float]:
-    screen = Screen(job)
+def ours(job: Stack, folder: Path, work: Work) -> Figures:
+    screen, totals = Screen(job), []
 
     def make(layer: Layer) -> tuple[float, int, int]:
         data = png.encode_layer(screen, layer)
         (folder / f"{layer.index:04d}.png").write_bytes(data)
         return layer.evaluations, layer.boundary, len(data)
 
-    wall, cpu = time.perf_counter(), time.process_time()
-    spent, boundary, size = np.sum(list(Slicer(job).map(make)), axis=0)
-    return {
-        "wall_s": time.perf_counter() - wall,
-        "cpu_s": time.process_time() - cpu,
-        "evals": spent,
-        "evals_per_cut_pixel": spent / boundary,
-        "bytes": size,
-    }
+    figures = timed(lambda: totals.extend(Slicer(job, work).map(make)))
+    evaluations, boundary, size = np.sum(totals, axis=0).tolist()
+    return {**figures, "evals": evaluations, "cut": boundary, "bytes": size}
 
 
-def main() -> None:
-    job, results = stack(), []
+def rows(run: Run, side: int = 1024, layers: int = 512) -> Iterator[Row]:
+    job, work = stack(side, layers), Work(run.threads[0])
     with tempfile.TemporaryDirectory() as folder:
-        ours(job, Path(folder))  # compiles
-        for _ in range(RUNS):
-            results.append([ours(job, Path(folder)), *told("slices", Path(folder, "peer"), SIDE, LAYERS)])
-    for name, runs in zip(("fracslice", "C++"), zip(*results, strict=True), strict=True):
-        print(name, {key: round(median(run[key] for run in runs), 3) for key in runs[0]})
-    for key in ("wall_s", "cpu_s", "evals"):
-        print(f"{key}: C++ / fracslice = {median(r[1][key] / r[0][key] for r in results):.2f}")
-
-
-if __name__ == "__main__":
-    main()
+        given = Path(folder, "peer"), side, layers, "--threads", run.threads[0]
+        acts = {
+            "fracslice": lambda: ours(job, Path(folder), work),
+            "C++": lambda: output("slices", *given)[0],
+        }
+        found = run.interleaved(acts)
+    for key, name in {"wall_s": "time", "cpu_s": "CPU time", "evals": "evaluations"}.items():
+        ratio, out = found.ratio("C++", "fracslice", key), "" if key == "evals" else "C++: grey rims"
+        yield {
+            "": name,
+            "fracslice": found.spread("fracslice", key),
+            "C++ / fracslice": ratio,
+            "leaves out": out,
+        }
+    yield {
+        "": "evaluations per cut pixel",
+        "fracslice": found.ratio("fracslice", "fracslice", "evals", "cut"),
+    }

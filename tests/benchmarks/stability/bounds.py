@@ -1,14 +1,12 @@
-"""The Lipschitz bound of every formula, tried at 10^7 points.
+"""The Lipschitz bound of every formula and of seams of fractals, tried at 10^7 points each.
 
-`python -m tests.benchmarks.stability.bounds [POINTS [NAME]] [--write]`: the example of every formula, seams
-of fractals, and nine versions of each with other numbers in all its elements, a tenth of the points each.
+A tenth of the points for the example, and for each of nine versions with other numbers in all its elements.
 Points anywhere, and on and next to axes, poles, cell borders and fold planes; partners along the gradient and
 anywhere.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from functools import reduce
 from itertools import count, islice
@@ -17,14 +15,16 @@ from zlib import crc32
 import numpy as np
 
 from fracslice.formulas import Node
-from tests.benchmarks.tables import publish, table
 from tests.examples import EXAMPLES
 from tests.stability.bounds import Verdict, verdict
 from tests.stability.draws import drawn, torn
 from tests.stability.seams import SEAMS
 
+from ..runner import Row, Run
+
 SCENES = {**EXAMPLES, **SEAMS}
 VERSIONS = 10
+SMALLEST = {"points": 200, "names": ("sphere",)}
 
 
 def versions(name: str) -> list[Node]:
@@ -38,23 +38,16 @@ def tried(name: str, tries: int) -> Verdict:
     return reduce(Verdict.__or__, (verdict(v, tries // VERSIONS, n) for n, v in enumerate(versions(name))))
 
 
-def rows(tries: int, wanted: str) -> Iterator[list[str]]:
-    for name, root in SCENES.items():
-        if wanted in name:
-            found = tried(name, tries)
-            kind = "free ball" if root.bounds.exterior_only else "slope"
-            points = f"{found.points:.2g}".replace("e+0", "e")
-            bound = f"{root.conservative().bounds.lipschitz:.3g}"
-            worst = f"{found.worst:.6f}" if found.worst else "< 0.5"
-            yield [name, kind, bound, points, str(found.violations), worst]
-
-
-def main() -> None:
-    given = [a for a in sys.argv[1:] if not a.startswith("--")]
-    tries, wanted = int(float(given[0])) if given else 10**7, given[1] if len(given) > 1 else ""
-    head = ["", "bound on", "L", "points", "violations", "worst, in units of L"]
-    publish("bounds", table(head, rows(tries, wanted)))
-
-
-if __name__ == "__main__":
-    main()
+def rows(run: Run, points: int = 10**7, names: tuple[str, ...] = tuple(SCENES)) -> Iterator[Row]:
+    for name in names:
+        root, found = SCENES[name], tried(name, points)
+        kind = "free ball" if root.bounds.exterior_only else "slope"
+        tries = f"{found.points:.2g}".replace("e+0", "e")
+        row = {
+            "": name,
+            "bound on": kind,
+            "L": f"{root.conservative().bounds.lipschitz:.3g}",
+            "points": tries,
+        }
+        worst = f"{found.worst:.6f}" if found.worst else "< 0.5"
+        yield {**row, "violations": found.violations, "worst, in units of L": worst}

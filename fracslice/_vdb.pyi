@@ -1,0 +1,53 @@
+"""OpenVDB grids of samples. Call `fracslice.volume.grid` instead.
+
+Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Long calls release the GIL.
+"""
+
+from numpy import float32, int32, uint32
+from numpy.typing import NDArray
+
+Point = tuple[float, float, float]
+
+class Grid:
+    """Sparse OpenVDB level set."""
+
+    @staticmethod
+    def from_bricks(
+        ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int32], origin: Point, voxel: float
+    ) -> Grid:
+        """Grid of samples: active at samples; the background is the largest sample, negative inside."""
+
+    @staticmethod
+    def read(path: str, name: str = "") -> Grid:
+        """Read the named float grid of a .vdb file, or the first one. Raises RuntimeError."""
+
+    def write(self, path: str, metadata: dict[str, str]) -> None:
+        """Write a .vdb file. Raises RuntimeError if it cannot be written completely."""
+
+    def to_bricks(self) -> tuple[list[float], float, NDArray[int32], NDArray[float32], NDArray[int32]]:
+        """Origin, voxel, ijk, values and index. Raises ValueError unless voxels are axis-aligned cubes."""
+
+    def mesh(self, adaptivity: float = 0.0) -> tuple[NDArray[float32], NDArray[uint32], NDArray[uint32]]:
+        """Dual contouring by OpenVDB: points [n, 3], triangles [m, 3], quads [k, 4]."""
+
+    def redistance(self) -> Grid:
+        """Signed distance field of the same surface, by fast sweeping (Zhao, 2004). Raises ValueError."""
+
+    def offset(self, distance: float) -> Grid:
+        """Signed distances of the surface, offset outwards by `distance`, scene units. Raises ValueError."""
+
+    def surfaces(self) -> list[Grid]:
+        """One grid per connected component of the surface, the largest first."""
+
+    name: str
+    @property
+    def metadata(self) -> dict[str, str]: ...
+    @property
+    def background(self) -> float: ...
+    @property
+    def active_voxels(self) -> int: ...
+    @property
+    def leaves(self) -> int: ...
+    @property
+    def memory(self) -> int:
+        """Memory in bytes."""

@@ -1,0 +1,7 @@
+"""Films: a scene over time, its frames and their files."""
+
+from .encode import ENDINGS, check_film, encode
+from .film import FilmJob, write_frames
+from .timeline import Timeline
+
+__all__ = ["ENDINGS", "FilmJob", "Timeline", "check_film", "encode", "write_frames"]

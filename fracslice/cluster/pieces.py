@@ -1,0 +1,322 @@
+"""Tasks of a job, and their results as files of any file system that fsspec knows."""
+
+from __future__ import annotations
+
+import os
+import platform
+import posixpath
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from secrets import token_hex
+from typing import TYPE_CHECKING, Any, Protocol
+
+from ..errors import ClusterError
+from ..extras import lacking
+from ..keys import program
+from ..version import __version__
+
+if TYPE_CHECKING:
+    from ..work import Work
+
+
+class Task(Protocol):
+    """Task of a job: enough for any process to make its result. It holds no arrays."""
+
+    @property
+    def job(self) -> str:
+        """Key of everything that determines the results of the job."""
+
+    @property
+    def name(self) -> str:
+        """Name within the job: of the file, and on Dask's dashboard."""
+
+    def make(self, work: Work) -> bytes:
+        """Make the result.
+
+        Parameters
+        ----------
+        work : Work
+            Threads.
+
+        Returns
+        -------
+        bytes
+            The same on every machine.
+        """
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Results of tasks in a folder, written beside and moved, so that each is whole or absent.
+
+    Attributes
+    ----------
+    url : str
+        Folder that all machines can reach: a path, or any URL of fsspec.
+
+    Raises
+    ------
+    ClusterError
+        If fsspec is not installed, or the folder cannot be used.
+    """
+
+    url: str
+
+    @cached_property
+    def _place(self) -> tuple[Any, str]:
+        """File system and root."""
+        if reason := lacking("fsspec", "clusters need"):
+            raise ClusterError(reason)
+        from fsspec.core import url_to_fs
+
+        try:
+            system, root = url_to_fs(self.url)
+        except (ImportError, ValueError) as error:
+            raise ClusterError(f"{self.url}: {error}") from None
+        return system, root
+
+    def has(self, task: Task) -> bool:
+        """True if the result of a task is there.
+
+        Parameters
+        ----------
+        task : Task
+            The task.
+
+        Returns
+        -------
+        bool
+        """
+        system, root = self._place
+        system.invalidate_cache()
+        return bool(system.exists(f"{root}/{task.job}/{task.name}"))
+
+    def path(self, name: str) -> str | None:
+        """Path of a file of this folder; None if it is no folder of this machine's file system.
+
+        Parameters
+        ----------
+        name : str
+            Name of the file.
+
+        Returns
+        -------
+        str or None
+        """
+        if "://" in self.url:
+            return None
+        os.makedirs(self.url, exist_ok=True)
+        return os.path.join(self.url, name)
+
+    def read(self, job: str, name: str, start: int | None = None, end: int | None = None) -> bytes:
+        """Read a file of a job, or a range of its bytes.
+
+        Parameters
+        ----------
+        job : str
+            Key of the job.
+        name : str
+            Name of the file.
+        start, end : int, optional
+            Range.
+
+        Returns
+        -------
+        bytes
+
+        Raises
+        ------
+        ClusterError
+            If it cannot be read.
+        """
+        system, root = self._place
+        try:
+            return bytes(system.cat_file(f"{root}/{job}/{name}", start=start, end=end))
+        except OSError as error:
+            raise ClusterError(f"{self.url}: {job}/{name}: {error}") from None
+
+    def write(self, job: str, name: str, data: bytes) -> None:
+        """Write a file of a job atomically.
+
+        Parameters
+        ----------
+        job : str
+            Key of the job.
+        name : str
+            Name of the file.
+        data : bytes
+            Contents.
+
+        Raises
+        ------
+        ClusterError
+            If it cannot be written.
+        """
+        system, root = self._place
+        part = f"{root}/{job}/.{name}.{token_hex(8)}.part"
+        try:
+            system.makedirs(f"{root}/{job}", exist_ok=True)
+            system.pipe_file(part, data)
+            system.mv(part, f"{root}/{job}/{name}")
+        except OSError as error:
+            raise ClusterError(f"{self.url}: {error}") from None
+
+    def remove(self, job: str, name: str = "") -> None:
+        """Remove a file of a job, or all of them; ignore what is not there.
+
+        Parameters
+        ----------
+        job : str
+            Key of the job.
+        name : str, optional
+            Name of the file.
+        """
+        system, root = self._place
+        with suppress(OSError):
+            system.rm(posixpath.join(root, job, name).rstrip("/"), recursive=not name)
+
+    def tidy(self) -> None:
+        """Remove the folder if it is empty."""
+        system, root = self._place
+        with suppress(OSError):
+            system.rmdir(root)
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What two processes must share to make the same bytes.
+
+    Attributes
+    ----------
+    version, python, program, processor : str
+        Version of fracslice and of Python; keys of the program's text and of the processor's instructions.
+    """
+
+    version: str
+    python: str
+    program: str
+    processor: str
+
+    @classmethod
+    def here(cls) -> Identity:
+        """Identity of this process."""
+        from ..kernel.objects import toolchain
+
+        return cls(__version__, platform.python_version(), program(), toolchain())
+
+    def difference(self, expected: Identity) -> str:
+        """Describe the first difference; "" if there is none.
+
+        Parameters
+        ----------
+        expected : Identity
+            Identity of the process that started the job.
+
+        Returns
+        -------
+        str
+            Such as "Python 3.12.1, expected 3.11.7".
+        """
+        for name, found, wanted in (
+            ("fracslice", self.version, expected.version),
+            ("Python", self.python, expected.python),
+            ("program text", self.program[:8], expected.program[:8]),
+            ("processor", self.processor[:8], expected.processor[:8]),
+        ):
+            if found != wanted:
+                return f"{name} {found}, expected {wanted}"
+        return ""
+
+
+def run(task: Task, pieces: Pieces, work: Work) -> None:
+    """Make the result of a task, unless it is there.
+
+    Parameters
+    ----------
+    task : Task
+        The task.
+    pieces : Pieces
+        Where its result belongs.
+    work : Work
+        Threads.
+    """
+    if not pieces.has(task):
+        pieces.write(task.job, task.name, task.make(work))
+
+
+class Pool(ABC):
+    """Processes that make the results of tasks.
+
+    Attributes
+    ----------
+    pieces : Pieces
+        Results.
+    first : bool
+        True for the process that writes the output; False for the other shards of a job.
+    """
+
+    pieces: Pieces
+    first: bool = True
+
+    def finished(self, job: str) -> None:
+        """Remove the results of a job whose output is complete.
+
+        Parameters
+        ----------
+        job : str
+            Key of the job.
+        """
+        self.pieces.remove(job)
+
+    @abstractmethod
+    def made(self, tasks: Sequence[Task], work: Work) -> Iterator[int]:
+        """Make the results of tasks.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+            Tasks of one job.
+        work : Work
+            Cancellation.
+
+        Yields
+        ------
+        int
+            Index of each task, in any order, once its result is there.
+        """
+
+    def results(self, tasks: Sequence[Task], work: Work, stage: str = "") -> Iterator[bytes]:
+        """Results of tasks, in order.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+            Tasks of one job.
+        work : Work
+            Progress and cancellation.
+        stage : str, optional
+            Name of the stage whose progress is the share of tasks that are done; none without it.
+
+        Yields
+        ------
+        bytes
+            Result of each task.
+
+        Raises
+        ------
+        ClusterError
+            If a task fails, or none ends in time.
+        Cancelled
+            When the work is cancelled.
+        """
+        following, done = 0, set[int]()
+        for index in self.made(tasks, work):
+            done.add(index)
+            if stage:
+                work.progress(stage, len(done) / len(tasks))
+            while following in done:
+                yield self.pieces.read(tasks[following].job, tasks[following].name)
+                following += 1

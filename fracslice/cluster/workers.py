@@ -1,0 +1,254 @@
+"""Workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from secrets import token_hex
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ClusterError
+from ..extras import lacking
+from ..files import warn
+from .pieces import Identity, Pieces, Pool, Task, run
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+    from ..work import Work
+
+HIDDEN = ".fracslice-pieces"
+"""Folder of the results where none is named."""
+
+POLL, CONNECT = 0.02, 10.0
+"""Seconds between two looks for results, and until a scheduler answers."""
+
+
+def on_worker(task: Task, pieces: Pieces, expected: Identity) -> str:
+    """Make the result of a task on a worker, in one thread.
+
+    Parameters
+    ----------
+    task : Task
+        The task.
+    pieces : Pieces
+        Where its result belongs.
+    expected : Identity
+        Identity of the process that started the job.
+
+    Returns
+    -------
+    str
+        Why this worker is of no use, with its address; "" if the result is there.
+    """
+    from distributed import get_worker
+
+    from ..work import Work
+
+    if difference := Identity.here().difference(expected):
+        return f"{get_worker().address} {difference}"
+    run(task, pieces, Work(threads=1))
+    return ""
+
+
+@dataclass(frozen=True, eq=False)
+class Workers(Pool):
+    """Workers of a Dask scheduler, each thread of which makes a task at a time.
+
+    What counts is whether a result is in the folder: if no task ends for a while, all that are missing are
+    submitted once more, since the same task twice does no harm.
+
+    Attributes
+    ----------
+    client : distributed.Client
+        Connection to the scheduler.
+    pieces : Pieces
+        Results.
+    patience : float
+        Seconds without a result until missing tasks are submitted once more; doubled every time.
+    limit : float
+        Seconds without a result until the job fails.
+    """
+
+    client: Client
+    pieces: Pieces
+    patience: float = 60.0
+    limit: float = 1800.0
+
+    @classmethod
+    def of(cls, client: Client) -> Workers:
+        """Workers of a client, with results in a hidden folder of the current one.
+
+        Parameters
+        ----------
+        client : distributed.Client
+            Connection to the scheduler.
+
+        Returns
+        -------
+        Workers
+
+        """
+        return cls(client, Pieces(os.path.abspath(HIDDEN)))
+
+    def made(self, tasks: Sequence[Task], work: Work) -> Iterator[int]:
+        """Submit tasks and yield them as they end; see `Pool.made`."""
+        missing = []
+        for index, task in enumerate(tasks):
+            if self.pieces.has(task):
+                yield index
+            else:
+                missing.append(index)
+        if missing:
+            yield from _Attempt(self, tasks).made(missing, work)
+
+
+class _Attempt:
+    """Futures of the tasks that are missing."""
+
+    def __init__(self, pool: Workers, tasks: Sequence[Task]) -> None:
+        from distributed import as_completed
+
+        self.pool, self.tasks, self.expected = pool, tasks, Identity.here()
+        self.token, self.count = token_hex(3), 0
+        self.refused: set[str] = set()
+        self.futures: dict[Future, int] = {}
+        self.queue: Any = as_completed(loop=pool.client.loop)
+
+    def made(self, indices: list[int], work: Work) -> Iterator[int]:
+        """Indices of tasks as their results come."""
+        pool, missing = self.pool, set(indices)
+        last, patience = time.monotonic(), pool.patience
+        try:
+            self.submit(indices)
+            while missing:
+                work.check()
+                for index in self.ended():
+                    if index in missing:
+                        missing.discard(index)
+                        last, patience = time.monotonic(), pool.patience
+                        yield index
+                quiet = time.monotonic() - last
+                if quiet > pool.limit:
+                    workers = len(self.known())
+                    raise ClusterError(f"no task ended within {pool.limit:g} s; {workers} workers")
+                if quiet > patience:
+                    patience += quiet
+                    self.submit(sorted(missing))
+                work.cancel.wait(POLL)
+        finally:
+            with suppress(Exception):  # the scheduler may be gone
+                pool.client.cancel(list(self.futures), force=True)
+
+    def submit(self, indices: Sequence[int]) -> None:
+        """Submit tasks under new names, preferably to workers that fit and are not stuck with one."""
+        self.count += 1
+        known = self.known()
+        fit = [address for address in known if address not in self.refused]
+        if self.refused and not fit:
+            raise ClusterError("no worker fits: none has the fracslice and the Python of this process")
+        free = [address for address in fit if address not in self.busy] or fit
+        where = {"workers": free, "allow_other_workers": True} if len(free) < len(known) else {}
+        for index in indices:
+            task = self.tasks[index]
+            key = f"{task.name}-{task.job[:8]}{self.token}{self.count:x}"
+            future = self.pool.client.submit(
+                on_worker, task, self.pool.pieces, self.expected, key=key, pure=False, **where
+            )
+            self.futures[future] = index
+            self.queue.add(future)
+
+    def known(self) -> dict[str, Any]:
+        """Workers of the scheduler, by address."""
+        client = self.pool.client
+        try:
+            about = client.sync(client.scheduler.identity, n_workers=-1, callback_timeout=CONNECT)
+        except (OSError, TimeoutError):
+            raise ClusterError(f"{client.scheduler.address}: the scheduler does not answer") from None
+        found: dict[str, Any] = about["workers"]
+        return found
+
+    @property
+    def busy(self) -> set[str]:
+        """Workers that have kept a task of an earlier submission."""
+        if self.count < 2:
+            return set()
+        client, own = self.pool.client, {future.key for future in self.futures}
+        try:
+            processing = client.sync(client.scheduler.processing, workers=None, callback_timeout=CONNECT)
+        except (OSError, TimeoutError):
+            return set()
+        return {address for address, keys in processing.items() if own & set(keys)}
+
+    def ended(self) -> Iterator[int]:
+        """Indices of tasks whose futures have ended since the last look."""
+        while self.queue.has_ready():
+            future = self.queue.next()
+            index = self.futures.pop(future)
+            if future.cancelled():
+                continue  # submitted once more when it is missed
+            error = future.exception(timeout=CONNECT)
+            if error is not None and type(error).__name__ == "KilledWorker":
+                self.submit([index])
+            elif error is not None:
+                raise ClusterError(f"{self.tasks[index].name}: {error or type(error).__name__}") from error
+            elif refusal := future.result(timeout=CONNECT):
+                self.refuse(refusal)
+                self.submit([index])
+            else:
+                yield index
+
+    def refuse(self, refusal: str) -> None:
+        """Remember a worker that makes other bytes; warn once."""
+        address, difference = refusal.split(" ", 1)
+        self.refused.add(address)
+        warn(f"worker {address} is not used: {difference}")
+
+
+@contextmanager
+def connected(where: str, store: str, threads: int = 1) -> Iterator[Workers]:
+    """Connect to a scheduler, or start workers here.
+
+    Parameters
+    ----------
+    where : str
+        Address of a scheduler, such as "tcp://host:8786"; or "local" or "local:4" for processes here.
+    store : str
+        Folder of the results, see `Pieces`.
+    threads : int
+        Threads of all local workers together.
+
+    Yields
+    ------
+    Workers
+
+    Raises
+    ------
+    ClusterError
+        If Dask is not installed, the text is malformed, or no scheduler answers.
+    """
+    if reason := lacking("distributed", "clusters need"):
+        raise ClusterError(reason)
+    from distributed import Client, LocalCluster
+
+    kind, _, count = where.partition(":")
+    if kind != "local":
+        try:
+            client = Client(where, timeout=CONNECT, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise ClusterError(f"{where}: no scheduler answers: {error}") from None
+        with client:
+            yield Workers(client, Pieces(store))
+        return
+    if count and not 1 <= int(count if count.isdigit() else 0) <= 1024:
+        raise ClusterError(f"{where!r}: expected local, local:N or the address of a scheduler")
+    workers = int(count or threads)
+    per_worker = max(1, threads // workers)
+    with (
+        LocalCluster(workers, per_worker, memory_limit=None, dashboard_address=None) as cluster,
+        Client(cluster, timeout=CONNECT, set_as_default=False) as client,
+    ):
+        yield Workers(client, Pieces(store))

@@ -1,0 +1,248 @@
+"""Print files that are ZIP archives of PNG pictures: .sl1 of Prusa, .nanodlp of NanoDLP."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import zipfile
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from functools import partial
+from itertools import chain
+from pathlib import Path
+
+from PIL import Image
+
+from fracslice.errors import ExportError
+from fracslice.export import png
+from fracslice.export.jobs import SliceRun
+from fracslice.export.prints import Print, one_height, printing
+from fracslice.files import replacing
+from fracslice.version import __version__
+
+MOST_MEMBERS = 65_535
+
+SL1_PREVIEWS = (400, 400), (800, 480)
+NANODLP_PREVIEW = 200, 100
+"""Width and height of the previews, pixels."""
+
+Members = Iterator[tuple[str, bytes]]
+
+
+def write_sl1(run: SliceRun, path: str | Path) -> Path:
+    """Write an archive for the SL1 family: config.ini, prusaslicer.ini, previews and a PNG for each layer.
+
+    PrusaSlicer opens the archive. An interrupted job resumes.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write, with a printer and a resin.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        Without a printer or a resin, for layers of unequal heights, which the format cannot express, for too
+        many layers, or for an error of the file system.
+    """
+    one_height(run, path, "an SL1 archive")
+    name = Path(path).stem
+    with _pictures(run, path) as job:
+        about = {
+            "config.ini": _ini(_config(job, name)),
+            "fracslice.json": run.describe(),
+            "prusaslicer.ini": _ini(_settings(job)),
+        }
+        previews = {
+            f"thumbnail/thumbnail{width}x{height}.png": _preview(job, width, height)
+            for width, height in SL1_PREVIEWS
+        }
+        layers = ((f"{name}{k:05d}.png", data) for k, data in enumerate(job))
+        return _archive(path, chain(about.items(), previews.items(), layers))
+
+
+def write_nanodlp(run: SliceRun, path: str | Path) -> Path:
+    """Write a .nanodlp archive (docs.nanodlp.com/manual/format); an interrupted job resumes.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write, with a printer and a resin.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        Without a printer or a resin, for too many layers, or for an error of the file system.
+    """
+    with _pictures(run, path) as job:
+        about = {f"{name}.json": _json(values) for name, values in _plate(job).items()}
+        about["3d.png"] = _preview(job, *NANODLP_PREVIEW)
+        layers = ((f"{k}.png", data) for k, data in enumerate(job, 1))
+        return _archive(path, chain(about.items(), layers))
+
+
+def _pictures(run: SliceRun, path: str | Path) -> AbstractContextManager[Print]:
+    if run.layers + 100 > MOST_MEMBERS:
+        raise ExportError(f"{path}: {run.layers} layers are too many for an archive")
+    return printing(run, path, "png", partial(png.encode_layer, run.screen))
+
+
+def _archive(path: str | Path, members: Members) -> Path:
+    """Write members that are not compressed and carry no time."""
+    with replacing(path) as file, zipfile.ZipFile(file, "w") as archive:
+        for name, data in members:
+            archive.writestr(zipfile.ZipInfo(name), data)
+    return Path(path)
+
+
+def _preview(job: Print, width: int, height: int) -> bytes:
+    file = io.BytesIO()
+    Image.fromarray(job.preview(width, height)).save(file, "PNG")
+    return file.getvalue()
+
+
+def _ini(values: dict[str, object]) -> bytes:
+    return "".join(f"{key} = {value}\n" for key, value in values.items()).encode()
+
+
+def _json(values: object) -> bytes:
+    return json.dumps(values, indent=1).encode()
+
+
+def _config(job: Print, name: str) -> dict[str, object]:
+    """Settings for the printer, with the keys of PrusaSlicer 2.5."""
+    printer, resin = job.printer, job.resin
+    return {
+        "action": "print",
+        "expTime": f"{resin.exposure:g}",
+        "expTimeFirst": f"{resin.bottom_exposure:g}",
+        "expUserProfile": 0,
+        "fileCreationTimestamp": f"{job.run.created:%Y-%m-%d at %H:%M:%S UTC}",
+        "hollow": 0,
+        "jobDir": name,
+        "layerHeight": f"{job.heights[0]:g}",
+        "materialName": resin.name,
+        "numFade": min(resin.transition_layers, job.layers),
+        "numFast": job.layers,
+        "numSlow": 0,
+        "printProfile": "fracslice",
+        "printTime": f"{job.seconds:.1f}",
+        "printerModel": printer.name.upper() if printer.file == "sl1" else "SL1",
+        "printerProfile": printer.title,
+        "printerVariant": "default",
+        "prusaSlicerVersion": f"fracslice-{__version__}",
+        "usedMaterial": f"{job.volume_ml:.6f}",
+    }
+
+
+def _settings(job: Print) -> dict[str, object]:
+    """Settings with which PrusaSlicer can import the layers."""
+    printer, resin = job.printer, job.resin
+    (width, depth), (across, along) = printer.screen, printer.pixels
+    layer = f"{job.heights[0]:g}"
+    return {
+        "bed_shape": f"0x0,{width:g}x0,{width:g}x{depth:g},0x{depth:g}",
+        "display_height": f"{depth:g}",
+        "display_mirror_x": int(job.mirrored),
+        "display_mirror_y": 0,
+        "display_orientation": "portrait" if printer.portrait else "landscape",
+        "display_pixels_x": across,
+        "display_pixels_y": along,
+        "display_width": f"{width:g}",
+        "exposure_time": f"{resin.exposure:g}",
+        "faded_layers": min(resin.transition_layers, job.layers),
+        "gamma_correction": f"{job.run.screen.gamma:g}",
+        "initial_exposure_time": f"{resin.bottom_exposure:g}",
+        "initial_layer_height": layer,
+        "layer_height": layer,
+        "max_print_height": f"{math.ceil(printer.height)}",
+        "printer_technology": "SLA",
+        "relative_correction": "1,1",
+    }
+
+
+def _plate(job: Print) -> dict[str, object]:
+    """Contents of the JSON files of a .nanodlp archive. Heights are in micrometres."""
+    resin, (rows, columns), heights = job.resin, job.run.screen.shape, 1000 * job.heights
+    (x, y, z), (width, height) = job.run.stack.size, job.printer.pixel
+    areas, created = job.areas.tolist(), int(job.run.created.timestamp())
+    uneven = heights.max() - heights.min() > 1e-6
+    box = {"XMin": -x / 2, "XMax": x / 2, "YMin": -y / 2, "YMax": y / 2, "ZMin": 0.0, "ZMax": z}
+    varying = {
+        "CureTimes": job.exposures.tolist(),
+        "DynamicThickness": heights.tolist() if uneven else [],
+    }
+    size = {"XRes": 1000 * width, "YRes": 1000 * height, "ZRes": float(heights.max())}
+    return {
+        "meta": {
+            "FormatVersion": 2,
+            "Distro": "generic",
+            "Program": "fracslice",
+            "Version": __version__,
+            "OS": "any",
+            "Arch": "any",
+            "Profile": True,
+        },
+        "plate": {
+            "PlateID": 1,
+            "ProfileID": 1,
+            "Path": job.run.metadata.get("Title", "fracslice"),
+            "CreatedDate": created,
+            "Updated": created,
+            "PrintTime": round(job.seconds),
+            "PrintEst": round(job.seconds),
+            "LayersCount": job.layers,
+            "TotalSolidArea": float(job.areas @ heights),
+            "MultiMaterial": False,
+            **size,
+            **varying,
+            **box,
+        },
+        "slicer": {
+            "Type": "stl",
+            "PWidth": columns,
+            "PHeight": rows,
+            "Thickness": float(heights.max()),
+            "SupportDepth": float(heights[0]),
+            "SupportLayerNumber": resin.bottom_layers,
+            "XPixelSize": 1000 * width,
+            "YPixelSize": 1000 * height,
+            "ImageMirror": int(job.mirrored),
+            "LayerCount": job.layers,
+            "Boundary": box,
+            **varying,
+        },
+        "profile": {
+            "ResinID": 1,
+            "ProfileID": 1,
+            "Title": resin.name,
+            "Depth": float(heights.max()),
+            "SupportDepth": float(heights[0]),
+            "SupportLayerNumber": resin.bottom_layers,
+            "TransitionalLayer": resin.transition_layers,
+            "CureTime": resin.exposure,
+            "SupportCureTime": resin.bottom_exposure,
+            "WaitHeight": resin.lift,
+            "SupportWaitHeight": resin.lift,
+            "WaitBeforePrint": resin.wait,
+            "SupportWaitBeforePrint": resin.wait,
+            "ResinPrice": resin.price,
+        },
+        "info": [
+            {"TotalSolidArea": area, "LayerNumber": k, "LayerHeight": float(height)}
+            for k, (area, height) in enumerate(zip(areas, heights, strict=True))
+        ],
+    }

@@ -1,0 +1,179 @@
+""".ctb versions 2 and 3, and .cbddlp, of ChiTu boards, unencrypted (Biffle, "CTB/CBDDLP file formats",
+github.com/cbiffle/catibo).
+
+All numbers are little-endian. A .ctb has 7 bits per pixel; version 3 adds motion to each layer. A .cbddlp has
+several pictures of one bit per layer, of the pixels above a level each.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+from functools import partial
+from itertools import accumulate
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fracslice._slices import Encoding
+from fracslice.export.jobs import SliceRun
+from fracslice.export.prints import Print, printing, rgb565
+from fracslice.files import replacing
+from fracslice.slicing import Layer
+from fracslice.slicing.raster import Screen
+
+CTB, CBDDLP = 0x12FD0086, 0x12FD0019
+LEVELS = 4
+"""Pictures per layer of a .cbddlp."""
+
+LARGE, SMALL = (400, 300), (200, 125)
+"""Width and height of the previews, pixels."""
+
+SOFTWARE = 0x01060300
+"""Version of the program that first wrote such files."""
+
+_HEADER = struct.Struct("<2I3f8x5f3I4I2I2II2HI2I")
+_MOTION = struct.Struct("<10fI16x")
+_SLICER = struct.Struct("<28x6If2I8x4x")
+_PREVIEW = struct.Struct("<4I16x")
+_LAYER = struct.Struct("<3f6I")
+_LAYER_MOTION = struct.Struct("<I11f")
+"""Version 3: after a copy of the layer's entry in the table."""
+
+
+def write_ctb(run: SliceRun, path: str | Path) -> Path:
+    """Write a .ctb file; an interrupted job resumes.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write, with a printer and a resin.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        Without a printer or a resin, or for an error of the file system.
+    """
+    version = 2 if run.screen.printer and run.screen.printer.version == 2 else 3
+    with printing(run, path, "ctb", partial(run.screen.encoded, encoding=Encoding.RLE7)) as job:
+        sizes = np.array([job.sizes])
+        return _write(job, path, CTB, version, sizes, job)
+
+
+def write_cbddlp(run: SliceRun, path: str | Path) -> Path:
+    """Write a .cbddlp file; an interrupted job resumes.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write, with a printer and a resin.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        Without a printer or a resin, or for an error of the file system.
+    """
+    with printing(run, path, "cbddlp", partial(_level_sets, run.screen)) as job:
+        sizes = np.array([struct.unpack_from(f"<{LEVELS}I", picture) for picture in job]).T
+        return _write(job, path, CBDDLP, 2, sizes, (picture[4 * LEVELS :] for picture in job))
+
+
+def _level_sets(screen: Screen, layer: Layer) -> bytes:
+    """Sizes of the pictures of a layer, then the pictures, the one of the highest level first."""
+    levels = np.arange(256)
+    tables = [np.uint8(255) * (levels >= 256 * (k + 0.5) / LEVELS) for k in reversed(range(LEVELS))]
+    pictures = [screen.encoded(layer, Encoding.RLE1, table) for table in tables]
+    return struct.pack(f"<{LEVELS}I", *map(len, pictures)) + b"".join(pictures)
+
+
+def _write(
+    job: Print, path: str | Path, magic: int, version: int, sizes: NDArray[np.int64], data: Iterable[bytes]
+) -> Path:
+    """Write header, previews, settings, layer table and layers. sizes: of the pictures, [levels, layers]."""
+    previews = [_preview(job.preview(*size)) for size in (LARGE, SMALL)]
+    name = job.printer.title.encode("ascii", "replace")
+    lengths = [
+        _HEADER.size,
+        *(_PREVIEW.size + len(p) for p in previews),
+        _MOTION.size,
+        _SLICER.size,
+        len(name),
+    ]
+    large, small, motion, slicer, machine, table = accumulate(lengths)
+    extra = _LAYER.size + _LAYER_MOTION.size if version == 3 else 0
+    ends = np.cumsum(sizes.T.ravel() + extra).reshape(sizes.shape[::-1]).T
+    places = table + _LAYER.size * sizes.size + ends - sizes
+    entries = [
+        _LAYER.pack(*_timing(job, k), int(places[level, k]), int(sizes[level, k]), 0, extra, 0, 0)
+        for level in range(len(sizes))
+        for k in range(job.layers)
+    ]
+    with replacing(path) as file:
+        file.write(_header(job, magic, version, len(sizes), (large, small, motion, slicer, table)))
+        for (width, height), at, preview in zip((LARGE, SMALL), (large, small), previews, strict=True):
+            file.write(_PREVIEW.pack(width, height, at + _PREVIEW.size, len(preview)) + preview)
+        file.write(_motion(job) + _slicer(job, magic, version, len(sizes), machine, len(name)) + name)
+        file.writelines(entries)
+        for entry, picture in zip(entries, data, strict=False):
+            if extra:
+                file.write(entry + _layer_motion(job, extra + len(picture)))
+            file.write(picture)
+    return Path(path)
+
+
+def _header(job: Print, magic: int, version: int, levels: int, places: tuple[int, ...]) -> bytes:
+    resin, (rows, columns), (large, small, motion, slicer, table) = job.resin, job.run.screen.shape, places
+    return _HEADER.pack(
+        *(magic, version, *job.printer.screen, job.printer.height, float(job.tops[-1])),
+        *(float(job.heights.max()), resin.exposure, resin.bottom_exposure, resin.wait, resin.bottom_layers),
+        *(columns, rows, large, table, job.layers, small, round(job.seconds), int(job.mirrored)),
+        *(motion, _MOTION.size, levels, 255, 255, 0, slicer, _SLICER.size),
+    )
+
+
+def _motion(job: Print) -> bytes:
+    resin = job.resin
+    return _MOTION.pack(
+        *((resin.lift, resin.lift_speed) * 2 + (resin.retract_speed,)),
+        *(job.volume_ml, job.weight_g, job.cost, resin.wait, resin.wait, resin.bottom_layers),
+    )
+
+
+def _slicer(job: Print, magic: int, version: int, levels: int, machine: int, size: int) -> bytes:
+    mode = 8 if magic == CBDDLP else 0x2000000F if version == 3 else 0xF
+    return _SLICER.pack(machine, size, mode, 0, levels, SOFTWARE, 0, 0, job.resin.transition_layers)
+
+
+def _timing(job: Print, layer: int) -> tuple[float, float, float]:
+    """Height of the platform, exposure and time without light."""
+    return float(job.tops[layer]), float(job.exposures[layer]), job.resin.wait
+
+
+def _layer_motion(job: Print, size: int) -> bytes:
+    resin = job.resin
+    return _LAYER_MOTION.pack(size, resin.lift, resin.lift_speed, 0, 0, resin.retract_speed, *(0,) * 5, 255)
+
+
+def _preview(picture: NDArray[np.uint8]) -> bytes:
+    """Runs of equal pixels of 15 bits; the bit after green marks a pixel that a run length follows."""
+    pixels = (rgb565(picture) & ~np.uint16(0x20)).ravel()
+    starts = np.flatnonzero(np.diff(pixels, prepend=~pixels[:1]))
+    words: list[int] = []
+    for value, length in zip(pixels[starts], np.diff(starts, append=len(pixels)), strict=True):
+        for begin in range(0, int(length), 0xFFE):
+            more = min(int(length) - begin, 0xFFE) - 1
+            words += [int(value) | 0x20, 0x3000 | more] if more else [int(value)]
+    return np.array(words, "<u2").tobytes()

@@ -1,0 +1,95 @@
+""".goo V3.0 of Elegoo, and .prz of Phrozen ("GOO file format", V1.2, github.com/elegooofficial/GOO).
+
+All numbers are big-endian; pixels have 8 bits; each layer has its own height and exposure.
+"""
+
+from __future__ import annotations
+
+import struct
+from functools import partial
+from pathlib import Path
+
+from fracslice._slices import Encoding
+from fracslice.export.jobs import SliceRun
+from fracslice.export.prints import Print, printing, rgb565
+from fracslice.files import replacing
+from fracslice.version import __version__
+
+MAGIC = b"\x07\0\0\0DLP\0"
+DELIMITER = b"\r\n"
+END = bytes(3) + MAGIC
+SMALL, LARGE = 116, 290
+"""Sides of the two previews, pixels."""
+
+_SETTINGS = struct.Struct(">I2H2?5f?8fI16f2H?I3f8sI?H")
+"""Header after the previews."""
+
+HEADER = 4 + len(MAGIC) + 32 + 24 + 24 + 3 * 32 + 3 * 2 + 2 * (SMALL**2 + LARGE**2 + 2) + _SETTINGS.size
+_LAYER = struct.Struct(">H15fH2sI")
+
+
+def write_goo(run: SliceRun, path: str | Path) -> Path:
+    """Write a .goo file; an interrupted job resumes.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers to write, with a printer and a resin.
+    path : str or path
+        The file to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ExportError
+        Without a printer or a resin, or for an error of the file system.
+    """
+    with (
+        printing(run, path, "goo", partial(run.screen.encoded, encoding=Encoding.GOO)) as job,
+        replacing(path) as file,
+    ):
+        file.write(_header(job))
+        for index, picture in enumerate(job):
+            file.write(_layer(job, index, len(picture)))
+            file.write(picture + DELIMITER)
+        file.write(END)
+    return Path(path)
+
+
+def _header(job: Print) -> bytes:
+    created = f"{job.run.created:%Y-%m-%d %H:%M:%S}"
+    texts = [("fracslice", 32), (__version__, 24), (created, 24), (job.printer.title, 32)]
+    texts += [("Default", 32), (job.resin.name, 32)]
+    named = b"".join(text.encode("ascii", "replace")[: size - 1].ljust(size, b"\0") for text, size in texts)
+    previews = b"".join(
+        rgb565(job.preview(side, side)).astype(">u2").tobytes() + DELIMITER for side in (SMALL, LARGE)
+    )
+    levels = struct.pack(">3H", 8, 1, 0)  # anti-aliasing, grey and blur
+    return b"V3.0" + MAGIC + named + levels + previews + _settings(job)
+
+
+def _settings(job: Print) -> bytes:
+    resin, (rows, columns) = job.resin, job.run.screen.shape
+    lift, up, down = resin.lift, resin.lift_speed, resin.retract_speed
+    return _SETTINGS.pack(
+        *(job.layers, columns, rows, job.mirrored, False),
+        *(*job.printer.screen, job.printer.height, float(job.heights.max()), resin.exposure),
+        True,  # rests instead of a time without light
+        *(0, 0, 0, resin.wait, 0, 0, resin.wait, resin.bottom_exposure),
+        resin.bottom_layers,
+        *((lift, up) * 2 + (lift, down) * 2 + (0,) * 8),
+        *(255, 255, True, round(job.seconds)),
+        *(1000 * job.volume_ml, job.weight_g, job.cost, b"", HEADER, True, resin.transition_layers),
+    )
+
+
+def _layer(job: Print, index: int, size: int) -> bytes:
+    resin = job.resin
+    return _LAYER.pack(
+        *(0, 0, float(job.tops[index]), float(job.exposures[index]), 0, 0, 0, resin.wait),
+        *(resin.lift, resin.lift_speed, 0, 0, resin.lift, resin.retract_speed, 0, 0),
+        *(255, DELIMITER, size),
+    )

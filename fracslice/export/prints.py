@@ -1,0 +1,205 @@
+"""Print jobs: the encoded pictures of all layers, and what printers show of the whole."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fracslice.errors import ExportError
+from fracslice.export.jobs import SliceRun
+from fracslice.export.resins import Resin
+from fracslice.export.resuming import Journal
+from fracslice.slicing import Layer
+from fracslice.slicing.printers import Printer
+
+_AREA = struct.Struct("<d")
+"""Area before the picture in a record, mm^2."""
+
+
+@dataclass(frozen=True, eq=False)
+class Print:
+    """A print job whose layers are encoded.
+
+    Attributes
+    ----------
+    run : SliceRun
+        Layers, screen and metadata.
+    printer : Printer
+        The printer.
+    resin : Resin
+        Exposure and motion.
+    journal : Journal
+        Area and picture of each layer.
+    """
+
+    run: SliceRun
+    printer: Printer
+    resin: Resin
+    journal: Journal
+
+    def __iter__(self) -> Iterator[bytes]:
+        """Iterate over the encoded pictures."""
+        return (record[_AREA.size :] for record in self.journal)
+
+    @cached_property
+    def _read(self) -> tuple[NDArray[np.float64], list[int]]:
+        """Areas of all layers and sizes of their pictures."""
+        records = [(_AREA.unpack_from(record)[0], len(record) - _AREA.size) for record in self.journal]
+        return np.array([area for area, _ in records]), [size for _, size in records]
+
+    @property
+    def areas(self) -> NDArray[np.float64]:
+        """Areas of the layers, mm^2, float64 [n]."""
+        return self._read[0]
+
+    @property
+    def sizes(self) -> list[int]:
+        """Sizes of the encoded pictures, bytes."""
+        return self._read[1]
+
+    @property
+    def layers(self) -> int:
+        """Number of layers."""
+        return self.run.layers
+
+    @property
+    def tops(self) -> NDArray[np.float64]:
+        """Upper faces of the layers, mm."""
+        return self.run.stack.tops
+
+    @property
+    def heights(self) -> NDArray[np.float64]:
+        """Layer heights, mm."""
+        return self.run.stack.heights
+
+    @cached_property
+    def exposures(self) -> NDArray[np.float64]:
+        """Exposure of each layer, s."""
+        return self.resin.exposures(self.layers)
+
+    @property
+    def volume_ml(self) -> float:
+        """Volume of the solid, ml."""
+        return float(self.areas @ self.heights) / 1000
+
+    @property
+    def weight_g(self) -> float:
+        """Weight, g."""
+        return self.volume_ml * self.resin.density
+
+    @property
+    def cost(self) -> float:
+        """Price of the resin."""
+        return self.volume_ml * self.resin.price / 1000
+
+    @property
+    def seconds(self) -> float:
+        """Duration, s."""
+        return self.resin.seconds(self.layers)
+
+    @property
+    def mirrored(self) -> bool:
+        """True if the pictures are mirrored along x."""
+        mirror = self.run.screen.mirror
+        return self.printer.mirror if mirror is None else mirror
+
+    def preview(self, width: int, height: int) -> NDArray[np.uint8]:
+        """Picture of the object.
+
+        Parameters
+        ----------
+        width, height : int
+            Size, pixels.
+
+        Returns
+        -------
+        uint8 [height, width, 3]
+            sRGB; black if the run has no pictures.
+        """
+        if self.run.picture is None:
+            return np.zeros((height, width, 3), np.uint8)
+        return self.run.picture(width, height)
+
+
+@contextmanager
+def printing(run: SliceRun, path: str | Path, form: str, encode: Callable[[Layer], bytes]) -> Iterator[Print]:
+    """Encode the pictures of all layers; an interrupted job resumes.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers, with a printer and a resin.
+    path : str or path
+        The file to write.
+    form : str
+        File format.
+    encode : callable
+        Encodes the picture of a layer.
+
+    Yields
+    ------
+    Print
+        The print job, to be written before the block ends.
+
+    Raises
+    ------
+    ExportError
+        Without a printer or a resin, or for an error of the file system.
+    """
+    if run.screen.printer is None:
+        raise ExportError(f"{path}: a print file needs a printer")
+    if run.resin is None:
+        raise ExportError(f"{path}: a print file needs an exposure: none is known for this printer")
+
+    def record(layer: Layer) -> bytes:
+        data = encode(layer)
+        return _AREA.pack(layer.area) + data
+
+    with run.encoded(path, form, record) as journal:
+        yield Print(run, run.screen.printer, run.resin, journal)
+
+
+def one_height(run: SliceRun, path: str | Path, form: str) -> None:
+    """Check that all layers have one height, for a format that cannot express others.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The layers.
+    path : str or path
+        The file to write.
+    form : str
+        Name of the format in the message.
+
+    Raises
+    ------
+    ExportError
+        For layers of unequal heights.
+    """
+    heights = run.stack.heights
+    if heights.max() - heights.min() > 1e-9:
+        raise ExportError(f"{path}: {form} has layers of one height; .goo takes a range of heights")
+
+
+def rgb565(picture: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """Convert a picture to 16 bits per pixel.
+
+    Parameters
+    ----------
+    picture : uint8 [height, width, 3]
+        sRGB.
+
+    Returns
+    -------
+    uint16 [height, width]
+        Red in the five highest bits, green in six, blue in the five lowest.
+    """
+    red, green, blue = np.moveaxis(picture.astype(np.uint16), 2, 0)
+    return np.asarray((red >> 3) << 11 | (green >> 2) << 5 | blue >> 3)

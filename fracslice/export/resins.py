@@ -1,0 +1,283 @@
+"""Exposure and motion of resin prints."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import re
+import tomllib
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fracslice.errors import ExportError
+from fracslice.files import reported
+from fracslice.formulas.parameters import REQUIRED, Count, Number, validate
+from fracslice.slicing.printers import Printer
+
+
+@dataclass(frozen=True)
+class Resin:
+    """Settings of a resin on a printer.
+
+    Attributes
+    ----------
+    exposure, bottom_exposure : float
+        Exposure of a layer, and of a bottom layer, s.
+    name : str
+        Name of the resin.
+    bottom_layers : int
+        Number of layers with the bottom exposure.
+    transition_layers : int
+        Number of layers above them over which the exposure falls linearly.
+    lift : float
+        Distance by which the platform rises after a layer, mm.
+    lift_speed, retract_speed : float
+        Speeds up and down, mm/min.
+    wait : float
+        Rest before a layer is exposed, s.
+    density : float
+        g/ml.
+    price : float
+        Price of a litre.
+
+    Raises
+    ------
+    ExportError
+        For an invalid value.
+    """
+
+    exposure: float
+    bottom_exposure: float
+    name: str = "unknown"
+    bottom_layers: int = 5
+    transition_layers: int = 5
+    lift: float = 5.0
+    lift_speed: float = 65.0
+    retract_speed: float = 150.0
+    wait: float = 0.5
+    density: float = 1.1
+    price: float = 0.0
+
+    def __post_init__(self) -> None:
+        validate(self, KINDS, ExportError)
+
+    def exposures(self, layers: int) -> NDArray[np.float64]:
+        """Exposure of each layer.
+
+        Parameters
+        ----------
+        layers : int
+            Number of layers.
+
+        Returns
+        -------
+        float64 [layers]
+            Seconds.
+        """
+        above = np.arange(layers) - self.bottom_layers + 1
+        share = np.clip(above / (self.transition_layers + 1), 0, 1)
+        return self.bottom_exposure + share * (self.exposure - self.bottom_exposure)
+
+    def seconds(self, layers: int) -> float:
+        """Duration of a print.
+
+        Parameters
+        ----------
+        layers : int
+            Number of layers.
+
+        Returns
+        -------
+        float
+            Seconds.
+        """
+        motion = 60 * self.lift * (1 / self.lift_speed + 1 / self.retract_speed)
+        return float(self.exposures(layers).sum() + layers * (motion + self.wait))
+
+
+def resin(name: str, printer: Printer | None, layer: float) -> Resin:
+    """Look up a resin in the table, or read it from a file.
+
+    Parameters
+    ----------
+    name : str
+        Name in the table for the printer, or a file: .toml with the attributes of `Resin`, or a resin profile
+        (.ini) of PrusaSlicer.
+    printer : Printer or None
+        The printer.
+    layer : float
+        Layer height, mm; the nearest one in the table counts.
+
+    Returns
+    -------
+    Resin
+
+    Raises
+    ------
+    ExportError
+        For an unknown resin, or a file that cannot be read or has an invalid value.
+    """
+    ending = Path(name).suffix.lower()
+    if ending in (".ini", ".toml"):
+        return _of_ini(Path(name)) if ending == ".ini" else of_table(name, _toml(Path(name)))
+    known = _table().get(printer.name if printer else "", {})
+    if name not in known:
+        near = difflib.get_close_matches(name, known, 1, 0.3)
+        hint = f"did you mean {near[0]!r}?" if near else "expected a .toml or .ini file, or --exposure"
+        title = printer.title if printer else "no printer"
+        raise ExportError(f"resin {name!r}: unknown for {title}; {hint}")
+    heights = known[name]
+    exposure, bottom = heights[min(heights, key=lambda height: abs(height - layer))]
+    return moving(Resin(exposure, bottom, name, bottom_layers=1, transition_layers=10), printer)
+
+
+def default_resin(printer: Printer, layer: float) -> Resin | None:
+    """Settings of the printer's own resin.
+
+    Parameters
+    ----------
+    printer : Printer
+        The printer.
+    layer : float
+        Layer height, mm.
+
+    Returns
+    -------
+    Resin or None
+        Settings for the nearest layer height; None if the maker publishes none.
+    """
+    if printer.settings:
+        return moving(of_table(printer.name, dict(printer.settings)), printer, printer.settings)
+    return resin(MAKERS, printer, layer) if MAKERS in _table().get(printer.name, {}) else None
+
+
+def moving(resin: Resin, printer: Printer | None, but: Collection[tuple[str, Any]] = ()) -> Resin:
+    """Take the motion of a printer.
+
+    Parameters
+    ----------
+    resin : Resin
+        Settings.
+    printer : Printer or None
+        The printer.
+    but : collection of (str, value), optional
+        Settings that stay.
+
+    Returns
+    -------
+    Resin
+    """
+    if printer is None:
+        return resin
+    motion: dict[str, Any] = dict(
+        zip(("lift", "lift_speed", "retract_speed", "wait"), printer.motion, strict=True)
+    )
+    return replace(resin, **motion | dict(but))
+
+
+def of_table(where: str, values: Mapping[str, Any]) -> Resin:
+    """Make settings from the keys and values of a file.
+
+    Parameters
+    ----------
+    where : str
+        File, for messages.
+    values : mapping
+        Attributes of `Resin`.
+
+    Returns
+    -------
+    Resin
+
+    Raises
+    ------
+    ExportError
+        For an unknown or missing key, or an invalid value.
+    """
+    names = [f.name for f in fields(Resin)]
+    if unknown := sorted(set(values) - set(names)):
+        raise ExportError(f"{where}: {unknown[0]!r}: unknown; expected {', '.join(names)}")
+    if missing := [name for name in names[:2] if name not in values]:
+        raise ExportError(f"{where}: {missing[0]} is missing")
+    try:
+        return Resin(**{"name": Path(where).stem, **values})
+    except ExportError as error:
+        raise ExportError(f"{where}: {error}") from None
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    with reported(path):
+        try:
+            return tomllib.loads(path.read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ExportError(f"{path}: {error}") from None
+
+
+def _of_ini(path: Path) -> Resin:
+    """Read a resin profile of PrusaSlicer: its keys, and those in its notes."""
+    with reported(path):
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    pairs = (line.partition("=") for line in lines if "=" in line and not line.startswith("#"))
+    values = {key.strip(): value.strip() for key, _, value in pairs}
+    notes = values.get("material_notes", "").replace("\\n", "\n").replace("\\r", "\n")
+    values |= dict(re.findall(r"^\s*(\w+)\s*=\s*(\S+)\s*$", notes, re.M))
+    found: dict[str, Any] = {}
+    for key, (name, times) in INI.items():
+        if key in values:
+            try:
+                found[name] = float(values[key]) * times
+            except ValueError:
+                raise ExportError(f"{path}: {key} = {values[key]}: expected a number") from None
+    if "transition_layers" in found:
+        found["transition_layers"] = int(found["transition_layers"])
+    return of_table(str(path), found)
+
+
+@cache
+def _table() -> dict[str, dict[str, dict[float, tuple[float, float]]]]:
+    """Exposures by printer, resin and layer height."""
+    table: dict[str, dict[str, dict[float, tuple[float, float]]]] = {}
+    lines = (Path(__file__).parent / "resins.csv").read_text(encoding="utf-8").splitlines()
+    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
+        heights = table.setdefault(row["printer"], {}).setdefault(row["resin"], {})
+        heights[float(row["layer_mm"])] = float(row["exposure_s"]), float(row["bottom_s"])
+    return table
+
+
+MAKERS = "Prusa Orange Tough"
+"""Resin that is the default of its printers."""
+
+INI = {
+    "exposure_time": ("exposure", 1.0),
+    "initial_exposure_time": ("bottom_exposure", 1.0),
+    "faded_layers": ("transition_layers", 1.0),
+    "material_density": ("density", 1.0),
+    "sla_primary_lift_distance": ("lift", 1.0),
+    "sla_primary_lift_speed": ("lift_speed", 1.0),
+    "sla_primary_retract_speed": ("retract_speed", 1.0),
+    "sla_wait_after_retract": ("wait", 1.0),
+    "LIFT_DISTANCE": ("lift", 1.0),
+    "LIFT_SPEED": ("lift_speed", 60.0),
+    "RETRACT_SPEED": ("retract_speed", 60.0),
+    "DELAY_BEFORE_EXPOSURE": ("wait", 1.0),
+}
+"""Keys of PrusaSlicer's profiles, and of the notes that its .pwmx writer reads (mm/s), and their units."""
+
+KINDS = {
+    "exposure": Number(REQUIRED, "seconds of each layer", above=0, most=1000),
+    "bottom_exposure": Number(REQUIRED, "seconds of each bottom layer", above=0, most=1000),
+    "bottom_layers": Count(5, "bottom layers", most=200),
+    "transition_layers": Count(5, "transition layers", most=200),
+    "lift": Number(5.0, "mm after each layer", above=0, most=100),
+    "lift_speed": Number(65.0, "mm/min", above=0, most=10_000),
+    "retract_speed": Number(150.0, "mm/min", above=0, most=10_000),
+    "wait": Number(0.5, "seconds before each layer", least=0, most=1000),
+    "density": Number(1.1, "g/ml", above=0, most=100),
+    "price": Number(0.0, "of a litre", least=0),
+}

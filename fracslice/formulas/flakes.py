@@ -1,0 +1,112 @@
+"""Flakes of the Platonic solids: smaller copies at every corner, by folding space (Knighty 2010)."""
+
+from __future__ import annotations
+
+import math
+
+from .box import Box
+from .parameters import Choice, Count
+from .registry import Fixed, Node, shape
+from .vocabulary import minimum, orbit
+
+Triple = tuple[float, float, float]
+
+GOLDEN = (1 + math.sqrt(5)) / 2
+HALF = math.sqrt(0.5)
+OCTANT: tuple[Triple, ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+TURNED = (-GOLDEN / 2, (GOLDEN - 1) / 2, -0.5)
+"""Normal of the mirror of the icosahedral group that is no coordinate plane."""
+
+MIRRORS: dict[str, tuple[Triple, ...]] = {
+    "tetrahedron": ((HALF, HALF, 0), (HALF, 0, HALF), (0, HALF, HALF), (-HALF, HALF, 0), (-HALF, 0, HALF)),
+    "octahedron": (*OCTANT, (HALF, -HALF, 0), (HALF, 0, -HALF)),
+    "dodecahedron": (*OCTANT, TURNED, *OCTANT, TURNED, *OCTANT, TURNED, *OCTANT),
+    "icosahedron": (*OCTANT, TURNED, *OCTANT, TURNED, *OCTANT, TURNED, *OCTANT),
+}
+"""Normals of the mirrors that fold space into the part nearest to one corner, in turn."""
+
+CORNERS = {
+    "tetrahedron": (1.0, 1.0, 1.0),
+    "octahedron": (1.0, 0.0, 0.0),
+    "dodecahedron": (1.0, 1.0, 1.0),
+    "icosahedron": (0.0, GOLDEN, 1.0),
+}
+"""A corner of each solid."""
+
+FACES = {
+    "tetrahedron": (-1.0, 1.0, 1.0),
+    "octahedron": (1.0, 1.0, 1.0),
+    "dodecahedron": (0.0, GOLDEN, 1.0),
+    "icosahedron": (1.0, 1.0, 1.0),
+}
+"""A normal of a face of each solid."""
+
+SCALES = {"tetrahedron": 2.0, "octahedron": 2.0, "dodecahedron": 2 + GOLDEN, "icosahedron": 1 + GOLDEN}
+"""Ratio of the sizes of a solid and of its copies, which touch."""
+
+
+def folded(solid: str, point: Triple) -> Triple:
+    """Image of a point in the part of space nearest to one corner."""
+    x, y, z = point
+    for a, b, c in MIRRORS[solid]:
+        s = 2.0 * min(a * x + b * y + c * z, 0.0)
+        x, y, z = x - s * a, y - s * b, z - s * c
+    return x, y, z
+
+
+def _unit(point: Triple) -> Triple:
+    x, y, z = point
+    length = math.hypot(x, y, z)
+    return x / length, y / length, z / length
+
+
+@shape(
+    solid=Choice("icosahedron", "the Platonic solid", tuple(MIRRORS)),
+    level=Count(3, "how often each solid is replaced by copies at its corners", most=20),
+)
+def flake(x, y, z, level, scale, corner, face, height, mirrors):  # type: ignore[no-untyped-def]
+    """The flake of a Platonic solid with corners on the unit sphere.
+
+    Sierpinski 1915 has the flat one; folds: Knighty 2010, "Kaleidoscopic (escape time) IFS". Reflections move
+    no two points apart, and scaling is undone at the end, so L = 1. Copies touch in points and edges.
+    """
+    vx, vy, vz = corner
+    fx, fy, fz = face
+    size = 1.0
+    for _ in range(level):
+        for a, b, c in mirrors:
+            s = 2.0 * minimum(a * x + b * y + c * z, 0.0)
+            x, y, z = x - s * a, y - s * b, z - s * c
+        x, y, z = scale * x - vx, scale * y - vy, scale * z - vz
+        size = size / scale
+        orbit((x * x + y * y + z * z) * size, x == x)
+    for a, b, c in mirrors:
+        s = 2.0 * minimum(a * x + b * y + c * z, 0.0)
+        x, y, z = x - s * a, y - s * b, z - s * c
+    return (fx * x + fy * y + fz * z - height) * size
+
+
+@flake.arguments
+def flake_arguments(node: Node) -> dict[str, object]:
+    solid, scale = node["solid"], SCALES[node["solid"]]
+    corner, face = (_unit(folded(solid, point[solid])) for point in (CORNERS, FACES))
+    return {
+        "level": node["level"],
+        "scale": scale,
+        "corner": tuple((scale - 1) * v for v in corner),
+        "face": face,
+        "height": sum(a * b for a, b in zip(face, corner, strict=True)),
+        "mirrors": Fixed(MIRRORS[solid]),
+    }
+
+
+@flake.bounds
+def flake_bounds(node: Node) -> Box:
+    return Box.centred(1.0)
+
+
+@flake.visible
+def flake_visible(node: Node, voxel: float) -> Node:
+    """The flake of the deepest level whose solids are wider than two voxels."""
+    deepest = max(math.floor(math.log(1.0 / voxel, SCALES[node["solid"]]) + 1e-6), 0)
+    return node if node["level"] <= deepest else node.changed(level=deepest)

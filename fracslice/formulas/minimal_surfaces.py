@@ -1,0 +1,85 @@
+"""Walls along triply periodic minimal surfaces, without end; put `bounds` around them.
+
+Level sets: von Schnering and Nesper 1991, "Nodal surfaces of Fourier series". Every field is divided by a
+bound of its gradient, so L = 1; walls are thinner where the gradient is smaller.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .box import Box
+from .parameters import Number
+from .registry import Node, shape
+from .vocabulary import absolute, cos, sin
+
+WALL: dict[str, Any] = {
+    "period": Number(1.0, "length after which the surface repeats", above=0),
+    "thickness": Number(0.1, "of the wall, at its thinnest", above=0),
+}
+
+
+@shape(**WALL)
+def gyroid(x, y, z, k, half):  # type: ignore[no-untyped-def]
+    """A wall along the gyroid (Schoen 1970, "Infinite periodic minimal surfaces without
+    self-intersections"). The gradient of its level function is at most sqrt(3).
+    """
+    x, y, z = k * x, k * y, k * z
+    return absolute(sin(x) * cos(y) + sin(y) * cos(z) + sin(z) * cos(x)) / (1.7320509 * k) - half
+
+
+@shape(**WALL)
+def schwarz_p(x, y, z, k, half):  # type: ignore[no-untyped-def]
+    """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most sqrt(3)."""
+    return absolute(cos(k * x) + cos(k * y) + cos(k * z)) / (1.7320509 * k) - half
+
+
+@shape(**WALL)
+def schwarz_d(x, y, z, k, half):  # type: ignore[no-untyped-def]
+    """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most sqrt(3)."""
+    x, y, z = k * x, k * y, k * z
+    f = sin(x) * sin(y) * sin(z) + sin(x) * cos(y) * cos(z) + cos(x) * sin(y) * cos(z)
+    return absolute(f + cos(x) * cos(y) * sin(z)) / (1.7320509 * k) - half
+
+
+@shape(**WALL)
+def neovius(x, y, z, k, half):  # type: ignore[no-untyped-def]
+    """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7."""
+    x, y, z = cos(k * x), cos(k * y), cos(k * z)
+    return absolute(3.0 * (x + y + z) + 4.0 * x * y * z) / (7.0 * k) - half
+
+
+@shape(**WALL)
+def iwp(x, y, z, k, half):  # type: ignore[no-untyped-def]
+    """A wall along the surface I-WP of Schoen 1970. The gradient of its level function is at most
+    3 sqrt(3).
+    """
+    x, y, z = cos(k * x), cos(k * y), cos(k * z)
+    squares = 2.0 * (x * x + y * y + z * z) - 3.0
+    return absolute(2.0 * (x * y + y * z + z * x) - squares) / (5.1961525 * k) - half
+
+
+@shape(**WALL)
+def lidinoid(x, y, z, k, half):  # type: ignore[no-untyped-def]
+    """A wall along the lidinoid (Lidin and Larsson 1990). The gradient of its level function is at most
+    1.5 sqrt(3).
+    """
+    x, y, z = k * x, k * y, k * z
+    a, b, c = sin(2.0 * x), sin(2.0 * y), sin(2.0 * z)
+    p, q, r = cos(2.0 * x), cos(2.0 * y), cos(2.0 * z)
+    twisted = a * cos(y) * sin(z) + b * cos(z) * sin(x) + c * cos(x) * sin(y)
+    return absolute(0.5 * (twisted - p * q - q * r - r * p) + 0.15) / (2.5980763 * k) - half
+
+
+def wall_arguments(node: Node) -> dict[str, object]:
+    return {"k": 2 * math.pi / node["period"], "half": node["thickness"] / 2}
+
+
+def wall_bounds(node: Node) -> Box:
+    return Box.everywhere()
+
+
+for _surface in (gyroid, schwarz_p, schwarz_d, neovius, iwp, lidinoid):
+    _surface.arguments(wall_arguments)
+    _surface.bounds(wall_bounds)

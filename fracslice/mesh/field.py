@@ -1,0 +1,167 @@
+"""A closed mesh as a signed distance field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..compiled import compiled
+from ..formulas.box import Box
+from ..formulas.field import Bounds, Device, Precision
+from ..kernel import Kernel
+from ..kernel.arrays import ArrayField
+from ..keys import key
+from ..work import Work
+from .model import Mesh
+from .nearest import Nearest
+
+CELLS = 1024
+"""Maximum number of cells along each side of the grid in which rays find their triangles."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshField(ArrayField):
+    """Distance to a mesh, negative where the mesh winds around a point: bodies that overlap are united.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        A closed mesh; its unit is the scene unit.
+    """
+
+    mesh: Mesh
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """`Field.bounds`."""
+        low, high = self.mesh.vertices.min(0).tolist(), self.mesh.vertices.max(0).tolist()
+        return Bounds(Box(tuple(low), tuple(high)), 1.0, False)
+
+    @cached_property
+    def key(self) -> str:
+        """`Field.key`."""
+        return key("mesh", self.mesh.vertices, self.mesh.triangles)
+
+    def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
+        """`Field.kernel`, always on the CPU."""
+        return _MeshKernel(self, np.dtype(precision))
+
+    @cached_property
+    def nearest(self) -> Nearest:
+        """Distance queries."""
+        return Nearest(self.mesh)
+
+    @cached_property
+    def columns(self) -> tuple[np.ndarray, ...]:
+        """Corners of the triangles, and a grid over x and y with the triangles of each cell.
+
+        The grid is its lower corner and cells per unit, float64 [2, 2], its numbers of cells, the first entry
+        of each cell, and the triangles.
+        """
+        corners = self.mesh.vertices[self.mesh.triangles]
+        low, high = self.mesh.vertices.min(0)[:2], self.mesh.vertices.max(0)[:2]
+        side = np.full(2, np.clip(int(len(corners) ** 0.5), 1, CELLS))
+        frame = np.stack([low, side / np.maximum(high - low, 1e-30)])
+        first = np.zeros(int(side.prod()) + 1, np.int64)
+        _assign(corners, frame, side, first, np.empty(0, np.int32))
+        starts = np.cumsum(first)
+        filled = np.empty(starts[-1], np.int32)
+        _assign(corners, frame, side, starts.copy(), filled)
+        return corners, frame, side, starts, filled
+
+
+class _MeshKernel(Kernel):
+    """Kernel of a mesh."""
+
+    batch = 1 << 14
+
+    def __init__(self, field: MeshField, dtype: np.dtype) -> None:
+        self._field, self.dtype = field, dtype
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """`Kernel.points`."""
+        points = np.stack([np.asarray(a, np.float64).ravel() for a in (x, y, z)], 1)
+        known = np.isfinite(points).all(1)
+        spots = np.arange(np.count_nonzero(known), dtype=np.int32)
+        found = np.full(len(points), np.nan)
+        if len(spots):
+            these = Mesh(points[known], np.stack([spots] * 3, 1))
+            away = self._field.nearest.samples(these, 1.0, Work(1))
+            inside = np.empty(len(spots), np.bool_)
+            _inside(these.vertices, *self._field.columns, inside)
+            found[known] = np.where(inside, -away, away)
+        return found.reshape(np.shape(x)).astype(self.dtype, copy=False)
+
+
+@compiled
+def _assign(corners, frame, side, first, filled):  # type: ignore[no-untyped-def]
+    """Count the triangles of each cell in the entry after its own, or write them if there is room.
+
+    In the second case each entry of `first` is moved to the end of its cell.
+    """
+    for t in range(len(corners)):
+        low, high = np.empty(2, np.int64), np.empty(2, np.int64)
+        for k in range(2):
+            least = min(corners[t, 0, k], corners[t, 1, k], corners[t, 2, k])
+            most = max(corners[t, 0, k], corners[t, 1, k], corners[t, 2, k])
+            low[k] = _cell(least, frame, side, k)
+            high[k] = _cell(most, frame, side, k)
+        for i in range(low[0], high[0] + 1):
+            for j in range(low[1], high[1] + 1):
+                cell = i * side[1] + j
+                if len(filled):
+                    filled[first[cell]] = t
+                    first[cell] += 1
+                else:
+                    first[cell + 1] += 1
+
+
+@compiled
+def _cell(value, frame, side, axis):  # type: ignore[no-untyped-def]
+    """Cell of a coordinate."""
+    return min(max(int((value - frame[0, axis]) * frame[1, axis]), 0), side[axis] - 1)
+
+
+@compiled
+def _inside(points, corners, frame, side, starts, filled, inside):  # type: ignore[no-untyped-def]
+    """True for points around which the mesh winds: a ray upwards adds the orientation of all triangles.
+
+    In projection, edges cross a line along x by one rule for both of their triangles, so that exactly one of
+    them contains a point on an edge.
+    """
+    for n in range(len(points)):
+        x, y, z = points[n]
+        cell = _cell(x, frame, side, 0) * side[1] + _cell(y, frame, side, 1)
+        winding = 0
+        for entry in range(starts[cell], starts[cell + 1]):
+            t = filled[entry]
+            ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
+            bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
+            cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
+            if max(az, bz, cz) <= z:
+                continue
+            if (
+                _crosses(ax, ay, bx, by, x, y)
+                ^ _crosses(bx, by, cx, cy, x, y)
+                ^ _crosses(cx, cy, ax, ay, x, y)
+            ):
+                up = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+                if up == 0:
+                    continue
+                b = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / up
+                c = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / up
+                if az + b * (bz - az) + c * (cz - az) > z:
+                    winding += 1 if up > 0 else -1
+        inside[n] = winding != 0
+
+
+@compiled
+def _crosses(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
+    """True if an edge crosses the line from a point along x, the same for both directions of the edge."""
+    if (ay > y) == (by > y):
+        return False
+    if ay > by:
+        ax, ay, bx, by = bx, by, ax, ay
+    return ax + (y - ay) / (by - ay) * (bx - ax) > x

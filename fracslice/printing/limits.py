@@ -1,0 +1,71 @@
+"""Limits of the printability checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import SceneError
+from ..formulas.parameters import Number, validate
+from ..scene.lengths import Length
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of the checks. Lengths are numbers of mm, or text such as "0.4mm".
+
+    Attributes
+    ----------
+    speck : float
+        Components with less area in every layer (mm^2), or less volume (mm^3), are counted as specks but are
+        not a problem.
+    cup : float
+        Minimum area of a suction cup or a resin trap, mm^2.
+    deep : float
+        Minimum height of a suction cup, mm; every hole in the first layers is a shallow one.
+    wall : float
+        Thinnest allowed wall, mm; layers are judged by their thinnest hundredth.
+    floor : float
+        Thinnest allowed floor or roof along z, mm.
+    thin : float
+        Minimum area of thin walls, or thin floors, that is a problem, mm^2.
+    overhang : float
+        Longest flat cantilever, mm.
+    span : float
+        Longest flat bridge between two supports, mm.
+    neck : float
+        Largest area that an area of 1 carries; a layer on less contact tears off.
+    heavy : float
+        Cross-section from which a component counts as carried, mm^2.
+    density : float
+        Density of the resin, g/cm^3.
+
+    Raises
+    ------
+    SceneError
+        For an invalid value.
+    """
+
+    speck: float = 0.02
+    cup: float = 1.0
+    deep: float = 2.0
+    wall: float = 0.1
+    floor: float = 0.1
+    thin: float = 1.0
+    overhang: float = 5.0
+    span: float = 20.0
+    neck: float = 50.0
+    heavy: float = 20.0
+    density: float = 1.1
+
+    def __post_init__(self) -> None:
+        validate(self, _KINDS, SceneError)
+
+
+_KINDS = {
+    **dict.fromkeys(("speck", "cup", "thin", "heavy"), Number(0.0, "an area", least=0)),
+    "deep": Length(2.0, "a height", zero=True),
+    **dict.fromkeys(("overhang", "span"), Length(5.0, "a length")),
+    "neck": Number(50.0, "a ratio", above=0),
+    **dict.fromkeys(("wall", "floor"), Length(0.1, "a thickness", zero=True)),
+    "density": Number(1.1, "of the resin", above=0),
+}

@@ -1,0 +1,90 @@
+"""Problems of an object: what, where, how large, and the option that mends it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+Place = tuple[float, float, float]
+"""Point, mm from the middle of the object along x and y, and above its lowest point."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One reason why an object would not print.
+
+    Attributes
+    ----------
+    kind : str
+        "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "walls", "floors" or "fit".
+    text : str
+        Description with the size.
+    layer : int or None
+        First layer of the largest one; None if layers were not examined.
+    at : Place or None
+        Place of the largest one.
+    mend : tuple of (str, str)
+        Print settings that mend it, by name; empty if none does.
+    advice : str
+        What else helps.
+    """
+
+    kind: str
+    text: str
+    layer: int | None = None
+    at: Place | None = None
+    mend: tuple[tuple[str, str], ...] = ()
+    advice: str = ""
+
+    def __str__(self) -> str:
+        """The problem in one line."""
+        where = [] if self.layer is None else [f"layer {self.layer}"]
+        if self.at is not None:
+            where.append("at {:.2f} {:.2f} {:.2f} mm".format(*self.at))
+        flags = " ".join(f"--{name} {value}" for name, value in self.mend)
+        hints = " or ".join(filter(None, [flags, self.advice]))
+        return " ".join(filter(None, [f"{self.text}:" if where else self.text, ", ".join(where)])) + (
+            f"; {hints}" if hints else ""
+        )
+
+
+def counted(things: Sequence[object], one: str, more: str = "") -> str:
+    """Count with its noun: "1 suction cup", "2 suction cups".
+
+    Parameters
+    ----------
+    things : sequence
+        Things to count.
+    one, more : str
+        Singular and plural; the plural is the singular and an s if not given.
+
+    Returns
+    -------
+    str
+        The number and the noun.
+    """
+    return f"{len(things)} {one if len(things) == 1 else more or one + 's'}"
+
+
+def mended(problems: Sequence[Problem]) -> dict[str, str]:
+    """Print settings that mend as many problems as they can.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+        The problems.
+
+    Returns
+    -------
+    dict
+        Values by the name of the setting; the largest one where several ask for the same length.
+    """
+    found: dict[str, str] = {}
+    for name, value in (setting for problem in problems for setting in problem.mend):
+        if name not in found or _mm(value) > _mm(found[name]):
+            found[name] = value
+    return found
+
+
+def _mm(value: str) -> float:
+    return float(value[:-2]) if value.endswith("mm") else 0.0

@@ -1,0 +1,211 @@
+"""Parts of a pass as tasks of a cluster."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import ClusterError
+from ..formulas.registry import Node
+from ..keys import key
+from ..scene import Scene
+from ..scene.reader import reads
+from ..scene.view import View
+from ..scene.writer import to_xml
+from ..work import Work
+from .accumulator import CHANNELS, Plan
+from .cpu import CpuTracer
+from .linking import Frame
+from .sequence import Samples
+
+if TYPE_CHECKING:
+    from ..cluster import Pieces
+    from .progressive import Renderer
+
+PIXELS = 1 << 14
+"""Pixels of a task."""
+
+INPUT = "input"
+"""Name of the file with the pixels of a pass and their sums."""
+
+
+@dataclass(frozen=True)
+class PartTask:
+    """Samples of some pixels of a pass.
+
+    Attributes
+    ----------
+    scene : str
+        XML of the scene.
+    size : tuple of int
+        Width and height of the picture, pixels.
+    dtype : str
+        Float type of the sums.
+    pieces : Pieces
+        Folder with the input of the pass.
+    job : str
+        Key of the pass: its frame, pixels and sums.
+    frame : str
+        Key of the linked frame.
+    number : int
+        Number of the pass.
+    ahead : bool
+        True if the cone prepass was run.
+    last : int
+        Largest goal of a pixel.
+    start, end, count : int
+        Pixels of this part, and of the pass.
+    """
+
+    scene: str
+    size: tuple[int, int]
+    dtype: str
+    pieces: Pieces
+    job: str
+    frame: str
+    number: int
+    ahead: bool
+    last: int
+    start: int
+    end: int
+    count: int
+
+    @property
+    def name(self) -> str:
+        """Name of the part."""
+        return f"pass-{self.number:04}-pixels-{self.start:010}"
+
+    def make(self, work: Work) -> bytes:
+        """Sums of the pixels after the pass; see `Task.make`."""
+        of = _renderer(self.scene, self.size)
+        of.prepare(self.ahead)
+        if of.dtype.name != self.dtype or frame_key(of.tracer.frame) != self.frame:
+            raise ClusterError("the frame linked here is another than that of the job")
+        width, dtype = 4 * self.count, of.dtype
+        pixels = np.frombuffer(self._input(4 * self.start, 4 * self.end), np.int32)
+        row = CHANNELS * dtype.itemsize
+        data = self._input(width + row * self.start, width + row * self.end)
+        sums, places = np.zeros((self.size[0] * self.size[1], CHANNELS), dtype), _places(pixels, self.size)
+        sums[places] = np.frombuffer(data, dtype).reshape(-1, CHANNELS)
+        of.tracer.add(sums.reshape(-1), Plan(pixels, len(pixels), self.last), work)
+        return bytes(sums[places].tobytes())
+
+    def _input(self, start: int, end: int) -> bytes:
+        return self.pieces.read(self.job, INPUT, start, end)
+
+
+def frame_key(frame: Frame) -> str:
+    """Key of a linked frame.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame.
+
+    Returns
+    -------
+    str
+    """
+    return key(frame.linked.source, frame.linked.parameters)
+
+
+class PoolTracer:
+    """Tracer whose samples other processes make, in parts of a pass; used as a `CpuTracer`.
+
+    Parameters
+    ----------
+    root : Node
+        Root of the formula tree.
+    view : View
+        View of the picture.
+    tracer : CpuTracer
+        Tracer of the same frame, which the sums are for.
+    """
+
+    def __init__(self, root: Node, view: View, tracer: CpuTracer) -> None:
+        self.scene, self.tracer = to_xml(Scene(root, 1.0, view=view)), tracer
+        self._passes, self._ahead = 0, False
+
+    @property
+    def frame(self) -> Frame:
+        """The frame."""
+        return self.tracer.frame
+
+    @property
+    def samples(self) -> Samples:
+        """Part of the sequence."""
+        return self.tracer.samples
+
+    def aim(self, frame: Frame) -> None:
+        """Load another frame; see `CpuTracer.aim`.
+
+        Parameters
+        ----------
+        frame : Frame
+            Linked frame.
+        """
+        self.tracer.aim(frame)
+        self._ahead = False
+
+    def look_ahead(self, work: Work) -> None:
+        """Leave the cone prepass to the workers.
+
+        Parameters
+        ----------
+        work : Work
+            Threads and cancellation.
+        """
+        self._ahead = True
+
+    def add(self, sums: np.ndarray, plan: Plan, work: Work) -> None:
+        """Add samples to pixels up to their goals; see `CpuTracer.add`.
+
+        Parameters
+        ----------
+        sums : ndarray, shape (height * width * CHANNELS,)
+            Sums of the picture, changed in place.
+        plan : Plan
+            Pixels to sample.
+        work : Work
+            Pool and cancellation.
+        """
+        pool, size = work.cluster, (self.tracer.width, self.tracer.height)
+        assert pool is not None
+        state, places = sums.reshape(-1, CHANNELS), _places(plan.pixels, size)
+        frame, count = frame_key(self.frame), len(plan.pixels)
+        known = np.ascontiguousarray(plan.pixels), state[places]
+        job = key(frame, size, self._ahead, *known)
+        of = self.scene, size, sums.dtype.name, pool.pieces, job, frame
+        about = *of, self._passes, self._ahead, plan.last
+        tasks = [
+            PartTask(*about, start, min(start + PIXELS, count), count) for start in range(0, count, PIXELS)
+        ]
+        pool.pieces.write(job, INPUT, b"".join(part.tobytes() for part in known))
+        parts = pool.results(tasks, work)
+        for task, data in zip(tasks, parts, strict=True):
+            state[places[task.start : task.end]] = np.frombuffer(data, sums.dtype).reshape(-1, CHANNELS)
+        pool.finished(job)
+        self._passes += 1
+
+
+def _places(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Row-major indices of pixels ``y << 16 | x``."""
+    return np.asarray((pixels >> 16).astype(np.intp) * size[0] + (pixels & 65535))
+
+
+_OWN = threading.local()
+
+
+def _renderer(scene: str, size: tuple[int, int]) -> Renderer:
+    """Renderer of a frame, the last one of this thread."""
+    from .progressive import Renderer
+
+    if getattr(_OWN, "of", None) != (scene, size):
+        read = reads(scene)
+        _OWN.renderer = Renderer(read.root, read.view, size, Work(threads=1), "cpu")
+        _OWN.of = scene, size
+    found: Renderer = _OWN.renderer
+    return found

@@ -1,0 +1,251 @@
+# ruff: noqa: RUF009 -- `described` makes a field, as dataclasses.field does
+"""Animation of a scene: the records behind `<animation>` and `<track>`."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from ..formulas.parameters import REQUIRED, Choice, Count, Number, Parameter, finite
+from .lengths import NUMBER
+from .view import Part, described
+
+LONGEST = 1e5
+"""Longest time, seconds."""
+_SECONDS = re.compile(rf"\s*({NUMBER})\s*s?\s*")
+
+
+@dataclass(frozen=True)
+class Seconds(Parameter):
+    """Parameter kind of a time: a number of seconds, with or without the unit."""
+
+    @property
+    def expects(self) -> str:
+        """Description of the accepted values."""
+        return f"a time in seconds such as 2.5s, from 0 to {LONGEST:g}"
+
+    def read(self, text: str) -> float:
+        """Parse text with an optional unit.
+
+        Parameters
+        ----------
+        text : str
+            The text.
+
+        Returns
+        -------
+        float
+            Time, seconds.
+
+        Raises
+        ------
+        ValueError
+            If it is not a time.
+        """
+        match = _SECONDS.fullmatch(text)
+        return self.check(float(match[1]) if match else None)
+
+    def check(self, value: Any) -> float:
+        """Validate a number of seconds.
+
+        Parameters
+        ----------
+        value : object
+            Any value.
+
+        Returns
+        -------
+        float
+            Time, seconds.
+
+        Raises
+        ------
+        ValueError
+            If it is not a time.
+        """
+        number = self.read(value) if isinstance(value, str) else finite(value)
+        if number is None or not 0 <= number <= LONGEST:
+            raise ValueError(self.expects)
+        return number
+
+    def text(self, value: float) -> str:
+        """Format a time in seconds.
+
+        Parameters
+        ----------
+        value : float
+            Time, seconds.
+
+        Returns
+        -------
+        str
+            The time with its unit.
+        """
+        return f"{value!r}s".replace(".0s", "s")
+
+
+Keyframes = tuple[tuple[float, str], ...]
+
+
+@dataclass(frozen=True)
+class Keys(Parameter):
+    """Parameter kind of keyframes: pairs of a time and the text of a value."""
+
+    @property
+    def expects(self) -> str:
+        """Description of the accepted values."""
+        return "times and values, such as 0s: 1 0 0; 2.5s: 0 1 0, in the order of time"
+
+    def read(self, text: str) -> Keyframes:
+        """Parse keyframes separated by semicolons.
+
+        Parameters
+        ----------
+        text : str
+            The text.
+
+        Returns
+        -------
+        tuple of tuple
+            Time in seconds and text of the value.
+
+        Raises
+        ------
+        ValueError
+            If it is no list of keyframes.
+        """
+        pairs = [item.partition(":") for item in text.split(";") if item.strip()]
+        return self.check([(time, value) for time, _, value in pairs])
+
+    def check(self, value: Any) -> Keyframes:
+        """Validate keyframes.
+
+        Parameters
+        ----------
+        value : object
+            Any value.
+
+        Returns
+        -------
+        tuple of tuple
+            Time in seconds and text of the value.
+
+        Raises
+        ------
+        ValueError
+            If they are no keyframes, or their times do not increase.
+        """
+        try:
+            keys = tuple((Seconds(0.0, "").check(time), " ".join(text.split())) for time, text in value)
+        except (TypeError, ValueError, AttributeError):
+            raise ValueError(self.expects) from None
+        if not keys or any(a >= b for (a, _), (b, _) in pairwise(keys)) or not all(text for _, text in keys):
+            raise ValueError(self.expects)
+        return keys
+
+    def text(self, value: Keyframes) -> str:
+        """Format keyframes.
+
+        Parameters
+        ----------
+        value : tuple of tuple
+            Time in seconds and text of the value.
+
+        Returns
+        -------
+        str
+            The keyframes, separated by semicolons.
+        """
+        return "; ".join(f"{Seconds(0.0, '').text(time)}: {text}" for time, text in value)
+
+
+@dataclass(frozen=True)
+class Target(Parameter):
+    """Parameter kind of an attribute of an element: ELEMENT.ATTRIBUTE or ELEMENT[NUMBER].ATTRIBUTE."""
+
+    @property
+    def expects(self) -> str:
+        """Description of the accepted values."""
+        return "ELEMENT.ATTRIBUTE, such as camera.eye or box[2].round"
+
+    def check(self, value: Any) -> str:
+        """Validate the name of an attribute.
+
+        Parameters
+        ----------
+        value : object
+            Any value.
+
+        Returns
+        -------
+        str
+            The name without spaces.
+
+        Raises
+        ------
+        ValueError
+            If it is no name of an attribute.
+        """
+        if not isinstance(value, str) or not re.fullmatch(r"\w+(\[\d+\])?\.\w+", value):
+            raise ValueError(self.expects)
+        return value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Animation(Part):
+    """Film of the scene: its length and its frames. Each `<track>` moves one attribute.
+
+    Without tracks, every frame is the same. Pictures, meshes and layers use the values of the elements
+    themselves, unless a time is given.
+    """
+
+    element = "animation"
+    duration: float = described(Seconds(REQUIRED, "length of the film"))
+    fps: float = described(Number(24.0, "frames per second", least=0.1, most=240))
+    shutter: float = described(
+        Number(
+            0.0, "fraction of a frame's time for which the shutter is open: 0.5 is a film's", least=0, most=1
+        )
+    )
+    times: int = described(Count(8, "times within the open shutter that a frame averages", least=1, most=256))
+    clearance: float = described(
+        Number(0.0, "least distance of the camera to the surface, in scene units: it is moved away", least=0)
+    )
+    noise: str = described(
+        Choice("moving", "whether the pattern of the noise changes from frame to frame", ("moving", "fixed"))
+    )
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return max(round(self.duration * self.fps), 1)
+
+
+CURVES = ("auto", "smooth", "linear", "log", "step", "path", "zoom", "rotation")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Track(Part):
+    """One attribute of one element over the time of the `<animation>`; repeatable.
+
+    Before the first and after the last keyframe, the value stays.
+    """
+
+    element = "track"
+    many = True
+    of: str = described(Target(REQUIRED, "the attribute to move"))
+    keys: Keyframes = described(Keys(REQUIRED, "keyframes: the value at each time"))
+    curve: str = described(
+        Choice(
+            "auto",
+            "smooth: no overshoot; linear; log: equal ratios in equal times; step: no values between; "
+            "path: a curve in space, at a pace without jumps; zoom: an eye around the target, by angle and "
+            "by the logarithm of the distance; rotation: of transform.rotate; auto: as the attribute needs",
+            CURVES,
+        )
+    )
+    ease: str = described(
+        Choice("none", "ends at which the motion begins or ends at rest", ("none", "in", "out", "both"))
+    )

@@ -1,0 +1,92 @@
+"""Everything that a slice run is made from."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from . import slicing
+from .export.jobs import EPOCH, SliceRun
+from .export.resins import Resin
+from .export.slices import write_slices
+from .scene.reader import reads
+from .slicing.printers import Printer
+from .slicing.raster import Screen
+from .stackmodel import StackModel
+from .work import Work
+
+
+@dataclass(frozen=True)
+class SliceRecipe:
+    """A scene and all settings of its slicing: enough for any process to plan and encode the same layers.
+
+    Attributes
+    ----------
+    scene, name : str
+        XML and name of the scene.
+    job : SliceJob
+        Size, layers and pixels.
+    most : float or None
+        Greatest layer height of adaptive layers, mm.
+    file, form : str
+        Name and format of the file.
+    printer : Printer or None
+        Printer whose screen the layers are for.
+    compensation, gamma, mirror
+        As for `Screen`.
+    resin, created, sections
+        As for `SliceRun`.
+    """
+
+    scene: str
+    name: str
+    job: slicing.SliceJob
+    most: float | None = None
+    file: str = "layers"
+    form: str = "png"
+    printer: Printer | None = None
+    compensation: float = 0.0
+    gamma: float = 1.0
+    mirror: bool | None = None
+    resin: Resin | None = None
+    created: datetime = EPOCH
+    sections: int = 1
+
+    def run(self, work: Work) -> SliceRun:
+        """Plan the layers.
+
+        Parameters
+        ----------
+        work : Work
+            Threads, progress and cancellation.
+
+        Returns
+        -------
+        SliceRun
+
+        Raises
+        ------
+        SceneError, SliceError, VolumeError, Cancelled
+            For a scene or settings that cannot be sliced.
+        """
+        scene = reads(self.scene, self.name)
+        stack = slicing.plan_stack(scene.root, self.job, work)
+        if self.most is not None:
+            stack = slicing.adapted(stack, self.most, work)
+        screen = Screen(stack, self.printer, self.compensation, self.gamma, self.mirror)
+        about = {"Title": self.name, "scene_hash": scene.hash}
+        model = StackModel(scene, self.job, replace(work, cluster=None))
+        files = about, model.mesh, model.picture, self.created
+        return SliceRun(stack, screen, work, self.resin, *files, self.sections, self)
+
+    def write(self, run: SliceRun) -> None:
+        """Begin to write a run, so that its format shows how it encodes layers; see `ranges.Encoding`.
+
+        Parameters
+        ----------
+        run : SliceRun
+            The run.
+        """
+        write_slices(run, Path(tempfile.gettempdir()) / self.file, self.form)

@@ -1,0 +1,117 @@
+"""Problems of a stack of layers, with their places and what mends them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from ..printing.checks import BRIDGE, FILL, loose
+from ..printing.problems import Problem, counted
+from .graph import Found
+from .printers import PRINTERS, Printer
+from .stack import Stack
+
+if TYPE_CHECKING:
+    from ..printing.limits import Limits
+    from .checks import PrintReport
+    from .necks import Neck
+
+SUPPORTS = "supports in the slicer"
+
+
+def misfit(stack: Stack, printer: Printer | None) -> Problem | None:
+    """Compare the size of a planned stack with a printer, before any layer is sampled.
+
+    Parameters
+    ----------
+    stack : Stack
+        The planned layers.
+    printer : Printer or None
+        The printer; None for all known ones.
+
+    Returns
+    -------
+    Problem or None
+        None if the stack fits the printer, or any of the known ones.
+    """
+    share = {
+        p: min(most / mine for most, mine in zip(p.build_volume, stack.size, strict=True))
+        for p in ([printer] if printer else PRINTERS.values())
+    }
+    nearest = max(share, key=lambda p: share[p])
+    if share[nearest] >= 1 - 1e-6:
+        return None
+    mine, most = (" x ".join(f"{s:.4g}" for s in size) for size in (stack.size, nearest.build_volume))
+    which = f"the {nearest.title}" if printer else f"any known printer, not even the {nearest.title}"
+    size = math.floor(10 * share[nearest] * max(stack.size)) / 10
+    text = f"does not fit {which}: {mine} mm, and it has {most} mm"
+    return Problem("fit", text, mend=(("size", f"{size:g}mm"),))
+
+
+def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Problem]:
+    """Problems that a report shows, except for the size.
+
+    Parameters
+    ----------
+    report : PrintReport
+        The report.
+    stack : Stack
+        The layers that it is of.
+    limits : Limits
+        Limits of the checks.
+
+    Returns
+    -------
+    list of Problem
+        The problems.
+    """
+
+    def where(found: Found) -> dict[str, Any]:
+        layer = found.layers[0]
+        return {"layer": layer, "at": (*found.at, _bottom(stack, layer))}
+
+    problems = []
+    if len(report.bodies) > 1:
+        problems.append(loose(len(report.bodies), **where(report.bodies[1])))
+    if report.islands:
+        largest = max(report.islands, key=lambda i: i.area)
+        first = min(i.layers[0] for i in report.islands)
+        text = f"{counted(report.islands, 'island')} in the air, the first from layer {first} on"
+        text += f", the largest of {largest.area:.3g} mm2"
+        problems.append(Problem("islands", text, mend=BRIDGE, advice=SUPPORTS, **where(largest)))
+    if report.overhang:
+        far = report.overhang
+        text = f"a flat overhang reaches {far.reach:.3g} mm, {far.area:.3g} mm2 of it too far"
+        at = (*far.at, _bottom(stack, far.layer))
+        problems.append(Problem("overhangs", text, far.layer, at, advice=f"--up, or {SUPPORTS}"))
+    if report.neck and report.neck.ratio > limits.neck:
+        problems.append(_weak(report.neck, stack, limits))
+    if report.cavities:
+        sealed = counted(report.cavities, "sealed cavity", "sealed cavities")
+        text = f"{sealed} with {sum(c.volume for c in report.cavities):.3g} mm3 of resin"
+        problems.append(Problem("cavities", text, mend=FILL, **where(report.cavities[0])))
+    for kind, noun, hollows in (("cups", "suction cup", report.cups), ("traps", "resin trap", report.traps)):
+        found = [hollow for hollow in hollows if hollow not in report.cavities]
+        if found:
+            largest = max(found, key=lambda h: h.area)
+            text = f"{counted(found, noun)} with {sum(h.volume for h in found):.3g} mm3 of resin"
+            text += f", the largest {largest.area:.3g} mm2"
+            problems.append(Problem(kind, text, advice="--up, or a drain hole", **where(largest)))
+    return [*problems, *report.solid.thin]
+
+
+def _weak(neck: Neck, stack: Stack, limits: Limits) -> Problem:
+    """Problem of a cross-section that is too small for what it carries."""
+    at = (*neck.at, _bottom(stack, neck.layer))
+    if neck.layer == 0:
+        text = f"it stands on {neck.area:.2g} mm2 and is {neck.carried:.3g} mm2 wide"
+        base = max(stack.size[2] / 50, 0.5)
+        return Problem("necks", text, 0, at, mend=(("base", f"{base:.2g}mm"),), advice="--raft 1mm")
+    text = f"{neck.carried:.3g} mm2 hang on {neck.area:.2g} mm2"
+    width = 1.2 * math.sqrt(4 / math.pi * neck.carried / limits.neck)
+    return Problem("necks", text, neck.layer, at, mend=(("thickness", f"{width:.2g}mm"),), advice=SUPPORTS)
+
+
+def _bottom(stack: Stack, layer: int) -> float:
+    """Lower face of a layer, mm."""
+    return float(stack.tops[layer] - stack.heights[layer])

@@ -1,0 +1,84 @@
+"""Mesh and pictures of the object of a slice job, for files that contain them beside its layers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .formulas import Node
+from .job import make_mesh
+from .mesh import Mesh
+from .meshjob import COARSEST, RESOLUTION, MeshJob
+from .rendering import Renderer
+from .scene import Scene
+from .scene.view import Film, View
+from .slicing import SliceJob
+from .slicing.stack import turned
+from .work import Work
+
+SAMPLES = 16
+"""Samples per pixel of pictures."""
+
+
+@dataclass(frozen=True)
+class StackModel:
+    """The object of a slice job.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    job : SliceJob
+        The slice job.
+    work : Work
+        Threads, progress and cancellation.
+    """
+
+    scene: Scene
+    job: SliceJob
+    work: Work
+
+    @cached_property
+    def _upright(self) -> Node:
+        return cast(Node, turned(self.scene.root, self.job.up, self.work))
+
+    def mesh(self) -> Mesh:
+        """Mesh of the object, simplified to the printer's resolution.
+
+        Returns
+        -------
+        Mesh
+            mm, standing on z = 0, centred. The voxel is a pixel, but at least 1/256 of the longest side; the
+            mesh is simplified within a quarter of a pixel.
+        """
+        job = self.job
+        voxel = max(*job.pixel, job.size / RESOLUTION)
+        what = MeshJob(
+            size_mm=job.size,
+            voxel_mm=min(voxel, job.size / COARSEST),
+            printing=job.printing,
+            simplify_mm=min(job.pixel) / 4,
+        )
+        return make_mesh(replace(self.scene, root=self._upright), what, self.work).mesh
+
+    def picture(self, width: int, height: int) -> NDArray[np.uint8]:
+        """Render the scene as it stands on the printer, without its print preparation.
+
+        Parameters
+        ----------
+        width, height : int
+            Size, pixels.
+
+        Returns
+        -------
+        uint8 [height, width, 3]
+            sRGB.
+        """
+        film = Film(width=width, height=height, samples=SAMPLES)
+        renderer = Renderer(self._upright, View(film=film), work=self.work, device="cpu")
+        *_, last = renderer.passes(SAMPLES)
+        return np.asarray(last.shown)

@@ -1,0 +1,205 @@
+"""Frames and films: kept, resumed, decorrelated, encoded."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fracslice.cli.main import run
+from PIL import Image
+
+from fracslice import read, reads
+from fracslice.animation import FilmJob, Timeline, encode, write_frames
+from fracslice.animation.encode import CODECS
+from fracslice.errors import ExportError, RenderError
+from fracslice.rendering import Renderer, develop
+from fracslice.work import Work
+
+FILMS = Path(__file__).parents[2] / "examples/films"
+SCENE = """<scene version="1"><solid size="80mm"><material colour="1 1 1"><sphere/></material></solid>
+<camera eye="0 -4 0"/><light kind="{light}" position="1 -1 1"/><film width="40" height="24" samples="8"/>
+<animation duration="1s" fps="8" {animation}/>{tracks}</scene>"""
+MOVING = '<track of="camera.eye" keys="0s: 0 -4 0; 1s: 1 -4 0"/>'
+
+
+def scene(light: str = "sun", animation: str = "", tracks: str = MOVING) -> str:
+    return SCENE.format(light=light, animation=animation, tracks=tracks)
+
+
+def job(text: str, samples: int = 8) -> FilmJob:
+    return FilmJob(Timeline(reads(text)), (40, 24), samples, 8.0, device="cpu")
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "ball.xml"
+    path.write_text(scene())
+    return path
+
+
+def animate(*arguments: object) -> int:
+    return run(["animate", *map(str, arguments), "--device", "cpu", "--quiet"])
+
+
+def test_a_film_that_stopped_goes_on_and_is_the_same(path: Path, tmp_path: Path) -> None:
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    assert animate(path, "-o", whole) == 0
+    assert animate(path, "-o", parts, "--frames", "2..5") == 0
+    kept = (parts / "frame00003.png").stat().st_mtime_ns
+    assert animate(path, "-o", parts, "--resume", "--threads", 1) == 0
+    assert (parts / "frame00003.png").stat().st_mtime_ns == kept
+    names = [f"frame{k:05}.png" for k in range(8)]
+    assert sorted(file.name for file in whole.iterdir()) == ["film.json", *names]
+    for name in names:
+        assert (whole / name).read_bytes() == (parts / name).read_bytes()
+    assert (whole / names[0]).read_bytes() != (whole / names[7]).read_bytes()
+
+
+def test_a_stopped_film_says_what_is_there(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    light = FilmJob.light
+
+    def interrupted(job: FilmJob, number: int, work: Work) -> np.ndarray:
+        if number == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+        return light(job, number, work)
+
+    monkeypatch.setattr(FilmJob, "light", interrupted)
+    assert animate(path, "-o", tmp_path / "film.gif") == 130
+    assert "film.frames are whole" in capsys.readouterr().err
+    frames = sorted(file.name for file in (tmp_path / "film.frames").iterdir())
+    assert frames == ["film.json", "frame00000.png", "frame00001.png", "frame00002.png"]
+    assert not (tmp_path / "film.gif").exists()
+
+
+def test_frames_of_another_film_are_not_mixed_in(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "frames"
+    assert animate(path, "-o", folder, "--samples", 1) == 0
+    assert animate(path, "-o", folder, "--samples", 2, "--frames", "0", "--resume") == 2
+    assert "another film" in capsys.readouterr().err and len(list(folder.iterdir())) == 9
+    assert animate(path, "-o", folder, "--samples", 2, "--frames", "0") == 0
+    assert sorted(file.name for file in folder.iterdir()) == ["film.json", "frame00000.png"]
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("dear")
+    with pytest.raises(RenderError, match="expected an empty folder"):
+        write_frames(job(scene()), range(1), tmp_path / "mine", False, Work(1))
+
+
+def test_noise_changes_with_the_frame_unless_it_is_fixed() -> None:
+    still = [job(scene("sky", f'noise="{noise}"', "")) for noise in ("moving", "fixed")]
+    moving, fixed = ([film.light(k, Work(1)) for k in range(8)] for film in still)
+    assert all(np.array_equal(fixed[0], other) for other in fixed)
+    noise = np.array(moving) - job(scene("sky", tracks=""), 512).light(0, Work(1))
+    one, mean = (np.sqrt((error**2).mean()) for error in (noise[0], noise.mean(0)))
+    assert mean < 0.55 * one, "the mean of eight frames is nearly as good as eight times the samples"
+
+
+def test_an_open_shutter_averages_the_times_and_divides_the_samples() -> None:
+    turning = '<track of="camera.eye" keys="0s: 0 -4 0; 1s: 24 -4 0" curve="linear"/>'
+    open_shutter = job(scene(animation='shutter="1" times="4"', tracks=turning), 16).light(2, Work(1))
+    timeline, parts = job(scene(tracks=turning)).timeline, []
+    for k in range(4):
+        at = timeline.at((2 + (k + 0.5) / 4) / 8)
+        *_, done = Renderer(at.root, at.view, (40, 24), Work(1), "cpu").passes(64)
+        parts.append(done.image)
+    expected = np.mean(parts, 0)
+    closed = job(scene(tracks=turning), 16).light(2, Work(1))
+    assert abs(open_shutter - expected).mean() < 0.3 * abs(closed - expected).mean()
+
+
+def test_the_camera_of_a_frame_becomes_a_scene(path: Path, tmp_path: Path) -> None:
+    assert animate(path, "-o", tmp_path / "at.xml", "--frames", "4") == 0
+    at = read(tmp_path / "at.xml")
+    assert at.view.camera and at.view.camera.eye == pytest.approx((0.5, -4, 0)) and at.animation is None
+    assert animate(path, "-o", tmp_path / "at.xml", "--frames", "8") == 2, "there are eight"
+
+
+def test_pictures_that_move_and_contact_sheets(path: Path, tmp_path: Path) -> None:
+    for name in ("film.gif", "film.apng"):
+        assert animate(path, "-o", tmp_path / name, "--resume") == 0
+        with Image.open(tmp_path / name) as film:
+            assert (film.n_frames, film.size) == (8, (40, 24))  # type: ignore[attr-defined]
+            assert film.info["duration"] == pytest.approx(125, abs=5)
+    assert animate(path, "-o", tmp_path / "film.png", "--resume") == 0
+    with Image.open(tmp_path / "film.png") as sheet:
+        assert sheet.size == (240, 48)
+    assert len(list((tmp_path / "film.frames").iterdir())) == 9, "made once"
+    assert animate(path, "-o", tmp_path / "film.png", "--preview") == 0
+    assert Image.open(tmp_path / "film.preview.frames" / "frame00000.png").size == (10, 6)
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".webm", ".mov"])
+def test_films(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    frames = []
+    for k in range(4):
+        frames.append(tmp_path / f"f{k}.png")
+        Image.new("RGB", (33, 17), (60 * k, 0, 200)).save(frames[-1])
+    encode(frames, tmp_path / f"film{ending}", 8.0)
+    count, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / f"film{ending}"))
+    assert (count, seconds) == (4, pytest.approx(0.5))
+    film = imageio_ffmpeg.read_frames(str(tmp_path / f"film{ending}"))
+    assert next(film)["size"] == (34, 18), "the codecs need pairs of pixels"
+    levels = [np.frombuffer(data, np.uint8).reshape(18, 34, 3)[8, 16, 0] for data in film]
+    assert np.allclose(levels, [0, 60, 120, 180], atol=8)
+    monkeypatch.setitem(CODECS, ending, ("none",))
+    with pytest.raises(ExportError, match="ffmpeg: "):
+        encode(frames, tmp_path / f"bad{ending}", 8.0)
+    assert not (tmp_path / f"bad{ending}").exists()
+
+
+@pytest.mark.parametrize("name", ["flight", "julia"])
+def test_shipped_films_are_what_their_scenes_show(name: str) -> None:
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    film = Timeline(read(FILMS / f"{name}.xml"))
+    assert film.animation.frames == 60
+    small = FilmJob(film, (80, 45), 16, film.animation.fps, device="cpu")
+    shown = develop(small.light(8, Work()), film.scene.view.film)
+    frames = imageio_ffmpeg.read_frames(str(FILMS / f"{name}.mp4"))
+    size = next(frames)["size"]
+    data = [np.frombuffer(frame, np.uint8) for frame in frames]
+    assert (len(data), size) == (60, (320, 180))
+    shipped = data[8].reshape(45, 4, 80, 4, 3).mean((1, 3))
+    assert abs(255 * shown - shipped).mean() < 12
+    assert abs(255 * shown - data[45].reshape(45, 4, 80, 4, 3).mean((1, 3))).mean() > 12
+
+
+def test_a_mesh_of_a_time(tmp_path: Path) -> None:
+    path = tmp_path / "ball.xml"
+    path.write_text(scene(tracks='<track of="solid.size" keys="0s: 20mm; 1s: 40mm" curve="step"/>'))
+    for seconds, size in (("0.5s", 20), ("1s", 40)):
+        output = tmp_path / f"{size}.stl"
+        assert (
+            run(["mesh", str(path), "-o", str(output), "--resolution", "16", "--time", seconds, "--quiet"])
+            == 0
+        )
+        points = np.frombuffer(
+            output.read_bytes()[84:], np.dtype([("n", "<3f4"), ("v", "<9f4"), ("a", "<u2")])
+        )["v"]
+        assert np.ptp(points.reshape(-1, 3), axis=0) == pytest.approx(size, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-o", "film.avi"], "known are .mp4"),
+        (["-o", "film.mp4", "--exr"], "expected a folder"),
+        (["-o", "f", "--frames", "9..3"], "such as 10..20"),
+        (["-o", "f", "--fps", "0"], "--fps"),
+    ],
+)
+def test_bad_options_are_one_line(
+    arguments: list[str], message: str, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert animate(path, *arguments) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert [file.name for file in tmp_path.iterdir()] == ["ball.xml"]

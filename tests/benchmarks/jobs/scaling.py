@@ -1,0 +1,61 @@
+"""How whole jobs scale with threads: time of a process by number of threads, and the serial share.
+
+One process per run, warm. The share is that of Amdahl's law, T(p) = T(1) (s + (1 - s) / p), fitted by least
+squares to all numbers of threads. An installed wheel is measured as well as a checkout, see
+`tests.benchmarks.jobs.command`.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+from ..runner import Figures, Row, Run, process
+from .command import COMMAND
+
+JOBS: dict[str, tuple[str, ...]] = {
+    "mesh": ("--resolution",),
+    "slice": ("--size", "30mm", "--printer", "sl1s", "--layer"),
+    "render": ("--size", "{pixels}", "--device", "cpu", "--samples"),
+}
+ENDINGS = {"mesh": "stl", "slice": "sl1", "render": "png"}
+RUNS, THREADS = 3, [1, 4, 16, 64]
+SMALLEST = {"jobs": ("render=1",), "pixels": "32x16"}
+
+
+def serial_share(threads: Sequence[int], seconds: Sequence[float]) -> float:
+    """The share s of T(p) = T(1) (s + (1 - s) / p), by least squares; the first is of one thread."""
+    weights = [1 - 1 / p for p in threads]
+    rest = [t / seconds[0] - 1 / p for p, t in zip(threads, seconds, strict=True)]
+    share = sum(w * r for w, r in zip(weights, rest, strict=True)) / (sum(w * w for w in weights) or 1.0)
+    return min(1.0, max(0.0, share))
+
+
+def once(words: Sequence[object], folder: Path, threads: int) -> Figures:
+    """One run; the output is removed, for a job resumes what is there."""
+    path = folder / f"out.{ENDINGS[str(words[len(COMMAND)])]}"
+    figures = process([*words, path, "--threads", threads])
+    path.unlink()
+    return figures
+
+
+def rows(
+    run: Run,
+    scene: str = "mandelbulb",
+    jobs: tuple[str, ...] = ("mesh=256", "mesh=512", "slice=0.025mm", "render=64"),
+    pixels: str = "1920x1080",
+) -> Iterator[Row]:
+    for job in jobs:
+        name, size = job.split("=")
+        with tempfile.TemporaryDirectory() as folder:
+            options = [word.format(pixels=pixels) for word in JOBS[name]]
+            words = [*COMMAND, name, scene, *options, size, "--quiet", "-o"]
+            found = run.interleaved({str(p): partial(once, words, Path(folder), p) for p in run.threads})
+        times = [found.spread(str(p), "wall_s") for p in run.threads]
+        share = serial_share(run.threads, [time.median for time in times])
+        for p, time in zip(run.threads, times, strict=True):
+            faster = found.ratio(str(run.threads[0]), str(p), "wall_s")
+            row = {"": name, "size": size, "threads": p, "time, s": time, "times faster": faster}
+            yield {**row, "peak MB": found.spread(str(p), "peak_mb"), "serial share": f"{share:.1%}"}

@@ -1,0 +1,58 @@
+"""CPU time to link and compile deep scenes and those of many elements, as a multiple of a sphere's.
+
+Float32, the kernel of samples alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+from fracslice.formulas import Node, bounds, box, sphere, transform, union
+from fracslice.kernel import compiler, link
+from fracslice.kernel.host import REGISTERS, host, lane_count
+from fracslice.kernel.loops import bricks, points
+
+from ..runner import Row, Run
+
+SMALLEST = {"scenes": ("a union of 2 spheres",)}
+
+
+def nested(depth: int) -> Node:
+    root = sphere()
+    for k in range(depth - 1):
+        root = bounds(root, min=(-9 - k, -9, -9), max=(9, 9, 9))
+    return root
+
+
+def balls(count: int) -> Node:
+    return union(*(transform(sphere(radius=1 + k), translate=(k + 1, 0, 0)) for k in range(count)))
+
+
+def mixed(count: int, **values: float) -> Node:
+    return union(*(kind() for k in range(count) for kind in (sphere, box)), **values)
+
+
+BASE = "a sphere"
+SCENES = {
+    "10 elements inside each other": nested(10),
+    "20 elements": nested(20),
+    "40 elements": nested(40),
+    "a union of 2 spheres": balls(2),
+    "a union of 80 spheres": balls(80),
+    "a union of 2 spheres and boxes": mixed(1),
+    "a union of 80": mixed(40),
+    "a smooth union of 80": mixed(40, smooth=0.1),
+}
+
+
+def compiled(root: Node) -> None:
+    target = compiler.Target(32, lane_count(32), REGISTERS, *host())
+    compiler.compile_object(link(root), target, (points, bricks))
+
+
+def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES)) -> Iterator[Row]:
+    acts = {BASE: partial(compiled, sphere()), **{name: partial(compiled, SCENES[name]) for name in scenes}}
+    found = run.interleaved(acts)
+    for name in scenes:
+        yield {"": name, "times a sphere": found.ratio(name, BASE, "cpu_s")}

@@ -1,0 +1,80 @@
+"""Checks of model files: all those that a scene gets, each problem with its place and what mends it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import trimesh
+from fracslice.cli.main import run
+
+COARSE = ["--layer", "0.5mm", "--pixel", "0.5mm", "-q"]
+PLATE = (20, 20, 2)
+
+
+def box(size: tuple[float, float, float], height: float = 0.0) -> trimesh.Trimesh:
+    part = trimesh.creation.box(size)
+    part.apply_translation((0, 0, height + size[2] / 2))
+    return part
+
+
+def ball(radius: float, height: float) -> trimesh.Trimesh:
+    part = trimesh.creation.icosphere(2, radius)
+    part.apply_translation((0, 0, height + radius))
+    return part
+
+
+def inverted(part: trimesh.Trimesh) -> trimesh.Trimesh:
+    part.invert()
+    return part
+
+
+@pytest.mark.parametrize(
+    ("name", "parts", "problem"),
+    [
+        ("floating.ply", [box(PLATE), ball(4, 8)], "1 island in the air"),
+        ("bar.obj", [box((400, 10, 10))], "does not fit any known printer"),
+        ("sheet.stl", [box(PLATE), box((15, 0.05, 12), 1)], "of walls are thinner than 0.1 mm"),
+        ("cavity.glb", [box((24, 20, 20)), inverted(box((18, 14, 14), 3))], "1 sealed cavity"),
+    ],
+)
+def test_a_bad_model_would_not_print(
+    name: str, parts: list[trimesh.Trimesh], problem: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    whole = trimesh.util.concatenate(parts)
+    if name.endswith(".glb"):
+        whole.apply_scale(1e-3)  # its unit is the metre
+    whole.export(tmp_path / name)
+    assert run(["check", str(tmp_path / name), *COARSE]) == 1
+    assert problem in capfd.readouterr().out
+
+
+def test_a_good_model_would_print_and_an_open_one_has_no_layers(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    box((20, 15, 10)).export(tmp_path / "box.3mf")
+    assert run(["check", str(tmp_path / "box.3mf"), *COARSE, "--json"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert report["watertight"] and report["layers"]["volume"] == pytest.approx(3000, rel=0.02)
+    torn = box((20, 15, 10))
+    torn.update_faces([True] * 11 + [False])
+    torn.export(tmp_path / "open.stl")
+    assert run(["check", str(tmp_path / "open.stl"), *COARSE]) == 1
+    assert "layers" not in capfd.readouterr().out
+
+
+def test_a_problem_has_its_place_and_fix_mends_it(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    trimesh.util.concatenate([box(PLATE), ball(4, 4)]).export(tmp_path / "loose.stl")
+    assert run(["check", str(tmp_path / "loose.stl"), *COARSE, "--fix", "--json"]) in (0, 1)
+    report = json.loads(capfd.readouterr().out)["layers"]
+    (bodies,) = (p for p in report["before"]["problems"] if p["kind"] == "bodies")
+    assert bodies["at"] == pytest.approx([0, 0, 4], abs=0.6) and bodies["layer"] == 8
+    assert report["flags"].startswith("--bridge 1mm")
+    assert "bodies" not in [p["kind"] for p in report["after"]["problems"]]
+
+
+def test_options_of_scenes_are_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    box(PLATE).export(tmp_path / "box.stl")
+    assert run(["check", str(tmp_path / "box.stl"), "--voxel", "1mm"]) == 2
+    assert "--voxel: only for scenes" in capfd.readouterr().err

@@ -1,0 +1,51 @@
+"""A scheduler and workers of Dask as processes that a test may kill."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+SECONDS = 60.0
+"""Until something that must happen has happened."""
+
+
+def wait_until(true: Callable[[], object]) -> None:
+    """Wait; fail after a time."""
+    end = time.monotonic() + SECONDS
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+class Cluster:
+    """Processes of one scheduler."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.file = folder, folder / "scheduler.json"
+        self.processes: list[subprocess.Popen[bytes]] = []
+        self._start("scheduler", "--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--no-show")
+        wait_until(lambda: self.file.exists() and self.file.read_text().strip())
+        self.address: str = json.loads(self.file.read_text())["address"]
+
+    def worker(self, *more: str) -> subprocess.Popen[bytes]:
+        """Start a worker of one thread."""
+        return self._start("worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", *more)
+
+    def _start(self, kind: str, *options: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "dask", kind, "--scheduler-file", str(self.file), *options]
+        log = (self.folder / f"{len(self.processes)}.log").open("wb")
+        environment = {**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "5s"}
+        started = subprocess.Popen(command, stdout=log, stderr=log, cwd=self.folder, env=environment)
+        self.processes.append(started)
+        return started
+
+    def end(self) -> None:
+        """Kill all that were started."""
+        for process in reversed(self.processes):
+            process.kill()
+            process.wait(SECONDS)

@@ -1,0 +1,212 @@
+"""Slices and frames by a scheduler and its workers."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from fracslice.cli.main import run as command
+
+from fracslice.cluster import Pieces, Workers, connected, workers
+from fracslice.cluster.pieces import Identity
+from fracslice.errors import Cancelled, ClusterError
+from fracslice.export.slices import write_slices
+from fracslice.formulas import mandelbulb
+from fracslice.rendering import Renderer, parts
+from fracslice.scene import scene
+from fracslice.scene.view import Camera, View
+from fracslice.scene.writer import to_xml
+from fracslice.slicerecipe import SliceRecipe
+from fracslice.slicing import SliceJob
+from fracslice.work import Work
+
+from .processes import Cluster, wait_until
+
+pytest.importorskip("distributed")
+ROOT = mandelbulb(iterations=4)
+RECIPE = SliceRecipe(
+    to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "a.cli", "cli"
+)
+VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
+SIZE, SAMPLES = (96, 72), 6
+
+Job = Callable[[Work, Path], bytes]
+
+
+def sliced(work: Work, folder: Path) -> bytes:
+    """Layers of a file."""
+    return write_slices(RECIPE.run(work), folder / "a.cli").read_bytes()
+
+
+def rendered(work: Work, folder: Path) -> bytes:
+    """Sums of a picture after its passes; progress after each."""
+    of = Renderer(ROOT, VIEW, SIZE, work, "cpu")
+    for done in of.passes(SAMPLES, 0.0):
+        work.progress("rendering", min(0.99, done.number / 100))
+    return of.accumulator.host().sums.tobytes()
+
+
+JOBS: dict[str, Job] = {"slice": sliced, "render": rendered}
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    started = Cluster(tmp_path_factory.mktemp("cluster"))
+    yield started
+    started.end()
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """Results of one machine."""
+    folder = tmp_path_factory.mktemp("expected")
+    return {name: job(Work(2), folder) for name, job in JOBS.items()}
+
+
+@pytest.fixture(autouse=True)
+def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parts, "PIXELS", 1024)
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_a_killed_worker_and_a_late_one(
+    name: str, cluster: Cluster, expected: dict[str, bytes], tmp_path: Path
+) -> None:
+    """SIGKILL in the middle of a job, with nobody left; then another worker comes."""
+    first, shares, late, made = cluster.worker(), [], [], []
+    pieces = tmp_path / "pieces"
+
+    def progress(_: str, share: float) -> None:
+        shares.append(share)
+        if share > 0 and not late and first.poll() is None:
+            first.send_signal(signal.SIGKILL)
+            first.wait()
+            made.append(len(list(pieces.glob("*/*-*"))))
+            late.append(cluster.worker())
+
+    with connected(cluster.address, str(pieces)) as pool:
+        result = JOBS[name](Work(1, progress=progress, cluster=pool), tmp_path)
+    assert late
+    assert made[0] < 25
+    assert shares == sorted(shares)
+    assert result == expected[name]
+    assert not any(pieces.iterdir())
+    late[0].kill()
+    late[0].wait()
+
+
+def test_a_worker_that_hangs(cluster: Cluster, expected: dict[str, bytes], tmp_path: Path) -> None:
+    """Its tasks are given to another one after a while without a result."""
+    hung, other = cluster.worker(), cluster.worker()
+
+    def progress(_: str, share: float) -> None:
+        hung.send_signal(signal.SIGSTOP)
+
+    with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+        pool.client.wait_for_workers(2, timeout=60)
+        quick = Workers(pool.client, pool.pieces, patience=0.5)
+        assert sliced(Work(1, progress=progress, cluster=quick), tmp_path) == expected["slice"]
+    for process in (hung, other):
+        process.kill()
+        process.wait()
+
+
+def test_the_client_dies_and_the_same_command_goes_on(
+    cluster: Cluster, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "bulb.xml").write_text(RECIPE.scene)
+    output, pieces = tmp_path / "b.cli", tmp_path / ".fracslice-pieces"
+    given = ["slice", str(tmp_path / "bulb.xml"), "-o", str(output), "--layer", "0.1mm", "--pixel", "0.05mm"]
+    given += ["--cluster", cluster.address, "--quiet"]
+    worker = cluster.worker()
+    client = subprocess.Popen([sys.executable, "-m", "fracslice.cli", *given])
+    wait_until(lambda: len(list(pieces.glob("*/layers-*"))) > 2)
+    client.kill()
+    client.wait()
+    assert not output.exists()
+    submitted: list[int] = []
+    submit = workers._Attempt.submit
+    monkeypatch.setattr(workers._Attempt, "submit", lambda of, n: (submitted.extend(n), submit(of, n)))
+    assert command(given) == 0
+    worker.kill()
+    worker.wait()
+    assert output.read_bytes() == expected["slice"]
+    assert 0 not in submitted
+    assert not pieces.exists()
+
+
+def test_a_worker_of_another_version_is_not_used(
+    cluster: Cluster, expected: dict[str, bytes], tmp_path: Path
+) -> None:
+    old = tmp_path / "old.py"
+    old.write_text('from fracslice.cluster import pieces\npieces.__version__ = "0.0.9"\n')
+    other, good = cluster.worker("--preload", str(old)), cluster.worker()
+    with (
+        connected(cluster.address, str(tmp_path / "pieces")) as pool,
+        warnings.catch_warnings(record=True) as said,
+    ):
+        warnings.simplefilter("always")
+        pool.client.wait_for_workers(2, timeout=60)
+        result = sliced(Work(1, cluster=pool), tmp_path)
+    assert result == expected["slice"]
+    (line,) = {str(one.message) for one in said if "not used" in str(one.message)}
+    assert line.endswith("is not used: fracslice 0.0.9, expected 0.1.0")
+    good.kill()
+    good.wait()
+    with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+        wait_until(lambda: len(pool.client.scheduler_info()["workers"]) == 1)
+        with pytest.raises(ClusterError, match="no worker fits"):
+            sliced(Work(1, cluster=pool), tmp_path)
+    other.kill()
+    other.wait()
+
+
+def test_what_differs_is_named() -> None:
+    here = Identity("0.1.0", "3.11.7", "a" * 32, "b" * 32)
+    assert here.difference(here) == ""
+    other = Identity("0.1.0", "3.12.1", "a" * 32, "b" * 32)
+    assert other.difference(here) == "Python 3.12.1, expected 3.11.7"
+
+
+def test_time_limits_and_cancellation(
+    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No worker; no scheduler; Ctrl-C."""
+    with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+        wait_until(lambda: not pool.client.scheduler_info()["workers"])
+        alone = Workers(pool.client, pool.pieces, patience=0.2, limit=0.6)
+        with pytest.raises(ClusterError, match=r"no task ended within 0\.6 s; 0 workers"):
+            sliced(Work(1, cluster=alone), tmp_path)
+        work = Work(1, cluster=pool)
+        threading.Timer(0.3, work.cancel.set).start()
+        with pytest.raises(Cancelled):
+            sliced(work, tmp_path)
+    monkeypatch.setattr(workers, "CONNECT", 0.3)
+    with pytest.raises(ClusterError, match="no scheduler answers"), connected("tcp://127.0.0.1:9", "x"):
+        pass
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_a_memory_file_system(name: str, expected: dict[str, bytes], tmp_path: Path) -> None:
+    """Threads of this process as workers; results in fsspec's memory."""
+    from distributed import Client
+
+    with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=":0") as client:
+        pool = Workers(client, Pieces(f"memory://{tmp_path.name}"))
+        assert JOBS[name](Work(1, cluster=pool), tmp_path) == expected[name]
+
+
+def test_a_client_of_dask_is_a_cluster(
+    expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from distributed import Client
+
+    monkeypatch.chdir(tmp_path)
+    with Client(processes=False, n_workers=1, dashboard_address=":0") as client:
+        assert sliced(Work(1, cluster=client), tmp_path) == expected["slice"]

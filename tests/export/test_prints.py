@@ -1,0 +1,125 @@
+"""Print files read back by readers that are not ours: every pixel of every layer, heights and exposures."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fracslice.errors import ExportError
+from fracslice.export.jobs import SliceRun
+from fracslice.export.resins import Resin
+from fracslice.export.slices import PRINTS, write_slices
+from fracslice.formulas import difference, menger, sphere
+from fracslice.scene import scene
+from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
+from fracslice.slicing.printers import Printer
+from fracslice.slicing.raster import Screen
+from fracslice.stackmodel import StackModel
+from fracslice.work import Work
+from tests.export import readers
+
+MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
+ROOT = difference(menger(level=1), sphere(radius=0.9))
+RESIN = Resin(2.5, 30, "Test resin", bottom_layers=2, transition_layers=3, density=1.2)
+
+
+def quantised(bits: int) -> Callable[[np.ndarray], np.ndarray]:
+    most = 2**bits - 1
+    return lambda image: np.floor(image / 255 * most + 0.5).astype(int)
+
+
+CASES = {
+    "goo": ("part.goo", readers.goo, lambda image: image),
+    "prz": ("part.prz", readers.goo, lambda image: image),
+    "ctb 2": ("part.ctb", readers.ctb, lambda image: image >> 1),
+    "ctb 3": ("part.ctb", readers.ctb, lambda image: image >> 1),
+    "cbddlp": ("part.cbddlp", readers.ctb, lambda image: (image.astype(int) + 32) // 64),
+    "pwmx 1": ("part.pwmx", readers.photon, quantised(4)),
+    "pwma 516": ("part.pwma", readers.photon, quantised(4)),
+    "nanodlp": ("part.nanodlp", readers.nanodlp, lambda image: image),
+}
+
+
+def run(version: int = 1, most: float | None = None, compensation: float = 0.0) -> SliceRun:
+    job = SliceJob(size=12, layer=0.5, pixel=MACHINE.pixel)
+    stack = plan_stack(ROOT, job)
+    if most is not None:
+        stack = adapted(stack, most)
+    screen = Screen(stack, replace(MACHINE, version=version), compensation=compensation)
+    model = StackModel(scene(ROOT, size=12), job, Work())
+    return SliceRun(stack, screen, resin=RESIN, metadata={"Title": "test"}, picture=model.picture)
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("most", [None, 1.0])
+def test_every_pixel_height_and_exposure_comes_back(case: str, most: float | None, tmp_path: Path) -> None:
+    name, read, level = CASES[case]
+    job = run(int((case.split() + ["1"])[1]), most)
+    found = read(write_slices(job, tmp_path / name).read_bytes())
+    expected = list(Slicer(job.stack).map(job.screen.picture))
+    assert len(found.pictures) == job.layers
+    assert job.layers < 24 if most else job.layers == 24
+    for one, other in zip(found.pictures, expected, strict=True):
+        assert (one == level(other)).all()
+    np.testing.assert_allclose(found.tops, job.stack.tops, rtol=1e-5)
+    np.testing.assert_allclose(found.exposures, RESIN.exposures(job.layers), rtol=1e-6)
+    assert found.exposures[:3] == pytest.approx([30, 30, 30 - 27.5 / 4])
+    for preview in found.previews:  # rendered: neither empty nor of one colour
+        assert len(np.unique(preview.reshape(-1, 3), axis=0)) > 50
+    unit = 1000 if name.endswith(("goo", "prz")) else 1
+    area = sum(image.sum() / 255 * h for image, h in zip(expected, job.stack.heights, strict=True))
+    assert found.about["volume"] * 1000 / unit == pytest.approx(area * 0.25**2, rel=1e-3)
+
+
+def test_pictures_that_are_compensated(tmp_path: Path) -> None:
+    job = run(compensation=0.1)
+    for name, read, level in (CASES["goo"], CASES["cbddlp"]):
+        found = read(write_slices(job, tmp_path / name).read_bytes())
+        expected = list(Slicer(job.stack).map(job.screen.picture))
+        assert all((a == level(b)).all() for a, b in zip(found.pictures, expected, strict=True))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_damaged_file_is_no_whole_one(case: str, tmp_path: Path) -> None:
+    """What the readers of the other tests accept is whole: they notice a lost or changed end."""
+    name, read, _ = CASES[case]
+    whole = write_slices(run(int((case.split() + ["1"])[1])), tmp_path / name).read_bytes()
+    for cut in (1, 10, len(whole) // 2):
+        with pytest.raises(readers.DamagedError):
+            read(whole[:-cut])
+
+
+def test_print_files_need_printer_and_resin(tmp_path: Path) -> None:
+    job = run()
+    for name in PRINTS:
+        for lacking in (replace(job, resin=None), replace(job, screen=Screen(job.stack))):
+            with pytest.raises(ExportError, match="needs"):
+                write_slices(lacking, tmp_path / f"part.{name}")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("values", [(-1, 30), (2, float("nan")), (0, 30), (2, float("inf"))])
+def test_exposures_that_no_printer_takes(values: tuple[float, float]) -> None:
+    with pytest.raises(ExportError, match="expected a number"):
+        Resin(*values)
+
+
+@pytest.mark.skipif(not shutil.which("cargo"), reason="needs cargo")
+def test_goo_by_the_crate_goo(tmp_path: Path) -> None:
+    crate = tmp_path / "crate"
+    shutil.copytree(Path(__file__).parent / "goo", crate)
+    command = ["cargo", "build", "--release", "--quiet", "--locked"]
+    if subprocess.run(command, cwd=crate, capture_output=True).returncode:
+        pytest.skip("the crate cannot be had here")
+    job = run(most=1.0)
+    path = write_slices(job, tmp_path / "part.goo")
+    subprocess.run([crate / "target/release/layers", path, tmp_path / "pixels"], check=True)
+    rows, columns = job.screen.shape
+    found = np.fromfile(tmp_path / "pixels", np.uint8).reshape(-1, rows, columns)
+    assert (found == list(Slicer(job.stack).map(job.screen.picture))).all()

@@ -1,0 +1,136 @@
+"""Printers and resins from tables and files; which file a printer reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fracslice.errors import ExportError, SliceError
+from fracslice.export.resins import Resin, default_resin, resin
+from fracslice.export.slices import ENDINGS, printers_file
+from fracslice.slicing.printers import PRINTERS, printer
+
+OWN = """
+title = "Mine"
+pixels = [1440, 2560]
+screen = [68.04, 120.96]
+height = 150
+file = "ctb"
+version = 2
+motion = [7, 80, 210, 1.5]
+[resin]
+exposure = 8
+bottom_exposure = 60.5
+lift = 6
+"""
+
+
+def test_the_table_of_printers() -> None:
+    page = (Path(__file__).parents[2] / "docs/reference/printers.md").read_text(encoding="utf-8")
+    assert len(PRINTERS) >= 60
+    for machine in PRINTERS.values():
+        assert 0.014 <= min(machine.pixel) <= max(machine.pixel) <= 0.12, machine.name
+        assert machine.file and all(value >= 0 for value in machine.motion)
+        assert f"| {machine.name} | {machine.title} | .{machine.file} |" in page
+    written = {machine.file for machine in PRINTERS.values() if f".{machine.file}" in ENDINGS}
+    assert {"sl1", "goo", "prz", "ctb", "nanodlp", "pwmx", "pwma"} <= written
+
+
+@pytest.mark.parametrize(
+    ("name", "output", "expected"),
+    [
+        ("mars-5", "a.goo", ""),
+        ("mars-5", "a.sl1", "Elegoo Mars 5 reads .goo files: make a.goo"),
+        ("mars-5", "layers", "Elegoo Mars 5 reads .goo files: make layers.goo"),
+        ("sl1s", "a.sl1s", ""),
+        ("sonic-mini-8k-s", "a.goo", ""),
+        ("photon-mono-4k", "a.pwmx", "Anycubic Photon Mono 4K reads .pwma files: make a.pwma"),
+        (
+            "mars-5-ultra",
+            "a.ctb",
+            "Elegoo Mars 5 Ultra reads encrypted .ctb files, which are not written: "
+            "make a.goo and convert it with UVtools",
+        ),
+    ],
+)
+def test_which_file_a_printer_reads(name: str, output: str, expected: str) -> None:
+    assert printers_file(printer(name), output) == expected
+
+
+def test_exposures_are_the_resins_and_the_layers() -> None:
+    found = [default_resin(printer(name), layer) for name in ("sl1", "sl1s") for layer in (0.025, 0.05, 0.1)]
+    assert [(r.exposure, r.bottom_exposure) for r in found if r] == [
+        *((6, 35), (7.5, 35), (13, 45)),
+        *((1.8, 25), (2, 25), (2.6, 25)),
+    ]
+    assert default_resin(printer("mars-5"), 0.05) is None
+    assert resin("Siraya Tech Fast Grey", printer("sl1"), 0.06).exposure == 10
+    with pytest.raises(ExportError, match=r"did you mean .Siraya Tech Fast Grey."):
+        resin("Siraya Fast Gray", printer("sl1"), 0.05)
+    with pytest.raises(ExportError, match=r"unknown for Elegoo Mars 5; expected a [.]toml or [.]ini file"):
+        resin("Siraya Tech Fast Grey", printer("mars-5"), 0.05)
+
+
+def test_a_printer_of_ones_own(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(OWN)
+    machine = printer(str(path))
+    assert (machine.name, machine.title, machine.pixels) == ("mine", "Mine", (1440, 2560))
+    assert machine.pixel == pytest.approx((0.04725, 0.04725))
+    found = default_resin(machine, 0.05)
+    assert found is not None
+    assert (found.exposure, found.bottom_exposure) == (8, 60.5)
+    assert (found.lift, found.lift_speed, found.retract_speed, found.wait) == (6, 80, 210, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("height", "hight", "'hight': unknown; expected name, title, pixels"),
+        ("height = 150", "", "height is missing"),
+        ("1440", "-1440", "pixels=.*: expected 2 whole numbers"),
+        ("150", '"tall"', "height=.*: expected a number"),
+        ("[1440", "1440", r"line \d+"),
+        ('file = "ctb"', "mirror = 1", "true or false for mirror"),
+    ],
+)
+def test_a_wrong_printer_is_one_line(old: str, new: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(OWN.replace(old, new, 1))
+    with pytest.raises(SliceError, match=message) as failure:
+        printer(str(path))
+    assert str(failure.value).startswith(str(path)) and "\n" not in str(failure.value)
+
+
+def test_a_resin_of_ones_own(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("exposure = 2.5\nbottom_exposure = 30\nbottom_layers = 4\n")
+    assert resin(str(path), None, 0.05) == Resin(2.5, 30, "mine", bottom_layers=4)
+    for text, message in (
+        ("exposure = 2.5", "bottom_exposure is missing"),
+        ("exposure = 2.5\nbottom_exposure = -1", "bottom_exposure=-1: expected a number > 0"),
+        ("exposures = 2.5", "'exposures': unknown; expected exposure"),
+    ):
+        path.write_text(text)
+        with pytest.raises(ExportError, match=message) as failure:
+            resin(str(path), None, 0.05)
+        assert str(failure.value).startswith(str(path))
+    with pytest.raises(ExportError, match="No such file"):
+        resin(str(tmp_path / "none.toml"), None, 0.05)
+
+
+def test_a_resin_profile_of_prusaslicer(tmp_path: Path) -> None:
+    path = tmp_path / "Fast Grey.ini"
+    path.write_text(
+        "# generated by PrusaSlicer 2.5.0 on 2022-10-20 at 13:33:45 UTC\n"
+        "bottle_cost = 0\nexposure_time = 2.4\nfaded_layers = 8\ninitial_exposure_time = 28\n"
+        "material_density = 1.15\nmaterial_notes = LIFT_DISTANCE=8.0\\nLIFT_SPEED=2.5\\nRETRACT_SPEED=3\n"
+    )
+    found = resin(str(path), printer("mars-5"), 0.05)
+    assert found == Resin(
+        2.4, 28, "Fast Grey", transition_layers=8, density=1.15, lift=8, lift_speed=150, retract_speed=180
+    )
+    path.write_text("exposure_time = fast\n")
+    with pytest.raises(ExportError, match="exposure_time = fast: expected a number"):
+        resin(str(path), None, 0.05)

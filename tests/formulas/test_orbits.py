@@ -1,0 +1,234 @@
+"""Escape-time fractals from their step: what the text of a step implies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracslice.errors import KernelError, SceneError
+from fracslice.formulas import Number, Vector, bristorbrot, julia, mandelbox, quaternion_mandelbrot, verbs
+from fracslice.formulas.orbits import code, grown, orbit
+from fracslice.formulas.registry import _REGISTRY
+from fracslice.formulas.verbs import ball, fold, positive, power, turn
+from fracslice.kernel import compile_scene, link, reference
+from fracslice.kernel.depth import resolve_depths
+from fracslice.kernel.orbits import _numpy
+from fracslice.kernel.steps import traced
+
+SHIFT = (0.3, -0.2, 0.1)
+RNG = np.random.default_rng(0)
+
+
+@pytest.fixture(autouse=True)
+def forgotten():  # type: ignore[no-untyped-def]
+    """Formulas of a test are forgotten after it."""
+    known = dict(_REGISTRY)
+    yield
+    _REGISTRY.clear()
+    _REGISTRY.update(known)
+
+
+def box_step(w, c, scale):  # type: ignore[no-untyped-def]
+    return scale * ball(fold(w, 1.0), 0.5) + c
+
+
+def square(w, c):  # type: ignore[no-untyped-def]
+    x, y, z = w
+    return (x * x - y * y - z * z, 2.0 * x * y, 2.0 * x * z) + c
+
+
+def bristor(w, c):  # type: ignore[no-untyped-def]
+    x, y, z = w
+    return (x * x - y * y - z * z, y * (2.0 * x - z), z * (2.0 * x + y)) + c
+
+
+def mixed(w, c):  # type: ignore[no-untyped-def]
+    x, y, z = turn(w, (0.0, 0.6, 0.8), 35.0)
+    r = np.sqrt(x * x + y**2 + 1.5)
+    for k in range(2):
+        x = x + k * np.sin(y / r) * np.exp(-0.1 * z * z)
+    u = (np.where(x > y, 2 * x, y + x), np.arctan2(z, r) * r, abs(z) - max(x, -y) / 2)
+    return 1.5 * u - SHIFT + 0.5 * c
+
+
+def triplex(w, c):  # type: ignore[no-untyped-def]
+    return power(positive(w), 3.0) + c
+
+
+def scope_of(step, sizes: dict[str, int]):  # type: ignore[no-untyped-def]
+    """Code of a step, and a function of points and constants that returns its images and stretches."""
+    from fracslice.formulas import vocabulary
+
+    made = traced(step, sizes, {})
+    names = "".join(f", v_{name}" for name in sizes)
+    text = "\n    ".join(
+        [
+            f"def run(x, y, z, cx, cy, cz{names}):",
+            *made.lines,
+            f"return ({', '.join(made.point)}), ({', '.join(made.stretch)})",
+        ]
+    )
+    scope = {n: getattr(vocabulary, n) for n in vocabulary.NAMES}
+    exec(text, scope)
+    return made, scope["run"]
+
+
+def jacobian(run, w, c, values, by: int) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """Central differences [3, 3, n] by w or c."""
+    h, columns = 1e-6, []
+    for k in range(3):
+        ends = []
+        for sign in (1, -1):
+            moved = [w.copy(), c.copy()]
+            moved[by][k] += sign * h
+            ends.append(np.array(np.broadcast_arrays(*run(*moved[0], *moved[1], *values)[0], w[0])[:3]))
+        columns.append((ends[0] - ends[1]) / (2 * h))
+    return np.stack(columns, axis=1)
+
+
+@pytest.mark.parametrize(
+    ("step", "values", "most"),
+    [
+        (box_step, {"scale": -1.5}, 1.001),
+        (square, {}, 1.16),
+        (bristor, {}, 1.25),
+        (mixed, {}, 1.25),
+        (triplex, {}, 1.001),
+    ],
+)
+def test_the_stretch_bounds_the_jacobian(step, values, most: float) -> None:  # type: ignore[no-untyped-def]
+    """Exact for similarities and for quaternions; at most a quarter too large for others."""
+    _, run = scope_of(step, dict.fromkeys(values, 1))
+    w, c = RNG.uniform(-2, 2, (2, 3, 2000))
+    given = list(values.values())
+    stretches = [np.broadcast_to(s, 2000) for s in run(*w, *c, *given)[1]]
+    for by, stretch in enumerate(stretches):
+        true = np.linalg.norm(jacobian(run, w, c, given, by).transpose(2, 0, 1), 2, axis=(1, 2))
+        assert (stretch >= true * (1 - 1e-4) - 1e-6).all()
+        assert np.quantile(stretch / np.maximum(true, 1e-9), 0.9) < most
+
+
+def test_verbs_need_no_derivatives() -> None:
+    """Stretches multiply: nothing of the Jacobian is left in the code."""
+    made, _ = scope_of(box_step, {"scale": 1})
+    assert not any(word in "".join(made.lines) for word in ("sqrt", "where"))
+    assert made.stretch[1] == "1.0"
+
+
+def test_a_returned_stretch_is_taken() -> None:
+    def declared(w, c):  # type: ignore[no-untyped-def]
+        x, y, z = w
+        return (2.0 * x, 2.0 * z, 2.0 * y) + c, 2.5
+
+    assert scope_of(declared, {})[0].stretch == ("2.5", "1.0")
+
+
+ARGUMENTS = {
+    fold: (1.0,),
+    verbs.fold_to: ((1.0, 0.5, 2.0),),
+    ball: (0.5,),
+    verbs.inversion: (1.2,),
+    positive: (),
+}
+ARGUMENTS |= {verbs.mirror: ((0.6, 0.0, 0.8),), turn: ((0.0, 0.6, 0.8), 40.0), power: (5.0,)}
+
+
+@pytest.mark.parametrize("verb", ARGUMENTS)
+@pytest.mark.parametrize("e", [0.001, 0.3])
+def test_the_stretch_over_a_ball_bounds_its_image(verb, e: float) -> None:  # type: ignore[no-untyped-def]
+    w = RNG.uniform(-1.5, 1.5, (3, 3000))
+    step = RNG.normal(size=(3, 3000))
+    inside = w + e * step / np.linalg.norm(step, axis=0) * RNG.uniform(0, 1, 3000)
+    (image, stretch), (other, _) = (verb(p, *ARGUMENTS[verb]) for p in (w, inside))
+    over = verbs.OVER[verb](w, e, *ARGUMENTS[verb]) if verb in verbs.OVER else stretch
+    moved = np.linalg.norm(np.array(image) - np.array(other), axis=0)
+    assert (
+        moved <= np.broadcast_to(over, 3000) * np.linalg.norm(inside - w, axis=0) * (1 + 1e-9) + 1e-12
+    ).all()
+
+
+def test_growth_is_found() -> None:
+    assert not grown(mandelbox()).by_power
+    assert grown(bristorbrot()).power == pytest.approx(2, abs=0.01)
+    assert grown(bristorbrot()).escape < 4
+
+
+@pytest.mark.parametrize(
+    "root", [mandelbox(iterations=9), mandelbox(scale=-1.5, iterations=9), bristorbrot(iterations=9)]
+)
+def test_orbits_do_not_come_back(root) -> None:  # type: ignore[no-untyped-def]
+    found, p = grown(root), RNG.uniform(-0.57, 0.57, (3, 20000)) * root.bounds.box.hi[0]
+    step = _numpy(code(root), {"scale": root.values.get("scale"), "inner": root.values.get("inner")})
+    w, gone = p, np.zeros(20000, bool)
+    for _ in range(12):
+        w = step(w, p)
+        size = np.linalg.norm(w, axis=0)
+        assert (size[gone] > found.escape).all()
+        gone |= size > found.escape
+
+
+def test_orbits_that_stay_are_refused() -> None:
+    with pytest.raises(SceneError, match=r"<mandelbox> has orbits that do not escape"):
+        mandelbox(scale=1.0)
+
+
+def test_the_quaternion_set_is_that_of_the_complex_numbers_turned() -> None:
+    root = quaternion_mandelbrot(iterations=12)
+    x, y, z = RNG.uniform(-1.6, 1.0, (3, 4000))
+    c = x + 1j * np.hypot(y, z)
+    w = c.copy()
+    for _ in range(12):
+        w = np.where(abs(w) < 1e6, w * w + c, w)
+    inside = abs(w) <= grown(root).escape
+    assert ((compile_scene(root, "float64").points(x, y, z) < 0) == inside).mean() > 0.9995
+
+
+def test_a_julia_set_is_that_of_the_formula_by_hand() -> None:
+    a = quaternion_mandelbrot(iterations=14, julia=(-0.2, 0.8, 0.0))
+    b = julia(iterations=14, c=(-0.2, 0.8, 0, 0))
+    p = RNG.uniform(-1.5, 1.5, (3, 20000))
+    inside = [compile_scene(root, "float64").points(*p) < 0 for root in (a, b)]
+    assert inside[1].sum() > 200
+    assert (inside[0] != inside[1]).sum() <= 0.05 * inside[1].sum()
+
+
+def test_parameters_of_every_kind() -> None:
+    from fracslice.formulas import Count
+
+    @orbit(
+        way=Vector((0.1, 0.2, 0.3), "offset"),
+        factor=Number(2.0, "scale"),
+        often=Count(2, "folds", least=1, most=5),
+    )
+    def own(w, c, way, factor, often):  # type: ignore[no-untyped-def]
+        """Own."""
+        for _ in range(often):
+            w = fold(w, 1.0) + way
+        return factor * w + c
+
+    p = RNG.uniform(-3, 3, (3, 500))
+    for root in (
+        own(iterations=3),
+        own(iterations=3, often=1, factor=-2.0),
+        own(iterations=2, julia=(1, 0, 0)),
+    ):
+        expected = reference(root)(*p)
+        np.testing.assert_allclose(
+            compile_scene(root, "float64").points(*p), expected, rtol=1e-12, atol=1e-12
+        )
+    assert link(own(iterations=3)).source == link(own(iterations=4, way=(0, 0, 1))).source
+
+
+def test_a_mistake_is_one_line_with_its_place() -> None:
+    @orbit()
+    def wrong(w, c):  # type: ignore[no-untyped-def]
+        return w * w + c
+
+    with pytest.raises(KernelError, match=r"test_orbits.py:\d+: step wrong: 'w \* w': expected a number"):
+        wrong(iterations=2)
+
+
+@pytest.mark.parametrize("scale", [2.0, -1.5])
+def test_an_automatic_depth_grows_with_the_detail(scale: float) -> None:
+    depths = [resolve_depths(mandelbox(scale=scale), detail)["iterations"] for detail in (0.4, 0.1, 0.025)]
+    assert depths[0] < depths[1] < depths[2] < 30

@@ -1,0 +1,45 @@
+"""A closed mesh as a field: distances and signs of the solid that it bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from fracslice.formulas import box, sphere
+from fracslice.mesh import Mesh
+from fracslice.mesh.field import MeshField
+from fracslice.volume import plan
+
+
+def field_of(*parts: trimesh.Trimesh) -> MeshField:
+    whole = trimesh.util.concatenate(parts)
+    return MeshField(Mesh(np.asarray(whole.vertices, np.float64), np.asarray(whole.faces, np.int32)))
+
+
+def moved(part: trimesh.Trimesh, *by: float) -> trimesh.Trimesh:
+    part.apply_translation(by)
+    return part
+
+
+def test_distances_and_signs_of_a_box_at_points_that_lie_on_its_edges_in_projection() -> None:
+    field = field_of(trimesh.creation.box((2, 2, 2)))
+    points = np.stack(np.meshgrid(*[np.linspace(-1.5, 1.5, 13)] * 3), 0).reshape(3, -1)
+    exact = box(size=(2, 2, 2)).kernel("cpu", "float64").points(*points)
+    assert field.kernel("cpu", "float64").points(*points) == pytest.approx(exact, abs=1e-12)
+
+
+def test_bodies_that_overlap_are_united_and_shells_inside_are_cavities() -> None:
+    hole = trimesh.creation.box((1, 1, 1))
+    hole.invert()
+    solid = trimesh.creation.box((2, 2, 2)), moved(trimesh.creation.box((2, 2, 2)), 1, 0.3, 0.2)
+    values = field_of(*solid, hole).kernel().points(np.array([0.8, -0.2, 1.9, 2.2]), *np.zeros((2, 4)))
+    assert (values < 0).tolist() == [True, False, True, False]
+
+
+def test_a_mesh_is_planned_like_a_formula_and_its_key_is_its_triangles() -> None:
+    field = field_of(trimesh.creation.icosphere(4, 1.0))
+    found, exact = plan(field, 64), plan(sphere(radius=1.0), 64)
+    assert found.box.size == pytest.approx(exact.box.size, abs=1e-5)
+    assert field.key != field_of(trimesh.creation.icosphere(3, 1.0)).key
+    assert np.isnan(field.kernel().points(np.array([np.nan]), np.zeros(1), np.zeros(1))).all()

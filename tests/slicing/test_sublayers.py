@@ -1,0 +1,85 @@
+"""Grey levels as shares of a layer's height, on a plane that slopes gently."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fracslice.errors import ExportError, SliceError
+from fracslice.export.jobs import SliceRun
+from fracslice.export.slices import write_slices
+from fracslice.formulas import Node, box, intersection, transform
+from fracslice.slicing import SliceJob, Slicer, Stack, adapted, plan_stack
+from fracslice.slicing.raster import Screen
+from fracslice.slicing.sublayers import MeanSlicer
+from fracslice.work import Work
+
+SLOPE = 0.12
+
+
+def wedge() -> Node:
+    """A plate with a sloping top: z = SLOPE x."""
+    angle = -np.degrees(np.arctan(SLOPE))
+    below = transform(box(size=(8, 8, 4)), translate=(0, 0, -2))
+    return intersection(box(size=(2, 0.5, 0.6)), transform(below, rotate=(0, 1, 0, angle)))
+
+
+@pytest.fixture(scope="module")
+def stack() -> Stack:
+    return plan_stack(wedge(), SliceJob(size=20, layer=0.5, pixel=(0.1, 0.1)))
+
+
+def off(stack: Stack, sections: int) -> np.ndarray:
+    """Height of the printed top above the plane, mm, where a pixel cures as deep as it is grey."""
+    slicer = MeanSlicer(stack, Work(), sections)
+    height = np.zeros(stack.shape)
+    for layer, picture in enumerate(slicer.map(lambda one: one.coverage)):
+        height += picture / 255 * stack.heights[layer]
+    rows, columns = stack.shape
+    x = (np.arange(columns) + 0.5 - columns / 2) * stack.pixel[0]
+    inner = np.abs(x) < 8
+    top = stack.size[2] - SLOPE * (x.max() - x.min()) / 2 + SLOPE * x
+    return (height[rows // 2] - height[rows // 2, inner].mean() - top + top[inner].mean())[inner]
+
+
+def test_stairs_of_a_slope_are_halved_at_least(stack: Stack) -> None:
+    errors = {n: np.abs(off(stack, n)).max() for n in (1, 2, 4, 8)}
+    assert errors[1] == pytest.approx(0.25, abs=0.02)  # half a layer
+    assert errors[2] < errors[1] / 2 * 1.05
+    assert errors[4] < errors[1] / 3
+    assert errors[8] < errors[1] / 5
+
+
+def test_the_volume_and_the_pictures_of_the_middle_stay(stack: Stack) -> None:
+    one = list(Slicer(stack).map(lambda layer: layer.area))
+    slicer = MeanSlicer(stack, Work(), 8)
+    eight = list(slicer.map(lambda layer: layer.area))
+    assert [slicer.areas[k] for k in range(len(eight))] == eight
+    assert np.sum(one) == pytest.approx(np.sum(eight), rel=4e-3)
+    same = list(MeanSlicer(stack, Work(), 1).map(lambda layer: layer.coverage))
+    assert all((a == b).all() for a, b in zip(same, Slicer(stack).map(lambda one: one.coverage), strict=True))
+
+
+def test_chosen_layers_of_any_height_on_any_number_of_threads(stack: Stack) -> None:
+    uneven = adapted(stack, 1.5)
+    assert len(uneven.z) < len(stack.z)
+    made = []
+    for threads in (1, 3):
+        screen = Screen(uneven)
+        slicer = MeanSlicer(uneven, Work(threads=threads), 4)
+        made.append(list(slicer.map(screen.picture)))
+        some = list(slicer.map(screen.picture, [1, 3]))
+        assert all((a == b).all() for a, b in zip(some, (made[-1][1], made[-1][3]), strict=True))
+    assert all((a == b).all() for a, b in zip(*made, strict=True))
+
+
+def test_other_numbers_are_refused(stack: Stack) -> None:
+    with pytest.raises(SliceError, match="sections=3: expected one of 1, 2, 4, 8"):
+        SliceRun(stack, Screen(stack), sections=3)
+
+
+def test_contours_have_one_section(stack: Stack, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match="contours are of one section per layer"):
+        write_slices(SliceRun(stack, Screen(stack), sections=2), tmp_path / "a.cli")
