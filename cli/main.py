@@ -60,7 +60,26 @@ def commands(context: click.Context) -> None:
         context.exit(USAGE)
 
 
+def run_formulas(context: click.Context, option: click.Parameter, files: Sequence[str]) -> None:
+    """Run the files of --formulas before the scene is read."""
+    for file in files:
+        from fracslice.formulas.plugins import run_file
+
+        run_file(file)
+
+
 for command in (mesh, render, animate, slice_, check, show, fly, formulas, scenes, bench):
+    command.params.append(
+        click.Option(
+            ["--formulas"],
+            metavar="FILE",
+            multiple=True,
+            is_eager=True,
+            expose_value=False,
+            callback=run_formulas,
+            help="A Python file that registers formulas of your own; it is run. Repeatable.",
+        )
+    )
     commands.add_command(command)
 
 

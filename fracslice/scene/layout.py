@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from ..formulas import get, names
 from ..formulas.parameters import REQUIRED, Choice, Parameter
+from ..formulas.plugins import load_installed
 from ..formulas.registry import Formula
 from .animation import Animation, Track
 from .lengths import Length
@@ -73,11 +74,12 @@ SECTIONS = {section.name: section for section in (SOLID, PRINT, *PICTURE, *FILM)
 
 
 def formulas() -> list[Formula]:
-    """Return every registered formula.
+    """Return every registered formula, those of installed packages too.
 
     Returns
     -------
     list of Formula
         Sorted by name.
     """
+    load_installed()
     return [get(name) for name in names()]

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import SceneError
 from ..formulas.parameters import REQUIRED
+from ..formulas.plugins import origin
 from ..formulas.registry import Formula
 from ..nearest import hint
 from .layout import SCENE, SECTIONS, Element, formulas
@@ -126,8 +127,14 @@ def overview() -> str:
     lines = []
     for kind, (title, _) in _GROUPS.items():
         members = [formula for formula in formulas() if formula.kind == kind]
-        lines += [f"{title}:", *(f"  {f.name:<13} {summary(f.doc)}" for f in members), ""]
+        lines += [f"{title}:", *(f"  {f.name:<21} {summary(f.doc)}{_source(f)}" for f in members), ""]
     return "\n".join(lines[:-1])
+
+
+def _source(formula: Formula) -> str:
+    """Note on a formula from outside this package."""
+    place = origin(formula)
+    return "" if place == "fracslice" else f" [{place}]"
 
 
 def page(name: str) -> str:

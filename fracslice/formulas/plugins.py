@@ -1,0 +1,68 @@
+"""Formulas from outside the package: files of the user, and packages that are installed."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from functools import cache
+from importlib.metadata import entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+from ..errors import FracsliceError, SceneError
+from .registry import Formula, get, names
+
+GROUP = "fracslice.formulas"
+"""Group of entry points: each names a module that registers formulas."""
+
+_FILES: dict[str, Path] = {}
+
+
+def run_file(path: str) -> list[Formula]:
+    """Run a Python file that registers formulas, once.
+
+    Parameters
+    ----------
+    path : str
+        The file. It is a program, and may do whatever a program may.
+
+    Returns
+    -------
+    list of Formula
+        The formulas of the file.
+
+    Raises
+    ------
+    SceneError
+        If the file cannot be read or run, with its line.
+    """
+    file = Path(path).resolve()
+    module = f"formulas of {file}"
+    if module not in _FILES:
+        spec = spec_from_file_location(module, file)
+        if spec is None or spec.loader is None or not file.is_file():
+            raise SceneError(f"{path}: expected a Python file of formulas")
+        found = sys.modules[module] = module_from_spec(spec)
+        try:
+            spec.loader.exec_module(found)
+        except FracsliceError:
+            raise
+        except Exception as error:
+            lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__, None)]
+            line = getattr(error, "lineno", None) or lines[-1]
+            raise SceneError(f"{path}:{line}: {type(error).__name__}: {error}") from error
+        _FILES[module] = file
+    return [formula for formula in map(get, names()) if formula.function.__module__ == module]
+
+
+@cache
+def load_installed() -> None:
+    """Load the formulas of installed packages."""
+    for entry in entry_points(group=GROUP):
+        entry.load()
+
+
+def origin(formula: Formula) -> str:
+    """Place that a formula is from: a package, or a file of the user."""
+    module = formula.function.__module__
+    return str(_FILES.get(module, module.partition(".")[0]))

@@ -1,0 +1,104 @@
+"""Trial of a formula at random points: back ends, Lipschitz bound and box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import SceneError
+from ..formulas.parameters import AUTO, REQUIRED
+from ..formulas.registry import Formula, Node, get
+from .cpu import compile_scene
+from .reference import reference
+
+COUNT, STEPS = 20_000, 6
+"""Random points, and the iterations of a trial where the depth is automatic."""
+
+TOLERANCE = {"float64": 1e-9, "float32": 1e-3}
+"""Differences from the reference, relative to values above 1."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Results of a trial.
+
+    Attributes
+    ----------
+    lines
+        One line per examination.
+    faults
+        Number of examinations that failed.
+    """
+
+    lines: tuple[str, ...]
+    faults: int
+
+
+def trial(formula: Formula) -> Trial:
+    """Examine a formula with its default values.
+
+    Parameters
+    ----------
+    formula
+        Formula whose parameters all have defaults; operators are applied to a sphere.
+
+    Returns
+    -------
+    Trial
+        Results.
+
+    Raises
+    ------
+    SceneError
+        If a parameter has no default.
+    KernelError
+        If the formula cannot be compiled.
+    """
+    root = _sample(formula)
+    box, rng = root.bounds.box, np.random.default_rng(0)
+    lo, hi = (
+        np.clip(corner, -2.0, 2.0) if not box.finite else np.array(corner) for corner in (box.lo, box.hi)
+    )
+    size = np.maximum(hi - lo, 1e-9)
+    points = rng.uniform(lo - 0.25 * size, hi + 0.25 * size, (COUNT, 3)).T
+    expected = reference(root)(*points)
+    results = [_parity(root, points, expected, "float64"), _parity(root, points, expected, "float32")]
+    field = compile_scene(root, "float64").points
+    values = field(*points)
+    step = rng.normal(size=points.shape)
+    step *= 0.999 * np.abs(values) / root.bounds.lipschitz / np.linalg.norm(step, axis=0)
+    outside = values > 0
+    broken = int((field(*(points + step))[outside] < -1e-9).sum())
+    results.append(
+        (not broken, f"bound L = {root.bounds.lipschitz:g}: broken at {broken} of {outside.sum()}")
+    )
+    beyond = ((lo > points.T) | (hi < points.T)).any(axis=1) & box.finite
+    lost = int((values[beyond] < 0).sum())
+    shown = " x ".join(f"{s:.4g}" for s in box.size)
+    results.append((not lost, f"box {shown}: {lost} of {beyond.sum()} points beyond it are inside"))
+    inside = float((values < 0).mean())
+    results.append((0 < inside < 1, f"inside: {inside:.1%} of the points in and around the box"))
+    lines = [f"{'ok   ' if good else 'FAULT'} {line}" for good, line in results]
+    return Trial(tuple(lines), sum(not good for good, _ in results))
+
+
+def _sample(formula: Formula) -> Node:
+    """Node of a formula with its defaults."""
+    for name, kind in formula.parameters.items():
+        if kind.default is REQUIRED:
+            raise SceneError(f"<{formula.name}> {name} has no default: expected one, for a trial")
+    depths: dict[str, Any] = {
+        name: STEPS for name, kind in formula.parameters.items() if kind.default == AUTO
+    }
+    return formula(*(get("sphere")() for _ in range(formula.children[0])), **depths)
+
+
+def _parity(root: Node, points: np.ndarray, expected: np.ndarray, precision: str) -> tuple[bool, str]:
+    """Comparison with the reference; creases of float32 orbits are few points with other values."""
+    found = compile_scene(root, precision).points(*points)  # type: ignore[arg-type]
+    error = np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)
+    typical = float(np.quantile(error, 0.99))
+    good = bool(np.isfinite(found).all()) and typical < TOLERANCE[precision]
+    return good, f"{precision}: 99% of the values within {typical:.1e} of the reference"
