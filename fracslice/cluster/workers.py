@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 HIDDEN = ".fracslice-pieces"
 """Folder of the results where none is named."""
 
-POLL, CONNECT = 0.02, 10.0
+POLL, CONNECT = 0.02, 20.0
 """Seconds between two looks for results, and until a scheduler answers."""
 
 

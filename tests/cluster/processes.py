@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-SECONDS = 60.0
+SECONDS = 120.0
 """Until something that must happen has happened."""
 
 
