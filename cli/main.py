@@ -102,7 +102,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, click.Abort):
         return say("stopped; nothing was written", INTERRUPTED)
     except MemoryError:
-        return say("out of memory: a coarser voxel needs less", FAILED)
+        return say("out of memory: a coarser voxel or a smaller picture needs less", FAILED)
     except BrokenPipeError:
         # Without it, Python fails to flush stdout at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,12 +11,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.errors import SharedError
+from fracslice.errors import Cancelled, SharedError
+from fracslice.work import Work
 
 from .cluster import cluster_options, pooled
 from .inputs import check_folder, check_targets, load_scene
 from .options import NAME, Whole, device_option, quiet_option, set_option, source_argument, threads_option
-from .working import working
+from .working import KeptError, working
 
 if TYPE_CHECKING:
     from fracslice.rendering import Pass, Renderer
@@ -113,7 +115,6 @@ def render(
     """Render a picture of SCENE, as its camera, lights and materials say."""
     from fracslice.export.images import check_image
     from fracslice.rendering import Renderer
-    from fracslice.work import Work
 
     check_image(output)
     check_targets(source, output, state)
@@ -126,40 +127,60 @@ def render(
     ):
         renderer = Renderer(scene.root, scene.view, size, work, device)
         aside = None if pool is None or state else pool.pieces.path(f"{renderer.key}.npz")
-        state, first = state or aside, pool is None or pool.first
+        state = state or aside
         if state and Path(state).exists():
             renderer.resume(state)
-        last = None
-        for last in timed(renderer, samples, limit):
-            work.progress(
-                f"{reached(last)}, {last.rate / 1e6:.2f} M samples/s", fraction(last, renderer, samples)
-            )
-            if pass_images:
-                Path(pass_images).mkdir(exist_ok=True)
-                save(Path(pass_images) / f"pass{last.number:04}.png", last, scene, "8")
-            if state and first:
+        first = pool is None or pool.first
+
+        def write(path: str | Path, done: Pass, bits: str) -> str:
+            save(path, done, scene, bits, threads)
+            return f"{path}: {renderer.width} x {renderer.height} pixels, {reached(done)}"
+
+        try:
+            for done in timed(renderer, samples, limit):
+                rate = f"{reached(done)}, {done.rate / 1e6:.2f} M samples/s"
+                work.progress(rate, fraction(done, renderer, samples))
+                if pass_images:
+                    Path(pass_images).mkdir(exist_ok=True)
+                    write(Path(pass_images) / f"pass{done.number:04}.png", done, "8")
+                if state and first:
+                    save_state(renderer, state)
+        except Cancelled:
+            if not first or not renderer.seen().samples:
+                raise
+            if state:
                 save_state(renderer, state)
+            raise KeptError(write(output, renderer.seen(), bits)) from None
     if not first:
         raise SharedError("the samples are made; shard 1 writes the file")
-    if last is None:
-        last = renderer.seen()
-    save(output, last, scene, bits)
+    written = write(output, renderer.seen(), bits)
     if aside:
         Path(aside).unlink(missing_ok=True)
     if not quiet:
-        click.echo(
-            f"{output}: {renderer.width} x {renderer.height} pixels, {reached(last)}, "
-            f"{renderer.setup.precision}, {renderer.device}, {time.monotonic() - start:.1f} s"
-        )
+        took = time.monotonic() - start
+        click.echo(f"{written}, {renderer.setup.precision}, {renderer.device}, {took:.1f} s")
 
 
 def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
-    """Iterate over passes until the time limit, in seconds, is exceeded; at least one is made."""
-    start = time.monotonic()
-    for done in renderer.passes(samples):
-        yield done
-        if limit is not None and time.monotonic() - start > limit:
-            return
+    """Iterate over passes until a time limit, in seconds, which interrupts all passes but the first."""
+    start, expired, timer = time.monotonic(), threading.Event(), None
+
+    def expire() -> None:
+        expired.set()
+        renderer.work.cancel.set()
+
+    try:
+        for done in renderer.passes(samples):
+            yield done
+            if limit is not None and timer is None:
+                timer = threading.Timer(max(start + limit - time.monotonic(), 0.0), expire)
+                timer.start()
+    except Cancelled:
+        if not expired.is_set():
+            raise
+    finally:
+        if timer:
+            timer.cancel()
 
 
 def reached(done: Pass) -> str:
@@ -172,11 +193,10 @@ def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
     return min(done.samples / (samples or renderer.setup.view.film.samples), 1.0)
 
 
-def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:
+def save(path: str | Path, done: Pass, scene: Scene, bits: str, threads: int) -> None:
     """Write the picture of a pass, with the scene and the samples in its metadata."""
     from fracslice.export import application
     from fracslice.export.images import write_image
-    from fracslice.rendering import develop
 
     text = {
         "Title": scene.name,
@@ -184,9 +204,7 @@ def save(path: str | Path, done: Pass, scene: Scene, bits: str) -> None:
         "scene_hash": scene.hash,
         "samples": f"{done.samples:.2f}",
     }
-    write_image(
-        path, develop(done.image, scene.view.film, scene.view.shading.mode), done.image, int(bits), text
-    )
+    write_image(path, done.developed, done.image, int(bits), text, Work(threads))
 
 
 def save_state(renderer: Renderer, path: str) -> None:

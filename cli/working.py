@@ -16,6 +16,10 @@ from fracslice.work import Work
 Progress = Callable[[str, float], None]
 
 
+class KeptError(Cancelled):
+    """The work was cancelled, and what there is was written; the message names it."""
+
+
 class StoppedError(FracsliceError):
     """A signal stopped the work.
 
@@ -25,8 +29,8 @@ class StoppedError(FracsliceError):
         Exit status by the shell's convention, 128 + the signal's number; 130 for Ctrl-C.
     """
 
-    def __init__(self, number: int) -> None:
-        super().__init__("stopped; nothing was written")
+    def __init__(self, number: int, kept: str = "nothing was written") -> None:
+        super().__init__(f"stopped; {kept}")
         self.status = 128 + number
 
 
@@ -91,6 +95,8 @@ def _cancelled_by_signals() -> Iterator[threading.Event]:
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield cancel
+    except KeptError as error:
+        raise StoppedError(received[0] if received else signal.SIGINT, str(error)) from None
     except Cancelled:
         raise StoppedError(received[0] if received else signal.SIGINT) from None
     finally:

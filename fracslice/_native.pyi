@@ -264,13 +264,8 @@ def component_sizes(
     labels: NDArray[int32],
     count: int,
     threads: int = 0,
-) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[int32]]:
+) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[int32], NDArray[int64]]:
     """See `fracslice.mesh.topology.component_sizes`."""
-
-def measures(
-    vertices: NDArray[float64], triangles: NDArray[int32], point: Point, threads: int = 0
-) -> tuple[float, float, int]:
-    """Area of triangles, signed volume between them and a point, and number of triangles without area."""
 
 def turned(
     vertices: NDArray[float64], triangles: NDArray[int32], frame: tuple[float, Point, float], threads: int = 0
@@ -326,7 +321,12 @@ def surroundings(
 def stl(vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0) -> NDArray[uint8]:
     """Records of a binary STL, uint8 [m, 50]."""
 
-def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]: ...
+def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]:
+    """First point of each group of equal points, ascending, and the group of each point.
+
+    Points are float32 [n, 3], finite and without negative zeros.
+    """
+
 def tree(
     vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0
 ) -> tuple[NDArray[int64], NDArray[float64], NDArray[float64]]:

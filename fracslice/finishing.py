@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .mesh.window import Finished
     from .surfaces import Surface
 
-MOST_ERRORS = 1 << 22
+MOST_ERRORS = 1 << 20
 """Approximate maximum of vertices whose distance from the surface is measured, evenly distributed over it."""
 
 VERTICES_A_BRICK = 170

@@ -197,7 +197,7 @@ class _Job:
         sized = self.planned()
         surface = self.meshed(sized, aside)
         thin, how = surface.thin, self.what.how(self.scene)
-        if thin and how.whole and how.sorts:  # only the field can tell bodies apart
+        if thin and how.whole and how.sorts:  # only the field can distinguish bodies
             sized = self.edited(sized.planned)
             surface = self.meshed(sized, aside)
             thin = surface.thin

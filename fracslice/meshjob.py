@@ -10,7 +10,7 @@ from .scene import Print, Scene
 from .scene.lengths import Length
 
 RESOLUTION = 256.0
-"""Default number of voxels along the longest side."""
+"""Default number of voxels along the longest side, and the detail that automatic depths resolve."""
 
 COARSEST, FINEST = 8, 16384
 """Limits of the voxels along the longest side."""

@@ -20,7 +20,7 @@ from .slicing import SliceJob
 from .slicing.stack import turned
 from .work import Work
 
-SAMPLES = 16
+SAMPLES = 4
 """Samples per pixel of pictures."""
 
 

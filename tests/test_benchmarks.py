@@ -41,11 +41,11 @@ def test_figures_are_those_of_interleaved_runs() -> None:
         order.append(name)
         return {"cpu_s": float(next(times[name]))}
 
-    found = Run(3).interleaved({name: lambda name=name: act(name) for name in times})
+    measured = Run(3).interleaved({name: lambda name=name: act(name) for name in times})
     assert order == ["a", "b"] * 4
-    assert found.spread("a", "cpu_s") == Spread(3, 1, 5)
-    assert found.ratio("a", "b", "cpu_s") == Spread(1.5, 0.5, 2.5)
-    assert found.ratio("a", ["a", "b"], "cpu_s").max == 5 / 7
+    assert measured.spread("a", "cpu_s") == Spread(3, 1, 5)
+    assert measured.ratio("a", "b", "cpu_s") == Spread(1.5, 0.5, 2.5)
+    assert measured.ratio("a", ["a", "b"], "cpu_s").max == 5 / 7
 
 
 def test_a_process_does_not_count_its_parent_s_memory() -> None:

@@ -23,8 +23,8 @@ from fracslice.mesh.extract import contour
 from fracslice.printing.walls import Walls
 from fracslice.rendering import Renderer
 from fracslice.rendering import cpu as tiles
-from fracslice.rendering.film import reinhard
-from fracslice.scene.view import View
+from fracslice.rendering.film import develop
+from fracslice.scene.view import Film, View
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.volume import Lattice, sample
 from fracslice.work import Work
@@ -124,7 +124,10 @@ def summed() -> None:
     """Prints the hashes of sums over the coordinates or colours of many points, and of a turned scene."""
     rng = np.random.default_rng(0)
     light, ends = rng.random((64, 64, 3), np.float32), rng.random((2, 1000, 3))
-    sums = reinhard(light), Walls(*ends, *rng.random((2, 1000))).along((0.48, 0.6, 0.64)).width
+    sums = (
+        develop(light, Film(tone="reinhard")),
+        Walls(*ends, *rng.random((3, 1000))).along((0.48, 0.6, 0.64)).width,
+    )
     turned = [transform(sphere(), rotate=(1, k, 2, 7 * k), scale=0.1 * k) for k in range(1, 41)]
     sums = *sums, link(union(*turned)).parameters
     print([hashlib.sha256(np.ascontiguousarray(found).tobytes()).hexdigest() for found in sums])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
-from ..formulas.parameters import Choice, Count, Number, Vector
+from ..formulas.parameters import Number, Vector
 from ..scene.animation import Animation, Track
 from ..scene.model import Scene
 from ..scene.values import kind_of
@@ -69,21 +69,16 @@ class Timeline:
         name = track.curve if track.curve != "auto" else _automatic(track.of, kind)
         if name == "step" or len(times) == 1:
             return lambda time: values[max(int(np.searchsorted(times, time, side="right")) - 1, 0)]
-        if not isinstance(kind, (Number, Vector)) or len({np.size(value) for value in values}) > 1:
-            raise track.fail(f"curve={name!r}: expected step, or keys of as many numbers each")
+        _check_curve(track, name, kind, values)
         table = np.array(values, float).reshape(len(times), -1)
-        targets = None
-        if name == "zoom":
-            targets = self._target
-            table = table - [targets(time) for time in times]
+        origin = self._target if name == "zoom" else lambda _: np.zeros(table.shape[1])
         try:
-            curve = CURVES[name](np.array(times), table)
+            curve = CURVES[name](np.array(times), table - [origin(time) for time in times])
         except ValueError as error:
             raise track.fail(f"keys of {track.of}: expected {error}") from None
 
         def value(time: float) -> Any:
-            numbers = curve(eased(times, track.ease, time))
-            numbers = numbers + targets(time) if targets else numbers
+            numbers = curve(eased(times, track.ease, time)) + origin(time)
             return kind.check(numbers.tolist() if isinstance(kind, Vector) else float(numbers[0]))
 
         return value
@@ -145,7 +140,18 @@ class Timeline:
 
 def _automatic(of: str, kind: Any) -> str:
     """Curve of an attribute whose track leaves the choice."""
-    if isinstance(kind, (Count, Choice)) or not isinstance(kind, (Number, Vector)):
+    if not isinstance(kind, (Number, Vector)) or getattr(kind, "whole", False):
         return "step"
     element, _, attribute = of.rpartition(".")
     return AUTOMATIC.get(f"{element.partition('[')[0]}.{attribute}", "smooth")
+
+
+def _check_curve(track: Track, name: str, kind: Any, values: list[Any]) -> None:
+    """Raise `SceneError` for a curve that does not suit the attribute."""
+    if not isinstance(kind, (Number, Vector)) or len({np.size(value) for value in values}) > 1:
+        raise track.fail(f"curve={name!r}: expected step, or keys of as many numbers each")
+    if name == "zoom" and track.of != "camera.eye":
+        raise track.fail("curve='zoom': expected of='camera.eye'")
+    size = {"path": 3, "rotation": 4}.get(name, np.size(values[0]))
+    if np.size(values[0]) != size:
+        raise track.fail(f"curve={name!r}: expected keys of {size} numbers each")

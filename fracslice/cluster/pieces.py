@@ -220,14 +220,14 @@ class Identity:
         str
             Such as "Python 3.12.1, expected 3.11.7".
         """
-        for name, found, wanted in (
+        for name, own, other in (
             ("fracslice", self.version, expected.version),
             ("Python", self.python, expected.python),
             ("program text", self.program[:8], expected.program[:8]),
             ("processor", self.processor[:8], expected.processor[:8]),
         ):
-            if found != wanted:
-                return f"{name} {found}, expected {wanted}"
+            if own != other:
+                return f"{name} {own}, expected {other}"
         return ""
 
 
@@ -298,7 +298,7 @@ class Pool(ABC):
         work : Work
             Progress and cancellation.
         stage : str, optional
-            Name of the stage whose progress is the share of tasks that are done; none without it.
+            Label of the progress, which is the share of tasks that are done; none without it.
 
         Yields
         ------

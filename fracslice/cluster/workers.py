@@ -168,8 +168,8 @@ class _Attempt:
             about = client.sync(client.scheduler.identity, n_workers=-1, callback_timeout=CONNECT)
         except (OSError, TimeoutError):
             raise ClusterError(f"{client.scheduler.address}: the scheduler does not answer") from None
-        found: dict[str, Any] = about["workers"]
-        return found
+        workers: dict[str, Any] = about["workers"]
+        return workers
 
     @property
     def busy(self) -> set[str]:

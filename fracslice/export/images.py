@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Mapping
+from functools import reduce
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,8 +14,13 @@ import numpy as np
 
 from fracslice.errors import ExportError
 from fracslice.files import replacing
+from fracslice.work import Work, chunks
 
 IMAGES = (".png", ".exr", ".tif", ".tiff")
+STRIP, LEVEL = 64, 6
+"""Rows of a PNG that are compressed as one, and the level of compression."""
+ZLIB = b"\x78\x9c"
+"""Header of a zlib stream (RFC 1950)."""
 
 
 def check_image(path: str | Path) -> str:
@@ -47,6 +53,7 @@ def write_image(
     light: np.ndarray,
     bits: int = 8,
     text: Mapping[str, str] | None = None,
+    work: Work | None = None,
 ) -> Path:
     """Write an image to a file, in the format of its extension.
 
@@ -62,6 +69,8 @@ def write_image(
         Bits per channel of a PNG.
     text : mapping of str to str, optional
         Keywords and texts of the metadata.
+    work : Work, optional
+        Threads that compress a PNG; one by default.
 
     Returns
     -------
@@ -76,7 +85,7 @@ def write_image(
         raise ExportError(f"{path}: {bits} bits: expected 8 or 16")
     metadata, ending = text or {}, check_image(path)
     data = (
-        png(shown, bits, metadata)
+        png(shown, bits, metadata, work)
         if ending == ".png"
         else (exr if ending == ".exr" else tiff)(light, metadata)
     )
@@ -85,7 +94,7 @@ def write_image(
     return Path(path)
 
 
-def png(shown: np.ndarray, bits: int, text: Mapping[str, str]) -> bytes:
+def png(shown: np.ndarray, bits: int, text: Mapping[str, str], work: Work | None = None) -> bytes:
     """Encode a PNG file (ISO/IEC 15948) with filtered rows, sRGB and text chunks.
 
     Parameters
@@ -96,6 +105,8 @@ def png(shown: np.ndarray, bits: int, text: Mapping[str, str]) -> bytes:
         Bits per channel.
     text : mapping of str to str
         Keywords and texts of the metadata.
+    work : Work, optional
+        Threads; one by default.
 
     Returns
     -------
@@ -103,12 +114,25 @@ def png(shown: np.ndarray, bits: int, text: Mapping[str, str]) -> bytes:
     """
     height, width, _ = shown.shape
     most = 2**bits - 1
-    levels = np.round(np.clip(shown, 0, 1) * np.float64(most)).astype(">u2" if bits == 16 else np.uint8)
-    filtered = _filtered(levels.reshape(height, -1).view(np.uint8), 3 * bits // 8)
-    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)), (b"sRGB", b"\0")]
-    chunks += [(b"iTXt", f"{k}\0\0\0\0\0{v}".encode()) for k, v in text.items()]
-    chunks += [(b"IDAT", zlib.compress(filtered.tobytes(), 9)), (b"IEND", b"")]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in chunks)
+
+    def compressed(rows: slice) -> tuple[bytes, bytes]:
+        """Filtered rows, and the same as blocks of a deflate stream that end at a byte."""
+        part = shown[max(rows.start - 1, 0) : rows.stop]
+        levels = np.round(np.clip(part, 0, 1) * np.float64(most)).astype(">u2" if bits == 16 else np.uint8)
+        filtered = _filtered(levels.reshape(len(part), -1).view(np.uint8), 3 * bits // 8)
+        data = filtered[rows.start > 0 :].tobytes()
+        packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
+        return data, packer.compress(data) + packer.flush(
+            zlib.Z_FINISH if rows.stop == height else zlib.Z_FULL_FLUSH
+        )
+
+    strips = (work or Work(1)).collect(compressed, chunks(height, STRIP))
+    checksum = reduce(lambda sum_, strip: zlib.adler32(strip[0], sum_), strips, 1)
+    stream = ZLIB + b"".join(blocks for _, blocks in strips) + struct.pack(">I", checksum)
+    parts = [(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)), (b"sRGB", b"\0")]
+    parts += [(b"iTXt", f"{k}\0\0\0\0\0{v}".encode()) for k, v in text.items()]
+    parts += [(b"IDAT", stream), (b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in parts)
 
 
 def _filtered(rows: np.ndarray, pixel: int) -> np.ndarray:

@@ -204,6 +204,6 @@ def _kept(recipe: Recipe) -> Encoding:
     run = recipe.run(Work(threads=1))
     try:
         recipe.write(replace(run, work=replace(run.work, cluster=Asking())))  # type: ignore[arg-type]
-    except Encoding as found:
-        return found
+    except Encoding as encoding:
+        return encoding
     raise ExportError("this format has no layers of its own")

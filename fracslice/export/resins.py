@@ -227,16 +227,16 @@ def _of_ini(path: Path) -> Resin:
     values = {key.strip(): value.strip() for key, _, value in pairs}
     notes = values.get("material_notes", "").replace("\\n", "\n").replace("\\r", "\n")
     values |= dict(re.findall(r"^\s*(\w+)\s*=\s*(\S+)\s*$", notes, re.M))
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     for key, (name, times) in INI.items():
         if key in values:
             try:
-                found[name] = float(values[key]) * times
+                settings[name] = float(values[key]) * times
             except ValueError:
                 raise ExportError(f"{path}: {key} = {values[key]}: expected a number") from None
-    if "transition_layers" in found:
-        found["transition_layers"] = int(found["transition_layers"])
-    return of_table(str(path), found)
+    if "transition_layers" in settings:
+        settings["transition_layers"] = int(settings["transition_layers"])
+    return of_table(str(path), settings)
 
 
 @cache

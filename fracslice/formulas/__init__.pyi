@@ -235,7 +235,8 @@ def flake(solid: Literal['tetrahedron', 'octahedron', 'dodecahedron', 'icosahedr
     """The flake of a Platonic solid with corners on the unit sphere.
 
     Sierpinski 1915 has the flat one; folds: Knighty 2010, "Kaleidoscopic (escape time) IFS". Reflections move
-    no two points apart, and scaling is undone at the end, so L = 1. Copies touch in points and edges.
+    no two points apart, and copies are made smaller, not space larger, so L = 1. Copies touch in points and
+    edges.
 
     Parameters
     ----------

@@ -247,7 +247,7 @@ def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return found
 
 
-def apart(caps: list[Cap], count: int) -> list[Cap]:
+def disjoint(caps: list[Cap], count: int) -> list[Cap]:
     """Select caps without common triangles, in order of preference.
 
     Parameters

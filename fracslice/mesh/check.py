@@ -82,7 +82,7 @@ class MeshReport:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Defects in plain words, tuple of str; empty for a printable mesh."""
+        """Descriptions of the defects, tuple of str; empty for a printable mesh."""
         counts = (
             (self.open_edges, "open edges (a hole in the surface)"),
             (self.nonmanifold_edges, "edges with more than two triangles"),
@@ -141,7 +141,8 @@ def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
         raise MeshError("the mesh has no triangles")
     threads = threads or 0
     mesh = quantised(mesh, threads)
-    area, _, flat = mesh.measured(threads)
+    sizes = mesh.sizes(threads)
+    area, flat = float(sizes.areas[0]), int(sizes.flat[0])
     whole = mesh
     if flat:
         a, b, c = mesh.triangles.T

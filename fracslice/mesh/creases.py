@@ -50,7 +50,7 @@ def on_creases(
     """
     middles = there = ends.mean(axis=1)
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    points, apart, first = starts, length / 4, np.empty(0)
+    points, spacing, first = starts, length / 4, np.empty(0)
     for step in range(STEPS):
         planes = fit.planes(points.reshape(-1, 3)).reshape(-1, 2, 4)
         normals = planes[..., :3]
@@ -61,8 +61,8 @@ def on_creases(
         there = there + move * np.minimum(1, length / np.maximum(size, 1e-300))[:, None]
         ways = points - there[:, None]
         ways /= np.maximum(np.linalg.norm(ways, axis=2, keepdims=True), 1e-300)
-        apart = np.clip(2 * size, NEAREST * length, apart / 2)
-        points = there[:, None] + apart[:, None, None] * ways
+        spacing = np.clip(2 * size, NEAREST * length, spacing / 2)
+        points = there[:, None] + spacing[:, None, None] * ways
     found = ((first * normals).sum(axis=2) > SAME).all(axis=1) & (size < NEAREST / 4 * length)
     found &= np.linalg.norm(there - middles, axis=1) < REACH * length
     return there, found

@@ -100,14 +100,14 @@ class Refiner:
         """
         self._work.check()
         known, end = max(self._end - begin, 0), max(self._end, end)
-        t, normals = self._room(begin, end - begin, known)
+        t, normals = self._space(begin, end - begin, known)
         if end > self._end:
             new = t[known:], normals[:, known:]
             self._cells.find_crossings(begin + known, end, *self._placement, self._loops, *new)
             self._end = end
         return Crossings(begin, t, normals)
 
-    def _room(self, begin: int, size: int, known: int) -> tuple[np.ndarray, np.ndarray]:
+    def _space(self, begin: int, size: int, known: int) -> tuple[np.ndarray, np.ndarray]:
         """Memory for `size` intersections, the first `known` of which are computed. They are moved only if no
         space is left behind them.
         """

@@ -84,7 +84,7 @@ def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool
     changed = np.zeros(len(measured), bool)
     for _ in range(ROUNDS):
         flips, worth = _candidates(mesh, due, measured[:, UPRIGHT] < STEEP)
-        flips = flips.some(_apart(flips, worth, len(measured)))
+        flips = flips.some(_independent(flips, worth, len(measured)))
         if not len(flips.old):
             break
         before = measured[flips.old]
@@ -141,7 +141,7 @@ def _sine_of_sum(p: NDArray[np.float64], a, b, c, d) -> NDArray[np.float64]:  # 
     return found
 
 
-def _apart(flips: Flips, worth: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+def _independent(flips: Flips, worth: NDArray[np.float64], count: int) -> NDArray[np.int64]:
     """Independent flips: the best one of each triangle, with no triangle or new edge in common."""
     order = np.argsort(worth, kind="stable")
     rank = np.empty(len(order), np.int64)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fracslice.mesh.exchange import Exchange
+from fracslice.mesh.topology import Sizes, component_sizes, edge_topology
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,8 +55,6 @@ class Mesh(Exchange):
     @property
     def is_watertight(self) -> bool:
         """True if every edge joins exactly two triangles."""
-        from .topology import edge_topology
-
         found = edge_topology(self.triangles, len(self.vertices))
         return len(self.triangles) > 0 and not (found.open_edges or found.non_manifold_edges)
 
@@ -89,20 +88,15 @@ class Mesh(Exchange):
     @property
     def area(self) -> float:
         """Surface area."""
-        return self.measures[0]
+        return float(self.sizes(1).areas[0])
 
     @property
     def volume(self) -> float:
         """Signed volume, by the divergence theorem; positive if the triangles face outwards."""
-        return self.measures[1]
+        return float(self.sizes(1).volumes[0])
 
-    @property
-    def measures(self) -> tuple[float, float, int]:
-        """`area`, `volume` and the number of triangles without area."""
-        return self.measured(1)
-
-    def measured(self, threads: int) -> tuple[float, float, int]:
-        """Multithreaded `measures`.
+    def sizes(self, threads: int) -> Sizes:
+        """Sizes of the mesh as one component.
 
         Parameters
         ----------
@@ -111,32 +105,11 @@ class Mesh(Exchange):
 
         Returns
         -------
-        tuple of (float, float, int)
-            Area, signed volume and number of triangles without area.
+        Sizes
+            Arrays of one element.
         """
-        x, y, z = self.bounds.mean(axis=0).tolist()
-        return self.measures_from((x, y, z), threads)
-
-    def measures_from(self, point: tuple[float, float, float], threads: int = 1) -> tuple[float, float, int]:
-        """`measures`, with the signed volume between the triangles and a point.
-
-        The volumes of the parts of a closed mesh add up to its volume.
-
-        Parameters
-        ----------
-        point : tuple of float
-            Apex of the volume.
-        threads : int, optional
-            Threads; 0 for all cores.
-
-        Returns
-        -------
-        tuple of (float, float, int)
-            Area, signed volume and number of triangles without area.
-        """
-        from fracslice._native import measures
-
-        return measures(self.vertices, self.triangles, point, threads)
+        labels = np.zeros(len(self.vertices), np.int32)
+        return component_sizes(self.vertices, self.triangles, labels, 1, threads)
 
     def translated(self, offset: tuple[float, float, float] | NDArray[np.float64]) -> Mesh:
         """Translated copy.

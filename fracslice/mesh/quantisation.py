@@ -200,7 +200,5 @@ def welded(mesh: Mesh) -> Mesh:
     Mesh
         The welded mesh.
     """
-    from fracslice.mesh.weld import weld
-
-    first, labels = weld(mesh.vertices.astype(np.float32))
+    first, labels = _native.weld(mesh.vertices.astype(np.float32))
     return Mesh(mesh.vertices[first], labels[mesh.triangles]) if len(first) < len(mesh.vertices) else mesh

@@ -14,7 +14,7 @@ from ..volume import Plan
 from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
 from ..work import Work
-from .caps import Cap, Rings, apart, best, capped
+from .caps import Cap, Rings, best, capped, disjoint
 from .extract import Piece
 from .fit import Fit
 from .model import Mesh
@@ -148,7 +148,7 @@ def _caps(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work
         best(rings.caps(vertex, tip.place), tip.gain, mesh, fit, voxel)
         for vertex, tip in zip(rings.at(ends), tips, strict=True)
     ]
-    caps = apart([cap for cap in found if cap], len(mesh.triangles))
+    caps = disjoint([cap for cap in found if cap], len(mesh.triangles))
     while caps:
         work.check()
         wrong = _crossing(mesh, caps, work)

@@ -149,12 +149,15 @@ class Sizes(NamedTuple):
         Vector areas; zero for closed components.
     outermost : ndarray of int32, shape (count, 6)
         First vertices farthest out along -x, -y, -z, x, y and z.
+    flat : ndarray of int64, shape (count,)
+        Triangles without area.
     """
 
     volumes: NDArray[np.float64]
     areas: NDArray[np.float64]
     vectors: NDArray[np.float64]
     outermost: NDArray[np.int32]
+    flat: NDArray[np.int64]
 
 
 def component_sizes(

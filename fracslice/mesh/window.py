@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import bounds, touching
+from ..formulas.algebra import dot
 from .check import MeshReport, duplicates
 from .clean import cleaned
 from .model import Mesh
@@ -38,7 +39,7 @@ class Finished:
     suspects : ndarray of int64, shape (k,)
         Triangles that may intersect others, ascending.
     done : int
-        The first triangles are finished with this piece, so many. Each triangle is finished once, in the
+        Number of finished triangles; the first ones. Each triangle is finished once, in the
         order of the pieces.
     counted : ndarray of bool, shape (n,)
         Vertices with all their triangles in `mesh`. Each vertex is counted once.
@@ -205,7 +206,8 @@ class Tally:
             among[piece.suspects] = True
             found = self_intersecting_triangles(mesh, threads=self.threads, among=among)
             crossing = np.flatnonzero(found[: piece.done])
-        area, volume, flat = passed.measures_from((0.0, 0.0, 0.0), self.threads)
+        sizes = passed.sizes(self.threads)
+        apex = passed.vertices[sizes.outermost[0, 0]] if len(passed.triangles) else np.zeros(3)
         self.triangles += len(passed.triangles)
         self.vertices += len(piece.points)
         self.open_edges += ends.open_edges
@@ -214,10 +216,10 @@ class Tally:
         self.nonmanifold_vertices += ends.non_manifold_vertices
         self.self_intersections += len(crossing)
         self.searched_triangles += int(np.searchsorted(piece.suspects, piece.done))
-        self.degenerate_triangles += flat
+        self.degenerate_triangles += int(sizes.flat[0])
         self.duplicate_triangles += duplicates(mesh.triangles[crossing])
-        self.volume += volume
-        self.area += area
+        self.volume += float(sizes.volumes[0] + dot(apex, sizes.vectors[0]) / 3)  # cones over the origin
+        self.area += float(sizes.areas[0])
         if len(piece.points):
             low, high = bounds(piece.points, self.threads)
             self.low = tuple(np.minimum(self.low, low).tolist())

@@ -29,6 +29,30 @@ def linear(colour: Sequence[float]) -> tuple[float, ...]:
     return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
 
 
+def opaque_part(node: Node) -> Node | None:
+    """Return a scene without the members of its unions that are transparent.
+
+    Parameters
+    ----------
+    node : Node
+        Root of the formula tree.
+
+    Returns
+    -------
+    Node or None
+        The rest; None if all of it is transparent, the tree itself if nothing is.
+    """
+    if node.formula.name == material.name and node["clear"]:
+        return None
+    parts = tuple(opaque_part(child) for child in node.children)
+    if all(part is child for part, child in zip(parts, node.children, strict=True)):
+        return node
+    if node.formula.name != "union":  # a transparent tool cuts all the same
+        return node.changed((parts[0], *node.children[1:])) if parts[0] else None
+    left = tuple(part for part in parts if part)
+    return node.changed(left) if left else None
+
+
 @dataclass
 class Look:
     """Materials of a scene, and the kernel lines that load the material at a hit.

@@ -9,7 +9,8 @@ import numpy as np
 from ..formulas.field import Precision
 from ..kernel.cuda import launched, load_loops, parameters, require
 from ..work import Work
-from .cpu import BLOCK
+from .accumulator import Plan
+from .cpu import BLOCK, STEPS
 from .cuda_loops import loops
 from .linking import Frame
 from .sequence import Samples
@@ -54,45 +55,41 @@ class CudaTracer:
         self.blocks = -(-self.width // BLOCK)
         self._starts = self._cuda.to_device(np.zeros(self.blocks * -(-self.height // BLOCK), self.dtype))
 
-    def look_ahead(self, limit: int, work: Work) -> None:
+    def look_ahead(self, work: Work) -> None:
         """Cone prepass: compute the distance up to which all rays of each block are free.
 
         Parameters
         ----------
-        limit : int
-            Steps per cone.
         work : Work
             Unused.
         """
         if self.frame.sharp:
-            given = (self._parameters, self._starts, self.blocks, self.dtype.type(limit))
+            given = (self._parameters, self._starts, self.blocks, self.dtype.type(STEPS))
             launched(self._loops.cones, self._starts.size, *given)
 
-    def add(self, sums: Any, pixels: Any, most: int, limit: int, work: Work) -> None:
-        """Add the next sample to each pixel; a pixel with k samples takes point k of the sequence.
+    def add(self, sums: Any, plan: Plan, work: Work) -> None:
+        """Add samples to pixels up to their goals; a pixel with k samples takes point k of the sequence.
 
         Copies nothing back and does not wait for the GPU.
 
         Parameters
         ----------
-        sums : device array, shape (height * width, 6)
+        sums : device array, shape (height * width * CHANNELS,)
             Sums of the picture, changed in place.
-        pixels : device array of int32
-            Distinct pixels, ``y << 16 | x``; negative entries are skipped.
-        most : int
-            Upper bound of the samples that any pixel has.
-        limit : int
-            Steps per ray.
+        plan : Plan
+            Pixels to sample.
         work : Work
-            Cancellation, checked before the launch.
+            Cancellation, checked before each launch.
 
         Raises
         ------
         Cancelled
             If the work was cancelled.
         """
-        work.check()
-        if len(self._points) <= most:
-            self._points = self._cuda.to_device(self.samples.points(2 * most + 64, self.frame.samples))
-        film = (pixels, sums, self.width, self.dtype.type(limit), self.blocks)
-        launched(self._loops.tile, pixels.size, self._parameters, self._points, self._starts, *film)
+        if len(self._points) < plan.last:
+            drawn = self.samples.points(2 * plan.last, self.frame.samples)
+            self._points = self._cuda.to_device(drawn)
+        film = (plan.pixels, sums, self.width, self.dtype.type(STEPS), self.blocks)
+        for _ in range((plan.last + 1) // 2):  # a goal is at most twice a count
+            work.check()
+            launched(self._loops.tile, plan.pixels.size, self._parameters, self._points, self._starts, *film)

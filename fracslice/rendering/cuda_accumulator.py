@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from copy import copy
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,8 +12,7 @@ from ..formulas.field import Precision
 from ..kernel.cuda import launched, load_loops, require
 from ..kernel.linker import Linked
 from ..scene.view import Film
-from .accumulator import FEW, NEARLY, TRUSTED, HostAccumulator, first_passes
-from .cpu import ordered
+from .accumulator import FEW, NEARLY, TRUSTED, HostAccumulator, Plan, ordered
 from .cuda_accumulator_loops import LOOPS
 
 PARTS = 8192
@@ -47,28 +44,10 @@ class CudaAccumulator:
         precision: Precision = "float32" if self.dtype == np.float32 else "float64"
         self._loops = load_loops(Linked("", np.zeros(1)), precision, LOOPS)
         self.sums = cuda.to_device(start.sums)
-        self._first_passes = lru_cache(maxsize=4)(self._sent)
         self._order = cuda.to_device(ordered(self.width, self.height))
-        self._pixels = cuda.device_array(pixels, np.int32)
         self._squares, self._gains = (cuda.device_array(pixels, self.dtype) for _ in range(2))
         self._parts = cuda.device_array((min(PARTS, pixels), 3), self.dtype)
         self._shown = cuda.device_array((pixels, 3), np.uint8)
-
-    @classmethod
-    def of(cls, other: HostAccumulator) -> CudaAccumulator:
-        """Copy a host accumulator to the GPU.
-
-        Parameters
-        ----------
-        other : HostAccumulator
-            The picture.
-
-        Returns
-        -------
-        CudaAccumulator
-            The copy.
-        """
-        return cls(other)
 
     def anew(self, coarse: int) -> CudaAccumulator:
         """Return an empty accumulator in the same memory; this one becomes invalid.
@@ -85,46 +64,43 @@ class CudaAccumulator:
         """
         fresh = copy(self)
         fresh.passes, fresh.coarse, self.passes = 0, coarse, GONE
-        launched(self._loops.clear, len(self.sums), self.sums)
+        launched(self._loops.clear, self.sums.size, self.sums)
         return fresh
 
     def host(self) -> HostAccumulator:
         """Return a copy in host memory; see `Accumulator.host`."""
         return HostAccumulator(self.width, self.height, self.sums.copy_to_host(), self.passes, self.coarse)
 
-    def _sent(self, coarse: int) -> list[Any]:
-        """The pixels of `first_passes`, on the GPU."""
-        return [self._cuda.to_device(pixels) for pixels in first_passes(self.width, self.height, coarse)]
-
     def _summed(self, loop: Any, *arguments: Any) -> np.ndarray:
-        """Run a kernel over the partial sums and return their total, float64 [3]."""
+        """Run a kernel over the partial sums and return them, float64 [threads, 3]."""
         launched(loop, len(self._parts), *arguments)
-        total: np.ndarray = self._parts.copy_to_host().sum(0, dtype=np.float64)
-        return total
+        return np.asarray(self._parts.copy_to_host(), np.float64)
 
     def statistics(self) -> tuple[float, float]:
         """Return the statistics of the picture; see `Accumulator.statistics`."""
-        total, known, samples = self._summed(self._loops.measure, self.sums, self._squares, self._parts)
+        parts = self._summed(self._loops.measure, self.sums, self._squares, self._parts)
+        total, known, samples = parts.sum(0)
         return samples / (self.width * self.height), math.sqrt(total / known) if known else math.inf
 
-    def wanted(self, most: int, tolerance: float) -> tuple[Any, int]:
-        """Select the pixels of the next pass, -1 for none; see `Accumulator.wanted`."""
-        first = self._first_passes(self.coarse)
-        if self.passes < len(first):
-            return first[self.passes], first[self.passes].size
+    def plan(self, most: int, tolerance: float) -> Plan:
+        """Set the goals of the next pass; see `Accumulator.plan`."""
+        if self.passes < 2:
+            step = self.coarse if self.passes == 0 else 1
+            plan = self._plan(self._loops.grid, self.sums, self._parts, self.width, step)
+            if plan.samples:
+                return plan
         self.statistics()
         real = self.dtype.type
         judged = (self.sums, self._squares, self._gains, self._parts, self.width)
         limits = (real(TRUSTED), real(most), real(tolerance * tolerance))
-        total, unfinished, _ = self._summed(self._loops.judge, *judged, *limits)
+        total, unfinished, _ = self._summed(self._loops.judge, *judged, *limits).sum(0)
         least = real(NEARLY * total / unfinished if unfinished > FEW * self.width * self.height else 0.0)
-        chosen = (self._gains, self._order, self._pixels, self._parts, self.width, least)
-        return self._pixels, int(self._summed(self._loops.choose, *chosen)[0])
+        return self._plan(self._loops.choose, self.sums, self._gains, self._parts, real(most), least)
 
-    def receive(self, pixels: Any, add: Callable[[Any], None]) -> None:
-        """Run a pass and add its samples; see `Accumulator.receive`."""
-        add(self.sums)
-        self.passes += 1
+    def _plan(self, loop: Any, *arguments: Any) -> Plan:
+        """Run a kernel that sets goals. All pixels are passed on: a thread skips those at their goals."""
+        left, last, _ = self._summed(loop, *arguments).T
+        return Plan(self._order, int(left.sum()), int(last.max()))
 
     def shown(self, film: Film, mode: str) -> np.ndarray:
         """Develop the picture, on the host if it has bloom; see `Accumulator.shown`."""

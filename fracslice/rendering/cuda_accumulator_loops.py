@@ -1,13 +1,15 @@
-"""CUDA kernels of the accumulator: statistics, pixel selection, development.
+"""CUDA kernels of the accumulator: statistics, goals, development.
 
-A holds the sums of the picture, shape (pixels, CHANNELS). T holds partial sums, one row per thread; thread b
+A holds the sums of the picture, CHANNELS per pixel. T holds partial sums, one row per thread; thread b
 handles every pixel whose index is b modulo the number of rows, so that the sums are deterministic.
 """
 
 from __future__ import annotations
 
-from ..formulas.vocabulary import exp, log, maximum, minimum
+from ..formulas.vocabulary import maximum, minimum
 from ..kernel.cuda_stubs import device, divide, kernel, real, thread, whole
+from .accumulator import CHANNELS, COUNT, GOAL
+from .units.pixel import UNKNOWN, encoded, filmic, reinhard, squared_error
 
 
 @kernel
@@ -16,13 +18,44 @@ def clear(A):
 
     Parameters
     ----------
-    A : array of real, shape (pixels, CHANNELS)
+    A : array of real
         Sums of the picture, written.
     """
     k = thread()
-    if k < A.shape[0]:
-        for c in range(A.shape[1]):
-            A[k, c] = real(0)
+    if k < A.size:
+        A[k] = real(0)
+
+
+@kernel
+def grid(A, T, width, step):
+    """Set the goals of a grid of pixels to one sample.
+
+    Parameters
+    ----------
+    A : array of real
+        Sums of the picture; goals are written.
+    T : array of real, shape (threads, 3)
+        Partial sums, written: samples to take, largest goal.
+    width : int
+        Picture width, pixels.
+    step : int
+        Grid spacing, pixels.
+    """
+    b = thread()
+    if b < T.shape[0]:
+        left, last = real(0), real(0)
+        k = b
+        while k * CHANNELS < A.size:
+            row = k // width
+            column = k - row * width
+            a = k * CHANNELS
+            if row % step == 0 and column % step == 0:
+                A[a + GOAL] = maximum(A[a + GOAL], real(1))
+            left += A[a + GOAL] - A[a + COUNT]
+            last = maximum(last, A[a + GOAL])
+            k += T.shape[0]
+        T[b, 0] = left
+        T[b, 1] = last
 
 
 @kernel
@@ -31,10 +64,10 @@ def measure(A, E, T):
 
     Parameters
     ----------
-    A : array of real, shape (pixels, CHANNELS)
+    A : array of real
         Sums of the picture.
     E : array of real, shape (pixels,)
-        Squared errors, written; 1e30 below 2 samples.
+        Squared errors, written; `UNKNOWN` below 2 samples.
     T : array of real, shape (threads, 3)
         Partial sums, written: squared error, pixels with a known error, samples.
     """
@@ -43,13 +76,11 @@ def measure(A, E, T):
         total, known, samples = real(0), real(0), real(0)
         k = b
         while k < E.size:
-            n = A[k, 5]
-            E[k] = real(1e30)
+            a = k * CHANNELS
+            n = A[a + COUNT]
+            E[k] = squared_error(A[a + 3], A[a + 4], n)
             samples += n
             if n >= real(2):
-                mean = divide(A[k, 3], n)
-                spread = maximum(divide(A[k, 4], n) - mean * mean, real(0))
-                E[k] = divide(spread, n - real(1))
                 total += E[k]
                 known += real(1)
             k += T.shape[0]
@@ -64,12 +95,12 @@ def judge(A, E, G, T, width, trusted, most, tolerance):
 
     Parameters
     ----------
-    A : array of real, shape (pixels, CHANNELS)
+    A : array of real
         Sums of the picture.
     E : array of real, shape (pixels,)
         Squared errors.
     G : array of real, shape (pixels,)
-        Gains, written: 1e30 for a pixel that must be sampled, -1 for a finished one.
+        Gains, written: -1 for a finished pixel.
     T : array of real, shape (threads, 3)
         Partial sums, written: gain, unfinished pixels.
     width : int
@@ -93,51 +124,56 @@ def judge(A, E, G, T, width, trusted, most, tolerance):
             for y in range(max(row - 1, 0), min(row + 2, height)):
                 for x in range(max(column - 1, 0), min(column + 2, width)):
                     near = y * width + x
-                    square = E[near] if A[near, 5] >= trusted else real(1e30)
+                    n = A[near * CHANNELS + COUNT]
+                    square = E[near] if n >= trusted else real(UNKNOWN)
                     worst = maximum(worst, square)
-                    gain = maximum(gain, divide(square, A[near, 5]))
-            n = whole(A[k, 5])
+                    gain = maximum(gain, divide(square, n))
             G[k] = real(-1)
-            if A[k, 5] < most and worst > tolerance:
+            if A[k * CHANNELS + COUNT] < most and worst > tolerance:
                 total += gain
                 unfinished += real(1)
-                G[k] = gain if n & (n - 1) == 0 else real(1e30)
+                G[k] = gain
             k += T.shape[0]
         T[b, 0] = total
         T[b, 1] = unfinished
 
 
 @kernel
-def choose(G, order, pixels, T, width, least):
-    """Select the pixels whose gain is at least `least`.
+def choose(A, G, T, most, least):
+    """Set the goals of the pixels whose gain is at least `least`.
 
     Parameters
     ----------
+    A : array of real
+        Sums of the picture; goals are written.
     G : array of real, shape (pixels,)
         Gains.
-    order : array of int32, shape (pixels,)
-        All pixels, ``y << 16 | x``, in tile order.
-    pixels : array of int32, shape (pixels,)
-        Selection, written: the pixel, or -1.
     T : array of real, shape (threads, 3)
-        Partial sums, written: selected pixels.
-    width : int
-        Picture width, pixels.
+        Partial sums, written: samples to take, largest goal.
+    most : real
+        Maximum samples per pixel.
     least : real
         Smallest gain.
     """
     b = thread()
     if b < T.shape[0]:
-        chosen = real(0)
+        left, last = real(0), real(0)
         k = b
-        while k < pixels.size:
-            pixel = order[k]
-            pixels[k] = -1
-            if G[(pixel >> 16) * width + (pixel & 65535)] >= least:
-                pixels[k] = pixel
-                chosen += real(1)
+        while k < G.size:
+            a = k * CHANNELS
+            n = A[a + COUNT]
+            goal = n
+            if G[k] >= least:
+                goal = real(1)
+                while goal <= n:
+                    goal = goal + goal
+                goal = minimum(goal, most)
+            A[a + GOAL] = goal
+            left += goal - n
+            last = maximum(last, goal)
             k += T.shape[0]
-        T[b, 0] = chosen
+        T[b, 0] = left
+        T[b, 1] = last
 
 
 @kernel
@@ -146,7 +182,7 @@ def show(A, out, width, coarse, exposure, tone):
 
     Parameters
     ----------
-    A : array of real, shape (pixels, CHANNELS)
+    A : array of real
         Sums of the picture.
     out : array of uint8, shape (pixels, 3)
         sRGB, written.
@@ -163,14 +199,11 @@ def show(A, out, width, coarse, exposure, tone):
     if k < out.shape[0]:
         row = k // width
         column = k - row * width
-        a = (row - row % coarse) * width + column - column % coarse
-        scale = divide(exposure, maximum(A[a, 5], real(1)))
-        r = A[a, 0] * scale
-        g = A[a, 1] * scale
-        b = A[a, 2] * scale
+        a = CHANNELS * ((row - row % coarse) * width + column - column % coarse)
+        scale = divide(exposure, maximum(A[a + COUNT], real(1)))
+        r, g, b = A[a] * scale, A[a + 1] * scale, A[a + 2] * scale
         if tone == 2:
-            y = real(0.2126) * r + real(0.7152) * g + real(0.0722) * b
-            dim = divide(real(1) + y * real(0.0625), real(1) + y)
+            dim = reinhard(r, g, b)
             r, g, b = r * dim, g * dim, b * dim
         if tone == 1:
             r, g, b = filmic(r), filmic(g), filmic(b)
@@ -179,44 +212,6 @@ def show(A, out, width, coarse, exposure, tone):
         out[k, 0] = level(r)
         out[k, 1] = level(g)
         out[k, 2] = level(b)
-
-
-@device
-def filmic(c):
-    """Filmic tone curve of `film.filmic`.
-
-    Parameters
-    ----------
-    c : real
-        Linear light.
-
-    Returns
-    -------
-    real
-        Tone-mapped light.
-    """
-    a = c * real(0.6)
-    return divide(a * (real(2.51) * a + real(0.03)), a * (real(2.43) * a + real(0.59)) + real(0.14))
-
-
-@device
-def encoded(c):
-    """sRGB encoding of `film.encode`.
-
-    Parameters
-    ----------
-    c : real
-        Linear light.
-
-    Returns
-    -------
-    real
-        sRGB in [0, 1].
-    """
-    a = minimum(maximum(c, real(0)), real(1))
-    if a <= real(0.0031308):
-        return a * real(12.92)
-    return real(1.055) * exp(log(a) * real(0.4166666666666667)) - real(0.055)
 
 
 @device
@@ -236,4 +231,4 @@ def level(c):
     return whole(minimum(maximum(c, real(0)), real(1)) * real(255) + real(0.5))
 
 
-LOOPS = clear, measure, judge, choose, show
+LOOPS = clear, grid, measure, judge, choose, show

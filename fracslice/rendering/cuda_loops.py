@@ -5,11 +5,13 @@ They compute the same as the loops of `packets`, with the same names for arrays.
 
 from __future__ import annotations
 
-from ..formulas.vocabulary import maximum, minimum
-from ..kernel.cuda_stubs import device, divide, kernel, real, thread, together, whole
+from ..formulas.vocabulary import maximum
+from ..kernel.cuda_stubs import device, kernel, real, thread, together, whole
 from ..kernel.loops import Loop
+from .accumulator import CHANNELS, COUNT, GOAL
 from .linking import Frame
 from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
+from .units.pixel import brightness, clamped
 from .units.random import centred, sample
 
 
@@ -42,9 +44,9 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
     S : array of real
         Start distance of each block.
     pixels : array of int32
-        Pixels, ``y << 16 | x``; negative entries are skipped.
-    A : array of real, shape (pixels, CHANNELS)
-        Sums of the picture, changed in place.
+        Pixels, ``y << 16 | x``; those at their goals are skipped.
+    A : array of real
+        Sums of the picture, CHANNELS per pixel, changed in place.
     width : int
         Picture width, pixels.
     limit : real
@@ -55,11 +57,12 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
         Linked frame.
     """
     k = thread()
-    if k < pixels.size and pixels[k] >= 0:
-        pixel = whole(pixels[k])
-        column = pixel & 65535
-        row = pixel >> 16
-        q = whole(A[row * width + column, 5])
+    pixel = whole(pixels[min(k, pixels.size - 1)])
+    column = pixel & 65535
+    row = pixel >> 16
+    a = (row * width + column) * CHANNELS
+    if k < pixels.size and A[a + COUNT] < A[a + GOAL]:
+        q = whole(A[a + COUNT])
         px = real(column) + centred(whole(Q[q, 0]), pixel, 0)
         py = real(row) + centred(whole(Q[q, 1]), pixel, 1)
         u, v = (
@@ -105,7 +108,7 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
             start, end = span_box(ox, oy, oz, dx, dy, dz, P)
             if not tr + tg + tb > real(0.002):
                 start = real(1e30)
-        gather(A, row * width + column, r, g, b)
+        gather(A, a, r, g, b)
 
 
 @kernel
@@ -147,38 +150,20 @@ def gather(A, a, r, g, b):
 
     Parameters
     ----------
-    A : array of real, shape (pixels, CHANNELS)
+    A : array of real
         Sums of the picture, changed in place.
     a : int
-        Row-major index of the pixel.
+        Index of the pixel's first sum.
     r, g, b : real
         Linear light.
     """
-    r = tamed(r)
-    g = tamed(g)
-    b = tamed(b)
-    bright = real(0.2126) * r + real(0.7152) * g + real(0.0722) * b
-    bright = divide(bright, real(1.0) + bright)
-    A[a, 0] += r
-    A[a, 1] += g
-    A[a, 2] += b
-    A[a, 3] += bright
-    A[a, 4] += bright * bright
-    A[a, 5] += real(1.0)
-
-
-@device
-def tamed(c):
-    """Clamp light to [0, 1e4]; NaN becomes 0.
-
-    Parameters
-    ----------
-    c : real
-        Linear light.
-
-    Returns
-    -------
-    real
-        The clamped value.
-    """
-    return minimum(maximum(c, real(0.0)), real(1e4)) if c == c else real(0.0)
+    r = clamped(r)
+    g = clamped(g)
+    b = clamped(b)
+    bright = brightness(r, g, b)
+    A[a] += r
+    A[a + 1] += g
+    A[a + 2] += b
+    A[a + 3] += bright
+    A[a + 4] += bright * bright
+    A[a + COUNT] += real(1.0)

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..scene.view import Film
+from ..work import Work, chunks
+from .units.pixel import encoded, filmic, reinhard
 
 BRIGHT = 1.0
 """Bloom threshold, linear light."""
+BAND = 32
+"""Rows of a picture per task."""
 
 
-def develop(image: np.ndarray, film: Film, mode: str = "light") -> np.ndarray:
+def develop(image: np.ndarray, film: Film, mode: str = "light", work: Work | None = None) -> np.ndarray:
     """Convert linear light to display values.
 
     Parameters
@@ -21,6 +25,8 @@ def develop(image: np.ndarray, film: Film, mode: str = "light") -> np.ndarray:
         Exposure, bloom and tone curve.
     mode : str
         `Shading.mode`. Values of modes other than "light" are only clipped to [0, 1].
+    work : Work, optional
+        Threads; one by default.
 
     Returns
     -------
@@ -29,13 +35,39 @@ def develop(image: np.ndarray, film: Film, mode: str = "light") -> np.ndarray:
     """
     if mode != "light":
         return np.asarray(np.clip(image, 0, 1), np.float32)
-    light = np.maximum(image, 0) * np.float32(2.0**film.exposure)
+    light, work = np.maximum(image, 0) * np.float32(2.0**film.exposure), work or Work(1)
     if film.bloom:
-        light = bloomed(light, film.bloom)
-    return encode(TONES[film.tone](light))
+        light = bloomed(light, film.bloom, work)
+
+    def displayed(rows: slice) -> None:
+        part = light[rows]
+        if film.tone == "filmic":
+            part = filmic(part)
+        elif film.tone == "reinhard":
+            part = part * reinhard(*np.moveaxis(part, -1, 0))[..., None]
+        light[rows] = encoded(part)
+
+    work.map(displayed, chunks(len(light), BAND))
+    return np.asarray(light, np.float32)
 
 
-def bloomed(light: np.ndarray, part: float) -> np.ndarray:
+def levels(shown: np.ndarray) -> np.ndarray:
+    """Quantise sRGB in [0, 1] to uint8.
+
+    Parameters
+    ----------
+    shown : ndarray of float32
+        sRGB in [0, 1].
+
+    Returns
+    -------
+    ndarray of uint8
+        Levels of 256.
+    """
+    return np.asarray(shown * np.float32(255) + np.float32(0.5), np.uint8)
+
+
+def bloomed(light: np.ndarray, part: float, work: Work) -> np.ndarray:
     """Add bloom to an image.
 
     Light above `BRIGHT` is spread by four Gaussians of standard deviation 1/256 to 1/32 of the picture's
@@ -47,6 +79,8 @@ def bloomed(light: np.ndarray, part: float) -> np.ndarray:
         Linear light.
     part : float
         Fraction of the bright light that is spread.
+    work : Work
+        Threads.
 
     Returns
     -------
@@ -56,76 +90,7 @@ def bloomed(light: np.ndarray, part: float) -> np.ndarray:
     from scipy.ndimage import gaussian_filter
 
     bright = np.maximum(light - BRIGHT, 0)
-    widths = [light.shape[0] / d for d in (256, 128, 64, 32)]
-    halo = sum(gaussian_filter(bright, (w, w, 0), mode="constant") for w in widths) / len(widths)
+    spread = [(channel, light.shape[0] / d) for d in (256, 128, 64, 32) for channel in range(3)]
+    halos = work.collect(lambda s: gaussian_filter(bright[..., s[0]], s[1], mode="constant"), spread)
+    halo = sum(np.stack(halos[k : k + 3], -1) for k in range(0, len(halos), 3)) / (len(halos) // 3)
     return np.asarray(light + part * (halo - bright), np.float32)
-
-
-def filmic(light: np.ndarray) -> np.ndarray:
-    """Filmic tone curve: contrast with soft shoulders (Narkowicz 2016, "ACES Filmic Tone Mapping Curve").
-
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        Tone-mapped light.
-    """
-    a = light * np.float32(0.6)
-    return np.asarray(a * (2.51 * a + 0.03) / (a * (2.43 * a + 0.59) + 0.14), np.float32)
-
-
-def reinhard(light: np.ndarray) -> np.ndarray:
-    """Luminance tone curve with white at 4; bright colours keep their hue (Reinhard et al. 2002).
-
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        Tone-mapped light.
-    """
-    y = (light * np.array([0.2126, 0.7152, 0.0722], np.float32)).sum(-1)
-    return np.asarray(light * ((1 + y / 16) / (1 + y))[..., None], np.float32)
-
-
-def plain(light: np.ndarray) -> np.ndarray:
-    """Identity tone curve; `encode` clips the result at white.
-
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        The same array.
-    """
-    return light
-
-
-TONES = {"filmic": filmic, "reinhard": reinhard, "none": plain}
-
-
-def encode(light: np.ndarray) -> np.ndarray:
-    """Encode linear light as sRGB (IEC 61966-2-1).
-
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light, clipped to [0, 1].
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        sRGB in [0, 1].
-    """
-    a = np.clip(light, 0, 1)
-    return np.asarray(np.where(a <= 0.0031308, a * 12.92, 1.055 * a ** (1 / 2.4) - 0.055), np.float32)

@@ -15,18 +15,18 @@ import numpy as np
 
 from ..formulas.registry import Fixed, Node
 from ..kernel import language
-from ..kernel.linker import Linked, Linker
+from ..kernel.linker import FieldDialect, Linked, Linker
+from ..kernel.structure import link_tree
 from ..scene.view import Camera, Light, View
-from .colours import Look, linear
+from .colours import Look, linear, opaque_part
 from .optics import Optics
 from .units import camera as cameras
 from .units import lights, march, shade
-from .units.intrinsics import GIVEN, background, surface
+from .units.intrinsics import GIVEN, background, blocker, surface
 from .units.normal import normal
 
-RELAX = 1.4
-"""Over-relaxation factor. Evaluations per frame of the Mandelbulb: 8.1 M at 1.0, 6.0 M at 1.4, 8.4 M at
-1.7."""
+PATIENCE = 800
+"""Maximum steps of a shadow ray."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class _Frame:
         self.linker.bind("span_box", march.span, {"lo": lo, "hi": hi})
         widest = 1.4143 * self.block * seen.cone * 1.02
         width = {"cone": seen.cone, "least": seen.least}
-        stepping = {"steepness": steepness, "relax": RELAX, **width, "glass": Fixed(self.inside)}
+        stepping = {"steepness": steepness, **width, "glass": Fixed(self.inside)}
         self.linker.bind("step_ray", march.advance, stepping)
         self.linker.bind("step_cone", march.widen, {"steepness": steepness, "spread": widest})
         self.linker.bind("width_at", _width, width)
@@ -198,11 +198,21 @@ class _Frame:
         lines += ["r = ambient * cr", "g = ambient * cg", "b = ambient * cb"]
         if any(light.shadows == "yes" for light in self.view.lights):
             steepness = 1 / self.root.bounds.lipschitz
-            self.linker.bind("visible_", march.visible, {"steepness": steepness, "patience": 200})
+            self.linker.bind("visible_", march.visible, {"steepness": steepness, "patience": PATIENCE})
+            self.linker.functions["blocker"] = self.blocker()
             lines += [f"s{a} = {a} + 3.0 * h * n{a}" for a in "xyz"]
         for k, light in enumerate(self.view.lights):
             lines += self.sky(light) if light.kind == "sky" else self.light(k, light)
         return lines
+
+    def blocker(self) -> str:
+        """Source of `units.intrinsics.blocker`."""
+        opaque = opaque_part(self.root)
+        if opaque is self.root:
+            return text_of(blocker, ["return field(x, y, z, P)"])
+        if opaque is None:
+            return text_of(blocker, ["return 0.0 * x + 1.0"])
+        return text_of(blocker, [f"return {link_tree(self.linker, opaque, FieldDialect(self.linker))}"])
 
     def light(self, k: int, light: Light) -> list[str]:
         """Lines for one sun or lamp."""
@@ -216,7 +226,7 @@ class _Frame:
         ]
         if light.shadows == "yes":
             lines.append(
-                "power = power * visible_(sx, sy, sz, lx, ly, lz, where(diffuse > 0.0, far, 0.0), 0.5 * h, P)"
+                "power = power * visible_(sx, sy, sz, lx, ly, lz, where(diffuse > 0.0, far, 0.0), h, P)"
             )
         return lines + [
             f"{c} = {c} + power * {s} * (diffuse * c{c} + gloss)" for c, s in zip("rgb", colour, strict=True)
@@ -246,7 +256,7 @@ class _Frame:
             lines = [
                 f"lx, ly, lz = upward(nx, ny, nz, {u}, {v})",
                 "kr, kg, kb = sky_(lx, ly, lz, P)",
-                f"open = visible_(sx, sy, sz, lx, ly, lz, {far} + 0.0 * t, 0.5 * h, P)",
+                f"open = visible_(sx, sy, sz, lx, ly, lz, {far} + 0.0 * t, h, P)",
             ]
         return lines + [f"{c} = {c} + open * k{c} * c{c}" for c in "rgb"]
 

@@ -20,8 +20,10 @@ from enum import IntEnum
 from ..formulas.vocabulary import any_of, where
 from ..kernel.intrinsics import WIDTH, load, store
 from ..kernel.loops import Loop, loop
+from .accumulator import CHANNELS, COUNT, GOAL
 from .linking import Frame
 from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
+from .units.pixel import brightness, clamped
 from .units.random import centred, sample
 
 Row = IntEnum("Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb px py", start=0)
@@ -38,9 +40,6 @@ Row = IntEnum("Row", "ox oy oz dx dy dz start end side path t steps status r g b
 """
 Lane = IntEnum("Lane", "ox oy oz dx dy dz start end side path t steps done before stride", start=0)
 """State of a ray in a packet. The first ten entries are those of `Row`."""
-
-CHANNELS = 6
-"""Numbers per pixel: sums of red, green, blue, displayed brightness and its square, and the sample count."""
 
 
 def loops(frame: Frame) -> tuple[Loop, ...]:
@@ -77,9 +76,9 @@ def workspace(frame: Frame, rays: int) -> int:
     return (Row.px + frame.samples) * rays
 
 
-@loop("rirrriirnnnnn")
-def tile(P, Q, S, W, L, rays, pixels, A, n, m, width, limit, blocks, frame):
-    """Add the next sample to each of n pixels.
+@loop("rirrriirnnnn")
+def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, blocks, frame):
+    """Add samples to each of n pixels up to their goals.
 
     Parameters
     ----------
@@ -88,11 +87,11 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, m, width, limit, blocks, frame):
     W, L, rays : pointer to float, pointer to float, pointer to int32
         Workspace, lanes, ray of each lane.
     pixels : pointer to int32
-        Pixels, ``y << 16 | x``.
+        Pixels, ``y << 16 | x``, below their goals; overwritten.
     A : pointer to float
         Sums of the picture, `CHANNELS` per pixel.
-    n, m : int
-        Pixels, and numbers per row of W.
+    n : int
+        Pixels.
     width : int
         Picture width, pixels.
     limit : int
@@ -102,16 +101,47 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, m, width, limit, blocks, frame):
     frame : Frame
         Linked frame.
     """
-    draw(W, Q, pixels, A, n, m, width, frame)
-    begin(W, m, P, frame)
+    left = n
+    while left > 0:
+        m = (left + WIDTH - 1) // WIDTH * WIDTH
+        draw(W, Q, pixels, A, left, m, width, frame)
+        begin(W, m, P, frame)
+        for k in range(left):
+            pixel = pixels[k]
+            early = S[(pixel >> 16 + frame.shift) * blocks + ((pixel & 65535) >> frame.shift)]
+            W[Row.start * m + k] = max(W[Row.start * m + k], early)
+        for bounce in range(frame.bounces + 1):
+            follow(W, L, rays, left, m, limit, P, step_ray)
+            shade(W, m, Row.px + frame.camera_samples + bounce * frame.bounce_samples, P, frame)
+        gather(W, pixels, A, left, m, width)
+        left = unfinished(pixels, A, left, width)
+
+
+def unfinished(pixels, A, n, width):
+    """Move the pixels below their goals to the front.
+
+    Parameters
+    ----------
+    pixels : pointer to int32
+        Pixels, changed in place.
+    A : pointer to float
+        Sums of the picture.
+    n, width : int
+        Pixels, and picture width.
+
+    Returns
+    -------
+    int
+        Their number.
+    """
+    kept = 0
     for k in range(n):
         pixel = pixels[k]
-        early = S[(pixel >> 16 + frame.shift) * blocks + ((pixel & 65535) >> frame.shift)]
-        W[Row.start * m + k] = max(W[Row.start * m + k], early)
-    for bounce in range(frame.bounces + 1):
-        follow(W, L, rays, n, m, limit, P, step_ray)
-        shade(W, m, Row.px + frame.camera_samples + bounce * frame.bounce_samples, P, frame)
-    gather(W, pixels, A, n, m, width)
+        a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
+        if A[a + COUNT] < A[a + GOAL]:
+            pixels[kept] = pixel
+            kept += 1
+    return kept
 
 
 @loop("rrirrinnnn")
@@ -207,7 +237,7 @@ def draw(W, Q, pixels, A, n, m, width, frame):
     """
     for k in range(m):
         pixel = pixels[min(k, n - 1)]
-        q = frame.samples * int(A[CHANNELS * ((pixel >> 16) * width + (pixel & 65535)) + 5])
+        q = frame.samples * int(A[CHANNELS * ((pixel >> 16) * width + (pixel & 65535)) + COUNT])
         W[Row.px * m + k] = (pixel & 65535) + centred(Q[q], pixel, 0)
         W[Row.py * m + k] = (pixel >> 16) + centred(Q[q + 1], pixel, 1)
         for d in range(2, frame.samples):
@@ -483,33 +513,18 @@ def gather(W, pixels, A, n, m, width):
     n, m, width : int
         Pixels, numbers per row of W, picture width.
     """
+    for i in range(0, m, WIDTH):
+        r, g, b = load_vector(W, Row.r, m, i)
+        r, g, b = clamped(r), clamped(g), clamped(b)
+        store_vector(W, Row.r, m, i, r, g, b)
+        store(W, Row.t * m + i, brightness(r, g, b))
     for k in range(n):
         pixel = pixels[k]
         a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
-        r = tamed(W[Row.r * m + k])
-        g = tamed(W[Row.g * m + k])
-        b = tamed(W[Row.b * m + k])
-        bright = 0.2126 * r + 0.7152 * g + 0.0722 * b
-        bright = bright / (1.0 + bright)
-        A[a] += r
-        A[a + 1] += g
-        A[a + 2] += b
+        bright = W[Row.t * m + k]
+        A[a] += W[Row.r * m + k]
+        A[a + 1] += W[Row.g * m + k]
+        A[a + 2] += W[Row.b * m + k]
         A[a + 3] += bright
         A[a + 4] += bright * bright
-        A[a + 5] += 1.0
-
-
-def tamed(c):
-    """Clamp light to [0, 1e4]; NaN becomes 0.
-
-    Parameters
-    ----------
-    c : float
-        Linear light.
-
-    Returns
-    -------
-    float
-        The clamped value.
-    """
-    return min(max(c, 0.0), 1e4) if c == c else 0.0
+        A[a + COUNT] += 1.0

@@ -16,24 +16,25 @@ from ..scene.reader import reads
 from ..scene.view import View
 from ..scene.writer import to_xml
 from ..work import Work
-from .accumulator import places_of
+from .accumulator import CHANNELS, Plan
 from .cpu import CpuTracer
 from .linking import Frame
+from .sequence import Samples
 
 if TYPE_CHECKING:
     from ..cluster import Pieces
     from .progressive import Renderer
 
-PIXELS = 1 << 16
+PIXELS = 1 << 14
 """Pixels of a task."""
 
-SUMS, INPUT = 6, "input"
-"""Sums of a pixel; name of the file with the pixels of a pass and their sums."""
+INPUT = "input"
+"""Name of the file with the pixels of a pass and their sums."""
 
 
 @dataclass(frozen=True)
 class PartTask:
-    """One sample more for some pixels of a pass.
+    """Samples of some pixels of a pass.
 
     Attributes
     ----------
@@ -49,8 +50,12 @@ class PartTask:
         Key of the pass: its frame, pixels and sums.
     frame : str
         Key of the linked frame.
-    number, limit : int
-        Number of the pass, and steps per ray.
+    number : int
+        Number of the pass.
+    ahead : bool
+        True if the cone prepass was run.
+    last : int
+        Largest goal of a pixel.
     start, end, count : int
         Pixels of this part, and of the pass.
     """
@@ -62,7 +67,8 @@ class PartTask:
     job: str
     frame: str
     number: int
-    limit: int
+    ahead: bool
+    last: int
     start: int
     end: int
     count: int
@@ -75,16 +81,16 @@ class PartTask:
     def make(self, work: Work) -> bytes:
         """Sums of the pixels after the pass; see `Task.make`."""
         of = _renderer(self.scene, self.size)
-        of.aim(self.number, self.limit)
+        of.prepare(self.ahead)
         if of.dtype.name != self.dtype or frame_key(of.tracer.frame) != self.frame:
             raise ClusterError("the frame linked here is another than that of the job")
         width, dtype = 4 * self.count, of.dtype
         pixels = np.frombuffer(self._input(4 * self.start, 4 * self.end), np.int32)
-        row = SUMS * dtype.itemsize
+        row = CHANNELS * dtype.itemsize
         data = self._input(width + row * self.start, width + row * self.end)
-        sums, places = np.zeros((self.size[0] * self.size[1], SUMS), dtype), places_of(pixels, self.size[0])
-        sums[places] = np.frombuffer(data, dtype).reshape(-1, SUMS)
-        of.tracer.add(sums, pixels, self.number, self.limit, work)
+        sums, places = np.zeros((self.size[0] * self.size[1], CHANNELS), dtype), _places(pixels, self.size)
+        sums[places] = np.frombuffer(data, dtype).reshape(-1, CHANNELS)
+        of.tracer.add(sums.reshape(-1), Plan(pixels, len(pixels), self.last), work)
         return bytes(sums[places].tobytes())
 
     def _input(self, start: int, end: int) -> bytes:
@@ -121,11 +127,17 @@ class PoolTracer:
 
     def __init__(self, root: Node, view: View, tracer: CpuTracer) -> None:
         self.scene, self.tracer = to_xml(Scene(root, 1.0, view=view)), tracer
+        self._passes, self._ahead = 0, False
 
     @property
     def frame(self) -> Frame:
         """The frame."""
         return self.tracer.frame
+
+    @property
+    def samples(self) -> Samples:
+        """Part of the sequence."""
+        return self.tracer.samples
 
     def aim(self, frame: Frame) -> None:
         """Load another frame; see `CpuTracer.aim`.
@@ -136,48 +148,52 @@ class PoolTracer:
             Linked frame.
         """
         self.tracer.aim(frame)
+        self._ahead = False
 
-    def look_ahead(self, limit: int, work: Work) -> None:
+    def look_ahead(self, work: Work) -> None:
         """Leave the cone prepass to the workers.
 
         Parameters
         ----------
-        limit : int
-            Steps per cone.
         work : Work
             Threads and cancellation.
         """
+        self._ahead = True
 
-    def add(self, sums: np.ndarray, pixels: np.ndarray, most: int, limit: int, work: Work) -> None:
-        """Add the next sample to each pixel; see `CpuTracer.add`.
+    def add(self, sums: np.ndarray, plan: Plan, work: Work) -> None:
+        """Add samples to pixels up to their goals; see `CpuTracer.add`.
 
         Parameters
         ----------
-        sums : ndarray, shape (height * width, 6)
+        sums : ndarray, shape (height * width * CHANNELS,)
             Sums of the picture, changed in place.
-        pixels : ndarray of int32
-            Distinct pixels, ``y << 16 | x``.
-        most : int
-            Number of the pass.
-        limit : int
-            Steps per ray.
+        plan : Plan
+            Pixels to sample.
         work : Work
             Pool and cancellation.
         """
         pool, size = work.cluster, (self.tracer.width, self.tracer.height)
         assert pool is not None
-        places, frame, count = places_of(pixels, size[0]), frame_key(self.frame), len(pixels)
-        known = np.ascontiguousarray(pixels), sums[places]
-        job = key(frame, size, most, limit, *known)
-        about = self.scene, size, sums.dtype.name, pool.pieces, job, frame, most, limit
+        state, places = sums.reshape(-1, CHANNELS), _places(plan.pixels, size)
+        frame, count = frame_key(self.frame), len(plan.pixels)
+        known = np.ascontiguousarray(plan.pixels), state[places]
+        job = key(frame, size, self._ahead, *known)
+        of = self.scene, size, sums.dtype.name, pool.pieces, job, frame
+        about = *of, self._passes, self._ahead, plan.last
         tasks = [
             PartTask(*about, start, min(start + PIXELS, count), count) for start in range(0, count, PIXELS)
         ]
         pool.pieces.write(job, INPUT, b"".join(part.tobytes() for part in known))
         parts = pool.results(tasks, work)
         for task, data in zip(tasks, parts, strict=True):
-            sums[places[task.start : task.end]] = np.frombuffer(data, sums.dtype).reshape(-1, SUMS)
+            state[places[task.start : task.end]] = np.frombuffer(data, sums.dtype).reshape(-1, CHANNELS)
         pool.finished(job)
+        self._passes += 1
+
+
+def _places(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Row-major indices of pixels ``y << 16 | x``."""
+    return np.asarray((pixels >> 16).astype(np.intp) * size[0] + (pixels & 65535))
 
 
 _OWN = threading.local()
@@ -191,5 +207,5 @@ def _renderer(scene: str, size: tuple[int, int]) -> Renderer:
         read = reads(scene)
         _OWN.renderer = Renderer(read.root, read.view, size, Work(threads=1), "cpu")
         _OWN.of = scene, size
-    found: Renderer = _OWN.renderer
-    return found
+    renderer: Renderer = _OWN.renderer
+    return renderer

@@ -18,16 +18,15 @@ from ..kernel.devices import chosen
 from ..keys import key, program
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import COARSE, Accumulator, HostAccumulator
+from .accumulator import COARSE, Accumulator, HostAccumulator, Plan
 from .cpu import BLOCK, CpuTracer
 from .linking import Frame, link_frame
 from .optics import optics
 from .parts import PoolTracer
 from .sequence import Samples
-from .setup import RenderSetup, prepare
+from .setup import prepare
+from .state import load_state, save_state
 
-STEPS, GROWTH, GROWN = 160, 10, 16
-"""Step limit of a ray in the first pass. It grows linearly by a factor of GROWTH over GROWN passes."""
 PREVIEWS = (1, 2, 4, 8)
 """Allowed grid spacings, in pixels, of the first pass after a camera move."""
 TOLERANCE = 0.002
@@ -50,7 +49,7 @@ class Pass:
     error : float
         Root mean square of the pixels' standard errors, in displayed brightness.
     active : float
-        Fraction of the pixels sampled in this pass.
+        Samples of this pass per pixel of the picture.
     rate : float
         Samples per second.
     film : Film
@@ -102,23 +101,39 @@ class Pass:
         """
         return self._current().shown(self.film, self.mode)
 
+    @cached_property
+    def developed(self) -> np.ndarray:
+        """Developed picture in floats.
+
+        Returns
+        -------
+        ndarray of float32, shape (height, width, 3)
+            sRGB in [0, 1].
+
+        Raises
+        ------
+        RenderError
+            If a later pass has replaced this picture.
+        """
+        return self._current().host().developed(self.film, self.mode)
+
     def _current(self) -> Accumulator:
         """The accumulator, if it still holds this pass."""
         if self.source.passes != self.number:
             raise RenderError(
-                f"pass {self.number}: its picture is gone, pass {self.source.passes} is over it"
+                f"pass {self.number}: its picture was replaced by that of pass {self.source.passes}"
             )
         return self.source
 
 
-def _machinery(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator], Accumulator]]:
+def _backend(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator], Accumulator]]:
     """The tracer and the accumulator factory of a device."""
     if device == "cpu":
-        return CpuTracer, HostAccumulator.of
+        return CpuTracer, HostAccumulator.host
     from .cuda import CudaTracer
     from .cuda_accumulator import CudaAccumulator
 
-    return CudaTracer, CudaAccumulator.of
+    return CudaTracer, CudaAccumulator
 
 
 class Renderer:
@@ -164,19 +179,21 @@ class Renderer:
         self.device = chosen(device if self.work.cluster is None else "cpu")
         self.setup = prepare(root, view, (self.width, self.height))
         self.dtype = np.dtype(self.setup.precision)
-        tracer, self._kept = _machinery(self.device)
-        self.tracer = tracer(self._frame(0), self.dtype, self.width, self.height)
+        tracer, self._placed = _backend(self.device)
+        self._frame = self._linked()
+        self.tracer = tracer(self._frame, self.dtype, self.width, self.height)
         self.tracer.samples = samples or self.tracer.samples
         if self.work.cluster is not None:
             self.tracer = PoolTracer(root, view, self.tracer)
-        self.accumulator = self._kept(self._empty)
-        self._aimed: tuple[Node, bool] | None = None
+        self.accumulator = self._placed(self._empty)
+        self._prepared = False
         self._rate = 0.0
 
     @property
     def _empty(self) -> HostAccumulator:
         """A host accumulator without samples."""
-        return HostAccumulator.empty(self.width, self.height, self.dtype, work=self.work)
+        work = Work(self.work.threads)  # not cancelled with the passes
+        return HostAccumulator.empty(self.width, self.height, self.dtype, work=work)
 
     @property
     def key(self) -> str:
@@ -187,10 +204,9 @@ class Renderer:
         str
             Equal keys mean equal pictures after equal passes.
         """
-        what: RenderSetup = self.setup
-        frames = [self._frame(k).linked for k in range(len(what.roots))]
-        parts = [part for frame in frames for part in (frame.source, frame.parameters)]
-        return key(program(), self.width, self.height, what.precision, self.tracer.samples, *parts)
+        linked, samples = self._frame.linked, self.tracer.samples
+        about = self.width, self.height, self.setup.precision, samples
+        return key(program(), *about, linked.source, linked.parameters)
 
     def look(self, camera: Camera, within: float | None = None) -> None:
         """Restart the picture from another camera; depths and precision are kept.
@@ -206,10 +222,11 @@ class Renderer:
             Time budget of the first pass, seconds. Its grid is the finest that fits, judged by the rate of
             earlier passes.
         """
-        what = self.setup
-        seen = optics(camera, (self.width, self.height), what.roots[-1], what.optics.least)
-        self.setup = replace(what, camera=camera, optics=seen)
-        self._aimed = None
+        setup = self.setup
+        seen = optics(camera, (self.width, self.height), setup.root, setup.optics.least)
+        self.setup = replace(setup, camera=camera, optics=seen)
+        self._frame, self._prepared = self._linked(), False
+        self.tracer.aim(self._frame)
         self.accumulator = self.accumulator.anew(COARSE if within is None else self._affordable(within))
 
     def _affordable(self, within: float) -> int:
@@ -227,7 +244,7 @@ class Renderer:
         file : BinaryIO
             Writable binary file.
         """
-        self.accumulator.host().save(file, self.key)
+        save_state(file, self.key, self.accumulator.host())
 
     def resume(self, path: str | Path) -> None:
         """Continue from a file written by `save`.
@@ -242,13 +259,13 @@ class Renderer:
         RenderError
             If the file belongs to another picture or is damaged.
         """
-        self.accumulator = self._kept(HostAccumulator.load(path, self.key, self._empty))
+        self.accumulator = self._placed(load_state(path, self.key, self._empty))
 
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
         """Yield the picture after every pass until all pixels have converged.
 
         A pixel is finished when it has `samples` samples or its error is within `tolerance`. The first pass
-        samples one pixel in 16, the second all others; `Accumulator.wanted` chooses the pixels of later
+        samples one pixel in 16, the second all others; `Accumulator.plan` chooses the pixels of later
         passes.
 
         Parameters
@@ -268,48 +285,41 @@ class Renderer:
         RenderError
             If `samples` or `tolerance` is invalid.
         Cancelled
-            If the work was cancelled; completed passes stay valid.
+            If the work was cancelled. The samples taken so far are kept, see `seen`, and the next call
+            continues the pass.
         """
         most = self.setup.view.film.samples if samples is None else samples
         most = validated("samples", most, Film.kinds()["samples"], RenderError)
         tolerance = validated("tolerance", tolerance, Number(TOLERANCE, "an error", least=0), RenderError)
-        while True:
-            pixels, count = self.accumulator.wanted(most, tolerance)
-            if not count:
-                return
-            yield self._pass(pixels, count)
+        while (plan := self.accumulator.plan(most, tolerance)).samples:
+            yield self._pass(plan)
 
-    def _pass(self, pixels: Any, count: int) -> Pass:
-        number = self.accumulator.passes
-        limit = STEPS + STEPS * (GROWTH - 1) * min(number, GROWN) // GROWN
+    def _pass(self, plan: Plan) -> Pass:
         start = time.perf_counter()
-        self.aim(number, limit)
-        self.accumulator.receive(pixels, lambda sums: self.tracer.add(sums, pixels, number, limit, self.work))
+        self.prepare(self.accumulator.passes > 0 or self.accumulator.coarse < BLOCK)
+        self.tracer.add(self.accumulator.sums, plan, self.work)
+        self.accumulator.passes += 1
         samples, error = self.accumulator.statistics()
-        self._rate = count / (time.perf_counter() - start)
-        return self._seen(samples, error, count, self._rate)
+        self._rate = plan.samples / (time.perf_counter() - start)
+        return self._seen(samples, error, plan.samples, self._rate)
 
-    def aim(self, number: int, limit: int) -> None:
-        """Load the tree of a pass into the tracer; run the cone prepass if a block holds several rays.
+    def prepare(self, ahead: bool) -> None:
+        """Load the frame into the tracer.
 
         Parameters
         ----------
-        number : int
-            Number of the pass, from 0.
-        limit : int
-            Steps per ray.
+        ahead : bool
+            True to run the cone prepass, which pays if a block holds several rays.
         """
-        ahead = number > 0 or self.accumulator.coarse < BLOCK
-        aimed = self.setup.root(number), ahead
-        if aimed != self._aimed:
-            self.tracer.aim(self._frame(number))
+        if ahead != self._prepared:
+            self.tracer.aim(self._frame)
             if ahead:
-                self.tracer.look_ahead(limit, self.work)
-            self._aimed = aimed
+                self.tracer.look_ahead(self.work)
+            self._prepared = ahead
 
-    def _frame(self, number: int) -> Frame:
-        what = self.setup
-        return link_frame(what.root(number), what.view, what.camera, what.optics, BLOCK)
+    def _linked(self) -> Frame:
+        setup = self.setup
+        return link_frame(setup.root, setup.view, setup.camera, setup.optics, BLOCK)
 
     def seen(self) -> Pass:
         """Return the current picture without another pass.
@@ -322,6 +332,6 @@ class Renderer:
         return self._seen(*self.accumulator.statistics(), 0, 0.0)
 
     def _seen(self, samples: float, error: float, traced: int, rate: float) -> Pass:
-        view, kept = self.setup.view, self.accumulator
+        view, source = self.setup.view, self.accumulator
         active = traced / (self.width * self.height)
-        return Pass(kept.passes, samples, error, active, rate, view.film, view.shading.mode, kept)
+        return Pass(source.passes, samples, error, active, rate, view.film, view.shading.mode, source)

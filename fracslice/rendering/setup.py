@@ -21,8 +21,8 @@ SKY = Light(
 CELLS = 1 << 13
 """Maximum cells in the search for the object's extent."""
 
-DETAIL = (4.0, 1.0, 0.5)
-"""Finest detail in pixels of the first and second pass, and of all later ones."""
+DETAIL = 0.5
+"""Finest detail, pixels."""
 FINER = 4.0
 """Ratio of details in the search for the depth at which the eye is outside the solid."""
 ROUNDING = {"float32": 2.0**-21, "float64": 2.0**-49}
@@ -35,8 +35,8 @@ class RenderSetup:
 
     Attributes
     ----------
-    roots : tuple of Node
-        Trees with resolved depths, one for each of the first passes; the last for all later passes.
+    root : Node
+        Tree with resolved depths.
     view : View
         View with lights.
     camera : Camera
@@ -47,26 +47,16 @@ class RenderSetup:
         "float32" or "float64".
     """
 
-    roots: tuple[Node, ...]
+    root: Node
     view: View
     camera: Camera
     optics: Optics
     precision: str
 
-    def root(self, index: int) -> Node:
-        """Return the tree of a pass.
-
-        Parameters
-        ----------
-        index : int
-            Number of the pass, from 0.
-
-        Returns
-        -------
-        Node
-            Tree with resolved depths.
-        """
-        return self.roots[min(index, len(self.roots) - 1)]
+    @property
+    def roots(self) -> tuple[Node, ...]:
+        """The tree, as a tuple."""
+        return (self.root,)
 
 
 def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
@@ -100,9 +90,9 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     near = surroundings(root, camera, pixel)
     scale = max(map(abs, camera.eye))
     precision = "float32" if pixel * near > 4 * ROUNDING["float32"] * scale else "float64"
-    roots = tuple(_around_eye(root, camera, detail * pixel * near)[0] for detail in DETAIL)
+    resolved, _ = _around_eye(root, camera, DETAIL * pixel * near)
     seen = optics(camera, size, root, ROUNDING[precision] * scale)
-    return RenderSetup(roots, replace(view, lights=lights), camera, seen, precision)
+    return RenderSetup(resolved, replace(view, lights=lights), camera, seen, precision)
 
 
 def surroundings(root: Node, camera: Camera, pixel: float) -> float:

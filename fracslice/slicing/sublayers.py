@@ -56,9 +56,9 @@ class MeanSlicer(Slicer):
 
 def _sections(stack: Stack, n: int) -> Stack:
     """Stack with a layer for each section."""
-    parts = (np.arange(n) + 0.5) / n
+    shares = (np.arange(n) + 0.5) / n
     heights = np.repeat(stack.heights, n) / n
     bottoms = stack.tops - stack.heights
-    within = (bottoms[:, None] + parts * stack.heights[:, None]).ravel()
+    within = (bottoms[:, None] + shares * stack.heights[:, None]).ravel()
     z = stack.z[0] + (within - stack.heights[0] / 2) / stack.scale
     return replace(stack, z=z, tops=np.cumsum(heights))

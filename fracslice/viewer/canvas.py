@@ -64,7 +64,7 @@ class Canvas:
     def size(self) -> tuple[int, int]:
         """Width and height of the window, pixels."""
         width, height = self.window.GetSize()
-        return width, height
+        return max(width, 1), max(height, 1)
 
     def on(self, event: str, act: Callable[[], None]) -> None:
         """Call a function at every event of a name.
@@ -119,7 +119,7 @@ class Canvas:
         camera.ParallelProjectionOn()
         camera.SetFocalPoint(x, y, 0)
         camera.SetPosition(x, y, 1)
-        camera.SetParallelScale(max(rows, columns * height / max(width, 1)) / 2)
+        camera.SetParallelScale(max(rows, columns * height / width) / 2)
         camera.SetClippingRange(0.5, 1.5)
         self.window.Render()
 

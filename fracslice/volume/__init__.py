@@ -13,6 +13,7 @@ from ..formulas.field import Bounds
 from ..formulas.registry import Node
 from ..kernel import Field, Kernel
 from ..kernel.depth import depth_notes, resolve_depths, visible
+from ..meshjob import RESOLUTION
 from ..store import Arrays, stored
 from ..work import Work
 from .bricks import Bricks, SignBricks
@@ -39,11 +40,6 @@ __all__ = [
 
 
 AnyBricks = TypeVar("AnyBricks", Bricks, SignBricks)
-
-DETAIL = 256
-"""Finest detail that automatic depths resolve: voxels along the longest side. A mesh of default resolution
-shows it. One more iteration would move most of the surface by less than half of it.
-"""
 
 COARSE = 64
 """Voxels along the longest side for the first estimate of the size, accurate to a quarter of a voxel, from
@@ -125,6 +121,9 @@ def plan(root: Field, resolution: float, work: Work | None = None) -> Plan:
 def with_depths(root: Node, work: Work | None = None) -> Node:
     """Replace every automatic depth by a number.
 
+    A mesh of default resolution shows the finest detail: one more iteration would move most of the surface by
+    less than half a voxel.
+
     Depths depend on the object only, not on the use of the samples: meshes, layers and checks describe the
     same solid.
 
@@ -148,11 +147,11 @@ def with_depths(root: Node, work: Work | None = None) -> Node:
     if not root.bounds.box.finite:
         return root
     size = max(root.bounds.box.size)
-    known = resolve_depths(root, size / DETAIL)
+    known = resolve_depths(root, size / RESOLUTION)
     # A deeper solid is smaller and needs finer detail; iterate until the depths are stable.
     while known is not root:
         size = min(size, max(extent(known, COARSE, work).box.size))
-        deeper = resolve_depths(root, size / DETAIL)
+        deeper = resolve_depths(root, size / RESOLUTION)
         if deeper == known:
             break
         known = deeper

@@ -126,9 +126,9 @@ def _part(
     rng = np.random.default_rng(0)
     points = cells[:, :, None] + step[:, None, None] * rng.uniform(-0.5, 0.5, (*cells.shape, each))
     inside = (values_at(kernel, points.reshape(3, -1), work) < 0).reshape(-1, each)
-    share, room = inside.mean(axis=1), float(step.prod())
+    share, cell = inside.mean(axis=1), float(step.prod())
     error = math.sqrt(float((share * (1 - share)).sum()) / (each - 1))
-    return VolumeEstimate(room * (whole + float(share.sum())), room * error, points[:, inside])
+    return VolumeEstimate(cell * (whole + float(share.sum())), cell * error, points[:, inside])
 
 
 def finer(

@@ -101,6 +101,8 @@ def test_an_eye_keeps_its_clearance_and_moves_without_jumps() -> None:
         ('of="julia.c" keys="1: 0 0 0 0; 1: 0 0 0 0"', r"film.xml:7: <track> keys=.*in the order of time"),
         ('of="box[3].size" keys="0: 1 1 1"', r"film.xml:7: <track> at 0s: .*has 2 <box>"),
         ('of="menger.level" keys="0: 1; 2: 3" curve="smooth"', r"curve='smooth': expected step"),
+        ('of="camera.fov" keys="0: 40; 2: 50" curve="zoom"', "curve='zoom': expected of='camera.eye'"),
+        ('of="camera.eye" keys="0: 4 0 0; 2: 5 0 0" curve="rotation"', "expected keys of 4 numbers each"),
         ('of="camera.eye" keys="0: 0 0 0; 2: 1 0 0" curve="zoom"', r"expected points other than the target"),
         (
             'of="camera.fov" keys="0: 40; 2: 4"/><track of="camera.fov" keys="0: 4"',

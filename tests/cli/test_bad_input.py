@@ -117,7 +117,6 @@ def test_scenes(text, message, folder, capfd):
         ("check none.stl", "none.stl: no such file"),
         ("check ball.stl", "ball.stl: not an STL file"),
         ("check ball.stl --voxel 1mm", "--voxel: only for scenes"),
-        ("check ball.stl --printer sl1s", "--printer: only for scenes"),
         ("check ball.stl --set sphere.radius=1", "--set: only for scenes"),
         ("show none.stl", "none.stl: no such file"),
         ("formulas mandelblub", "mandelblub: no such formula; did you mean mandelbulb?"),

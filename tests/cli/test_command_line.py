@@ -171,12 +171,11 @@ def loads_numba(*arguments: object) -> bool:
     return done.split()[-1] == "True"
 
 
-def test_a_mesh_and_its_check_do_without_numba(ball, tmp_path, monkeypatch):
+def test_a_mesh_does_without_numba(ball, tmp_path, monkeypatch):
     """Loading it would cost more than all else that a small mesh needs."""
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
     model = tmp_path / "b.stl"
     assert not loads_numba("mesh", ball, "-o", model, "--resolution", 24, "--quiet")
-    assert not loads_numba("check", model)
 
 
 def test_a_slice_does_without_numba(ball, tmp_path, monkeypatch):

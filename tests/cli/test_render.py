@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import re
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fracslice.cli.main import run
 from PIL import Image
+
+from fracslice.rendering import Pass, Renderer
+from fracslice.rendering.accumulator import Plan
 
 SCENE = """<scene version="1">
   <solid size="80mm"><material colour="0.9 0.3 0.2"><sphere/></material></solid>
@@ -43,9 +49,9 @@ def test_pass_images_and_going_on_from_a_state(scene: Path, tmp_path: Path) -> N
     state = ["--state", str(tmp_path / "s.npz")]
     assert run([*common, "-o", str(tmp_path / "a.png"), "--samples", "2", *state]) == 0
     passes = ["--pass-images", str(tmp_path / "passes")]
-    assert run([*common, "-o", str(tmp_path / "a.png"), "--samples", "4", *state, *passes]) == 0
+    assert run([*common, "-o", str(tmp_path / "a.png"), "--samples", "5", *state, *passes]) == 0
     assert sorted(p.name for p in (tmp_path / "passes").iterdir()) == ["pass0004.png", "pass0005.png"]
-    assert run([*common, "-o", str(tmp_path / "b.png"), "--samples", "4"]) == 0
+    assert run([*common, "-o", str(tmp_path / "b.png"), "--samples", "5"]) == 0
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
@@ -89,3 +95,64 @@ def test_mistakes_in_the_file_have_their_line(
     scene.write_text(SCENE.replace(old, new))
     assert run(["render", str(scene), "-o", str(tmp_path / "a.png")]) == 2
     assert f"ball.xml:{line}: " in capsys.readouterr().err
+
+
+def stopped_after(passes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Press Ctrl-C in the pass after some others."""
+    receive = Renderer._pass
+
+    def pressed(self: Renderer, plan: Plan) -> Pass:
+        if self.accumulator.passes == passes:
+            os.kill(os.getpid(), signal.SIGINT)
+        return receive(self, plan)
+
+    monkeypatch.setattr(Renderer, "_pass", pressed)
+
+
+def test_ctrl_c_keeps_the_picture_and_its_state(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["render", str(scene), "--device", "cpu", "--samples", "8", "-o"]
+    stopped_after(3, monkeypatch)
+    state = ["--state", str(tmp_path / "s.npz")]
+    assert run([*common, str(tmp_path / "a.png"), *state]) == 130
+    assert "stopped; " in (error := capsys.readouterr().err)
+    assert "a.png: 40 x 24 pixels, 2.0 samples a pixel" in error
+    with Image.open(tmp_path / "a.png") as image:
+        assert np.ptp(np.asarray(image)) > 50
+    monkeypatch.undo()
+    assert run([*common, str(tmp_path / "a.png"), *state]) == 0
+    assert run([*common, str(tmp_path / "b.png")]) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_ctrl_c_before_the_first_sample_writes_nothing(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stopped_after(0, monkeypatch)
+    assert run(["render", str(scene), "--device", "cpu", "-o", str(tmp_path / "a.png")]) == 130
+    assert "nothing was written" in capsys.readouterr().err
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_a_time_limit_interrupts_a_pass(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A pass of a large picture takes many times the limit."""
+    options = [
+        "--set",
+        "shading.ambient=0.1",
+        "--size",
+        "1500x1500",
+        "--time",
+        "0.01s",
+        "--device",
+        "cpu",
+        "--threads",
+        "1",
+    ]
+    assert run(["render", str(scene), "-o", str(tmp_path / "a.png"), *options]) == 0
+    samples = float(re.search(r"([\d.]+) samples", capsys.readouterr().out)[1])  # type: ignore[index]
+    assert 0 < samples < 1
+    with Image.open(tmp_path / "a.png") as image:
+        assert np.asarray(image).reshape(-1, 3).max(1).min() > 0, "no pixel is empty"

@@ -149,13 +149,13 @@ def test_a_worker_of_another_version_is_not_used(
     other, good = cluster.worker("--preload", str(old)), cluster.worker()
     with (
         connected(cluster.address, str(tmp_path / "pieces")) as pool,
-        warnings.catch_warnings(record=True) as said,
+        warnings.catch_warnings(record=True) as lines,
     ):
         warnings.simplefilter("always")
         pool.client.wait_for_workers(2, timeout=60)
         result = sliced(Work(1, cluster=pool), tmp_path)
     assert result == expected["slice"]
-    (line,) = {str(one.message) for one in said if "not used" in str(one.message)}
+    (line,) = {str(one.message) for one in lines if "not used" in str(one.message)}
     assert line.endswith("is not used: fracslice 0.0.9, expected 0.1.0")
     good.kill()
     good.wait()

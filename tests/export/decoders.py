@@ -15,7 +15,7 @@ def picture(runs: Iterator[tuple[int, int]], shape: tuple[int, int]) -> np.ndarr
 
 
 def goo(data: bytes) -> Iterator[tuple[int, int]]:
-    """Elegoo, "GOO file format", V1.2, section 3.3."""
+    """Runs and differences of a .goo layer, as the crate goo 0.1.1 reads them."""
     assert data[0] == 0x55
     assert data[-1] == ~sum(data[1:-1]) & 0xFF
     at, color = 1, 0

@@ -57,7 +57,7 @@ def colours(words: np.ndarray) -> np.ndarray:
 
 
 def goo(data: bytes) -> Read:
-    """Elegoo, "GOO file format", V1.2; the offsets are those of its table."""
+    """A .goo file: the layout of the crate goo 0.1.1."""
     file = Bytes(data, ">")
     file.expect(b"V3.0\x07\0\0\0DLP\0")
     texts = [file.raw(size).split(b"\0")[0].decode() for size in (32, 24, 24, 32, 32, 32)]

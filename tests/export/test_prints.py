@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from tests.export import readers
 
 MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
 ROOT = difference(menger(level=1), sphere(radius=0.9))
+JOB = SliceJob(size=12, layer=0.5, pixel=MACHINE.pixel)
 RESIN = Resin(2.5, 30, "Test resin", bottom_layers=2, transition_layers=3, density=1.2)
 
 
@@ -47,13 +49,17 @@ CASES = {
 
 
 def run(version: int = 1, most: float | None = None, compensation: float = 0.0) -> SliceRun:
-    job = SliceJob(size=12, layer=0.5, pixel=MACHINE.pixel)
-    stack = plan_stack(ROOT, job)
+    stack = plan_stack(ROOT, JOB)
     if most is not None:
         stack = adapted(stack, most)
     screen = Screen(stack, replace(MACHINE, version=version), compensation=compensation)
-    model = StackModel(scene(ROOT, size=12), job, Work())
-    return SliceRun(stack, screen, resin=RESIN, metadata={"Title": "test"}, picture=model.picture)
+    return SliceRun(stack, screen, resin=RESIN, metadata={"Title": "test"}, picture=picture)
+
+
+@cache
+def picture(width: int, height: int) -> np.ndarray:
+    """A rendered preview, once for all files."""
+    return StackModel(scene(ROOT, size=12), JOB, Work()).picture(width, height)
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -51,10 +51,11 @@ def test_sizes_of_components() -> None:
         heights = (1 if side < 3 else -1) * LOOSE.vertices[:, side % 3]
         order = np.lexsort([heights, labels])
         assert (found[0].outermost[:, side] == order[np.searchsorted(labels[order], np.arange(count))]).all()
-    for volumes, areas, vectors, _ in found:
+    for volumes, areas, vectors, _, flat in found:
         assert np.allclose(volumes, expected, rtol=1e-9, atol=1e-9)
         assert np.allclose(areas, np.bincount(of, np.linalg.norm(LOOSE.normals, axis=1)) / 2)
         assert np.allclose(vectors[:, 2], np.bincount(of, LOOSE.normals[:, 2]) / 2)
+        assert flat.sum() == (LOOSE.normals == 0).all(axis=1).sum()
     assert len({b"".join(array.tobytes() for array in sizes) for sizes in found}) == 1
 
 

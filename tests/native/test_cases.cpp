@@ -112,7 +112,7 @@ TEST_CASE("flat cells are two triangles between four edges along one axis") {
 }
 
 TEST_CASE("cases of a row are those of its corners, one by one") {
-    Corners a, b;
+    CornerPlanes a, b;
     for (size_t k = 0; k < 4; ++k) a[k] = 0x9E3779B97F4A7C15u * (k + 1), b[k] = 0xC2B2AE3D27D4EB4Fu * (k + 5);
     for (int y = 0; y < 8; ++y) {
         const BitPlane row = cases_of_row(a, b, y);

@@ -99,7 +99,7 @@ TEST_CASE("a cut run: zeros or 255s before up to eight bytes; and bytes among wh
     Runs runs;
     runs.clear();
     Bytes bytes;
-    Runs::End end = runs.room(100000, 100000);
+    Runs::End end = runs.reserve(100000, 100000);
     for (int i = 0; i < 500; ++i) {
         uint8_t some[2 * Runs::kAtOnce];
         for (uint8_t& byte : some) byte = uint8_t(value(random));

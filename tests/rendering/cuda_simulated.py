@@ -2,35 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fracslice.kernel.cuda import require
-from fracslice.rendering.accumulator import HostAccumulator
-from fracslice.rendering.cpu import CpuTracer, ordered
+from fracslice.rendering.accumulator import CHANNELS, HostAccumulator, Plan, ordered
+from fracslice.rendering.cpu import CpuTracer
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.cuda_accumulator import CudaAccumulator
 from fracslice.scene.view import Film
 from fracslice.work import Work
 from tests.rendering.cuda_cases import CASES, HEIGHT, WIDTH, frame
 
-SAMPLE, LIMIT = 65, 128
+SAMPLE = 65
 SINGLE = np.dtype(np.float32)
 
 
 def kernels() -> None:
     for name in CASES:
-        sums = [np.zeros((HEIGHT * WIDTH, 6), SINGLE) for _ in range(2)]
-        for filled in sums:
-            filled[:, 5] = SAMPLE
-        cpu, gpu = (
-            CpuTracer(frame(name), SINGLE, WIDTH, HEIGHT),
-            CudaTracer(frame(name), SINGLE, WIDTH, HEIGHT),
-        )
-        cpu.look_ahead(LIMIT, Work(1)), gpu.look_ahead(LIMIT, Work(1))
-        cpu.add(sums[0], ordered(WIDTH, HEIGHT), SAMPLE, LIMIT, Work(1))
-        placed, pixels = (require().to_device(a) for a in (sums[1], ordered(WIDTH, HEIGHT)))
-        gpu.add(placed, pixels, SAMPLE, LIMIT, Work(1))
-        placed.copy_to_host(sums[1])
+        pictures = [HostAccumulator.empty(WIDTH, HEIGHT, SINGLE) for _ in range(2)]
+        for picture in pictures:
+            picture.channels[..., 5:] = SAMPLE, SAMPLE + 1
+        cpu, gpu = (kind(frame(name), SINGLE, WIDTH, HEIGHT) for kind in (CpuTracer, CudaTracer))
+        cpu.look_ahead(Work(1)), gpu.look_ahead(Work(1))
+        plan = Plan(ordered(WIDTH, HEIGHT), WIDTH * HEIGHT, SAMPLE + 1)
+        cpu.add(pictures[0].sums, plan, Work(1))
+        placed, pixels = (require().to_device(a) for a in (pictures[1].sums, plan.pixels))
+        gpu.add(placed, replace(plan, pixels=pixels, last=SAMPLE + 1), Work(1))
+        placed.copy_to_host(pictures[1].sums)
+        sums = [picture.sums.reshape(-1, CHANNELS) for picture in pictures]
         # A ray that grazes an edge may fall on either side of it.
         alike = np.isclose(*sums, rtol=1e-3, atol=1e-3).all(1).mean()
         assert alike > 0.97, f"{name}: {alike:.3f} of the pixels are alike"
@@ -41,21 +42,22 @@ def accumulators() -> None:
     """Statistics, choice and tones of the same sums."""
     rng = np.random.default_rng(3)
     host = HostAccumulator.empty(WIDTH, HEIGHT, SINGLE)
-    gpu = CudaAccumulator.of(host)
-    assert (gpu.wanted(9, 0.1)[0].copy_to_host() == host.wanted(9, 0.1)[0]).all()
-    n = 2.0 ** rng.integers(3, 6, WIDTH * HEIGHT) + rng.integers(0, 2, WIDTH * HEIGHT)
+    gpu = CudaAccumulator(host)
+    assert gpu.plan(9, 0.1).samples == host.plan(9, 0.1).samples
+    np.testing.assert_array_equal(gpu.host().sums, host.sums)
+    n = 2.0 ** rng.integers(3, 6, WIDTH * HEIGHT)
     bright = rng.beta(0.3, 0.5, n.size)
-    host.sums[:] = np.stack([*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n], 1)
+    state = [*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n, n]
+    host.channels[:] = np.stack(state, 1).reshape(host.channels.shape)
     host.passes = 70
-    gpu = CudaAccumulator.of(host)
+    gpu = CudaAccumulator(host)
     assert np.allclose(gpu.statistics(), host.statistics(), rtol=1e-4)
     for most, tolerance in ((100, 0.0), (9, 0.05), (64, 0.08)):
-        pixels, count = gpu.wanted(most, tolerance)
-        found = pixels.copy_to_host()
-        wanted, _ = host.wanted(most, tolerance)
-        assert 0 < count < n.size
-        assert count == (found >= 0).sum()
-        assert (found[found >= 0] == wanted).all()
+        host.channels[..., 6] = host.channels[..., 5]
+        mine, theirs = gpu.plan(most, tolerance), host.plan(most, tolerance)
+        assert 0 < mine.samples < n.sum()
+        assert (mine.samples, mine.last) == (theirs.samples, theirs.last)
+        np.testing.assert_array_equal(gpu.host().sums, host.sums)
     for film, mode in (
         *((Film(tone=tone, exposure=0.7), "light") for tone in ("filmic", "reinhard", "none")),
         (Film(bloom=0.5), "light"),
@@ -63,12 +65,16 @@ def accumulators() -> None:
     ):
         assert abs(gpu.shown(film, mode).astype(int) - host.shown(film, mode)).max() <= 1
     host.passes = gpu.passes = 1
+    host.channels[..., 6] = 0
     assert abs(gpu.shown(Film(), "light").astype(int) - host.shown(Film(), "light")).max() <= 1
     again, fresh = gpu.anew(2), host.anew(2)
     assert not again.host().sums.any() and gpu.passes != again.passes == 0
     for number in (0, 1):
         again.passes = fresh.passes = number
-        assert (again.wanted(9, 0.1)[0].copy_to_host() == fresh.wanted(9, 0.1)[0]).all()
+        assert again.plan(9, 0.1).samples == fresh.plan(9, 0.1).samples > 0
+        np.testing.assert_array_equal(again.host().sums, fresh.sums)
+        fresh.channels[..., 5] = fresh.channels[..., 6]
+        again = CudaAccumulator(fresh)
 
 
 if __name__ == "__main__":

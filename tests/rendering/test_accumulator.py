@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.rendering import accumulator
-from fracslice.rendering.accumulator import HostAccumulator, around, places_of, squared_errors
-from fracslice.rendering.cpu import ordered
+from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, HostAccumulator, around, ordered
+from fracslice.scene.view import Film
 from fracslice.work import Work
 
 WIDTH, HEIGHT = 37, 23
@@ -16,44 +15,58 @@ WIDTH, HEIGHT = 37, 23
 def begun(threads: int = 1) -> HostAccumulator:
     """A picture of 70 passes."""
     rng = np.random.default_rng(3)
-    n = 2.0 ** rng.integers(3, 6, WIDTH * HEIGHT) + rng.integers(0, 2, WIDTH * HEIGHT)
+    n = 2.0 ** rng.integers(3, 6, WIDTH * HEIGHT)
     bright = rng.beta(0.3, 0.5, n.size)
-    sums = np.stack([*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n], 1)
-    return HostAccumulator(WIDTH, HEIGHT, sums.astype(np.float32), 70, work=Work(threads))
+    sums = np.stack([*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n, n], 1)
+    return HostAccumulator(WIDTH, HEIGHT, sums.astype(np.float32).ravel(), 70, work=Work(threads))
 
 
-def test_pixels_are_chosen_alike_by_any_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, count = begun().wanted(64, 0.05)
-    assert 0 < count < WIDTH * HEIGHT
-    monkeypatch.setattr(accumulator, "BAND", 3)
-    for threads in (1, 3):
-        np.testing.assert_array_equal(begun(threads).wanted(64, 0.05)[0], whole)
+def test_pixels_are_chosen_alike_by_any_number_of_threads() -> None:
+    whole = begun().plan(64, 0.05)
+    assert 0 < len(whole.pixels) < WIDTH * HEIGHT
+    picture = begun(3)
+    np.testing.assert_array_equal(picture.plan(64, 0.05).pixels, whole.pixels)
+    goals, counts = picture.channels[..., GOAL], picture.counts
+    assert whole.samples == (goals - counts).sum()
+    assert set(np.unique(goals / counts)) == {1, 2}, "a net is doubled"
 
 
-def test_errors_follow_what_a_pass_changed() -> None:
-    picture = begun()
-    before = picture.squares().copy()
-    pixels = ordered(WIDTH, HEIGHT)[5:300]
-
-    def add(sums: np.ndarray) -> None:
-        sums[places_of(pixels, WIDTH)] += [0.1, 0.2, 0.3, 0.9, 0.81, 1.0]
-
-    picture.receive(pixels, add)
-    np.testing.assert_array_equal(picture.squares().ravel(), squared_errors(picture.sums))
-    assert (picture.squares() != before).sum() == len(pixels)
+def test_every_pixel_is_in_the_order_once() -> None:
+    for width, height in ((1, 1), (70, 33), (64, 32), (5, 64)):
+        pixels = ordered(width, height)
+        places = (pixels >> 16) * width + (pixels & 65535)
+        np.testing.assert_array_equal(np.sort(places), np.arange(width * height))
 
 
-def test_a_pass_that_fails_leaves_the_picture_as_it_was() -> None:
-    picture, same = begun(), begun()
+def test_statistics_are_those_of_the_samples() -> None:
+    rng = np.random.default_rng(1)
+    bright = rng.random((16, WIDTH * HEIGHT))
+    sums = np.zeros((WIDTH * HEIGHT, CHANNELS))
+    sums[:, 3], sums[:, 4], sums[:, COUNT] = bright.sum(0), (bright**2).sum(0), 16
+    samples, error = HostAccumulator(WIDTH, HEIGHT, sums.ravel(), 5).statistics()
+    assert samples == 16
+    assert error == pytest.approx(np.sqrt(bright.var(0, ddof=1).mean() / 16))
 
-    def add(sums: np.ndarray) -> None:
-        sums[:9] += 1.0
-        raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        picture.receive(ordered(WIDTH, HEIGHT), add)
-    np.testing.assert_array_equal(picture.sums, same.sums)
-    assert picture.passes == same.passes
+def test_an_interrupted_second_pass_shows_its_samples_and_the_grid_elsewhere() -> None:
+    picture = HostAccumulator.empty(8, 8, np.dtype(np.float32))
+    picture.plan(4, 0.0)
+    picture.channels[::4, ::4, :6] = (2, 2, 2, 0, 0, 1)
+    picture.passes = 1
+    assert (picture.mean() == 2).all()
+    picture.plan(4, 0.0)
+    picture.channels[0, 1, :6] = (5, 5, 5, 0, 0, 1)
+    assert picture.mean()[0, 1, 0] == 5
+    assert (np.delete(picture.mean()[..., 0].ravel(), 1) == 2).all()
+    assert picture.shown(Film(), "light").shape == (8, 8, 3)
+
+
+def test_a_picture_of_one_pixel_gets_all_its_samples() -> None:
+    picture = HostAccumulator.empty(1, 1, np.dtype(np.float32))
+    for samples in (1, 1, 2, 4):
+        assert picture.plan(64, 0.0).samples == samples
+        picture.sums[COUNT] = picture.sums[GOAL]
+        picture.passes += 1
 
 
 @pytest.mark.parametrize("shape", [(5, 7), (1, 4), (3, 1)])

@@ -25,14 +25,14 @@ pytestmark = pytest.mark.skipif(
 @pytest.mark.parametrize("name", CASES)
 def test_float32_kernels_hold_no_float64(name: str, tmp_path: Path) -> None:
     seen = frame(name)
-    ptx = compiled(seen.linked, 32, loops(seen), "tile", "RNRIMnrn", tmp_path)
+    ptx = compiled(seen.linked, 32, loops(seen), "tile", "RNRIRnrn", tmp_path)
     assert ".f64" not in ptx
     assert ".f32" in ptx
 
 
 @pytest.mark.parametrize(
     ("name", "arguments"),
-    [("measure", "MRM"), ("judge", "MRRMnrrr"), ("choose", "RIIMnr"), ("show", "MUnnrn")],
+    [("measure", "RRM"), ("judge", "RRRMnrrr"), ("choose", "RRMrr"), ("show", "RUnnrn")],
 )
 def test_what_keeps_the_picture_holds_no_float64(name: str, arguments: str, tmp_path: Path) -> None:
     ptx = compiled(Linked("", np.zeros(1)), 32, cuda_accumulator.LOOPS, name, arguments, tmp_path)
@@ -43,7 +43,7 @@ def test_what_keeps_the_picture_holds_no_float64(name: str, arguments: str, tmp_
 def test_threads_go_on_together_after_the_march(tmp_path: Path) -> None:
     """Without the barrier those that hit first shade alone, and a frame takes twice as long."""
     seen = frame("fractal")
-    assert "bar.warp.sync" in compiled(seen.linked, 32, loops(seen), "tile", "RNRIMnrn", tmp_path)
+    assert "bar.warp.sync" in compiled(seen.linked, 32, loops(seen), "tile", "RNRIRnrn", tmp_path)
 
 
 def test_pictures_are_those_of_the_lanes_on_the_simulator() -> None:

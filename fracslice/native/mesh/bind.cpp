@@ -48,8 +48,8 @@ std::span<const bool> marks_of(const Vector<bool>& marks, size_t count) {
 }
 
 nb::tuple bind_links(const Rows<int32_t>& triangles, const Vector<bool>& counted, int threads) {
-    Links found = unlocked(threads, [&] { return links(triangles_of(triangles, counted.size()), counted.data()); });
-    return nb::make_tuple(found.edges, found.open, found.crowded, found.misoriented, found.extra_fans);
+    EdgeCounts found = unlocked(threads, [&] { return edge_counts(triangles_of(triangles, counted.size()), counted.data()); });
+    return nb::make_tuple(found.edges, found.open, found.non_manifold, found.misoriented, found.extra_fans);
 }
 
 nb::tuple bind_corners(const Rows<int32_t>& triangles, size_t vertices, int threads) {
@@ -71,12 +71,8 @@ nb::tuple bind_sizes(const Rows<double>& vertices, const Rows<int32_t>& triangle
         return component_sizes(mesh, span_of(labels), count);
     });
     return nb::make_tuple(to_numpy(std::move(found.volumes), {count}), to_numpy(std::move(found.areas), {count}),
-                          to_numpy(std::move(found.vectors), {count, 3}), to_numpy(std::move(found.outermost), {count, 6}));
-}
-
-nb::tuple bind_measures(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Point& point, int threads) {
-    Measures found = unlocked(threads, [&] { return measures(mesh_of(vertices, triangles), point); });
-    return nb::make_tuple(found.area, found.volume, found.flat);
+                          to_numpy(std::move(found.vectors), {count, 3}), to_numpy(std::move(found.outermost), {count, 6}),
+                          to_numpy(std::move(found.flat), {count}));
 }
 
 nb::object numbers(const std::vector<int64_t>& found) {
@@ -199,7 +195,6 @@ void bind_mesh(nb::module_& module) {
     module.def("corners_by_vertex", &bind_corners, "triangles"_a, "vertices"_a, "threads"_a = 0);
     module.def("connected_components", &bind_components, "triangles"_a, "vertices"_a, "threads"_a = 0);
     module.def("component_sizes", &bind_sizes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a, "threads"_a = 0);
-    module.def("measures", &bind_measures, "vertices"_a, "triangles"_a, "point"_a, "threads"_a = 0);
     module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "frame"_a, "threads"_a = 0);
     module.def("pointed", &bind_pointed, "vertices"_a, "triangles"_a, "sine"_a, "most"_a, "threads"_a = 0);
     module.def("bounds", &bind_bounds, "points"_a, "threads"_a = 0);

@@ -25,11 +25,11 @@ nb::tuple bind_marching_cubes(const IjkArray& ijk, const ValuesArray& values, co
 }
 
 // The cells of a surface, kept from one piece of it to the next together with the arrays they look into.
-class Cells {
+class SurfaceCells {
   public:
-    Cells(const IjkArray& ijk, const SignsArray& signs, const IndexArray& index, int threads)
+    SurfaceCells(const IjkArray& ijk, const SignsArray& signs, const IndexArray& index, int threads)
         : ijk_(ijk), index_(index), threads_(threads),
-          grid_(unlocked(threads, [&] { return CellGrid(volume::layout(ijk, index), words(ijk, signs)); })) {}
+          grid_(unlocked(threads, [&] { return CellGrid(volume::layout(ijk, index), sign_rows(ijk, signs)); })) {}
 
     nb::object segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel) const {
         if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
@@ -64,7 +64,7 @@ class Cells {
     int threads() const { return threads_; }
 
   private:
-    static std::vector<Signs> words(const IjkArray& ijk, const SignsArray& signs) {
+    static std::vector<Signs> sign_rows(const IjkArray& ijk, const SignsArray& signs) {
         if (ijk.shape(0) != signs.shape(0)) throw nb::value_error("ijk and signs differ in length");
         std::vector<Signs> rows(signs.shape(0));
         std::copy_n(signs.data(), signs.size(), reinterpret_cast<uint8_t*>(rows.data()));
@@ -80,7 +80,7 @@ class Cells {
 // The surface in some layers of cells, while it is made.
 class Surfacing {
   public:
-    Surfacing(const Cells& cells, int first, int last, const std::array<double, 3>& origin, double voxel, double margin)
+    Surfacing(const SurfaceCells& cells, int first, int last, const std::array<double, 3>& origin, double voxel, double margin)
         : threads_(cells.threads()), margin_(margin), made_(cells.grid(), {first, last}, {origin, voxel, margin}) {}
 
     void advance(int end, size_t first, const RootsArray& t, const NormalsArray& normals) {
@@ -136,14 +136,14 @@ void bind_contour(nb::module_& module) {
     nb::class_<RootLoops>(module, "RootLoops")
         .def(nb::new_(&root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "field"_a,
              "steps"_a, "sure"_a);
-    nb::class_<Cells>(module, "Cells")
+    nb::class_<SurfaceCells>(module, "Cells")
         .def(nb::init<const IjkArray&, const SignsArray&, const IndexArray&, int>(),
              "ijk"_a, "signs"_a, "index"_a, "threads"_a = 0)
-        .def("segments", &Cells::segments, "begin"_a, "end"_a, "origin"_a, "voxel"_a)
-        .def("find_crossings", &Cells::find_crossings, "begin"_a, "end"_a, "origin"_a, "voxel"_a, "loops"_a, "t"_a, "normals"_a)
-        .def("crossings_before", &Cells::crossings_before, "layer"_a);
+        .def("segments", &SurfaceCells::segments, "begin"_a, "end"_a, "origin"_a, "voxel"_a)
+        .def("find_crossings", &SurfaceCells::find_crossings, "begin"_a, "end"_a, "origin"_a, "voxel"_a, "loops"_a, "t"_a, "normals"_a)
+        .def("crossings_before", &SurfaceCells::crossings_before, "layer"_a);
     nb::class_<Surfacing>(module, "Contouring")
-        .def(nb::init<const Cells&, int, int, const std::array<double, 3>&, double, double>(),
+        .def(nb::init<const SurfaceCells&, int, int, const std::array<double, 3>&, double, double>(),
              nb::keep_alive<1, 2>(), "cells"_a, "first"_a, "last"_a, "origin"_a, "voxel"_a, "minimum_edge_parameter"_a)
         .def("advance", &Surfacing::advance, "end"_a, "first"_a, "t"_a, "normals"_a)
         .def("finish", &Surfacing::finish);

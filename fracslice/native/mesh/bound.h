@@ -8,7 +8,7 @@
 
 namespace fracslice::mesh {
 
-// How often a triangle is cut before nothing is said of it, and how often before the nearest triangle is looked for again
+// How often a triangle is cut before it is given up, and how often before the nearest triangle is looked for again
 // though that of a neighbour is near, or what lies over a triangle is taken from what does not.
 constexpr int kDepth = 32, kTrusting = 12, kPatient = 8;
 

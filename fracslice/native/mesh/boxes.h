@@ -12,7 +12,7 @@
 
 namespace fracslice::mesh {
 
-// Rounded to float32 and outwards: boxes that meet are told to meet, and for float32 coordinates no others.
+// Rounded to float32 and outwards: boxes that meet meet still, and for float32 coordinates no others.
 inline float below(double x) {
     float rounded = float(x);
     return rounded > x ? std::nextafter(rounded, -std::numeric_limits<float>::infinity()) : rounded;

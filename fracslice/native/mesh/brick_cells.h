@@ -27,7 +27,7 @@ struct Cell {
 // A brick's cells; its crossings are still to be numbered.
 struct BrickCells {
     Octant octant;
-    std::array<Corners, kSide + 1> corners;
+    std::array<CornerPlanes, kSide + 1> corners;
     Numbers numbers;
     std::array<int, 3> first;  // its lowest grid point
 

@@ -11,9 +11,9 @@ namespace {
 constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
 
 // Finds a brick's crossings and returns their number.
-size_t find_crossings(const std::array<Corners, kSide + 1>& corners, BrickCrossings& found) {
+size_t find_crossings(const std::array<CornerPlanes, kSide + 1>& corners, BrickCrossings& found) {
     for (int x = 0; x < kSide; ++x) {
-        const Corners& own = corners[x];
+        const CornerPlanes& own = corners[x];
         found.bits[0][x] = own[0] ^ corners[x + 1][0];
         found.bits[1][x] = own[0] ^ own[1];
         found.bits[2][x] = own[0] ^ own[2];
@@ -29,12 +29,12 @@ size_t find_crossings(const std::array<Corners, kSide + 1>& corners, BrickCrossi
 }
 
 // The ghosts' places, in order.
-std::vector<Place> ghosts(const Layout& layout, const std::vector<Signs>& signs) {
-    std::vector<Place> found;
+std::vector<BrickPlace> ghosts(const Layout& layout, const std::vector<Signs>& signs) {
+    std::vector<BrickPlace> found;
     for (size_t row = 0; row < layout.count; ++row) {
         const int32_t* p = layout.ijk + 3 * row;
         for (int k : {3, 5, 6, 7}) {
-            Place q = {p[0] / kSide - (k & 1), p[1] / kSide - (k >> 1 & 1), p[2] / kSide - (k >> 2 & 1)};
+            BrickPlace q = {p[0] / kSide - (k & 1), p[1] / kSide - (k >> 1 & 1), p[2] / kSide - (k >> 2 & 1)};
             int32_t at = layout.at(q[0], q[1], q[2]);
             if (at >= 0) continue;
             BitPlane seen = (k & 2 ? kFirstY : ~BitPlane(0)) & (k & 4 ? kFirstZ : ~BitPlane(0)), differ = 0;
@@ -64,7 +64,7 @@ CellGrid::CellGrid(const Layout& layout, std::vector<Signs> signs)
         crossings_[i].base = find_crossings(corners_of(octant(i), signs_), crossings_[i]);
     });
     vertices_ = running_sum(crossings_, &BrickCrossings::base, "vertices");
-    for (const Place& place : ghosts(layout, signs_)) places_.push_back(place);
+    for (const BrickPlace& place : ghosts(layout, signs_)) places_.push_back(place);
 }
 
 size_t CellGrid::brick_of(size_t crossing) const {
@@ -114,7 +114,7 @@ void CellGrid::collect(const Octant& near, Numbers& numbers) const {
 
 // The first brick of a sorted range whose layer is not before this one.
 size_t CellGrid::lower_bound(size_t begin, size_t end, int layer) const {
-    auto before = [](const Place& place, int wanted) { return place[0] < wanted; };
+    auto before = [](const BrickPlace& place, int wanted) { return place[0] < wanted; };
     return size_t(std::lower_bound(places_.begin() + int64_t(begin), places_.begin() + int64_t(end), layer, before) -
                   places_.begin());
 }
@@ -130,7 +130,7 @@ size_t CellGrid::crossings_before(int layer) const {
     return row < sampled() ? crossings_[row].base : vertices_;
 }
 
-int64_t CellGrid::find(const Place& place) const {
+int64_t CellGrid::find(const BrickPlace& place) const {
     int32_t row = layout_.at(place[0], place[1], place[2]);
     if (row >= 0) return row;
     auto first = places_.begin() + int64_t(sampled()), found = std::lower_bound(first, places_.end(), place);

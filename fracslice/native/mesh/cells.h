@@ -10,10 +10,10 @@
 
 namespace fracslice::mesh {
 
-using volume::BitPlane, volume::Corners, volume::Layout, volume::Octant, volume::Signs;
+using volume::BitPlane, volume::CornerPlanes, volume::Layout, volume::Octant, volume::Signs;
 using volume::constant, volume::corners_of, volume::kFirstY, volume::kFirstZ, volume::kSamples, volume::kSide, volume::shift_y, volume::shift_z;
 
-using Place = std::array<int, 3>;  // of a brick, in bricks
+using BrickPlace = std::array<int, 3>;  // of a brick, in bricks
 
 constexpr size_t kMostElements = size_t(std::numeric_limits<int32_t>::max());
 
@@ -71,14 +71,14 @@ struct GridEdges {
 };
 
 // A bit for each cell between two planes of corners whose corners are not all alike.
-inline BitPlane mixed(const Corners& a, const Corners& b) {
+inline BitPlane mixed(const CornerPlanes& a, const CornerPlanes& b) {
     BitPlane any = a[0] | a[1] | a[2] | a[3] | b[0] | b[1] | b[2] | b[3];
     BitPlane all = a[0] & a[1] & a[2] & a[3] & b[0] & b[1] & b[2] & b[3];
     return any & ~all;
 }
 
 // The cases of eight cells along z, one in each byte: the transpose of their eight corner bits.
-inline BitPlane cases_of_row(const Corners& a, const Corners& b, int y) {
+inline BitPlane cases_of_row(const CornerPlanes& a, const CornerPlanes& b, int y) {
     BitPlane m = 0;
     for (int k = 0; k < 4; ++k) {
         m |= (a[k] >> 8 * y & 0xff) << 16 * k | (b[k] >> 8 * y & 0xff) << (16 * k + 8);
@@ -97,7 +97,7 @@ struct Passed {
     std::array<std::array<BitPlane, 2>, 3> flat;  // by axis and whether up
     BitPlane rest;
 
-    Passed(const Corners& a, const Corners& b) {
+    Passed(const CornerPlanes& a, const CornerPlanes& b) {
         BitPlane axes[3] = {(a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2]) | (a[3] ^ b[3]),
                         (a[0] ^ a[1]) | (a[2] ^ a[3]) | (b[0] ^ b[1]) | (b[2] ^ b[3]),
                         (a[0] ^ a[2]) | (a[1] ^ a[3]) | (b[0] ^ b[2]) | (b[1] ^ b[3])};
@@ -120,7 +120,7 @@ constexpr uint8_t kFlat[3][2] = {{0x55, 0xaa}, {0x33, 0xcc}, {0x0f, 0xf0}};
 
 // Calls visit(x, y, z, case) for some cells between two planes of corners, in order.
 template <class Visit>
-inline void for_each_cell(const Corners& a, const Corners& b, int x, BitPlane cells, const Visit& visit) {
+inline void for_each_cell(const CornerPlanes& a, const CornerPlanes& b, int x, BitPlane cells, const Visit& visit) {
     while (cells) {
         int y = std::countr_zero(cells) / 8;
         BitPlane cases = cases_of_row(a, b, y);
@@ -134,7 +134,7 @@ inline void for_each_cell(const Corners& a, const Corners& b, int x, BitPlane ce
 
 // The same for every cell of a brick that the surface passes.
 template <class Visit>
-inline void for_each_cell(const std::array<Corners, kSide + 1>& corners, const Visit& visit) {
+inline void for_each_cell(const std::array<CornerPlanes, kSide + 1>& corners, const Visit& visit) {
     for (int x = 0; x < kSide; ++x) for_each_cell(corners[x], corners[x + 1], x, mixed(corners[x], corners[x + 1]), visit);
 }
 
@@ -179,11 +179,11 @@ class CellGrid {
     size_t vertices() const { return vertices_; }
     const Layout& layout() const { return layout_; }
     const std::vector<Signs>& signs() const { return signs_; }
-    const Place& place(size_t i) const { return places_[i]; }
+    const BrickPlace& place(size_t i) const { return places_[i]; }
     Octant octant(size_t i) const { return {layout_, places_[i][0], places_[i][1], places_[i][2]}; }
 
     // Number of the brick at a place, -1 if the surface passes no cell of it.
-    int64_t find(const Place& place) const;
+    int64_t find(const BrickPlace& place) const;
 
     // Calls visit(place in Numbers, vertex) for a brick's own crossings, in order, then for those on its neighbours' near
     // sides that its cells have.
@@ -255,7 +255,7 @@ class CellGrid {
     Layout layout_;
     std::vector<Signs> signs_;
     std::vector<BrickCrossings> crossings_;
-    std::vector<Place> places_;
+    std::vector<BrickPlace> places_;
     size_t vertices_;
 };
 

@@ -49,6 +49,7 @@ struct Run {
     int32_t label;
     double volume = 0, area = 0;
     Vec3 vector{0, 0, 0};
+    int64_t flat = 0;
 };
 
 // Of consecutive vertices of a component: those farthest out.
@@ -130,7 +131,9 @@ Sizes component_sizes(const MeshView& mesh, std::span<const int32_t> labels, siz
             Vec3 a = at(mesh.corner(t, 0)), b = at(mesh.corner(t, 1)), c = at(mesh.corner(t, 2));
             Vec3 normal = cross(b - a, c - a);
             runs.back().volume += dot(normal, a - o);
-            runs.back().area += std::sqrt(dot(normal, normal));
+            double size = std::sqrt(dot(normal, normal));
+            runs.back().area += size;
+            runs.back().flat += size == 0;
             runs.back().vector = runs.back().vector + normal;
         }
         return runs;
@@ -140,11 +143,12 @@ Sizes component_sizes(const MeshView& mesh, std::span<const int32_t> labels, siz
         for (const Run& run : runs) {
             Run& sum = sums[size_t(run.label)];
             sum.volume += run.volume, sum.area += run.area, sum.vector = sum.vector + run.vector;
+            sum.flat += run.flat;
         }
     }
-    Sizes sizes{{count, 1}, {count, 1}, {count, 3}, {count, 6}};
+    Sizes sizes{{count, 1}, {count, 1}, {count, 3}, {count, 6}, {count, 1}};
     for (size_t i = 0; i < count; ++i) {
-        sizes.volumes.data[i] = sums[i].volume / 6, sizes.areas.data[i] = sums[i].area / 2;
+        sizes.volumes.data[i] = sums[i].volume / 6, sizes.areas.data[i] = sums[i].area / 2, sizes.flat.data[i] = sums[i].flat;
         for (size_t k = 0; k < 3; ++k) sizes.vectors.data[3 * i + k] = sums[i].vector[k] / 2;
         std::copy(reach[i].vertex.begin(), reach[i].vertex.end(), &sizes.outermost.data[6 * i]);
     }

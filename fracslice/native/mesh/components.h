@@ -21,6 +21,7 @@ struct Sizes {
     Array<double> areas;
     Array<double> vectors;     // [count, 3], sums of the triangles' vector areas
     Array<int32_t> outermost;  // [count, 6], the first vertices farthest out along -x, -y, -z, x, y and z
+    Array<int64_t> flat;       // triangles without area
 };
 
 // labels: of the vertices, each below count.

@@ -54,12 +54,12 @@ size_t crossings_of(const CellGrid& cells, Layers layers) {
     return cells.crossings_before(layers.last) - cells.crossings_before(layers.first);
 }
 
-// Room for at most so much. A crossing is in the loops of four cells. A loop has one tip, no more corners, each shared with
+// Space for at most these numbers. A crossing is in the loops of four cells. A loop has one tip, no more corners, each shared with
 // another loop, than crossings, and twice as many triangles; three crossings at least.
-Contour room(size_t crossings, size_t known) {
-    Contour room{{crossings + known * 10 / 3, 3}, {8 * known, 3}, {known * 10 / 3, 3}, {known * 10 / 3, 1}, crossings};
-    room.triangles.rows = room.cases.rows = 0;
-    return room;
+Contour space(size_t crossings, size_t known) {
+    Contour space{{crossings + known * 10 / 3, 3}, {8 * known, 3}, {known * 10 / 3, 3}, {known * 10 / 3, 1}, crossings};
+    space.triangles.rows = space.cases.rows = 0;
+    return space;
 }
 
 }  // namespace
@@ -67,7 +67,7 @@ Contour room(size_t crossings, size_t known) {
 Contouring::Contouring(const CellGrid& cells, Layers layers, const Placement& placement)
     : cells_(cells), layers_(layers), placement_(placement), features_(cells, layers), next_(layers.first - 1),
       first_vertex_(cells.crossings_before(layers.first)), known_(crossings_of(cells, {layers.first - 1, layers.last + 2})),
-      result_(room(crossings_of(cells, {layers.first, layers.last + 1}), known_)) {}
+      result_(space(crossings_of(cells, {layers.first, layers.last + 1}), known_)) {}
 
 void Contouring::advance(int end, const Hermite& data) {
     size_t first = cells_.crossings_before(next_), last = cells_.crossings_before(end + 1);

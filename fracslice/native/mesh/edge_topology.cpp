@@ -47,13 +47,13 @@ class Fans {
             }
             ++counts.edges;
             counts.open += j - i == 1;
-            counts.crowded += j - i > 2;
+            counts.non_manifold += j - i > 2;
             counts.misoriented += j - i > 1 && 2 * outward != j - i;
         }
         counts.extra_fans += fans - 1;
     }
 
-    Links counts;
+    EdgeCounts counts;
 
   private:
     // Whether all arrows form one ring, as nearly everywhere: then nothing needs to be sorted.
@@ -93,8 +93,8 @@ class Fans {
     std::vector<int32_t> fan_;
 };
 
-Links operator+(const Links& a, const Links& b) {
-    return {a.edges + b.edges, a.open + b.open, a.crowded + b.crowded, a.misoriented + b.misoriented,
+EdgeCounts operator+(const EdgeCounts& a, const EdgeCounts& b) {
+    return {a.edges + b.edges, a.open + b.open, a.non_manifold + b.non_manifold, a.misoriented + b.misoriented,
             a.extra_fans + b.extra_fans};
 }
 
@@ -116,11 +116,11 @@ CornersByVertex corners_by_vertex(const Triangles& triangles) {
     return found;
 }
 
-Links links(const Triangles& triangles, const bool* counted) {
+EdgeCounts edge_counts(const Triangles& triangles, const bool* counted) {
     Stars stars(triangles);
     return tbb::parallel_reduce(
-        tbb::blocked_range<size_t>(0, stars.blocks(), 1), Links(),
-        [&](const tbb::blocked_range<size_t>& range, const Links& before) {
+        tbb::blocked_range<size_t>(0, stars.blocks(), 1), EdgeCounts(),
+        [&](const tbb::blocked_range<size_t>& range, const EdgeCounts& before) {
             Fans fans(triangles);
             for (size_t block = range.begin(); block < range.end(); ++block) {
                 stars.for_each(block, [&](size_t v, std::span<const int64_t> corners) {
@@ -129,7 +129,7 @@ Links links(const Triangles& triangles, const bool* counted) {
             }
             return before + fans.counts;
         },
-        [](const Links& a, const Links& b) { return a + b; });
+        [](const EdgeCounts& a, const EdgeCounts& b) { return a + b; });
 }
 
 }  // namespace fracslice::mesh

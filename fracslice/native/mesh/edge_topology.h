@@ -13,13 +13,13 @@ struct CornersByVertex {
 
 CornersByVertex corners_by_vertex(const Triangles& triangles);
 
-// Sums over vertices. An edge is counted at both ends; crowded: of more than two triangles; misoriented: of triangles that
+// Sums over vertices. An edge is counted at both ends; non_manifold: of more than two triangles; misoriented: of triangles that
 // do not run in opposite ways.
-struct Links {
-    int64_t edges = 0, open = 0, crowded = 0, misoriented = 0, extra_fans = 0;
+struct EdgeCounts {
+    int64_t edges = 0, open = 0, non_manifold = 0, misoriented = 0, extra_fans = 0;
 };
 
 // At the vertices where counted is true: [vertices]. Triangles with two equal corners do not count.
-Links links(const Triangles& triangles, const bool* counted);
+EdgeCounts edge_counts(const Triangles& triangles, const bool* counted);
 
 }  // namespace fracslice::mesh

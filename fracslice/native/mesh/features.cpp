@@ -141,7 +141,7 @@ Around::Around(const FeatureGrid& grid, size_t i) : own_(&grid.of(i)) {
 }
 
 const Features* FeatureGrid::beside(size_t i, int axis, int step) const {
-    Place to = cells_.place(i);
+    BrickPlace to = cells_.place(i);
     to[axis] += step;
     int64_t at = cells_.find(to);
     return at >= 0 ? &of(size_t(at)) : nullptr;

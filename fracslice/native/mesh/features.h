@@ -61,12 +61,12 @@ struct Features {
     void add(size_t kind, const Feature& feature) { found[kind][counts[kind]++] = feature; }
 };
 
-// Where a thread finds features and keeps them, until it is told that nobody needs them.
+// Where a thread finds features and keeps them, until nobody needs them.
 class FeatureStore {
   public:
-    // Makes room for the features of a brick.
+    // Makes space for the features of a brick.
     void open(Features& of) {
-        for (size_t kind = 0; kind < 4; ++kind) of.found[kind] = rows_[kind].room();
+        for (size_t kind = 0; kind < 4; ++kind) of.found[kind] = rows_[kind].space();
     }
 
     // Keeps those that were put there.
@@ -83,7 +83,7 @@ class FeatureStore {
         std::vector<Array<Feature>> blocks;
         size_t block = 0, used = 0;
 
-        Feature* room() {
+        Feature* space() {
             constexpr size_t size = size_t(1) << 14;
             if (used + kSamples > size) ++block, used = 0;
             if (block == blocks.size()) blocks.emplace_back(size, 1);

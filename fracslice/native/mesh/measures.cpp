@@ -23,24 +23,6 @@ Vec3 normal(const MeshView& mesh, size_t t) {
 
 }  // namespace
 
-Measures measures(const MeshView& mesh, const Vec3& point) {
-    Measures all;
-    for (const Measures& part : in_blocks<Measures>(mesh.count, [&](size_t first, size_t last) {
-             Measures sum;
-             for (size_t t = first; t < last; ++t) {
-                 Vec3 n = normal(mesh, t);
-                 double length = std::sqrt(dot(n, n));
-                 sum.area += length / 2;
-                 sum.volume += dot(n, at(mesh.corner(t, 0)) - point) / 6;
-                 sum.flat += length == 0;
-             }
-             return sum;
-         })) {
-        all.area += part.area, all.volume += part.volume, all.flat += part.flat;
-    }
-    return all;
-}
-
 std::vector<int64_t> turned(const MeshView& mesh, const Frame& frame) {
     return chosen(mesh.count, [&](size_t t) {
         Vec3 exact[3], moved[3];

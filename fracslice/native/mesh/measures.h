@@ -1,4 +1,4 @@
-// How large a mesh is, and what of it rounding turns over.
+// What of a mesh rounding turns over, what is pointed, and its box.
 #pragma once
 #include <limits>
 #include <vector>
@@ -6,15 +6,6 @@
 #include "quantise.h"
 
 namespace fracslice::mesh {
-
-struct Measures {
-    double area = 0;
-    double volume = 0;  // signed, between the triangles and a point: a closed mesh's, wherever that is
-    size_t flat = 0;    // triangles without area
-};
-
-// Sums are over blocks of equal size, and so the same for any number of threads.
-Measures measures(const MeshView& mesh, const Vec3& point);
 
 // The triangles, in order, that are flat or turn by a right angle or more when they are quantised.
 std::vector<int64_t> turned(const MeshView& mesh, const Frame& frame);

@@ -8,8 +8,8 @@
 namespace fracslice::mesh {
 namespace {
 
-// Whether rounding keeps all planes apart.
-bool apart(const Planes& planes) {
+// Whether all planes are distinct when rounded.
+bool distinct(const Planes& planes) {
     for (size_t i = 1; i < planes.count; ++i) {
         for (int axis = 0; axis < 3; ++axis) {
             if (!(rounded(planes(i - 1, axis)) < rounded(planes(i, axis)))) return false;
@@ -59,7 +59,7 @@ Quantised quantise(const MeshView& mesh, std::span<const bool> keep, std::span<c
     for (size_t& number : triangles) total += std::exchange(number, total);
     Quantised found{{vertices.back(), 3}, {vertices.back(), 1}, {total, 3}, std::vector<int64_t>(edits.rows.size(), -1)};
     Array<int32_t> number(mesh.vertices, 1);
-    bool known = apart(planes);
+    bool known = distinct(planes);
     std::atomic<bool> finite = true;
     for_each_block(mesh.vertices, [&](size_t block, size_t first, size_t last) {
         bool all = true;

@@ -114,7 +114,7 @@ struct FlatBrick {
     uint32_t edge, edge_end, leader, leader_end;
 };
 
-// A brick looks flat where leaders lead so many on average.
+// A brick looks flat where leaders lead this many on average.
 constexpr size_t kLed = 10;
 
 // The field is compared so far beside two crossings, in voxels, in no direction that a scene would have: where it is the same

@@ -35,9 +35,9 @@ class Pairs {
 
     bool meet(size_t a, size_t b) const {
         const double *low = tree_.low, *high = tree_.high;
-        bool apart = !holds_[a] && !holds_[b];
-        for (int k = 0; k < 3; ++k) apart |= (low[3 * a + k] > high[3 * b + k]) | (high[3 * a + k] < low[3 * b + k]);
-        return !apart;
+        bool separate = !holds_[a] && !holds_[b];
+        for (int k = 0; k < 3; ++k) separate |= (low[3 * a + k] > high[3 * b + k]) | (high[3 * a + k] < low[3 * b + k]);
+        return !separate;
     }
 
     bool asked(size_t s, size_t t) const { return !among_ || among_[s] || among_[t]; }

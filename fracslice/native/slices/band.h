@@ -46,8 +46,8 @@ inline constexpr auto find_turns = turns_each;
 class Band {
  public:
     Band(const Orientation& orientation, int tiles, int first, int last)
-        : orientation_(orientation), first_(first), last_(last), room_(tiles / 8 * 8 + 16), column_(room_), tiles_(room_), cut_(room_),
-          cut_rows_(room_), levels_(size_t(kTile * stride())), ends_(kTile * room_ + 2 + kSlack) {}
+        : orientation_(orientation), first_(first), last_(last), capacity_(tiles / 8 * 8 + 16), column_(capacity_), tiles_(capacity_),
+          cut_(capacity_), cut_rows_(capacity_), levels_(size_t(kTile * stride())), ends_(kTile * capacity_ + 2 + kSlack) {}
 
     // Begins with eight rows of which those from `from` to before `to` are on the picture; `at`: the place of the first one's
     // first byte among all bytes, `across` from row to row.
@@ -55,7 +55,7 @@ class Band {
     // A tile of which some cells are cut as the next one, if it is on the picture. Its levels are to be set before the end.
     Levels& cut(int tile, uint64_t cells) {
         column_[n_] = kTile * tile, cut_[n_] = cells;
-        return tiles_[on(tile) ? n_++ : room_ - 1];
+        return tiles_[on(tile) ? n_++ : capacity_ - 1];
     }
     // One that is not cut.
     void uniform(int tile, bool inside) {
@@ -73,7 +73,7 @@ class Band {
 
     // The rows, each after `before` zeros and before `after` ones.
     void write(uint32_t before, uint32_t after, Runs& runs) {
-        Runs::End end = runs.room(size_t(to_ - from_) * size_t(2 * kTile * n_ + 8), size_t(to_ - from_) * across_);
+        Runs::End end = runs.reserve(size_t(to_ - from_) * size_t(2 * kTile * n_ + 8), size_t(to_ - from_) * across_);
         const int* column = column_.data();
         for (int row = from_; row < to_; ++row) {
             const uint8_t* bytes = levels(row);
@@ -99,7 +99,7 @@ class Band {
  private:
     bool on(int tile) const { return kTile * tile > first_ - kTile && kTile * tile < last_; }
     // From row to row of the levels.
-    ptrdiff_t stride() const { return kTile * room_; }
+    ptrdiff_t stride() const { return kTile * capacity_; }
     const uint8_t* levels(int row) const { return &levels_[size_t(row * stride())]; }
     // Tiles as rows, in which zeros are what is not on the picture.
     void lay_out() {
@@ -130,7 +130,7 @@ class Band {
     }
 
     Orientation orientation_;
-    int first_, last_, room_, n_ = 0;
+    int first_, last_, capacity_, n_ = 0;
     std::vector<int> column_;
     std::vector<Levels> tiles_;
     std::vector<uint64_t> cut_, cut_rows_;  // by tiles; by eights of these, and by their rows

@@ -9,8 +9,8 @@ namespace fracslice::slices {
 namespace {
 
 constexpr int kEnd = 256, kCodes = 286, kMostBits = 15;
-constexpr ptrdiff_t kMany = 1 << 14;  // symbols: where there are more, `kTold` of each `kOf` say how often they come
-constexpr ptrdiff_t kTold = 64, kOf = 8 * kTold;
+constexpr ptrdiff_t kMany = 1 << 14;  // symbols: where there are more, `kSampled` of each `kOf` are counted
+constexpr ptrdiff_t kSampled = 64, kOf = 8 * kSampled;
 
 // The code of a length: a symbol, and bits after it.
 struct Length {
@@ -144,12 +144,12 @@ const std::array<Meaning, Runs::kSymbols> kMeanings = [] {
 Counts counts_of(const uint16_t* symbols, const uint16_t* end) {
     // Two counts, for the same symbol may come twice in a row.
     uint32_t uses[2][Runs::kSymbols] = {};
-    const ptrdiff_t step = end - symbols > kMany ? kOf : kTold;
+    const ptrdiff_t step = end - symbols > kMany ? kOf : kSampled;
     for (; symbols < end; symbols += std::min(step, end - symbols))
-        for (const uint16_t *s = symbols, *to = s + std::min(kTold, end - s); s != to; s += 2) ++uses[0][s[0]], ++uses[1][s[1]];
+        for (const uint16_t *s = symbols, *to = s + std::min(kSampled, end - s); s != to; s += 2) ++uses[0][s[0]], ++uses[1][s[1]];
 
     Counts counts;
-    counts.fill(step > kTold);
+    counts.fill(step > kSampled);
     counts[kEnd] = 1;
     for (int s = 0; s < Runs::kSymbols; ++s) {
         const Meaning& meaning = kMeanings[s];
@@ -161,17 +161,17 @@ Counts counts_of(const uint16_t* symbols, const uint16_t* end) {
 }
 
 // What is written for each symbol.
-using Words = std::array<Code, Runs::kSymbols>;
-Words words_of(const std::array<Code, kCodes>& codes) {
-    Words words{};
+using Emissions = std::array<Code, Runs::kSymbols>;
+Emissions emissions_of(const std::array<Code, kCodes>& codes) {
+    Emissions emissions{};
     for (int s = 0; s < Runs::kSymbols; ++s) {
         const Meaning& meaning = kMeanings[s];
         const Length& length = kLengths[meaning.length];
-        for (int i = 0; i < meaning.bytes; ++i) words[s] = words[s].then(codes[meaning.byte]);
+        for (int i = 0; i < meaning.bytes; ++i) emissions[s] = emissions[s].then(codes[meaning.byte]);
         for (int i = 0; i < meaning.matches; ++i)
-            words[s] = words[s].then(codes[length.symbol]).then({length.bits, length.extra}).then({0, 1});
+            emissions[s] = emissions[s].then(codes[length.symbol]).then({length.bits, length.extra}).then({0, 1});
     }
-    return words;
+    return emissions;
 }
 
 }  // namespace
@@ -195,12 +195,12 @@ Runs::End Runs::End::mixed(End end, const uint8_t* from, int n) {
 }
 
 void Runs::add(uint8_t value, uint64_t n) {
-    End end = room(kAtOnce, 0);
+    End end = reserve(kAtOnce, 0);
     end.add(value, n);
     set(end);
 }
 
-Runs::End Runs::room(size_t symbols, uint64_t n) {
+Runs::End Runs::reserve(size_t symbols, uint64_t n) {
     const size_t count = size_t(end_.symbol - symbols_.data());
     symbols += count + size_t((n + end_.length) / kLongest) + kAtOnce;
     if (symbols > symbols_.size()) {
@@ -213,7 +213,7 @@ Runs::End Runs::room(size_t symbols, uint64_t n) {
 const Meaning* Runs::meanings() { return kMeanings.data(); }
 
 const uint16_t* Runs::finish() {
-    End last = room(kAtOnce, 0);
+    End last = reserve(kAtOnce, 0);
     last.close();
     while ((last.symbol - symbols_.data()) % 4) *last.symbol++ = kNothing;
     return last.symbol;
@@ -223,17 +223,17 @@ const Rows<uint8_t>& Runs::zlib(uint32_t checksum) {
     const uint16_t *end = finish(), *symbols = symbols_.data();
     const Sizes sizes = sizes_of(counts_of(symbols, end));
     const std::array<Code, kCodes> codes = codes_of(sizes);
-    const Words words = words_of(codes);
+    const Emissions emissions = emissions_of(codes);
 
     data_.resize(1024 + 8 * size_t(end - symbols));
     Bits out(data_.data());
     put_head(out, sizes);
     for (const uint16_t* s = symbols; s != end; s += 4) {
-        const Code first = words[s[0]].then(words[s[1]]), second = words[s[2]].then(words[s[3]]);
+        const Code first = emissions[s[0]].then(emissions[s[1]]), second = emissions[s[2]].then(emissions[s[3]]);
         if (first.size + second.size <= 56) {
             out.put(first.then(second));
         } else {
-            for (int i = 0; i < 4; ++i) out.put(words[s[i]]);
+            for (int i = 0; i < 4; ++i) out.put(emissions[s[i]]);
         }
     }
     out.put(codes[kEnd]);

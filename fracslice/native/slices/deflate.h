@@ -10,7 +10,7 @@ namespace fracslice::slices {
 
 constexpr int kShortest = 3, kLongest = 258;  // bytes that a match repeats
 
-// A symbol of `Runs`: so many times a byte, then so many matches of a length.
+// A symbol of `Runs`: a byte, repeated; then matches of one length.
 struct Meaning {
     uint8_t byte, bytes, matches;
     uint16_t length;
@@ -83,8 +83,8 @@ class Runs {
     // Begins.
     void clear() { end_ = {symbols_.data(), 0, 0}; }
     void add(uint8_t value, uint64_t n);
-    // Where so many symbols may be written, and longest matches of n bytes; then so far they were.
-    End room(size_t symbols, uint64_t n);
+    // The end, with memory for more symbols and for longest matches of n bytes; `set` takes it back, advanced.
+    End reserve(size_t symbols, uint64_t n);
     void set(const End& end) {
         assert(end.symbol <= symbols_.data() + symbols_.size());
         end_ = end;

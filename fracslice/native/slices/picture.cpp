@@ -24,11 +24,11 @@ struct Cut {
 struct Axis {
     int tiles, first, last, at;
 
-    Axis(int places, int shape, int place, int room, bool backwards) : tiles(places - 2) {
-        first = std::max(0, -place), last = std::max(std::min(shape, room - place), first), at = place + first;
+    Axis(int places, int shape, int place, int size, bool backwards) : tiles(places - 2) {
+        first = std::max(0, -place), last = std::max(std::min(shape, size - place), first), at = place + first;
         if (!backwards) return;
         int end = kTile * tiles;
-        at = room - place - last;
+        at = size - place - last;
         first = std::exchange(last, end - first), first = end - first;
     }
     int count() const { return last - first; }

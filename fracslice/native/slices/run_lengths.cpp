@@ -18,7 +18,7 @@ class Bytes {
     void put(uint64_t byte) { data.push_back(uint8_t(byte)); }
 };
 
-// Elegoo, "GOO file format", V1.2. Big-endian; a chunk has its kind in two bits, then the size of its length in two more, or, if
+// .goo V3.0, after the crate goo (0.1.1). Big-endian; a chunk has its kind in two bits, then the size of its length in two more, or, if
 // it holds a difference, the sign and whether a length follows.
 class Goo : public Bytes {
  public:

@@ -110,10 +110,10 @@ int64_t open_edges(const Layout& layout, const std::vector<Signs>& signs) {
            64 * sum(layout.size[0], [&](size_t x) { return open_faces(layout, int(x)); });
 }
 
-std::array<Corners, kSide + 1> corners_of(const Octant& octant, const std::vector<Signs>& signs) {
-    std::array<Corners, kSide + 1> corners;
+std::array<CornerPlanes, kSide + 1> corners_of(const Octant& octant, const std::vector<Signs>& signs) {
+    std::array<CornerPlanes, kSide + 1> corners;
     for (int x = 0; x <= kSide; ++x) {
-        Corners own;
+        CornerPlanes own;
         for (int k = 0; k < 4; ++k) {
             int32_t row = octant.rows[(x == kSide) + 2 * k];
             own[k] = row >= 0 ? signs[row][x % kSide] : constant(row);

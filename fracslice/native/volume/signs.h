@@ -35,7 +35,7 @@ struct Octant {
 };
 
 // Corner signs of a brick's cells. Word k of plane x holds, at bit y*8 + z, the sign at (x, y + k % 2, z + k / 2).
-using Corners = std::array<BitPlane, 4>;
-std::array<Corners, kSide + 1> corners_of(const Octant& octant, const std::vector<Signs>& signs);
+using CornerPlanes = std::array<BitPlane, 4>;
+std::array<CornerPlanes, kSide + 1> corners_of(const Octant& octant, const std::vector<Signs>& signs);
 
 }  // namespace fracslice::volume

@@ -4,10 +4,39 @@ from __future__ import annotations
 
 from ...kernel.intrinsics import field, intrinsic
 
-__all__ = ["GIVEN", "background", "camera_ray", "field", "span_box", "step_cone", "step_ray", "surface"]
+__all__ = [
+    "GIVEN",
+    "background",
+    "blocker",
+    "camera_ray",
+    "field",
+    "span_box",
+    "step_cone",
+    "step_ray",
+    "surface",
+]
 
-GIVEN = frozenset({"field"})
+GIVEN = frozenset({"blocker", "field"})
 """Intrinsics that units may call before the linker writes them."""
+
+
+@intrinsic
+def blocker(x, y, z, P):
+    """Evaluate the field of the opaque parts of the scene.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Coordinates, scene units.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    float
+        Field value.
+    """
+    raise NotImplementedError
 
 
 @intrinsic

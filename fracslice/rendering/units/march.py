@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from ...formulas.vocabulary import any_of, maximum, minimum, sqrt, where
-from .intrinsics import field
+from .intrinsics import blocker, field
+
+MOST = 1.9
+"""Maximum over-relaxation factor; above 2, balls do not touch."""
 
 
 def span(ox, oy, oz, dx, dy, dz, lo, hi):
@@ -39,15 +42,20 @@ def span(ox, oy, oz, dx, dy, dz, lo, hi):
     return maximum(enter, 0.0), leave
 
 
-def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, relax, cone, least, glass):
+def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, cone, least, glass):
     """Take one step of safe, over-relaxed sphere tracing.
 
     Sphere tracing: Hart 1996, "Sphere Tracing". Over-relaxation: Keinert et al. 2014, "Enhanced Sphere
-    Tracing". ``|f| / L`` is the radius of an empty ball. A step of `relax` radii is kept if the next ball
-    touches the previous one; otherwise the ray returns to the end of the previous ball. A hit is a point
-    nearer to the surface than half a pixel's width.
+    Tracing". ``|f| / L`` is the radius of an empty ball. A longer step is kept if the next ball touches the
+    previous one; otherwise the ray returns to the end of the previous ball. The factor is that of a plane at
+    the slope of the last step (Balint and Valasek 2018, "Accelerating Sphere Tracing").
 
-    Inside the solid (side -1), the field of a fractal is no useful bound: a hit is a change of sign, and
+    The surface may be many times as far as the radius. The slope along the ray estimates its distance: a step
+    passes behind a surface that is nearer than a quarter of a pixel by the estimate. A hit is a change of
+    sign over less than two pixels, or within an empty ball, where only rounding causes it. The root is that
+    of the secant.
+
+    Inside the solid (side -1), the field of a fractal is no useful bound: a hit is any change of sign, and
     steps are at least two pixels.
 
     Parameters
@@ -64,10 +72,8 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
         Scene parameters.
     steepness : float
         Reciprocal of the field's Lipschitz bound.
-    relax : float
-        Over-relaxation factor.
     cone, least : float
-        Half width of a pixel at distance 1; smallest hit tolerance.
+        Half width of a pixel at distance 1; resolution of positions.
     glass : bool
         True if rays may be inside the solid.
 
@@ -81,17 +87,21 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
         f = side * f
     radius = f * steepness
     near = cone * (path + t) + least
-    kept = radius + before >= stride
+    fall = maximum(before - radius, 1e-30)
+    ahead = radius * stride / fall
+    hit = (radius < least) & (stride <= maximum(before, 4.0 * near))
+    kept = maximum(radius, 0.0) + before >= stride
+    relax = maximum(MOST * stride / (stride + fall), 1.0)
     step = relax * radius
-    margin = near
+    step = where(ahead < 0.5 * near, maximum(step, 2.0 * ahead), step)
     if glass:
         inside = side < 0.0
         kept = kept | inside
-        margin = where(inside, 0.0, near)
+        hit = (inside & (radius < 0.0)) | (hit & (side > 0.0))
         step = where(inside, maximum(step, 4.0 * near), step)
-    gap = where(kept, radius - margin, 1.0)
-    after = where(kept, where(gap < 0.0, t, t + step), t - stride + before)
-    return after, where(kept, radius, before), where(kept, step, 0.0), gap
+    after = where(kept, t + step, t - stride + before)
+    after = where(hit, t + where(radius < 0.0, ahead, 0.0), after)
+    return after, where(kept, radius, before), where(kept, step, before), where(hit, -1.0, 1.0)
 
 
 def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, spread):
@@ -139,7 +149,7 @@ def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
     far : float
         Distance of the light.
     least : float
-        Clearance below which the ray is blocked.
+        Smallest step.
     P : array of float
         Scene parameters.
     steepness : float
@@ -158,8 +168,8 @@ def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
     for _ in range(patience):
         if not any_of(going):
             break
-        radius = field(x + t * dx, y + t * dy, z + t * dz, P) * steepness
-        blocked = where(going & (radius < least), 1.0, blocked)
+        radius = blocker(x + t * dx, y + t * dy, z + t * dz, P) * steepness
+        blocked = where(going & (radius < 0.0), 1.0, blocked)
         t = t + maximum(radius, least)
         going = going & (t < far) & (blocked < 0.5)
     return 1.0 - blocked

@@ -16,7 +16,7 @@ import numpy as np
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
 from fracslice.kernel.loop_linker import link_loops
 from fracslice.rendering import Renderer, packets
-from fracslice.rendering.cpu import ordered
+from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, Plan, ordered
 from fracslice.rendering.units.random import hashed
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work
@@ -24,7 +24,6 @@ from fracslice.work import Work
 from ..runner import Row, Run
 
 SIZE = (96, 64)
-STEPS = 1600
 SMALLEST = {"scenes": ("mandelbulb",), "rounds": 4, "truth": 8}
 GROUND = plane(offset=-1.1)
 SUN = Light(position=(-1, -1.4, 1.2), size=3)
@@ -56,20 +55,19 @@ def centred(a, pixel, dimension):  # type: ignore[no-untyped-def]
 
 def renderer(root: Node, view: View) -> Renderer:
     made = Renderer(root, view, SIZE, Work(threads=2), "cpu")
-    made.tracer.aim(made._frame(9))
-    made.tracer.look_ahead(STEPS, made.work)
+    made.tracer.look_ahead(made.work)
     return made
 
 
 def mean_of_rounds(of: Renderer, count: int, first: int = 0) -> Iterator[np.ndarray]:
     """The mean after every round of one sample in each pixel, from sample `first` on; float64 [pixels, 3]."""
-    sums, pixels, total = np.zeros((SIZE[0] * SIZE[1], 6), np.float32), ordered(*SIZE), 0.0
-    for n in range(count):
+    sums, pixels, total = np.zeros((SIZE[0] * SIZE[1], CHANNELS), np.float32), ordered(*SIZE), 0.0
+    for n in range(first, first + count):
         sums[:] = 0
-        sums[:, 5] = first + n
-        of.tracer.add(sums, pixels, first + n, STEPS, of.work)
+        sums[:, COUNT], sums[:, GOAL] = n, n + 1
+        of.tracer.add(sums.ravel(), Plan(pixels, pixels.size, n + 1), of.work)
         total = total + sums[:, :3].astype(np.float64)
-        yield total / (n + 1)
+        yield total / (n - first + 1)
 
 
 def reference(root: Node, view: View, count: int) -> np.ndarray:

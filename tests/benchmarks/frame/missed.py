@@ -27,7 +27,8 @@ def missed(root: Node, camera: Camera, side: int) -> tuple[int, int]:
     found, d = distances(root, camera, (side, side)), directions(camera, (side, side))
     first = first_inside(root, np.array(camera.eye), d)
     hit = np.isfinite(first)
-    return int((np.isnan(found[hit]) | (found[hit] > first[hit] + 1e-3)).sum()), int(hit.sum())
+    pixel = 2 * np.tan(np.radians(25)) / side * first[hit]
+    return int((np.isnan(found[hit]) | (found[hit] > first[hit] + pixel)).sum()), int(hit.sum())
 
 
 def first_inside(root: Node, eye: np.ndarray, d: np.ndarray) -> np.ndarray:

@@ -9,12 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from fracslice import read
 from fracslice.rendering import Renderer
-from fracslice.rendering.cpu import ordered
-from fracslice.rendering.progressive import STEPS
+from fracslice.rendering.accumulator import GOAL, HostAccumulator, Plan, ordered
 from fracslice.scene import library
 from fracslice.scene.view import Camera
 
@@ -54,8 +51,11 @@ def moved(of: Renderer, show: Callable[[Camera], None], camera: Camera) -> Figur
     """Milliseconds of a picture from a new place, the rays, and the CPU time over that of tracing them."""
     whole = timed(lambda: show(camera))
     kept = of.accumulator.host()
-    sums, pixels = np.zeros_like(kept.sums), ordered(of.width, of.height)
+    size = of.width, of.height
+    picture, pixels = HostAccumulator.empty(*size, kept.sums.dtype), ordered(*size)
+    picture.channels[..., GOAL] = 1
     pixels = pixels[kept.counts[pixels >> 16, pixels & 65535] > 0]
-    bound = timed(lambda: of.tracer.add(sums, pixels, 1, STEPS, of.work))["cpu_s"]
+    plan = Plan(pixels, len(pixels), 1)
+    bound = timed(lambda: of.tracer.add(picture.sums, plan, of.work))["cpu_s"]
     spent = {"wall_ms": 1e3 * whole["wall_s"], "cpu_ms": 1e3 * whole["cpu_s"]}
     return {**spent, "rays": float(len(pixels)), "of the bound": whole["cpu_s"] / bound}

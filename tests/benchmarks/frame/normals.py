@@ -67,7 +67,7 @@ def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES), count: int = 4000) -
             "central, 6 samples": partial(gradient, root, points, AXES),
             "forward, 3 samples": partial(gradient, root, points, np.eye(3), True),
         }
-        found = run.interleaved({**acts, "once": partial(reference(root), *points.T)})
+        measured = run.interleaved({**acts, "once": partial(reference(root), *points.T)})
         for how, act in acts.items():
             cosine = (act() * expected).sum(1)
             angle = np.degrees(np.arccos(np.clip(np.nan_to_num(cosine), -1, 1)))
@@ -77,4 +77,4 @@ def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES), count: int = 4000) -
                 "mean": float(angle.mean()),
                 "worst hundredth": float(np.quantile(angle, 0.99)),
             }
-            yield {**row, "cost": found.ratio(how, "once", "cpu_s")}
+            yield {**row, "cost": measured.ratio(how, "once", "cpu_s")}

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice.formulas import mandelbulb
-from fracslice.rendering.cpu import BLOCK, CpuTracer, ordered
+from fracslice.rendering.accumulator import GOAL, HostAccumulator, Plan, ordered
+from fracslice.rendering.cpu import BLOCK, CpuTracer
 from fracslice.rendering.linking import link_frame
 from fracslice.rendering.optics import optics
 from fracslice.scene.view import Camera, Light, Shading, View
@@ -20,7 +21,6 @@ from fracslice.work import Work
 from ..programs import output
 from ..runner import Figures, Row, Run, timed
 
-STEPS = 300
 RUNS = 9
 SMALLEST = {"width": 64, "height": 48, "samples": 2}
 
@@ -36,19 +36,19 @@ def tracer(width: int, height: int) -> CpuTracer:
 
 def ours(of: CpuTracer, pixels: np.ndarray, samples: int, work: Work) -> Figures:
     """CPU seconds of the first sample, the look ahead included, and of all of them."""
-    sums = np.zeros((len(pixels), 6), np.float32)
+    picture = HostAccumulator.empty(of.width, of.height, np.dtype(np.float32))
     of.aim(of.frame)
 
-    def first() -> None:
-        of.look_ahead(STEPS, work)
-        of.add(sums, pixels, 0, STEPS, work)
+    def add(goal: int) -> None:
+        picture.channels[..., GOAL] = goal
+        of.add(picture.sums, Plan(pixels, goal * pixels.size, goal), work)
 
-    def others() -> None:
-        for index in range(1, samples):
-            of.add(sums, pixels, index, STEPS, work)
+    def first() -> None:
+        of.look_ahead(work)
+        add(1)
 
     once = timed(first)["cpu_s"]
-    return {"cpu_s": once, "cpu16_s": once + timed(others)["cpu_s"]}
+    return {"cpu_s": once, "cpu16_s": once + timed(lambda: add(samples))["cpu_s"]}
 
 
 def rows(run: Run, width: int = 800, height: int = 600, samples: int = 16) -> Iterator[Row]:
@@ -59,7 +59,7 @@ def rows(run: Run, width: int = 800, height: int = 600, samples: int = 16) -> It
             "fracslice": lambda: ours(of, pixels, samples, work),
             "C++": lambda: output("frame", *given)[0],
         }
-        found = run.interleaved(acts)
+        measured = run.interleaved(acts)
     for key, name in {"cpu_s": "first sample", "cpu16_s": f"{samples} samples"}.items():
-        ratio = found.ratio("fracslice", "C++", key)
-        yield {"": name, "CPU s": found.spread("fracslice", key), "/ C++": ratio}
+        ratio = measured.ratio("fracslice", "C++", key)
+        yield {"": name, "CPU s": measured.spread("fracslice", key), "/ C++": ratio}

@@ -13,7 +13,8 @@ import numpy as np
 
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
-from fracslice.rendering.cpu import BLOCK, CpuTracer, ordered
+from fracslice.rendering.accumulator import CHANNELS, GOAL, Plan, ordered
+from fracslice.rendering.cpu import BLOCK, CpuTracer
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.optics import optics
@@ -24,7 +25,7 @@ from ..runner import Row, Run
 from . import native
 from .sampling import best
 
-WIDTH, HEIGHT, LIMIT = 1920, 1080, 256
+WIDTH, HEIGHT = 1920, 1080
 ROUNDS = 256
 """More samples than a pixel gets here."""
 SINGLE = np.dtype(np.float32)
@@ -90,7 +91,7 @@ __global__ void tile(Parameters P, const float *S, const int *pixels, int count,
     r = tamed(r), g = tamed(g), b = tamed(b);
     float bright = 0.2126f * r + 0.7152f * g + 0.0722f * b;
     bright = bright / (1.0f + bright);
-    float *a = A + 6 * (row * width + column);
+    float *a = A + 7 * (row * width + column);
     a[0] += r, a[1] += g, a[2] += b, a[3] += bright, a[4] += bright * bright, a[5] += 1.0f;
 }
 int main(int, char **argument) {
@@ -99,7 +100,7 @@ int main(int, char **argument) {
     FILE *file = fopen(argument[1], "rb");
     if (fread(pixels.data(), 4, count, file) != count) return 1;
     float *A, *S, best = 1e30f;
-    cudaMalloc(&A, count * 24);
+    cudaMalloc(&A, count * 28);
     cudaMalloc(&S, blocks * height / 8 * 4);
     cudaMalloc(&placed, count * 4);
     cudaMemset(S, 0, blocks * height / 8 * 4);
@@ -108,7 +109,7 @@ int main(int, char **argument) {
     cudaEventCreate(&start);
     cudaEventCreate(&end);
     for (int round = 0; round < 50; round++) {
-        cudaMemset(A, 0, count * 24);
+        cudaMemset(A, 0, count * 28);
         cudaEventRecord(start);
         tile<<<(count + 127) / 128, 128>>>(GIVEN, S, placed, count, A, width, 256.0f, blocks);
         cudaEventRecord(end);
@@ -117,10 +118,10 @@ int main(int, char **argument) {
         cudaEventElapsedTime(&time, start, end);
         best = fminf(best, time);
     }
-    std::vector<float> sums(6 * count);
-    cudaMemcpy(sums.data(), A, count * 24, cudaMemcpyDeviceToHost);
+    std::vector<float> sums(7 * count);
+    cudaMemcpy(sums.data(), A, count * 28, cudaMemcpyDeviceToHost);
     double mean = 0;
-    for (int i = 0; i < count; i++) mean += sums[6 * i + 3];
+    for (int i = 0; i < count; i++) mean += sums[7 * i + 3];
     printf("%g %.9g %d\n", best, mean / count, int(cudaGetLastError()));
 }
 """
@@ -131,14 +132,15 @@ def rows(run: Run) -> Iterator[Row]:
     numba_cuda, seen, pixels = cuda.require(), frame(WIDTH, HEIGHT), ordered(WIDTH, HEIGHT)
     tracer = CudaTracer(seen, SINGLE, WIDTH, HEIGHT)
     placed = numba_cuda.to_device(pixels)
-    sums = numba_cuda.to_device(np.zeros((WIDTH * HEIGHT, 6), SINGLE))
-    work = Work(1)
-    tracer.add(sums, placed, 0, LIMIT, work)
-    picture = sums.copy_to_host()
+    sums, work = numba_cuda.to_device(empty()), Work(1)
+    tracer.add(sums, Plan(placed, pixels.size, 1), work)
+    picture = sums.copy_to_host().reshape(-1, CHANNELS)
+    tracer.add(sums, Plan(placed, pixels.size, ROUNDS), work)
+    one = Plan(placed, pixels.size, 1)
     acts: dict[str, Callable[[], None]] = {
-        "frame": lambda: tracer.add(sums, placed, ROUNDS, LIMIT, work),
-        "cones": lambda: tracer.look_ahead(LIMIT, work),
-        "frame after cones": lambda: tracer.add(sums, placed, ROUNDS, LIMIT, work),
+        "frame": lambda: tracer.add(sums, one, work),
+        "cones": lambda: tracer.look_ahead(work),
+        "frame after cones": lambda: tracer.add(sums, one, work),
     }
     for name, act in acts.items():
         mean = float(picture[:, 3].mean()) if name == "frame" else None
@@ -155,6 +157,14 @@ def rows(run: Run) -> Iterator[Row]:
 
 def on_cpu(seen: Frame, pixels: np.ndarray) -> np.ndarray:
     """The same sums from the lanes."""
-    sums = np.zeros((WIDTH * HEIGHT, 6), SINGLE)
-    CpuTracer(seen, SINGLE, WIDTH, HEIGHT).add(sums, pixels, 0, LIMIT, Work())
-    return sums
+    sums = empty()
+    sums.reshape(-1, CHANNELS)[:, GOAL] = 1
+    CpuTracer(seen, SINGLE, WIDTH, HEIGHT).add(sums, Plan(pixels, pixels.size, 1), Work())
+    return sums.reshape(-1, CHANNELS)
+
+
+def empty() -> np.ndarray:
+    """Sums without samples, whose goals are out of reach."""
+    sums = np.zeros((WIDTH * HEIGHT, CHANNELS), SINGLE)
+    sums[:, GOAL] = ROUNDS
+    return sums.ravel()

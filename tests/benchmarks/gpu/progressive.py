@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
 from fracslice.rendering import Renderer
-from fracslice.rendering.cpu import ordered
-from fracslice.rendering.progressive import GROWTH, STEPS
+from fracslice.rendering.accumulator import CHANNELS, GOAL, Plan, ordered
 from fracslice.scene.view import Camera, Film, Light, View
 
 from ..runner import Row, Run, Spread
@@ -33,15 +34,17 @@ def rows(run: Run) -> Iterator[Row]:
     for _ in range(WARM):
         last = next(passes)
         _ = last.shown
-    pixels = numba_cuda.to_device(ordered(1920, 1080))
 
     def shown() -> None:
         _ = next(passes).shown
 
+    pixels = numba_cuda.to_device(ordered(1920, 1080))
+    sums = np.zeros((1920 * 1080, CHANNELS), of.dtype)
+    sums[:, GOAL] = 3 * RUNS
+    placed = numba_cuda.to_device(sums.ravel())
+
     def traced() -> None:
-        of.accumulator.receive(
-            pixels, lambda sums: of.tracer.add(sums, pixels, 4096, STEPS * GROWTH, of.work)
-        )
+        of.tracer.add(placed, Plan(pixels, pixels.size, 1), of.work)
         numba_cuda.synchronize()
 
     moved = Renderer(mandelbulb(), VIEW, (640, 360), device="cuda")
@@ -62,18 +65,18 @@ def rows(run: Run) -> Iterator[Row]:
         "pass": lambda: _done(next(passes)),
         "pass and its picture": shown,
         "statistics": lambda: _done(of.accumulator.statistics()),
-        "choice of pixels": lambda: _done(of.accumulator.wanted(4096, 0.0)),
+        "choice of pixels": lambda: _done(of.accumulator.plan(4096, 0.0)),
         "tones and download": lambda: _done(of.accumulator.shown(VIEW.film, "light")),
         "moved camera, 640 x 360, first pass": coarse,
         "moved camera, 640 x 360, every pixel": full,
     }
-    found = run.interleaved(acts)
+    measured = run.interleaved(acts)
     for name in acts:
-        ms = Spread.of([1e3 * figures["wall_s"] for figures in found[name]])
+        ms = Spread.of([1e3 * figures["wall_s"] for figures in measured[name]])
         yield {
             "": name,
             "ms": ms,
-            "/ tracing every pixel": found.ratio(name, "tracing every pixel", "wall_s"),
+            "/ tracing every pixel": measured.ratio(name, "tracing every pixel", "wall_s"),
         }
 
 

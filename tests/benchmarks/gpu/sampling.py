@@ -56,7 +56,7 @@ def rates(root: Node, corners: np.ndarray) -> dict[str, tuple[float, int]]:
     count, placed = 512 * len(corners), cuda.require().to_device(corners)
     out = numba_cuda.device_array((len(corners), 512), np.float32)
     took = best(lambda: kernel.bricks_on_device(placed, ORIGIN, VOXEL, out))
-    found = {"fracslice": (count / took / 1e6, int((out.copy_to_host() < 0).sum()))}
+    measured = {"fracslice": (count / took / 1e6, int((out.copy_to_host() < 0).sum()))}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "corners"
         corners.tofile(path)
@@ -65,8 +65,8 @@ def rates(root: Node, corners: np.ndarray) -> dict[str, tuple[float, int]]:
                 link(root), native.SAMPLING, flags, str(path), *(str(v) for v in (*ORIGIN, VOXEL))
             )
             assert error == 0
-            found[name] = (count / took / 1e6, int(inside))
-    return found
+            measured[name] = (count / took / 1e6, int(inside))
+    return measured
 
 
 def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES)) -> Iterator[Row]:
@@ -77,6 +77,6 @@ def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES)) -> Iterator[Row]:
                 yield {"": name, "samples": part, "by": back_end, "G evaluations/s": rate, "inside": inside}
         kernels = {"CPU": cpu.compile_scene(root), "CUDA": cuda.compile_scene(root)}
         acts = {key: partial(sample, kernel, root.bounds, LATTICE) for key, kernel in kernels.items()}
-        found = run.interleaved(acts)
+        measured = run.interleaved(acts)
         for key in kernels:
-            yield {"": name, "samples": "sampler", "by": key, "s": found.spread(key, "wall_s")}
+            yield {"": name, "samples": "sampler", "by": key, "s": measured.spread(key, "wall_s")}

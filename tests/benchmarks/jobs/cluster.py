@@ -100,11 +100,11 @@ def rows(
             "threads": partial(by_threads, Pieces(folder + "/threads"), waiting, Work(threads)),
             "empty": partial(by_pool, pool, nothing),
         }
-        found = run.interleaved(acts)
-    cost = Spread.of([figures["wall_s"] / empty for figures in found["empty"]])
+        measured = run.interleaved(acts)
+    cost = Spread.of([figures["wall_s"] / empty for figures in measured["empty"]])
     task = layers_task(pixels)
     layers = min(timed(lambda: task.make(Work(1)))["cpu_s"] for _ in range(run.runs))
-    over = found.ratio("workers", "threads", "wall_s")
+    over = measured.ratio("workers", "threads", "wall_s")
     yield {"": f"{tasks} tasks of {seconds:g} s, {threads} workers / {threads} threads", "figure": over}
     yield {
         "": "a task in the scheduler and the client, ms",

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..programs import output
-from ..runner import Row, Run, Spread, process, timed
+from ..runner import Row, Run, process, timed
 from .command import COMMAND
 
 SCENES = {
@@ -32,10 +32,10 @@ def rows(
     for name in scenes:
         for resolution in resolutions:
             with tempfile.TemporaryDirectory() as folder:
-                yield measured(run, Path(folder), name, resolution)
+                yield job_row(run, Path(folder), name, resolution)
 
 
-def measured(run: Run, folder: Path, name: str, resolution: int) -> Row:
+def job_row(run: Run, folder: Path, name: str, resolution: int) -> Row:
     """The row of a scene at a resolution."""
     element, peer = SCENES[name]
     scene, stl, mesh = folder / "scene.xml", folder / "mesh.stl", folder / "mesh.bin"
@@ -48,10 +48,11 @@ def measured(run: Run, folder: Path, name: str, resolution: int) -> Row:
         "C++": lambda: output("sparse", *given)[0],
         "copy": lambda: timed(lambda: shutil.copyfile(stl, folder / "copy.stl")),
     }
-    found = run.interleaved(acts)
+    measured = run.interleaved(acts)
     row = {"": name, "voxels": resolution, "triangles": stl.stat().st_size // 50}
     for key, title in {"wall_s": "time, s", "cpu_s": "CPU s", "peak_mb": "peak MB"}.items():
-        row[title] = found.spread("fracslice", key)
-    row["/ (C++ + copy)"] = found.ratio("fracslice", ("C++", "copy"), "wall_s")
-    peak = [f["peak_mb"] / c["worker_peak_mb"] for f, c in zip(found["fracslice"], found["C++"], strict=True)]
-    return {**row, "memory / C++": Spread.of(peak), "leaves out": LEAVES_OUT}
+        row[title] = measured.spread("fracslice", key)
+    row["/ (C++ + copy)"] = measured.ratio("fracslice", ("C++", "copy"), "wall_s")
+    row["CPU / (C++ + copy)"] = measured.ratio("fracslice", ("C++", "copy"), "cpu_s")
+    memory = measured.ratio("fracslice", "C++", "peak_mb", "worker_peak_mb")
+    return {**row, "memory / C++": memory, "leaves out": LEAVES_OUT}

@@ -29,7 +29,9 @@ def rows(
             words = [*COMMAND, "mesh", scene, "-o", stl, "--resolution", resolution, "--quiet"]
             words += ["--threads", run.threads[0]]
             acts = {repair: [*words, *repair.replace("none", "").split()] for repair in repairs}
-            found = run.interleaved({repair: partial(process, command) for repair, command in acts.items()})
+            measured = run.interleaved(
+                {repair: partial(process, command) for repair, command in acts.items()}
+            )
         for repair in repairs:
-            spent = {"CPU s": found.spread(repair, "cpu_s"), "peak MB": found.spread(repair, "peak_mb")}
+            spent = {"CPU s": measured.spread(repair, "cpu_s"), "peak MB": measured.spread(repair, "peak_mb")}
             yield {"": name, "repair": repair, **spent}

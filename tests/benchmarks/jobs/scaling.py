@@ -52,10 +52,10 @@ def rows(
         with tempfile.TemporaryDirectory() as folder:
             options = [word.format(pixels=pixels) for word in JOBS[name]]
             words = [*COMMAND, name, scene, *options, size, "--quiet", "-o"]
-            found = run.interleaved({str(p): partial(once, words, Path(folder), p) for p in run.threads})
-        times = [found.spread(str(p), "wall_s") for p in run.threads]
+            measured = run.interleaved({str(p): partial(once, words, Path(folder), p) for p in run.threads})
+        times = [measured.spread(str(p), "wall_s") for p in run.threads]
         share = serial_share(run.threads, [time.median for time in times])
         for p, time in zip(run.threads, times, strict=True):
-            faster = found.ratio(str(run.threads[0]), str(p), "wall_s")
+            faster = measured.ratio(str(run.threads[0]), str(p), "wall_s")
             row = {"": name, "size": size, "threads": p, "time, s": time, "times faster": faster}
-            yield {**row, "peak MB": found.spread(str(p), "peak_mb"), "serial share": f"{share:.1%}"}
+            yield {**row, "peak MB": measured.spread(str(p), "peak_mb"), "serial share": f"{share:.1%}"}

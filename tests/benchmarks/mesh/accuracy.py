@@ -48,7 +48,7 @@ TRUTHS = {
     "Menger level 4": Truth(menger(level=4), 213.3, *sponge(4)),
     "Julia c = 0, a sphere": Truth(julia(c=(0, 0, 0, 0), iterations=12), 128, *ball(2 ** (1 / 4096))),
 }
-SMALLEST = {"solids": ("unit sphere",), "share": 0.1}
+SMALLEST = {"solids": ("box 1 x 2 x 0.7",), "share": 0.1}
 
 
 def rows(run: Run, solids: tuple[str, ...] = tuple(TRUTHS), share: float = 1.0) -> Iterator[Row]:

@@ -53,6 +53,6 @@ def compiled(root: Node) -> None:
 
 def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES)) -> Iterator[Row]:
     acts = {BASE: partial(compiled, sphere()), **{name: partial(compiled, SCENES[name]) for name in scenes}}
-    found = run.interleaved(acts)
+    measured = run.interleaved(acts)
     for name in scenes:
-        yield {"": name, "times a sphere": found.ratio(name, BASE, "cpu_s")}
+        yield {"": name, "times a sphere": measured.ratio(name, BASE, "cpu_s")}

@@ -52,16 +52,16 @@ def rows(
             "of it: edge roots": roots,
             "of it: features": partial(triangles, cells, last, roots(), place, minimum_edge_parameter(signs)),
         }
-        found = run.interleaved(acts)
+        measured = run.interleaved(acts)
         parts = [
-            [figures["cpu_s"] for figures in found[key]] for key in ("samples", "marching cubes", "exact")
+            [figures["cpu_s"] for figures in measured[key]] for key in ("samples", "marching cubes", "exact")
         ]
         ratio = Spread.of([(s + e) / (s + m) for s, m, e in zip(*parts, strict=True)])
         off = np.abs(
             planned.root.kernel("cpu", "float64").points(*contour(planned.root, bricks).vertices.T)
             / planned.voxel
         )
-        spent = {key: found.spread(key, "cpu_s") for key in acts}
+        spent = {key: measured.spread(key, "cpu_s") for key in acts}
         yield {
             "": name,
             **spent,

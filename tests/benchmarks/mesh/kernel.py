@@ -50,13 +50,15 @@ def rows(run: Run, n: int = 128, scenes: tuple[str, ...] = tuple(SCENES)) -> Ite
             for precision in ("float32", "float64"):
                 kernel = compile_scene(SCENES[name][1], precision)  # type: ignore[arg-type]
                 acts[f"{name} {precision} {which}"] = partial(kernel.points, *at.astype(precision))
-        found = run.interleaved(acts)
+        measured = run.interleaved(acts)
     for (name, which), at in points.items():
         for precision in ("float32", "float64"):
             key = f"{name} {precision} {which}"
             forms = (f"{SCENES[name][0]} {form}_{precision} {which}" for form in ("lanes", "two_lanes"))
-            best = min(forms, key=lambda form: found.spread("C++", form).median)
-            speed = Spread.of([at.shape[1] / figures["cpu_s"] / 1e6 for figures in found[key]])
-            against = Spread.of([c[best] / f["cpu_s"] for c, f in zip(found["C++"], found[key], strict=True)])
+            best = min(forms, key=lambda form: measured.spread("C++", form).median)
+            speed = Spread.of([at.shape[1] / figures["cpu_s"] / 1e6 for figures in measured[key]])
+            against = Spread.of(
+                [c[best] / f["cpu_s"] for c, f in zip(measured["C++"], measured[key], strict=True)]
+            )
             row = {"": name, "precision": precision, "points": which, "million/s": speed}
             yield {**row, "/ C++": against, "leaves out": LEAVES_OUT}

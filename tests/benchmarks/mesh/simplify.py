@@ -38,8 +38,8 @@ SMALLEST = {"scenes": ("sphere",), "share": 0.1}
 
 
 def by_manifold3d(mesh: Mesh, tolerance: float, count: int) -> Mesh:
-    found = to_manifold(mesh).as_original().simplify(tolerance).to_mesh64()
-    return Mesh(np.ascontiguousarray(found.vert_properties[:, :3]), found.tri_verts.astype(np.int32))
+    measured = to_manifold(mesh).as_original().simplify(tolerance).to_mesh64()
+    return Mesh(np.ascontiguousarray(measured.vert_properties[:, :3]), measured.tri_verts.astype(np.int32))
 
 
 def by_pymeshlab(mesh: Mesh, tolerance: float, count: int) -> Mesh:
@@ -50,8 +50,8 @@ def by_pymeshlab(mesh: Mesh, tolerance: float, count: int) -> Mesh:
     meshes.meshing_decimation_quadric_edge_collapse(
         targetfacenum=count, preservetopology=True, preservenormal=True, planarquadric=True
     )
-    found = meshes.current_mesh()
-    return Mesh(found.vertex_matrix(), found.face_matrix().astype(np.int32))
+    measured = meshes.current_mesh()
+    return Mesh(measured.vertex_matrix(), measured.face_matrix().astype(np.int32))
 
 
 def by_us(mesh: Mesh, tolerance: float, count: int) -> Mesh:
@@ -68,7 +68,7 @@ def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES), share: float = 1.0) 
         mesh, tolerance = quantised(contour(root, sample_scene(planned))), TOLERANCE * planned.voxel
         count = len(by_us(mesh, tolerance, 0).triangles)
         acts = {how: partial(method, mesh, tolerance, count) for how, method in METHODS.items()}
-        found = run.interleaved(acts, warm=False)
+        measured = run.interleaved(acts, warm=False)
         for how, act in acts.items():
             few = act()
             off = Nearest(few).samples(mesh, 10 * planned.voxel, Work(run.threads[0])).max() / tolerance
@@ -79,6 +79,6 @@ def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES), share: float = 1.0) 
             row = {"": name, "voxels": share * resolution, "by": how, **sizes, "off": float(off)}
             yield {
                 **row,
-                "CPU s": found.spread(how, "cpu_s"),
+                "CPU s": measured.spread(how, "cpu_s"),
                 "defects": ", ".join(check_mesh(few).problems) or "none",
             }

@@ -46,10 +46,10 @@ def rows(
     run: Run, scenes: tuple[str, ...] = tuple(SCENES), pixels: tuple[int, ...] = (256, 512, 1024)
 ) -> Iterator[Row]:
     for name in scenes:
-        found = run.interleaved({str(n): partial(cost, name, n) for n in pixels})
+        measured = run.interleaved({str(n): partial(cost, name, n) for n in pixels})
         for n, last in zip(pixels, (0, *pixels), strict=False):
             row: Row = {"": name, "pixels": n}
             for key, title in {"cut": "cut pixels", "evals": "evaluations", "cpu_s": "CPU s"}.items():
-                row[title] = found.spread(str(n), key)
-                row[f"times, {title}"] = found.ratio(str(n), str(last), key) if last else None
-            yield {**row, "evaluations per cut pixel": found.ratio(str(n), str(n), "evals", "cut")}
+                row[title] = measured.spread(str(n), key)
+                row[f"times, {title}"] = measured.ratio(str(n), str(last), key) if last else None
+            yield {**row, "evaluations per cut pixel": measured.ratio(str(n), str(n), "evals", "cut")}

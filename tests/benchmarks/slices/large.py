@@ -65,16 +65,16 @@ def rows(run: Run, layers: int = 0) -> Iterator[Row]:
         "sampling": lambda: list(Slicer(stack).map(lambda layer: layer.evaluations)),
         "every pixel": lambda: dense(stack, job.screen.shape, work),
     }
-    found = run.interleaved(acts)
+    measured = run.interleaved(acts)
     yield {"": "layers", "figure": count}
-    yield {"": "time, s", "figure": found.spread("job", "wall_s")}
-    yield {"": "CPU time, s", "figure": found.spread("job", "cpu_s")}
-    yield {"": "memory, MB", "figure": found["job"][0]["peak_mb"]}
-    yield {"": "picture size, kB", "figure": found.spread("job", "kB a picture")}
+    yield {"": "time, s", "figure": measured.spread("job", "wall_s")}
+    yield {"": "CPU time, s", "figure": measured.spread("job", "cpu_s")}
+    yield {"": "memory, MB", "figure": measured["job"][0]["peak_mb"]}
+    yield {"": "picture size, kB", "figure": measured.spread("job", "kB a picture")}
     against = "evaluating each pixel, CPU time / the job's"
     yield {
         "": against,
-        "figure": found.ratio("every pixel", "job", "cpu_s"),
+        "figure": measured.ratio("every pixel", "job", "cpu_s"),
         "leaves out": "pictures",
     }
-    yield {"": f"{against}, without pictures", "figure": found.ratio("every pixel", "sampling", "cpu_s")}
+    yield {"": f"{against}, without pictures", "figure": measured.ratio("every pixel", "sampling", "cpu_s")}

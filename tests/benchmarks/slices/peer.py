@@ -55,16 +55,16 @@ def rows(run: Run, side: int = 1024, layers: int = 512) -> Iterator[Row]:
             "fracslice": lambda: ours(job, Path(folder), work),
             "C++": lambda: output("slices", *given)[0],
         }
-        found = run.interleaved(acts)
+        measured = run.interleaved(acts)
     for key, name in {"wall_s": "time", "cpu_s": "CPU time", "evals": "evaluations"}.items():
-        ratio, out = found.ratio("C++", "fracslice", key), "" if key == "evals" else "C++: grey rims"
+        ratio, out = measured.ratio("C++", "fracslice", key), "" if key == "evals" else "C++: grey rims"
         yield {
             "": name,
-            "fracslice": found.spread("fracslice", key),
+            "fracslice": measured.spread("fracslice", key),
             "C++ / fracslice": ratio,
             "leaves out": out,
         }
     yield {
         "": "evaluations per cut pixel",
-        "fracslice": found.ratio("fracslice", "fracslice", "evals", "cut"),
+        "fracslice": measured.ratio("fracslice", "fracslice", "evals", "cut"),
     }

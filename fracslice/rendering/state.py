@@ -1,0 +1,102 @@
+"""Files from which rendering continues exactly."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+from typing import BinaryIO
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.lib.npyio import NpzFile
+
+from ..errors import RenderError
+from .accumulator import COUNT, GOAL, HostAccumulator
+
+COARSEST, MOST_PASSES, MOST_SAMPLES = 64, 1 << 24, 1 << 20
+"""Limits of a saved picture's grid spacing, passes and samples per pixel."""
+HEADER = 1 << 12
+"""Maximum header size of an array in a file, bytes."""
+INVALID = "expected a picture in progress, complete, as it was saved"
+
+
+def save_state(file: BinaryIO, key: str, picture: HostAccumulator) -> None:
+    """Write the sums as an .npz file.
+
+    Parameters
+    ----------
+    file : BinaryIO
+        Writable binary file.
+    key : str
+        Key of the picture; see `Renderer.key`.
+    picture : HostAccumulator
+        The picture.
+    """
+    shape = np.array([picture.width, picture.height, picture.passes, picture.coarse])
+    np.savez(file, sums=picture.sums, shape=shape, key=np.array(key))
+
+
+def load_state(path: str | Path, key: str, like: HostAccumulator) -> HostAccumulator:
+    """Read a file written by `save_state`. Its contents are validated before native code sees them.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    key : str
+        Expected key of the picture.
+    like : HostAccumulator
+        Picture of the expected size and float type.
+
+    Returns
+    -------
+    HostAccumulator
+        The saved picture.
+
+    Raises
+    ------
+    RenderError
+        If the file is missing, damaged or of another picture.
+    """
+    try:
+        with open(path, "rb") as file, NpzFile(file) as stored:
+            if str(_array(stored, "key")) != key:
+                raise RenderError(f"{path}: is of another scene, view, size or version")
+            width, height, passes, coarse = map(int, _array(stored, "shape"))
+            sums = _array(stored, "sums", like.sums.nbytes)
+    except OSError as error:
+        raise RenderError(f"{path}: {error.strerror or error}") from None
+    except (ValueError, KeyError, EOFError, BadZipFile, NotImplementedError, zlib.error):
+        raise RenderError(f"{path}: {INVALID}") from None
+    found = HostAccumulator(width, height, sums, passes, coarse, like.work)
+    if not _fits(found, like):
+        raise RenderError(f"{path}: {INVALID}")
+    return found
+
+
+def _fits(found: HostAccumulator, like: HostAccumulator) -> bool:
+    """True if a picture is consistent and has the size and float type of another."""
+    return (
+        (found.width, found.height) == (like.width, like.height)
+        and (found.sums.shape, found.sums.dtype) == (like.sums.shape, like.sums.dtype)
+        and 0 <= found.passes < MOST_PASSES
+        and 1 <= found.coarse <= COARSEST
+        and all(_counts(found.channels[..., channel]) for channel in (COUNT, GOAL))
+        and bool((found.counts <= found.channels[..., GOAL]).all())
+    )
+
+
+def _counts(n: np.ndarray) -> bool:
+    """True if all values are numbers of samples."""
+    return bool(((n >= 0) & (n <= MOST_SAMPLES) & (n == np.floor(n))).all())
+
+
+def _array(stored: NpzFile, name: str, most: int = 0) -> np.ndarray:
+    """Load an array of at most `most` bytes from a file.
+
+    A small file can expand to a large array.
+    """
+    assert stored.zip
+    if stored.zip.getinfo(f"{name}.npy").file_size > most + HEADER:
+        raise ValueError(name)
+    return np.asarray(stored[name])
