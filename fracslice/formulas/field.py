@@ -179,7 +179,7 @@ class Field(Protocol):
 
     @property
     def escape_time_only(self) -> bool:
-        """True if all shapes of the field are escape-time fractals."""
+        """True if all shapes of the field are escape-time fractals with the field of a potential."""
         return False
 
     def conservative(self) -> Field:

@@ -150,7 +150,7 @@ class Node(Operators, Field):
     @property
     def escape_time_only(self) -> bool:
         """See `Field.escape_time_only`."""
-        return all(node.formula.exterior_only for node in self.walk() if node.formula.kind == "shape")
+        return all(map(_has_potential, (node for node in self.walk() if node.formula.kind == "shape")))
 
     @property
     def key(self) -> str:
@@ -216,3 +216,9 @@ def _restored(formula: Formula, values: dict[str, Any], *fields: Any) -> Node:
 def _given(node: Node) -> dict[str, Any]:
     """Parameter values that are not None."""
     return {name: value for name, value in node.values.items() if value is not None}
+
+
+def _has_potential(shape: Node) -> bool:
+    """True if the field is that of a potential; orbits that grow linearly have none."""
+    hook = shape.formula.hooks.get("potential")
+    return bool(hook(shape)) if hook else shape.formula.exterior_only

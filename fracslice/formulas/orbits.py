@@ -56,7 +56,14 @@ def orbit(**parameters: Parameter) -> Callable[[Callable[..., Any]], Formula]:
     def decorate(step: Callable[..., Any]) -> Formula:
         formula = shape(lipschitz=2.0, exterior_only=True, **parameters, **OWN)(step)
         STEPS[formula.name] = step
-        for hook in (orbit_bounds, orbit_arguments, orbit_select, orbit_steepening, orbit_check):
+        for hook in (
+            orbit_bounds,
+            orbit_arguments,
+            orbit_select,
+            orbit_steepening,
+            orbit_potential,
+            orbit_check,
+        ):
             formula.hooks[hook.__name__.removeprefix("orbit_")] = hook
         return formula
 
@@ -103,6 +110,11 @@ def orbit_select(node: Node) -> Callable[..., Any]:
 
 def orbit_steepening(node: Node) -> float:
     return max(2.0, float(grown(node).power))
+
+
+def orbit_potential(node: Node) -> bool:
+    """True if the field is that of a potential, far from its bound inside."""
+    return bool(grown(node).by_power)
 
 
 def orbit_check(node: Node) -> None:

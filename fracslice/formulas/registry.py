@@ -169,6 +169,13 @@ class Formula:
         """Set the hook that returns `Bounds.steepening`, where it is not the maximum of the children's."""
         return self._hook("steepening", hook)
 
+    def potential(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """Set the hook that returns True if the field is that of a potential, where it depends on parameters.
+
+        By default it is one for every escape-time fractal.
+        """
+        return self._hook("potential", hook)
+
     def arguments(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
         """Set the hook that returns the arguments after points or values, if they are not the parameters."""
         return self._hook("arguments", hook)

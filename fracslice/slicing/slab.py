@@ -10,12 +10,13 @@ sign is only implied, that sample is evaluated. Nothing within a layer is evalua
 Above 16 pixels the bound is the formula's own, which is proven or measured with a margin. Escape-time
 fractals are far from it: their values are a fifth of the distance outside and a fiftieth inside (means on
 Mandelbulbs and Julia sets), and subdivision to single pixels by that bound would cost more than the contours.
-In a scene of escape-time fractals only, blocks of 16 are dropped by half of the bound outside and by a tenth
-inside. Smaller blocks are dropped by the steepness of the field there, but not below `LIKELY`. Single samples
-are dropped where two blocks around theirs all have one sign: inside, the signs around a sample are better
-evidence of the distance to the surface than its value. Specks of a pixel or two are lost, below 0.1 % of the
-area (tests/slicing/test_layers.py). Where a scene mixes fractals with other shapes, subdivision ends at
-blocks of `STOP` pixels instead, and smaller features that touch no probe are missed.
+In a scene of fractals with a potential only, blocks of 16 are dropped by half of the bound outside and by a
+tenth inside. Smaller blocks are dropped by the steepness of the field there, but not below `LIKELY`. Single
+samples are dropped where two blocks around theirs all have one sign: inside, the signs around a sample are
+better evidence of the distance to the surface than its value. Specks of a pixel or two are lost, below 0.1 %
+of the area (tests/slicing/test_layers.py). Orbits that grow linearly, such as a Mandelbox, have values near
+to the distance on both sides: there, and where a scene mixes fractals with other shapes, small blocks are
+dropped by `MIXED` of the bound.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from ..kernel import Field, Kernel
 LIKELY = 0.06, 0.015
 """Minimum bounds for small blocks of a fractal, outside and inside, as fractions of its own bound."""
 
-STOP = 2, 4
-"""Pixels, outside and inside."""
+MIXED = 0.25
+"""Fraction of the bound for small blocks of scenes with other shapes or linear growth."""
 
 
 class Sampler:
@@ -105,5 +106,5 @@ def _probe_bounds(root: Field, bounds: Bounds) -> ProbeBounds:
     bound, exterior_only = bounds.lipschitz, bounds.exterior_only
     if exterior_only and root.escape_time_only:
         return ProbeBounds(bound, bound * LIKELY[0], bound * LIKELY[1], 1, 1, True)
-    stop = STOP if exterior_only else (1, 1)
-    return ProbeBounds(bound, bound, bound, *stop, False)
+    likely = bound * MIXED if exterior_only else bound
+    return ProbeBounds(bound, likely, likely, 1, 1, False)
