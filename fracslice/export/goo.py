@@ -1,4 +1,4 @@
-""".goo V3.0 of Elegoo, and .prz of Phrozen, after the readers and writers of UVtools, PrusaSlicer and the crate goo.
+""".goo V3.0 of Elegoo, and .prz of Phrozen, after UVtools, PrusaSlicer and the crate goo.
 
 All numbers are big-endian; pixels have 8 bits; each layer has its own height and exposure.
 """
