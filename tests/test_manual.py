@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import commands, run
 
-import fracslice.slicerecipe  # noqa: F401  before a test replaces what it imports
+# Loaded first, for they bind what the tests replace.
 from fracslice.export import write
 
 from .mesh import shapes
@@ -88,7 +88,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     )
     for name in ("my.xml", "part.xml"):
         (tmp_path / name).write_text(scene)
-    for name in ("my.stl", "my.3mf"):
+    for name in ("my.stl", "my.3mf", "part.stl"):
         write(shapes.cube(), tmp_path / name)
     (tmp_path / "scenes").symlink_to(ROOT / "scenes")
     monkeypatch.chdir(tmp_path)

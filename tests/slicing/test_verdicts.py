@@ -91,7 +91,7 @@ def sealed(r: Random) -> Node:
 
 
 def long_bar(r: Random) -> Node:
-    return block(r.uniform(260, 450), r.uniform(8, 20), r.uniform(8, 20))
+    return block(r.uniform(450, 700), r.uniform(8, 20), r.uniform(8, 20))
 
 
 def sheet(r: Random) -> Node:
