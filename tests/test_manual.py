@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import re
 import shlex
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from fracslice.cli.main import commands, run
 
-# Loaded first, for they bind what the tests replace.
 from fracslice.export import write
 
 from .mesh import shapes
+
+for name in ("animation.film", "slicerecipe", "stackmodel"):
+    import_module(f"fracslice.{name}")  # before a test replaces what they import
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
