@@ -163,7 +163,7 @@ TEST_CASE("face_corner: where tangents meet in the face, strictly inside it") {
     CHECK_FALSE(face_corner(x, x, 2, 1e-3, corner));
     REQUIRE(face_corner(x, Crossing{{0, 1.2, 0}, {0, 1, 0}}, 2, 1e-3, corner));
     CHECK(corner[1] == doctest::Approx(1 - 1e-3));
-    CHECK_FALSE(face_corner(x, Crossing{{0, 1.7, 0}, {0, 1, 0}}, 2, 1e-3, corner));
+    CHECK_FALSE(face_corner(x, Crossing{{0, 2.2, 0}, {0, 1, 0}}, 2, 1e-3, corner));  // two planes at a right angle are a wedge: a cell away, not more
 }
 
 }  // namespace fracslice::mesh
