@@ -25,7 +25,10 @@ def file_hash(scene: str, name: str, threads: int) -> str:
     job, *options = JOBS[name]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name
-        process([*COMMAND, job, scene, "-o", path, *options, "--threads", threads, "--quiet"])
+        process(
+            [*COMMAND, job, scene, "-o", path, *options, "--threads", threads, "--quiet"],
+            SOURCE_DATE_EPOCH="0",
+        )
         return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
