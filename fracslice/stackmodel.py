@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageOps
 
 from .formulas import Node
 from .job import make_mesh
@@ -20,6 +21,8 @@ from .slicing import SliceJob
 from .slicing.stack import turned
 from .work import Work
 
+LARGEST = 800, 480
+"""Width and height of the largest preview of a format, pixels."""
 SAMPLES = 4
 """Samples per pixel of pictures."""
 
@@ -65,8 +68,18 @@ class StackModel:
         )
         return make_mesh(replace(self.scene, root=self._upright), what, self.work).mesh
 
+    @cached_property
+    def _image(self) -> Image.Image:
+        width, height = LARGEST
+        film = Film(width=width, height=height, samples=SAMPLES)
+        renderer = Renderer(self._upright, View(film=film), work=self.work, device="cpu")
+        *_, last = renderer.passes(SAMPLES)
+        return Image.fromarray(np.asarray(last.shown))
+
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Render the scene as it stands on the printer, without its print preparation.
+
+        Pictures of all sizes are cut from one.
 
         Parameters
         ----------
@@ -78,7 +91,4 @@ class StackModel:
         uint8 [height, width, 3]
             sRGB.
         """
-        film = Film(width=width, height=height, samples=SAMPLES)
-        renderer = Renderer(self._upright, View(film=film), work=self.work, device="cpu")
-        *_, last = renderer.passes(SAMPLES)
-        return np.asarray(last.shown)
+        return np.asarray(ImageOps.fit(self._image, (width, height), Image.Resampling.LANCZOS))
