@@ -26,8 +26,6 @@ class ProbeBounds:
         Bound for blocks over all layers.
     outside, inside : float
         Bounds for smaller blocks, by the sign at the centre.
-    stop_outside, stop_inside : int
-        Size of blocks that are not subdivided further, pixels.
     escape_time_only : bool
         True for a field of escape-time fractals alone. Its inside values differ from outside ones by one
         scale factor, so that a sample of the crossings represents all; the bound outside follows the slope of
@@ -40,8 +38,6 @@ class ProbeBounds:
         proven: float,
         outside: float,
         inside: float,
-        stop_outside: int,
-        stop_inside: int,
         escape_time_only: bool,
     ) -> None: ...
 

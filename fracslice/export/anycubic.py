@@ -118,6 +118,6 @@ def _motion(job: Print) -> bytes:
 
 
 def _machine(job: Print) -> bytes:
-    size, name = (*job.printer.screen, job.printer.height), job.printer.title.encode("ascii", "replace")
+    size, name = (*job.printer.screen, job.printer.height), job.title
     contents = _MACHINE.pack(name[:95], b"pw0Img", *size, 516, BOARD)
     return _section("MACHINE", contents, 16)

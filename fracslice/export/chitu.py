@@ -104,7 +104,7 @@ def _write(
 ) -> Path:
     """Write header, previews, settings, layer table and layers. sizes: of the pictures, [levels, layers]."""
     previews = [_preview(job.preview(*size)) for size in (LARGE, SMALL)]
-    name = job.printer.title.encode("ascii", "replace")
+    name = job.title
     lengths = [
         _HEADER.size,
         *(_PREVIEW.size + len(p) for p in previews),

@@ -110,6 +110,11 @@ class Print:
         mirror = self.run.screen.mirror
         return self.printer.mirror if mirror is None else mirror
 
+    @property
+    def title(self) -> bytes:
+        """Name of the printer, ASCII."""
+        return self.printer.title.encode("ascii", "replace")
+
     def preview(self, width: int, height: int) -> NDArray[np.uint8]:
         """Picture of the object.
 

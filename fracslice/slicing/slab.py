@@ -105,6 +105,6 @@ def _probe_bounds(root: Field, bounds: Bounds) -> ProbeBounds:
     """Bounds by which blocks are dropped."""
     bound, exterior_only = bounds.lipschitz, bounds.exterior_only
     if exterior_only and root.escape_time_only:
-        return ProbeBounds(bound, bound * LIKELY[0], bound * LIKELY[1], 1, 1, True)
+        return ProbeBounds(bound, bound * LIKELY[0], bound * LIKELY[1], True)
     likely = bound * MIXED if exterior_only else bound
-    return ProbeBounds(bound, likely, likely, 1, 1, False)
+    return ProbeBounds(bound, likely, likely, False)

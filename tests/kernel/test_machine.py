@@ -22,7 +22,7 @@ from fracslice.mesh.roots import Roots
 
 
 def slab_of(entry: Any) -> Slab:
-    return Slab(Memory(), entry, ProbeBounds(1, 1, 1, 1, 1, False), (0, 0, 1, 1), [0.0], 9, 9)
+    return Slab(Memory(), entry, ProbeBounds(1, 1, 1, False), (0, 0, 1, 1), [0.0], 9, 9)
 
 
 def test_arrays_of_another_kind_are_refused() -> None:

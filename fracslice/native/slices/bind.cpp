@@ -151,8 +151,7 @@ NB_MODULE(_slices, module) {
     using namespace fracslice::slices;
     nb::exception<std::domain_error>(module, "BorderError", PyExc_ValueError);
     nb::class_<ProbeBounds>(module, "ProbeBounds")
-        .def(nb::init<double, double, double, int, int, bool>(), "proven"_a, "outside"_a, "inside"_a, "stop_outside"_a,
-             "stop_inside"_a, "escape_time_only"_a);
+        .def(nb::init<double, double, double, bool>(), "proven"_a, "outside"_a, "inside"_a, "escape_time_only"_a);
     nb::enum_<Encoding>(module, "Encoding")
         .value("PNG", Encoding::png)
         .value("GOO", Encoding::goo)

@@ -46,14 +46,13 @@ void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
     list(chunk, among);
     const float inside_reach = factor(bounds_.inside, frame_);
     const int back = size / 2 * kBack;
-    const uint64_t own = uint64_t(1) << back, least_in = size <= bounds_.stop_inside ? block(size) : own,
-                   least_out = size <= bounds_.stop_outside ? block(size) : own;
+    const uint64_t own = uint64_t(1) << back;
     evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) {
         const float *kept = values[ask.tile].data(), outside_reach = open_.reach[ask.tile];
         uint64_t reached = 0, within = 0;
         each(ask.samples, [&](int bit) {
             const float v = kept[bit], d2 = v * v * (v < 0 ? inside_reach : outside_reach);
-            uint64_t near = (*discs_)(d2, bit) | (v < 0 ? least_in : least_out) << (bit - back);
+            uint64_t near = (*discs_)(d2, bit) | own << (bit - back);
             within = v < 0 ? within | near : within & ~near;
             reached |= near;
         });

@@ -198,7 +198,6 @@ void Slab::quarter(double height) {
 void Slab::open(double height) {
     const float aside = float(square(height)) * factor(1, frame_), least = aside + float(2.25 * diagonal_ * square(bounds_.escape_time_only ? kBeside : 1));
     // What is farther than its rim decides its quarter.
-    const float outside_rim = bounds_.stop_outside < 4 ? least : -1, inside_rim = bounds_.stop_inside < 4 ? least : -1;
     const float inside_reach = factor(bounds_.inside, frame_);
     grow(columns_.size());
     open_.decided.resize(count()), open_.reach.resize(count());
@@ -206,7 +205,7 @@ void Slab::open(double height) {
     for (size_t i = 0; i < columns_.size(); ++i) {
         const Column& c = columns_[i];
         const Four v = quarters_[i], d2 = v * v * (v < 0 ? Four{} + inside_reach : Four{} + c.reach);
-        const auto far = d2 > (v < 0 ? Four{} + inside_rim : Four{} + outside_rim);
+        const auto far = d2 > Four{} + least;
         uint64_t now = c.value < 0 ? kAll : 0, reached = 0;
         for (int q = 0; q < 4; ++q) {
             const uint64_t negative = -uint64_t(v[q] < 0);

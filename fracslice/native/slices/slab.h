@@ -35,7 +35,6 @@ struct Frame {
 struct ProbeBounds {
     double proven;           // for blocks of 16 pixels and more, and of 8 if nothing better is known
     double outside, inside;  // for smaller ones, by the value's sign
-    int stop_outside, stop_inside;  // blocks of so many samples are not cut any more
     bool escape_time_only;  // values inside are of another scale than outside, of one scale in a layer, see `inside_scale`
 };
 
