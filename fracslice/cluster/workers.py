@@ -27,8 +27,15 @@ POLL, CONNECT = 0.02, 20.0
 """Seconds between two looks for results, and until a scheduler answers."""
 
 
-def on_worker(task: Task, pieces: Pieces, expected: Identity) -> str:
+class UnfitWorkerError(ClusterError):
+    """Worker that would make other bytes: its address, and the difference."""
+
+
+def on_worker(task: Task, pieces: Pieces, expected: Identity) -> None:
     """Make the result of a task on a worker, in one thread.
+
+    Nothing is returned: a value would have to be fetched from a worker that may be gone. Exceptions travel
+    through the scheduler.
 
     Parameters
     ----------
@@ -39,19 +46,18 @@ def on_worker(task: Task, pieces: Pieces, expected: Identity) -> str:
     expected : Identity
         Identity of the process that started the job.
 
-    Returns
-    -------
-    str
-        Why this worker is of no use, with its address; "" if the result is there.
+    Raises
+    ------
+    UnfitWorkerError
+        If this process is of another identity.
     """
     from distributed import get_worker
 
     from ..work import Work
 
     if difference := Identity.here().difference(expected):
-        return f"{get_worker().address} {difference}"
+        raise UnfitWorkerError(get_worker().address, difference)
     run(task, pieces, Work(threads=1))
-    return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,19 +197,17 @@ class _Attempt:
             if future.cancelled():
                 continue  # submitted once more when it is missed
             error = future.exception(timeout=CONNECT)
-            if error is not None and type(error).__name__ == "KilledWorker":
-                self.submit([index])
-            elif error is not None:
-                raise ClusterError(f"{self.tasks[index].name}: {error or type(error).__name__}") from error
-            elif refusal := future.result(timeout=CONNECT):
-                self.refuse(refusal)
-                self.submit([index])
-            else:
+            if error is None:
                 yield index
+                continue
+            if isinstance(error, UnfitWorkerError):
+                self.refuse(*error.args)
+            elif type(error).__name__ != "KilledWorker":
+                raise ClusterError(f"{self.tasks[index].name}: {error or type(error).__name__}") from error
+            self.submit([index])
 
-    def refuse(self, refusal: str) -> None:
+    def refuse(self, address: str, difference: str) -> None:
         """Remember a worker that makes other bytes; warn once."""
-        address, difference = refusal.split(" ", 1)
         self.refused.add(address)
         warn(f"worker {address} is not used: {difference}")
 

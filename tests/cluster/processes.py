@@ -38,14 +38,22 @@ class Cluster:
 
     def _start(self, kind: str, *options: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "dask", kind, "--scheduler-file", str(self.file), *options]
-        log = (self.folder / f"{len(self.processes)}.log").open("wb")
+        log = (self.folder / f"{time.monotonic_ns()}.log").open("wb")
         environment = {**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "5s"}
         started = subprocess.Popen(command, stdout=log, stderr=log, cwd=self.folder, env=environment)
         self.processes.append(started)
         return started
 
-    def end(self) -> None:
-        """Kill all that were started."""
-        for process in reversed(self.processes):
+    def end_workers(self) -> None:
+        """Kill the workers, stopped ones too."""
+        scheduler, *workers = self.processes
+        for process in workers:
             process.kill()
             process.wait(SECONDS)
+        self.processes = [scheduler]
+
+    def end(self) -> None:
+        """Kill all that were started."""
+        self.end_workers()
+        self.processes[0].kill()
+        self.processes[0].wait(SECONDS)
