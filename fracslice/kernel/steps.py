@@ -14,7 +14,7 @@ from types import FunctionType
 from typing import Any, NoReturn
 
 from ..errors import KernelError
-from . import language
+from . import functions, language
 from .source import specialised
 from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector
 
@@ -72,7 +72,7 @@ def traced(
     for name, size in parameters.items():
         parts = tuple(Scalar(f"v_{name}_{k}") for k in range(size))
         env[name] = Scalar(f"v_{name}") if size == 1 else Vector(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
-    names = language.parameters(function)
+    names = functions.parameters(function)
     if names[:2] != ["w", "c"] or {*names[2:]} != {*parameters, *fixed}:
         place = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
         wanted = ", ".join(("w", "c", *parameters, *fixed))
@@ -103,9 +103,9 @@ def _followed(
     function: Callable[..., Any], fixed: Mapping[str, Any], env: dict[str, Value], tape: Tape
 ) -> Value:
     """Follow the statements of a function; return its value."""
-    scope, code = language.scope(function), function.__code__
+    scope, code = functions.scope(function), function.__code__
     loops = {n: v for n, v in scope.items() if n in code.co_names and isinstance(v, tuple)}
-    tuples = {n: v for n, v in loops.items() if language.is_number(v)}
+    tuples = {n: v for n, v in loops.items() if functions.is_number(v)}
     place = f"{code.co_filename}:{code.co_firstlineno}: step {function.__name__}: "
     return _Reader(tape, env, scope, place).run(specialised(function, {**tuples, **fixed}).body)
 
@@ -156,7 +156,7 @@ class _Reader:
                 return Scalar(repr(float(number)))
             case ast.Name(name) if name in self.env:
                 return self.env[name]
-            case ast.Name(name) if language.is_number(self.scope.get(name)):
+            case ast.Name(name) if functions.is_number(self.scope.get(name)):
                 return _constants(self.scope[name])
             case ast.Tuple(elements):
                 parts = tuple(map(self.value, elements))
@@ -212,7 +212,7 @@ class _Reader:
     def call(self, name: str, given: list[Value], node: ast.AST) -> Value:
         function = self.scope.get(name)
         if name not in language.INTRINSICS and isinstance(function, FunctionType):
-            names = language.parameters(function)
+            names = functions.parameters(function)
             if len(names) != len(given):
                 self.fail(node, f"{name} takes {len(names)} values, found {len(given)}")
             value = _followed(function, {}, dict(zip(names, given, strict=True)), self.tape)
