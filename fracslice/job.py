@@ -34,7 +34,7 @@ STL = ".stl"
 
 @dataclass(frozen=True, eq=False)
 class MeshResult:
-    """MeshResult of `make_mesh`.
+    """Result of `make_mesh`.
 
     Attributes
     ----------
