@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from .box import Box
-from .parameters import Number, Vector
+from .palettes import OWN, PALETTES
+from .parameters import Choice, Number, Vector
 from .registry import Node, domain_operator
+
+TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
+"""Properties of an orbit that a palette shows."""
 
 
 @domain_operator(
@@ -14,6 +18,13 @@ from .registry import Node, domain_operator
         sizes=tuple(range(3, 25, 3)),
         least=0,
         most=1,
+    ),
+    palette=Choice(OWN, "a palette by name in place of the colours", (OWN, *PALETTES)),
+    trap=Choice(
+        "point",
+        "property of the orbit that the palette shows: its smallest distance to the origin, to the axes, to "
+        "the coordinate planes or the unit sphere, its number of steps, or its last angle about the z axis",
+        TRAPS,
     ),
     repeats=Number(1.0, "how often the palette is run through", above=0, most=1000),
     shift=Number(0.0, "where in the palette it starts, from 0 to 1", least=0, most=1),
@@ -45,3 +56,20 @@ def material_bounds(node: Node) -> Box:
 @material.identity
 def material_identity(node: Node) -> bool:
     return True
+
+
+def stops(node: Node) -> tuple[float, ...]:
+    """Return the sRGB colours of a material, three numbers each; several are a palette.
+
+    Parameters
+    ----------
+    node : Node
+        A `material`.
+
+    Returns
+    -------
+    tuple of float
+        Components in [0, 1].
+    """
+    colours: tuple[float, ...] = PALETTES.get(node["palette"], node["colour"])
+    return colours

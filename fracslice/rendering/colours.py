@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..formulas.material import material
+from ..formulas.material import material, stops
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
-from .tracing import TraceDialect
+from .tracing import TraceDialect, traps
 from .units import shade
 
 
@@ -76,7 +76,7 @@ class Look:
         plain = material(self.root)
         self.all = self.nodes if covered else [plain, *self.nodes]
         self.paints = {id(n): self.all.index(n) if covered else k + 1 for k, n in enumerate(self.nodes)}
-        self.palettes = any(len(n["colour"]) > 3 for n in self.all)
+        self.palettes = any(len(stops(n)) > 3 for n in self.all)
         self.glows = any(n["glow"] for n in self.all)
         self.inside = any(n["clear"] for n in self.all)
         self.bounces = self.inside or any(n["reflect"] for n in self.all)
@@ -91,7 +91,11 @@ class Look:
         """
         lines = []
         if len(self.all) > 1 or self.palettes:
-            trace = link_tree(self.linker, self.root, TraceDialect(self.linker, materials=self.paints))
+            trace = link_tree(
+                self.linker,
+                self.root,
+                TraceDialect(self.linker, materials=self.paints, traps=traps(self.root)),
+            )
             lines.append(f"_, paint, tone = {trace}")
         lines += self.chosen([self.colour(k, n) for k, n in enumerate(self.all)], ("cr", "cg", "cb"))
         names = ["specular", "shininess"]
@@ -121,7 +125,7 @@ class Look:
         values : list of str
             Expressions of red, green and blue.
         """
-        colours = linear(node["colour"])
+        colours = linear(stops(node))
         if len(colours) == 3:
             return [], [self.linker.argument(c) for c in colours]
         self.linker.bind(f"palette{k}", shade.palette, {"stops": colours, "count": Fixed(len(colours) // 3)})
