@@ -20,9 +20,12 @@ from .options import (
     print_options,
     printing_of,
     quiet_option,
+    scale_option,
     set_option,
+    size_option,
     source_argument,
     threads_option,
+    up_option,
 )
 from .working import working
 
@@ -94,12 +97,9 @@ def printer_option(text: str) -> Callable[..., Any]:
     help="png, sl1, goo, ctb, cbddlp, pwmx, nanodlp, 3mf, svg, slic3r, cli, cli-binary or json; by default, "
     "that of the extension of OUT.",
 )
-@click.option(
-    "--size",
-    callback=length,
-    metavar="LENGTH",
-    help="The longest side, such as 80mm; the scene's by default.",
-)
+@size_option
+@up_option
+@scale_option
 @click.option(
     "--layer",
     callback=heights,
@@ -111,13 +111,6 @@ def printer_option(text: str) -> Callable[..., Any]:
     "--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's by default, or 0.05mm."
 )
 @printer_option('The printer whose screen the layers are for, or a .toml file of it; "list" shows all.')
-@click.option(
-    "--up",
-    nargs=3,
-    type=NUMBER,
-    metavar="X Y Z",
-    help="The scene's direction that is up; 0 0 1 by default.",
-)
 @click.option(
     "--compensation",
     callback=shift,
@@ -188,24 +181,23 @@ def slice_(
         raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
     check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
-    recipe = SliceRecipe(
-        to_xml(scene),
-        scene.name,
-        job(scene, options),
-        options["layer"][1],
-        Path(output).name,
-        kind,
-        options["machine"],
-        options["compensation"],
-        options["gamma"],
-        options["mirror"],
-        resin,
-        created(),
-        int(options["sections"]),
-    )
     shared = (options[name] for name in ("cluster", "shard", "store"))
     with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
-        run = recipe.run(work)
+        run = SliceRecipe(
+            to_xml(scene),
+            scene.name,
+            job(scene, options, work),
+            options["layer"][1],
+            Path(output).name,
+            kind,
+            options["machine"],
+            options["compensation"],
+            options["gamma"],
+            options["mirror"],
+            resin,
+            created(),
+            int(options["sections"]),
+        ).run(work)
         stack, screen = run.stack, run.screen
         write_slices(run, output, form)
         if preview:
@@ -266,17 +258,18 @@ def created() -> datetime:
     return datetime.fromtimestamp(int(seconds), UTC) if seconds else now
 
 
-def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
+def job(scene: Scene, options: dict[str, Any], work: Work) -> SliceJob:
     """Slice job with the given options."""
     from fracslice.slicing import SliceJob
+    from fracslice.volume.sizing import sizing
 
     pixel, machine = options["pixel"], options["machine"]
     if pixel is not None and machine is not None:
         raise click.UsageError("--pixel and --printer: expected one of them")
     given = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
-    up = tuple(options.get("up") or (0.0, 0.0, 1.0))
-    size = options["size"] or scene.size_mm
-    return SliceJob(size, options["layer"][0], given, up, printing_of(scene, options))
+    size = sizing(scene, options["size"], options["scale"], work)
+    how = printing_of(scene, options), size.factors, size.unit
+    return SliceJob(size.side, options["layer"][0], given, options["up"], *how)
 
 
 def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .mesh.components import Removed
     from .mesh.window import Finished
     from .surfaces import Surface
+    from .volume.sizing import Sizing
 
 MOST_ERRORS = 1 << 20
 """Approximate maximum of vertices whose distance from the surface is measured, evenly distributed over it."""
@@ -92,8 +93,8 @@ class Finish:
         Choice of bodies and cavities.
     dust : callable
         Maps the volume of the object to the volume below which a body is removed, mm3.
-    size : float
-        Longest side of the remaining bodies, mm.
+    size : Sizing
+        Size of the remaining bodies.
     scale : float or None
         mm per scene unit; None to derive it from the size.
     clock : Clock
@@ -110,7 +111,7 @@ class Finish:
         surface: Surface,
         how: Print,
         dust: Callable[[float], float],
-        size: float,
+        size: Sizing,
         scale: float | None,
         clock: Clock,
     ) -> None:
@@ -121,7 +122,7 @@ class Finish:
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
         self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
-        unit = (scale or size / max(planned.box.size)) ** 3
+        unit = (scale or size.scale(planned.box)) ** 3
         nested, self.misplaced = shells.nested(pieces, how.cavities == "fill", clock.work.threads)
         sized = replace(nested, volumes=nested.volumes * unit)
         limit = dust(float(sized.volumes.sum()))
@@ -129,7 +130,7 @@ class Finish:
         rest = shells.bounds(self.stays)
         tips = shells.tips(self.stays)
         box = box_of_the_rest(planned, shells.bounds(), rest, tips, clock.work)
-        exact = scale or size / max(box.size)
+        exact = scale or size.scale(box)
         x, y, _ = box.centre
         self.place = Placement(exact, (-exact * x, -exact * y, -exact * float(rest[0, 2])))
         self.removed: Removed = removed
