@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .inputs import check_targets, is_model, load_model, load_scene, refuse_options
+from .layers import LAYER, PIXEL_MM, as_high_as_wanted, heights, printer_option
 from .options import (
     NAME,
     job_of,
@@ -24,7 +25,6 @@ from .options import (
     source_argument,
     threads_option,
 )
-from .slice import LAYER, PIXEL_MM, as_high_as_wanted, heights, printer_option
 from .summary import figures, summary
 from .working import working
 

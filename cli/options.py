@@ -196,6 +196,11 @@ def printing_of(scene: Scene, options: dict[str, Any]) -> Print:
     return replace(scene.printing, **{n: options[n] for n in names if options[n] is not None})
 
 
+def price_option(of: str) -> Callable[..., Any]:
+    """Decorator that adds --price, the price of a unit of material."""
+    return click.option("--price", type=NUMBER, callback=amount, metavar="N", help=f"Price of a {of}.")
+
+
 set_option = click.option(
     "--set",
     "settings",

@@ -137,6 +137,9 @@ class Finish:
         self.volume = float(nested.volumes[self.stays].sum()) * exact**3
         """Volume of all bodies, removed ones included, mm3."""
         self.volume += removed.bodies_mm3 - removed.filled_mm3
+        volumes = nested.volumes[self.stays]
+        self.cavities = -float(volumes[volumes < 0].sum()) * exact**3
+        """Volume of the cavities that stay, mm3."""
         self._planes = self.place.mm(grid_planes(surface.signs))
         self._bed = FLAT * minimum_edge_parameter(surface.signs) * planned.voxel * exact
 
@@ -183,6 +186,8 @@ class Check:
         self._finish, self._tally = finish, Tally(finish.clock.work.threads)
         self._stride = -(-VERTICES_A_BRICK * bricks // MOST_ERRORS)
         self._errors: list[NDArray[np.float64]] = []
+        self.contact = 0.0
+        """Area on the plate, mm2."""
 
     def passing(self, pieces: Iterable[Finished]) -> Iterator[Mesh]:
         """Pass pieces on and check them.
@@ -201,6 +206,7 @@ class Check:
             yield piece.passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
+                self.contact += _on_the_plate(piece.passed)
                 self._errors.append(self._off(piece.points[:: self._stride]))
 
     def _off(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -221,3 +227,11 @@ class Check:
     def errors(self) -> NDArray[np.float64]:
         """Distances of vertices from the surface, mm."""
         return self._finish.place.scale * np.concatenate(self._errors)
+
+
+def _on_the_plate(mesh: Mesh) -> float:
+    """Area of the triangles at z = 0."""
+    lying = (mesh.vertices[:, 2] == 0)[mesh.triangles].all(1)
+    x, y = np.moveaxis(mesh.vertices[mesh.triangles[lying], :2], 2, 0)
+    double = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    return float(np.abs(double).sum()) / 2

@@ -272,6 +272,8 @@ class _Job:
             simplified=simplified,
             notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
             depths=planned.depths,
+            contact_mm2=check.contact,
+            cavities_mm3=finish.cavities,
         )
         return MeshResult(report, finish.place, planned, whole, clock.work)
 

@@ -17,7 +17,7 @@ from ..formulas import Box, Node, box, cylinder, plane, transform, union
 from ..kernel import Field
 from ..meshjob import DUST
 from ..scene import Print
-from ..volume import Bricks, Plan, extent, sample_scene
+from ..volume import Bricks, Drain, Plan, extent, sample_scene
 from ..volume.grid import from_grid, to_grid
 from ..volume.sizing import Sizing
 from ..work import Work
@@ -281,15 +281,16 @@ class _Preparation:
             raise VolumeError(f"walls of {self.how.hollow:g} mm leave nothing to hollow out")
         if not self.how.drain:
             return edited(self.thing, "cut", Samples(hollow))
-        large, holes = count[numbers] >= POCKET * count[numbers[0]], list[Node]()
+        large, holes = count[numbers] >= POCKET * count[numbers[0]], list[Drain]()
         thing = edited(self.thing, "cut", Samples(found.without(numbers[~large])))
         for number in numbers[large]:
             at = (found.labels == number) & (hollow.values > -hollow.voxel)
             points = np.array(hollow.origin) + hollow.voxel * positions(hollow, *np.nonzero(at))
             holes += self.drains(points, -hollow.values[at])
-        return edited(thing, "cut", union(*holes))
+        self.planned = replace(self.planned, drains=tuple(holes))
+        return edited(thing, "cut", union(*map(_hole, holes)))
 
-    def drains(self, hollow: np.ndarray, depth: np.ndarray) -> Iterator[Node]:
+    def drains(self, hollow: np.ndarray, depth: np.ndarray) -> Iterator[Drain]:
         """Drain holes of one hollow: one sideways, one upwards.
 
         The first leads from the lowest point to the nearer side along x, as the plate would close a hole
@@ -301,11 +302,18 @@ class _Preparation:
         x, y, z = hollow[lowest].tolist()
         z -= float(depth[lowest])
         to = outer.hi[0] + radius if x - outer.lo[0] > outer.hi[0] - x else outer.lo[0] - radius
-        side = cylinder(radius=radius, height=abs(to - x))
-        yield transform(side, rotate=(0, 1, 0, 90), translate=((x + to) / 2, y, z + radius))
+        yield Drain((x, y, z + radius), (to, y, z + radius), radius)
         x, y, z = hollow[highest].tolist()
-        low, high = z - radius, outer.hi[2] + radius
-        yield transform(cylinder(radius=radius, height=high - low), translate=(x, y, (low + high) / 2))
+        yield Drain((x, y, z - radius), (x, y, outer.hi[2] + radius), radius)
+
+
+def _hole(drain: Drain) -> Node:
+    """Cylinder of a drain hole, which runs along x or z."""
+    (x, y, low), (to, _, high) = drain.start, drain.end
+    if to != x:
+        side = cylinder(radius=drain.radius, height=abs(to - x))
+        return transform(side, rotate=(0, 1, 0, 90), translate=((x + to) / 2, y, low))
+    return transform(cylinder(radius=drain.radius, height=high - low), translate=(x, y, (low + high) / 2))
 
 
 def _spaced(points: np.ndarray, voxel: float) -> np.ndarray:

@@ -14,7 +14,7 @@ from ..kernel import Field
 from ..printing import printable
 from ..scene import Print
 from ..scene.lengths import Length, Pair, Percent
-from ..volume import plan
+from ..volume import Drain, plan
 from ..volume.sizing import SAME, UP, Sizing, oriented
 from ..work import Work
 
@@ -108,6 +108,8 @@ class Stack:
         Conservative bounds of the object, scene units.
     notes : tuple of str
         What a pixel or a layer is too large for.
+    drains : tuple of Drain
+        Drain holes.
     """
 
     root: Field
@@ -120,6 +122,7 @@ class Stack:
     size: tuple[float, float, float]
     outer: Box
     notes: tuple[str, ...] = ()
+    drains: tuple[Drain, ...] = ()
 
     @property
     def heights(self) -> np.ndarray:
@@ -182,7 +185,7 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     z = found.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
     pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounded(mm[2], float(tops[-1])))
-    return Stack(planned.root, scale, at, job.pixel, pixels, z, tops, size, outer, notes)
+    return Stack(planned.root, scale, at, job.pixel, pixels, z, tops, size, outer, notes, planned.drains)
 
 
 def _tops(height: float, layer: float) -> np.ndarray:

@@ -20,6 +20,7 @@ from fracslice.formulas import (
     bend,
     bounds,
     box,
+    cone,
     cylinder,
     difference,
     julia,
@@ -42,7 +43,7 @@ from fracslice.printing.widths import Widths
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layers import Slicer
-from fracslice.volume import Plan, plan, sample_scene
+from fracslice.volume import Drain, Plan, plan, sample_scene
 from fracslice.volume.grid import from_grid, to_grid
 from fracslice.volume.sizing import Sizing
 from fracslice.work import Work
@@ -389,3 +390,12 @@ print("numba" in sys.modules)"""
 def test_a_raft_that_no_voxel_holds_is_refused() -> None:
     with pytest.raises(VolumeError, match=r"a raft of 0.2 mm: expected at least a voxel, 0.3125 mm"):
         printable(plan(box(), 64), Sizing(SIZE), Print(raft=0.2))
+
+
+def test_the_sharp_rim_of_a_drain_hole_is_no_thin_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fracslice.printing.checks.resolved", lambda root, bricks, *others: bricks)
+    hole = transform(cylinder(radius=1, height=22), translate=(0, 0, 5))
+    thing = plan(difference(cone(radius=6, height=22), hole), 100)
+    drain = Drain((0, 0, -6), (0, 0, 12), 1.0)
+    rims, none = (check_object(thing.root, thing.outer, 1, drains=drains) for drains in ((), (drain,)))
+    assert [p.kind for p in rims.problems] == ["walls"] and none.problems == []
