@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import click
 
 from fracslice.errors import Cancelled, SharedError
-from fracslice.work import Work
 
 from .cluster import cluster_options, pooled
 from .inputs import check_folder, check_targets, load_scene
@@ -115,6 +114,7 @@ def render(
     """Render a picture of SCENE, as its camera, lights and materials say."""
     from fracslice.export.images import check_image
     from fracslice.rendering import Renderer
+    from fracslice.work import Work
 
     check_image(output)
     check_targets(source, output, state)
@@ -197,6 +197,7 @@ def save(path: str | Path, done: Pass, scene: Scene, bits: str, threads: int) ->
     """Write the picture of a pass, with the scene and the samples in its metadata."""
     from fracslice.export import application
     from fracslice.export.images import write_image
+    from fracslice.work import Work
 
     text = {
         "Title": scene.name,
