@@ -156,7 +156,8 @@ def _parsed(source: str) -> Override:
 
 def _changed(scene: Scene, override: Override) -> Scene:
     if override.element == SOLID.name:
-        return replace(scene, size_mm=override.value(SOLID))
+        sizes = {"size_mm": None, "unit_mm": None, f"{override.attribute}_mm": override.value(SOLID)}
+        return replace(scene, **sizes)
     if override.element == PRINT.name:
         return replace(scene, printing=replace(scene.printing, **{override.attribute: override.value(PRINT)}))
     if override.element in (section.name for section in PICTURE):
