@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..formulas.material import material
@@ -11,22 +10,7 @@ from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
 from .tracing import TraceDialect
 from .units import shade
-
-
-def linear(colour: Sequence[float]) -> tuple[float, ...]:
-    """Convert an sRGB colour to linear light (IEC 61966-2-1).
-
-    Parameters
-    ----------
-    colour : sequence of float
-        sRGB components in [0, 1].
-
-    Returns
-    -------
-    tuple of float
-        Linear components.
-    """
-    return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
+from .units.pixel import linear
 
 
 def opaque_part(node: Node) -> Node | None:

@@ -13,7 +13,7 @@ from ..formulas import Node
 from ..nearest import hint
 from .layout import PICTURE, PRINT, SECTIONS, SOLID, Element
 from .model import Scene
-from .view import View
+from .view import Part, View
 
 FORM = "ELEMENT.ATTRIBUTE=VALUE, such as mandelbulb.power=6 or box[2].round=0.1"
 _FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*(\d+)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL)
@@ -171,9 +171,12 @@ def _changed(scene: Scene, override: Override) -> Scene:
 
 
 def _relit(view: View, override: Override) -> View:
-    """The view with one value changed; film and shading can be changed even if they are not in the file."""
+    """The view with one value changed; an element that may stand once need not be in the file."""
     section = SECTIONS[override.element]
-    always = [part for part in (view.film, view.shading) if part not in view.parts]
+    always: list[Part] = [part for part in (view.film, view.shading) if part not in view.parts]
+    missing = all(part.element != section.name for part in (*view.parts, *always))
+    if section.part and missing and not section.many:
+        always.append(section.part())
     found, counted = [], 0
     for part in (*view.parts, *always):
         counted += part.element == section.name

@@ -46,7 +46,7 @@ def test_an_effect_is_in_the_kernel_of_a_scene_that_uses_it_and_in_no_other(line
     assert line not in frame().linked.source
 
 
-@pytest.mark.parametrize("mode", ["normal", "depth", "distance", "steps"])
+@pytest.mark.parametrize("mode", ["normal", "position", "depth", "distance", "steps"])
 def test_modes_that_show_a_number_light_nothing(mode: str) -> None:
     source = frame(shading=Shading(mode=mode), lights=(Light(),)).linked.source
     assert "phong" not in source
