@@ -200,19 +200,14 @@ class Check:
             yield piece.passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
-                self._errors += self._off(piece.points[:: self._stride])
+                self._errors.append(self._off(piece.points[:: self._stride]))
 
-    def _off(self, vertices: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def _off(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances of vertices in mm from the surface, scene units."""
         from .volume.accuracy import surface_error
-        from .work import Work, chunks
 
-        planned, place, alone = self._finish.planned, self._finish.place, Work(1)
-
-        def task(part: slice) -> NDArray[np.float64]:
-            return surface_error(planned.root, place.units(vertices[part]), planned.voxel, alone)
-
-        return self._finish.clock.work.collect(task, chunks(len(vertices), 1 << 14))
+        planned, points = self._finish.planned, self._finish.place.units(vertices)
+        return surface_error(planned.root, points, planned.voxel, self._finish.clock.work)
 
     @property
     def mesh(self) -> MeshReport:

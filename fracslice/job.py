@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .mesh.simplify import Simplified
     from .surfaces import Surface
-    from .volume import Bricks, Plan
+    from .volume import Bricks, Plan, SignBricks
 
 STL = ".stl"
 
@@ -192,20 +192,23 @@ class _Job:
         # Keep cavities: the hollow is one.
         return _Sized(made, scale, Print(keep=keep, cavities=how.cavities if how.whole else "keep"))
 
-    def surface(self, aside: Callable[[], Path] | None) -> tuple[_Sized, Surface, str]:
-        """Surface of the remaining bodies, and a note on walls thinner than a voxel."""
-        sized = self.planned()
-        surface = self.meshed(sized, aside)
-        thin, how = surface.thin, self.what.how(self.scene)
-        if thin and how.whole and how.sorts:  # only the field can distinguish bodies
-            sized = self.edited(sized.planned)
-            surface = self.meshed(sized, aside)
-            thin = surface.thin
-        return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, surface, thin
+    def sampled(self) -> tuple[_Sized, SignBricks]:
+        """Field, its samples, and the choice of bodies that is left to the mesh.
 
-    def meshed(self, sized: _Sized, aside: Callable[[], Path] | None) -> Surface:
-        """Surface, in one piece if it fits in memory."""
+        Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
+        """
+        sized, how = self.planned(), self.what.how(self.scene)
         signs = surfaces.sampled(sized.planned, self.clock)
+        thin = how.sorts and surfaces.has_thin_walls(signs)
+        if thin and how.whole:
+            sized = self.edited(sized.planned)
+            signs = surfaces.sampled(sized.planned, self.clock)
+            thin = surfaces.has_thin_walls(signs)
+        return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, signs
+
+    def surface(self, aside: Callable[[], Path] | None) -> tuple[_Sized, Surface]:
+        """Surface, in one piece if it fits in memory, and the choice of bodies that is left."""
+        sized, signs = self.sampled()
         most, voxel = len(signs), self.what.size(self.scene) / self.what.voxels(self.scene)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
@@ -217,15 +220,15 @@ class _Job:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
         folder = aside() if aside and most < len(signs) else None
-        return surfaces.made(sized.planned, signs, most, folder, self.clock)
+        return sized, surfaces.made(sized.planned, signs, most, folder, self.clock)
 
-    def result(self, sized: _Sized, surface: Surface, thin: str) -> MeshResult:
+    def result(self, sized: _Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""
         from .mesh.missed import surface_to_mesh
         from .shown import mesh_amount
 
         what, clock, size, refined = self.what, self.clock, self.what.size(self.scene), None
-        planned, signs = surface.planned, surface.signs
+        planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord_mm is not None:
             unit = sized.scale or size / max(planned.box.size)
             surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..formulas.registry import Node
-from ..kernel import language
-from ..kernel.linker import FieldDialect, Linker
+from ..kernel import functions
+from ..kernel.dialects import FieldDialect
+from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
 from ..scene.view import Camera, Light, View
 from .colours import Look, opaque_part
@@ -234,5 +235,5 @@ def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:
     str
         Source text.
     """
-    names = ", ".join(language.parameters(function))
+    names = ", ".join(functions.parameters(function))
     return "\n    ".join([f"def {function.__name__}({names}):", *lines])

@@ -11,9 +11,10 @@ from typing import Any
 from ..errors import SceneError
 from ..formulas import Node
 from ..nearest import hint
+from .element import Part
 from .layout import PICTURE, PRINT, SECTIONS, SOLID, Element
 from .model import Scene
-from .view import Part, View
+from .view import View
 
 FORM = "ELEMENT.ATTRIBUTE=VALUE, such as mandelbulb.power=6 or box[2].round=0.1"
 _FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*(\d+)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL)
