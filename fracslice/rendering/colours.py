@@ -49,10 +49,13 @@ class Look:
         Linker of the kernel.
     root : Node
         Root of the formula tree.
+    paths : bool
+        True if rays also continue where a surface scatters light.
     """
 
     linker: Linker
     root: Node
+    paths: bool = False
 
     def __post_init__(self) -> None:
         self.nodes = [n for n in self.root.walk() if n.formula.name == material.name]
@@ -63,7 +66,8 @@ class Look:
         self.palettes = any(len(n["colour"]) > 3 for n in self.all)
         self.glows = any(n["glow"] for n in self.all)
         self.inside = any(n["clear"] for n in self.all)
-        self.bounces = self.inside or any(n["reflect"] for n in self.all)
+        self.glossy = self.paths or any(n["roughness"] or n["metallic"] for n in self.all)
+        self.bounces = self.inside or self.glossy or any(n["reflect"] for n in self.all)
 
     def lines(self) -> list[str]:
         """Return the lines that set cr, cg, cb, specular, shininess and the other properties in use.
@@ -80,6 +84,7 @@ class Look:
         lines += self.chosen([self.colour(k, n) for k, n in enumerate(self.all)], ("cr", "cg", "cb"))
         names = ["specular", "shininess"]
         names += ["glow"] * self.glows + ["reflect"] * self.bounces + ["clear", "index"] * self.inside
+        names += ["roughness", "metallic"] * self.glossy
         for name in names:
             values = [[self.linker.argument(n[name])] for n in self.all]
             lines += self.chosen([([], v) for v in values], (name,))

@@ -39,7 +39,7 @@ def drafted(root: Node, view: View) -> View:
         for light in view.lights or default_lights(root)
     )
     camera = view.camera and replace(view.camera, aperture=0.0)
-    return replace(view, camera=camera, lights=lights, shading=replace(view.shading, bounces=0))
+    return replace(view, camera=camera, lights=lights, shading=replace(view.shading, bounces=0, paths="no"))
 
 
 class Follower:

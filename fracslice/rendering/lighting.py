@@ -14,8 +14,11 @@ from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
 from ..scene.view import Camera, Light, View
 from .colours import Look, opaque_part
+from .drawn import Drawn
 from .optics import Optics
+from .scattering import divided
 from .units import lights, march, shade
+from .units.glossy import highlight
 from .units.intrinsics import background, blocker
 from .units.pixel import linear
 
@@ -36,35 +39,6 @@ def casts_shadows(light: Light) -> bool:
     bool
     """
     return light.shadows == "yes" and light.kind != "camera"
-
-
-@dataclass
-class Drawn:
-    """Random numbers of a bounce.
-
-    Attributes
-    ----------
-    count : int
-        Numbers in use.
-    """
-
-    count: int = 0
-
-    def names(self, count: int) -> list[str]:
-        """Reserve random numbers.
-
-        Parameters
-        ----------
-        count : int
-            Numbers to reserve.
-
-        Returns
-        -------
-        list of str
-            Their expressions.
-        """
-        self.count += count
-        return [f"u[{k}]" for k in range(self.count - count, self.count)]
 
 
 @dataclass
@@ -110,16 +84,22 @@ class Lighting:
                     "openness", shade.occlusion, {"strength": shading.occlusion, "reach": shading.reach}
                 )
                 lines.append("ambient = ambient * openness(x, y, z, nx, ny, nz, P)")
-        if look.glows:
-            lines.append("ambient = ambient + glow")
-        lines += ["r = ambient * cr", "g = ambient * cg", "b = ambient * cb"]
+        if look.glossy:
+            lines += divided(self.linker)
+            lines += [f"{c} = ambient * c{c}" + f" + glow * e{c}" * look.glows for c in "rgb"]
+        else:
+            lines += ["ambient = ambient + glow"] * look.glows
+            lines += [f"{c} = ambient * c{c}" for c in "rgb"]
         if any(map(casts_shadows, self.view.lights)):
             steepness = 1 / self.root.bounds.lipschitz
             self.linker.bind("visible_", march.visible, {"steepness": steepness, "patience": PATIENCE})
             self.linker.functions["blocker"] = self.blocker()
             lines += [f"s{a} = {a} + 3.0 * h * n{a}" for a in "xyz"]
         for k, light in enumerate(self.view.lights):
-            lines += self.sky(light) if light.kind == "sky" else self.light(k, light)
+            if light.kind != "sky":
+                lines += self.light(k, light, look.glossy)
+            elif not look.paths:  # else rays that continue see it
+                lines += self.sky(light)
         return lines
 
     def blocker(self) -> str:
@@ -131,7 +111,7 @@ class Lighting:
             return text_of(blocker, ["return 0.0 * x + 1.0"])
         return text_of(blocker, [f"return {link_tree(self.linker, opaque, FieldDialect(self.linker))}"])
 
-    def light(self, k: int, light: Light) -> list[str]:
+    def light(self, k: int, light: Light, glossy: bool) -> list[str]:
         """Lines for one sun or lamp, or a light at the camera."""
         self.linker.share(shade.phong)
         soft = light.size and light.kind != "camera"
@@ -149,8 +129,14 @@ class Lighting:
             lines.append(
                 "power = power * visible_(sx, sy, sz, lx, ly, lz, where(diffuse > 0.0, far, 0.0), h, P)"
             )
+        shine = "gloss"
+        if glossy:
+            self.linker.share(highlight)
+            lines.append("spot, half = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, roughness)")
+            shine = "where(roughness > 0.0, spot * tinted(half, k{0}), gloss)"
         return lines + [
-            f"{c} = {c} + power * {s} * (diffuse * c{c} + gloss)" for c, s in zip("rgb", colour, strict=True)
+            f"{c} = {c} + power * {s} * (diffuse * c{c} + {shine.format(c)})"
+            for c, s in zip("rgb", colour, strict=True)
         ]
 
     def bind_light(self, name: str, light: Light) -> None:

@@ -16,10 +16,12 @@ from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linked, Linker
 from ..scene.view import Camera, View
 from .colours import Look
-from .lighting import Drawn, Lighting, text_of
+from .drawn import Drawn
+from .lighting import Lighting, text_of
 from .optics import Optics
+from .scattering import onward
 from .units import camera as cameras
-from .units import march, shade
+from .units import march
 from .units.intrinsics import GIVEN, surface
 from .units.normal import normal
 
@@ -108,6 +110,7 @@ class _Frame:
 
     def __post_init__(self) -> None:
         self.lit = self.view.shading.mode == "light"
+        self.paths = self.view.shading.paths == "yes"
         of = self.root, self.view, self.camera, self.seen
         self.lighting = Lighting(self.linker, self.drawn, *of, self.inside)
 
@@ -117,7 +120,7 @@ class _Frame:
         linker.field(self.root)
         self.marching()
         camera_samples = self.cameras()
-        look = Look(linker, self.root)
+        look = Look(linker, self.root, self.paths)
         far = len(linker.parameters)
         for number in (self.seen.far, *self.seen.origin):
             linker.argument(number)
@@ -176,34 +179,14 @@ class _Frame:
             self.linker.share(normal)
             lines.append("nx, ny, nz = normal(x, y, z, h, P)")
         if mode == "light":
-            lines += look.lines() + self.lighting.lines(look) + self.onward(look)
+            lines += look.lines() + self.lighting.lines(look)
+            if self.bounces:
+                lines += onward(self.linker, self.drawn, look)
             lines += self.lighting.fog(self.bounces > 0)
         else:
             lines += self.shown(mode, look)
-        onward = "tr, tg, tb, ox, oy, oz, ex, ey, ez, es" if self.bounces else ""
-        return text_of(surface, [*lines, f"return (r, g, b), ({onward})"])
-
-    def onward(self, look: Look) -> list[str]:
-        """Lines for the ray that continues after reflection or refraction."""
-        if not self.bounces:
-            return []
-        (u,) = self.drawn.names(1) if look.inside else ("t",)
-        for function in (shade.mirrored, shade.fresnel, shade.bent, shade.goes_on, shade.reflects):
-            self.linker.share(function)
-        if not look.inside:
-            return [
-                "tr, ex, ey, ez = reflects(dx, dy, dz, nx, ny, nz, reflect)",
-                "tg, tb, es = tr, tr, side",
-                *(f"{c} = {c} * (1.0 - t{c})" for c in "rgb"),
-                *(f"o{a} = {a} + 3.0 * h * n{a}" for a in "xyz"),
-            ]
-        return [
-            f"share, ex, ey, ez, out = goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, {u})",
-            "es = side * out",
-            *(f"t{c} = share * where(side < 0.0, exp(-absorb{c} * t), 1.0 + 0.0 * t)" for c in "rgb"),
-            *(f"{c} = {c} * where(side < 0.0, 0.0, 1.0 - share)" for c in "rgb"),
-            *(f"o{a} = {a} + 3.0 * h * out * n{a}" for a in "xyz"),
-        ]
+        ray = "tr, tg, tb, ox, oy, oz, ex, ey, ez, es" if self.bounces else ""
+        return text_of(surface, [*lines, f"return (r, g, b), ({ray})"])
 
     def shown(self, mode: str, look: Look) -> list[str]:
         """Lines for the modes that show a value."""

@@ -105,6 +105,9 @@ class Shading(Part):
     ambient: float = described(Number(0.0, "light that is everywhere", least=0, most=100))
     occlusion: float = described(Number(0.0, "how much occlusion darkens ambient light", least=0, most=4))
     reach: float = described(Number(0.2, "distance at which surfaces occlude, in scene units", above=0))
+    paths: str = described(
+        Choice("no", "whether surfaces light each other, and glowing ones the others", ("no", "yes"))
+    )
     bounces: int = described(Count(4, "maximum number of reflections and refractions of a ray", most=16))
 
 

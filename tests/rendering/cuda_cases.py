@@ -36,6 +36,10 @@ CASES: dict[str, tuple[Node, View]] = {
         torus(),
         View(film=Film(alpha="yes"), lights=(Light(kind="camera"), SKY), fog=Fog(density=0.2)),
     ),
+    "rough metal and glass, paths": (
+        union(get("material")(torus(), metallic=0.7, roughness=0.4), _glass()),
+        View(lights=SOFT, shading=Shading(paths="yes", bounces=2)),
+    ),
     "normals": (torus(), View(shading=Shading(mode="normal"))),
     "steps": (torus(), View(shading=Shading(mode="steps"))),
 }

@@ -35,6 +35,8 @@ EFFECTS = {
     "nearest": {"root": material(BULB, colour=(1, 0, 0, 0, 1, 0))},
     "def reflects(": {"root": material(BULB, reflect=0.2)},
     "def goes_on(": {"root": material(BULB, clear=0.9)},
+    "def glossy(": {"root": material(BULB, roughness=0.5, reflect=0.1)},
+    "def upward(nx": {"shading": Shading(paths="yes")},
     "glow": {"root": material(BULB, glow=1)},
     "paint": {"root": union(material(BULB), sphere(radius=0.3))},
 }
