@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -96,6 +95,8 @@ def check(
         refuse_options(context, OF_LAYERS, "only with --layer")
         with working(threads, quiet) as work:
             numbers, lines, problems = of_mesh(source, options, work)
+    import json
+
     click.echo(json.dumps(numbers, indent=2) if as_json else os.linesep.join(filter(None, lines)))
     return 1 if problems else 0
 

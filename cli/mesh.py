@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shutil
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,10 +34,12 @@ GRID = ".vdb"
 
 def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
     """Parse a time of an animation into seconds."""
+    if text is None:
+        return None
     from fracslice.scene.animation import Seconds
 
     try:
-        return None if text is None else Seconds(0.0, "").read(text)
+        return Seconds(0.0, "").read(text)
     except ValueError as error:
         raise click.BadParameter(f"{text!r}: expected {error}") from None
 
@@ -173,6 +172,9 @@ def check_outputs(source: str, output: str, report: str | None, picture: str | N
 
 def write_grid(result: MeshResult, path: str, about: dict[str, str]) -> None:
     """Write the samples, in mm, as an OpenVDB file."""
+    import shutil
+    import tempfile
+
     from fracslice.export import replacing
     from fracslice.volume.grid import write_vdb
 
@@ -185,6 +187,8 @@ def write_grid(result: MeshResult, path: str, about: dict[str, str]) -> None:
 
 def write_report(report: Report, path: str) -> None:
     """Write the report as JSON."""
+    import json
+
     from fracslice.export import replacing
 
     with replacing(path) as file:

@@ -64,10 +64,12 @@ def source_argument(metavar: str) -> Callable[..., Any]:
 
 def length(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
     """Parse a length into mm."""
+    if value is None:
+        return None
     from fracslice.scene import parse_length
 
     try:
-        return None if value is None else parse_length(value)
+        return parse_length(value)
     except SceneError as error:
         raise click.BadParameter(str(error)) from None
 
@@ -124,10 +126,12 @@ _JOB = [
 
 def print_value(context: click.Context, option: click.Parameter, text: str | None) -> Any:
     """Parse the value of an attribute of `<print>`."""
+    if text is None:
+        return None
     from fracslice.scene import Print
 
     try:
-        return None if text is None else Print.kinds()[str(option.name)].read(text)
+        return Print.kinds()[str(option.name)].read(text)
     except ValueError as error:
         raise click.BadParameter(f"{text!r}: expected {error}") from None
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import click
 
 from fracslice.errors import Cancelled, SharedError
-from fracslice.work import Work
 
 from .cluster import cluster_options, pooled
 from .inputs import check_folder, check_targets, load_scene
@@ -149,6 +148,7 @@ def render(
     from fracslice.rendering import Renderer
     from fracslice.rendering.layers import layers as rendered_layers
     from fracslice.rendering.sequence import Samples
+    from fracslice.work import Work
 
     if check_image(output) != ".exr" and layers:
         raise click.BadParameter("expected an .exr file as --output, which holds them", param_hint="--layers")
@@ -249,6 +249,7 @@ def save(
     """Write the picture of a pass, with the scene and the samples in its metadata."""
     from fracslice.export import application
     from fracslice.export.images import write_image
+    from fracslice.work import Work
 
     text = {
         "Title": scene.name,

@@ -8,7 +8,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps
 
 from .formulas import Node
 from .job import make_mesh
@@ -68,27 +67,16 @@ class StackModel:
         )
         return make_mesh(replace(self.scene, root=self._upright), what, self.work).mesh
 
-    @cached_property
-    def _image(self) -> Image.Image:
-        width, height = LARGEST
-        film = Film(width=width, height=height, samples=SAMPLES)
-        renderer = Renderer(self._upright, View(film=film), work=self.work, device="cpu")
-        *_, last = renderer.passes(SAMPLES)
-        return Image.fromarray(np.asarray(last.shown))
-
-    def picture(self, width: int, height: int) -> NDArray[np.uint8]:
+    def picture(self) -> NDArray[np.uint8]:
         """Render the scene as it stands on the printer, without its print preparation.
-
-        Pictures of all sizes are cut from one.
-
-        Parameters
-        ----------
-        width, height : int
-            Size, pixels.
 
         Returns
         -------
         uint8 [height, width, 3]
-            sRGB.
+            sRGB, as large as the largest preview of a format.
         """
-        return np.asarray(ImageOps.fit(self._image, (width, height), Image.Resampling.LANCZOS))
+        width, height = LARGEST
+        film = Film(width=width, height=height, samples=SAMPLES)
+        renderer = Renderer(self._upright, View(film=film), work=self.work, device="cpu")
+        *_, last = renderer.passes(SAMPLES)
+        return np.asarray(last.shown)

@@ -19,7 +19,6 @@ import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 from typing import Any, BinaryIO
@@ -315,6 +314,8 @@ def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> M
 @lru_cache(maxsize=1)
 def _toolchain() -> str:
     """Key of everything that the machine code depends on besides the module's own text."""
+    from importlib.metadata import version  # imports an e-mail parser
+
     words = texts(Path(__file__).parent / "cuda_intrinsics.py")
     versions = (version(name) for name in ("numba-cuda", "numba", "llvmlite"))
     return key(words, *versions, *_numba_settings())

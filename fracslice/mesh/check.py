@@ -202,7 +202,8 @@ def duplicates(triangles: NDArray[np.int32]) -> int:
     int
         Duplicates.
     """
-    return len(triangles) - len(np.unique(np.sort(triangles, axis=1), axis=0))
+    distinct = np.unique(np.sort(triangles, axis=1), axis=0) if len(triangles) else triangles
+    return len(triangles) - len(distinct)
 
 
 def _genus(mesh: Mesh, edges: int, shells: int) -> int:

@@ -118,15 +118,15 @@ def cleaned(
     displaced, keep = np.zeros(len(keep), bool), keep.copy()
     displaced[mesh.triangles[fresh]], keep[gone] = True, False
     final, displaced, places = quantise(mesh, keep, displaced, edits, planes, frame, threads)
-    suspects = touching(final.triangles, displaced, threads)
-    suspects = np.union1d(suspects, places[places >= 0])
+    suspected = np.zeros(len(final.triangles), bool)
+    suspected[touching(final.triangles, displaced, threads)] = suspected[places[places >= 0]] = True
     # Only displaced vertices can coincide with others.
-    return Cleaned(welded(final) if displaced.any() else final, suspects, edits)
+    return Cleaned(welded(final) if displaced.any() else final, np.flatnonzero(suspected), edits)
 
 
 def _with_edited(edits: Edits, edited: NDArray[np.int64], triangles: NDArray[np.int32]) -> Edits:
     """Edits, and triangles edited before, as they are."""
-    edited = np.setdiff1d(edited, edits[0])
+    edited = np.setdiff1d(edited, edits[0], assume_unique=True)
     rows = np.concatenate([edits[0], edited])
     order = np.argsort(rows)
     return rows[order], np.concatenate([edits[1], triangles[edited]])[order]

@@ -78,8 +78,9 @@ class _Survey:
         here, there = (beside(mesh.vertices, seam, self.voxel / 2) for seam in (self.end, end))
         points, before = self.border
         _, theirs, mine = np.intersect1d(points, rows(mesh.vertices[here]), return_indices=True)
-        pairs = np.stack([before[theirs], labels[here[mine]]], axis=1)
-        self.same.append(np.unique(pairs, axis=0))
+        if len(mine):
+            pairs = np.stack([before[theirs], labels[here[mine]]], axis=1)
+            self.same.append(np.unique(pairs, axis=0))
         self.border = rows(mesh.vertices[there]), labels[there]
         self.end = end
 
@@ -203,7 +204,7 @@ class WholeShells:
         count, hollow = len(self.volumes), self.volumes < 0
         parent, winding = np.full(count, -1, np.int64), np.zeros(count, np.int64)
         searched = hollow | (bodies and count > 1)
-        for number in np.unique(self.piece[searched]).tolist():
+        for number in sorted(set(self.piece[searched].tolist())):
             mesh, own = pieces.mesh(number), searched & (self.piece == number)
             first = np.where(own, self.first, -1)
             shell = self.of_label[pieces.labels(number)]

@@ -74,6 +74,11 @@ FILM = [_section(part) for part in (Animation, Track)]
 SECTIONS = {section.name: section for section in (SOLID, PRINT, *PICTURE, *FILM)}
 
 
+def registered() -> dict[str, Formula]:
+    """Return every registered formula by name, without a look at installed packages."""
+    return {name: get(name) for name in names()}
+
+
 def formulas() -> list[Formula]:
     """Return every registered formula, those of installed packages too.
 
@@ -83,4 +88,4 @@ def formulas() -> list[Formula]:
         Sorted by name.
     """
     load_installed()
-    return [get(name) for name in names()]
+    return list(registered().values())
