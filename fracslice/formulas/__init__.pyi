@@ -717,7 +717,7 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     Node
     """
 
-def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, roughness: float = 0.0, metallic: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """The appearance of the element in pictures. A material nested deeper takes precedence.
 
     The field is that of the element: L = the element's.
@@ -744,6 +744,10 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette
         light of its own, in its colour
     reflect : a number >= 0 and <= 1, default 0.0
         the part of light that is mirrored head on; more is at grazing angles
+    roughness : a number >= 0 and <= 1, default 0.0
+        roughness of the reflection: 0 is a mirror, 1 is dull
+    metallic : a number >= 0 and <= 1, default 0.0
+        1 for a metal, which reflects in its colour and has no other light
     clear : a number >= 0 and <= 1, default 0.0
         the part of light that goes through
     index : a number >= 1 and <= 4, default 1.5
