@@ -42,7 +42,7 @@ def ratio(a: np.ndarray | float, b: np.ndarray) -> np.ndarray:
     return result
 
 
-def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
+def orbit(r2: np.ndarray, alive: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> None:
     """Record a step of an orbit for the palettes of pictures; elsewhere it does nothing.
 
     Parameters
@@ -51,6 +51,8 @@ def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
         |w|^2 after the step.
     alive
         Mask of the points whose orbit is still running.
+    x, y, z
+        w after the step.
     """
 
 

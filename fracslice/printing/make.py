@@ -18,6 +18,7 @@ from ..kernel import Field
 from ..meshjob import DUST
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
+from ..volume.sizing import Sizing
 from ..work import Work
 from .edits import edited
 
@@ -36,7 +37,7 @@ THIN = 1.0
 """Area of walls or gaps that samples may miss, from which finer samples are taken, mm^2."""
 
 
-def printable(planned: Plan, size: float, how: Print, work: Work | None = None) -> tuple[Plan, float]:
+def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None) -> tuple[Plan, float]:
     """Make a planned scene printable.
 
     Samples with the voxel of `planned` lie at the same points before and after.
@@ -45,8 +46,8 @@ def printable(planned: Plan, size: float, how: Print, work: Work | None = None) 
     ----------
     planned : Plan
         The scene.
-    size : float
-        Longest side of the bodies that stay, mm, measured on the field before anything is cut off or added.
+    size : Sizing
+        Size of the bodies that stay, measured on the field before anything is cut off or added.
     how : Print
         Changes to make.
     work : Work, optional
@@ -67,8 +68,10 @@ def printable(planned: Plan, size: float, how: Print, work: Work | None = None) 
         When the work is cancelled.
     """
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
-        if (length := getattr(how, name)) > size and (name != "drain" or how.hollow):
-            raise VolumeError(f"{name} {length:g} mm: expected at most the object's size, {size:g} mm")
+        if (length := getattr(how, name)) > size.longest and (name != "drain" or how.hollow):
+            raise VolumeError(
+                f"{name} {length:g} mm: expected at most the object's size, {size.longest:g} mm"
+            )
     job = _Preparation(planned, size, how, work or Work())
     for stage, change in job.changes():
         job.work.check()
@@ -83,13 +86,18 @@ class _Preparation:
     """The object during its edits."""
 
     planned: Plan
-    size: float
+    sizing: Sizing
     how: Print
     work: Work
     scale: float = 1.0
     """mm per scene unit, set once the bodies that stay are known."""
     known: Components | None = None
     """Components, once computed."""
+
+    @property
+    def size(self) -> float:
+        """Approximate longest side, mm."""
+        return self.sizing.longest
 
     @property
     def root(self) -> Field:
@@ -120,7 +128,7 @@ class _Preparation:
             yield "keeping the largest", self.largest
             if self.root is not before:
                 self.bound()
-        self.scale = self.size / max(self.planned.box.size)
+        self.scale = self.sizing.scale(self.planned.box)
         if how.gap:
             yield "closing gaps", self.closed
         if how.thickness:
@@ -258,9 +266,10 @@ class _Preparation:
         from .hollowing import hollows
 
         samples, how, root = self.sampled(self.how.hollow), self.how, self.root
-        cuts = hollows(samples, how.hollow / self.scale, how.drain / self.scale, self.planned.outer)
+        cuts, drains = hollows(samples, how.hollow / self.scale, how.drain / self.scale, self.planned.outer)
         if not cuts:
             raise VolumeError(f"walls of {how.hollow:g} mm leave nothing to hollow out")
+        self.planned = replace(self.planned, drains=drains)
         for cut in cuts:
             root = edited(root, "cut", cut)
         return root

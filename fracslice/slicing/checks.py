@@ -153,7 +153,7 @@ def check_layers(
 
     limits, work = limits or Limits(), work or Work()
     finest, origin = max(stack.pixel), stack.origin
-    solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin)
+    solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin, stack.drains)
     return _Collector(stack, limits, printer, solid).report(Slicer(stack, work).map(make))
 
 
