@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from .mesh.simplify import Simplified
     from .surfaces import Surface
     from .volume import Plan, SignBricks
+    from .volume.sizing import Sizing
 
 STL = ".stl"
 
@@ -83,9 +85,16 @@ class _Job:
     clock: Clock
     path: Path | None
 
+    @cached_property
+    def size(self) -> Sizing:
+        """Size of the object."""
+        from .volume.sizing import sizing
+
+        return sizing(self.scene, self.what.size_mm, self.what.scale, self.clock.work)
+
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
-        self.what.voxels(self.scene)
+        self.what.voxels(self.size.longest)
         if self.path is not None:
             from .export import check_format, check_target
 
@@ -111,10 +120,12 @@ class _Job:
     def planned(self) -> _Sized:
         """Field to be meshed, with its edits."""
         from .volume import plan
+        from .volume.sizing import oriented
 
         how = self.what.how(self.scene)
         with self.clock("planning"):
-            planned = plan(self.scene.root, self.what.voxels(self.scene), self.clock.work)
+            root = oriented(self.scene.root, self.what.up, self.size.stretch, self.clock.work)
+            planned = plan(root, self.what.voxels(self.size.longest), self.clock.work)
         return _Sized(planned, None, how) if how.whole else self.edited(planned)
 
     def edited(self, planned: Plan) -> _Sized:
@@ -123,7 +134,7 @@ class _Job:
 
         how = self.what.how(self.scene)
         with self.clock("changing"):
-            made, scale = printable(planned, self.what.size(self.scene), how, self.clock.work)
+            made, scale = printable(planned, self.size, how, self.clock.work)
         # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.
         keep = how.keep if planned.root.bounds.exterior_only else "all"
         # Keep cavities: the hollow is one.
@@ -146,7 +157,7 @@ class _Job:
     def surface(self, aside: Callable[[], Path] | None) -> tuple[_Sized, Surface]:
         """Surface, in one piece if it fits in memory, and the choice of bodies that is left."""
         sized, signs = self.sampled()
-        most, voxel = len(signs), self.what.size(self.scene) / self.what.voxels(self.scene)
+        most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
         except TooLargeError as error:
@@ -164,10 +175,10 @@ class _Job:
         from .mesh.missed import surface_to_mesh
         from .shown import mesh_amount
 
-        what, clock, size, refined = self.what, self.clock, self.what.size(self.scene), None
+        what, clock, size, refined = self.what, self.clock, self.size, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord_mm is not None:
-            unit = sized.scale or size / max(planned.box.size)
+            unit = sized.scale or size.scale(planned.box)
             surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)
             refined = done.scaled(unit)
         with clock("finishing"):
@@ -184,7 +195,7 @@ class _Job:
             scene=self.scene.name,
             scene_hash=self.scene.hash,
             version=__version__,
-            size_mm=size,
+            size_mm=size.longest,
             voxel_mm=planned.voxel * scale,
             mesh=check.mesh,
             removed=finish.removed,
@@ -199,6 +210,8 @@ class _Job:
             simplified=simplified,
             notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
             depths=planned.depths,
+            contact_mm2=check.contact,
+            cavities_mm3=finish.cavities,
         )
         return MeshResult(report, finish.place, planned, whole, clock.work)
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class MeshResult:
-    """MeshResult of `make_mesh`.
+    """Result of `make_mesh`.
 
     Attributes
     ----------
