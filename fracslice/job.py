@@ -14,85 +14,23 @@ import numpy as np
 
 from . import surfaces
 from .errors import SceneError, TooLargeError
-from .finishing import Check, Finish, Placement
+from .finishing import Check, Finish
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
+from .meshresult import MeshResult
 from .report import Report, SurfaceError, SurfaceToMesh
 from .scene import Print, Scene
 from .version import __version__
 from .work import Clock, Work, ahead
 
 if TYPE_CHECKING:
-    from .kernel import Field
     from .mesh import Mesh
     from .mesh.simplify import Simplified
     from .surfaces import Surface
-    from .volume import Bricks, Plan, SignBricks
+    from .volume import Plan, SignBricks
     from .volume.sizing import Sizing
 
 STL = ".stl"
-
-
-@dataclass(frozen=True, eq=False)
-class MeshResult:
-    """Result of `make_mesh`.
-
-    Attributes
-    ----------
-    report : Report
-        Measures, checks and costs.
-    place : Placement
-        Map from the scene to the mesh.
-    planned : Plan
-        Sampled field.
-    whole : Mesh or None
-        The mesh; None if it is larger than memory and only in the file.
-    work : Work
-        Threads, progress and cancellation of the job.
-    """
-
-    report: Report
-    place: Placement
-    planned: Plan
-    whole: Mesh | None
-    work: Work
-
-    @property
-    def mesh(self) -> Mesh:
-        """The mesh in mm, standing on z = 0, quantised to float32.
-
-        Raises
-        ------
-        TooLargeError
-            If the mesh was written in pieces.
-        """
-        if self.whole is None:
-            raise TooLargeError("the mesh does not fit in memory; it is in the file that was written")
-        return self.whole
-
-    @property
-    def root(self) -> Field:
-        """Field that was meshed."""
-        return self.planned.root
-
-    @cached_property
-    def bricks(self) -> Bricks:
-        """Samples of the field around the surface, scene units; computed on first access."""
-        from .volume import sample_scene
-
-        return sample_scene(self.planned, self.work)
-
-    @property
-    def bricks_mm(self) -> Bricks:
-        """Samples in print space: positions and values in mm."""
-        scale, (x, y, z) = self.place.scale, self.bricks.origin
-        dx, dy, dz = self.place.offset
-        return replace(
-            self.bricks,
-            origin=(scale * x + dx, scale * y + dy, scale * z + dz),
-            voxel=scale * self.bricks.voxel,
-            values=self.bricks.values * np.float32(scale),
-        )
 
 
 def make_mesh(
