@@ -33,6 +33,7 @@ from .formulas import mirror as mirror
 from .formulas import neovius as neovius
 from .formulas import octahedron as octahedron
 from .formulas import offset as offset
+from .formulas import orbit as orbit
 from .formulas import plane as plane
 from .formulas import prism as prism
 from .formulas import quaternion_mandelbrot as quaternion_mandelbrot

@@ -32,7 +32,7 @@ from .vocabulary import sin as sin
 from .vocabulary import sqrt as sqrt
 from .vocabulary import where as where
 
-def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1.0, 0.7), angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1.0, 0.7), angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The asymmetric Mandelbox, turned in each step (Rrrola and Knighty 2010, fractalforums.com).
 
     With a third size of 1e6, z is never folded: the Amazing Surf (Kali 2011). L = 2 is measured.
@@ -51,6 +51,8 @@ def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 20, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -115,7 +117,7 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> Node:
     Node
     """
 
-def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Bristorbrot (Bristor 2009, fractalforums.com). L = 2 is measured.
 
     Parameters
@@ -124,13 +126,15 @@ def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequenc
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 20, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbulb of absolute coordinates, after Michelitsch and Roessler 1992, "The burning ship".
 
     L = 2 is measured.
@@ -143,6 +147,8 @@ def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = '
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 20, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -297,7 +303,7 @@ def iwp(period: float = 1.0, thickness: float = 0.1) -> Node:
     Node
     """
 
-def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0) -> Node:
+def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0, repeat: int = 1) -> Node:
     """The filled Julia set of q^2 + c in the quaternions, cut at k = 0.
 
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
@@ -314,6 +320,8 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     bailout : a number > 1 and <= 1e+06, default 2.0
         the solid is where the last step is not larger than this
+    repeat : a whole number from 1 to 20, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -336,7 +344,7 @@ def lidinoid(period: float = 1.0, thickness: float = 0.1) -> Node:
     Node
     """
 
-def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbox (Lowe 2010, "What is a Mandelbox?"). L = 2 is measured.
 
     Parameters
@@ -349,13 +357,15 @@ def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Lit
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 20, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0, julia: Sequence[float] | None = None) -> Node:
+def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0, julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
@@ -385,6 +395,8 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
         the solid is where the last step is not larger than this
     julia : 3 numbers >= -4 and <= 4
         adds this point in each step instead of the start point: a Julia set of the Mandelbulb
+    repeat : a whole number from 1 to 20, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -546,7 +558,7 @@ def prism(sides: int = 6, radius: float = 0.5, height: float = 1.0) -> Node:
     Node
     """
 
-def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbrot set of q^2 + c in the quaternions, cut at k = 0 (Norton 1982).
 
     It is the complex Mandelbrot set turned about the real axis. L = 2 is measured.
@@ -557,6 +569,8 @@ def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', juli
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 20, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------

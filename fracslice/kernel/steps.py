@@ -73,7 +73,7 @@ class Step:
 
 
 def traced(
-    function: Callable[..., Any], parameters: Mapping[str, int], fixed: Mapping[str, Any], prefix: str = "s"
+    function: Callable[..., Any], parameters: Mapping[str, int], fixed: Mapping[str, Any], place: int = 0
 ) -> Step:
     """Follow the text of a step.
 
@@ -82,32 +82,32 @@ def traced(
     function
         Step ``f(w, c, ...)``.
     parameters
-        Number of components of each argument after w and c; names are prefixed with ``v_``.
+        Number of components of each argument after w and c.
     fixed
         Values of the arguments that are constants of the code.
-    prefix
-        Prefix of the names of the code.
+    place
+        Place of the step in the round, part of all names but x, y and z.
 
     Returns
     -------
     Step
-        Code in terms of x, y, z, cx, cy, cz and the arguments.
+        Code in terms of x, y, z, of cx0, cy0, cz0 and of the arguments, such as v0_scale, for place 0.
 
     Raises
     ------
     KernelError
         If the function is not in the language of steps.
     """
-    trace = _Trace(prefix)
-    env: dict[str, Value] = {"w": trace.variable("x y z", 0), "c": trace.variable("cx cy cz", 3)}
+    trace = _Trace(f"s{place}_")
+    env: dict[str, Value] = {"w": trace.variable("x y z", 0), "c": trace.variable(f"cx{place} cy{place} cz{place}", 3)}
     for name, size in parameters.items():
-        parts = tuple(Scalar(f"v_{name}_{k}") for k in range(size))
-        env[name] = Scalar(f"v_{name}") if size == 1 else Vector(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
+        parts = tuple(Scalar(f"v{place}_{name}_{k}") for k in range(size))
+        env[name] = Scalar(f"v{place}_{name}") if size == 1 else Vector(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
     names = language.parameters(function)
     if names[:2] != ["w", "c"] or {*names[2:]} != {*parameters, *fixed}:
-        place = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
+        line = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
         wanted = ", ".join(("w", "c", *parameters, *fixed))
-        raise KernelError(f"{place}: step {function.__name__}: expected the arguments {wanted}")
+        raise KernelError(f"{line}: step {function.__name__}: expected the arguments {wanted}")
     found = trace.body(function, fixed, env)
     declared = found[1] if isinstance(found, tuple) and len(found) == 2 else None
     vector = _vector(found if declared is None else found[0], function)
@@ -238,18 +238,35 @@ class _Reader:
                     for k in range(n):
                         self.env[counter] = Scalar(repr(float(k)))
                         self.run(inner)
+                case ast.For(target, ast.Name(name), inner) if name in self.env:
+                    for value in self.elements(self.env[name]):
+                        self.assign(target, value)
+                        self.run(inner)
+                case ast.If(test, body, others):
+                    self.run(body if self.known(test) else others)
                 case ast.Return(ast.expr() as value):
                     return self.value(value)
                 case _:
                     self.fail(statement, "expected assignments, loops over constants and a return")
         return None
 
+    def elements(self, value: Value) -> tuple[Value, ...]:
+        return value.parts if isinstance(value, Vector) else value
+
+    def known(self, test: ast.expr) -> bool:
+        """Truth of a condition that is known here."""
+        value = self.value(test)
+        number = _number(value.atom) if isinstance(value, Scalar) else None
+        if number is None:
+            self.fail(test, "expected a condition on constants")
+        return number != 0
+
     def assign(self, target: ast.expr, value: Value) -> None:
         match target:
             case ast.Name(name):
                 self.env[name] = value
             case ast.Tuple(targets):
-                parts = value.parts if isinstance(value, Vector) else value
+                parts = self.elements(value)
                 if not isinstance(parts, tuple) or len(parts) != len(targets):
                     self.fail(target, f"expected {len(targets)} values")
                 for one, part in zip(targets, parts, strict=True):
