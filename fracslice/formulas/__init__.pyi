@@ -51,7 +51,7 @@ def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
-    repeat : a whole number from 1 to 20, default 1
+    repeat : a whole number from 1 to 8, default 1
         times that the step is taken in each round of an <orbit>
 
     Returns
@@ -126,7 +126,7 @@ def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequenc
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
-    repeat : a whole number from 1 to 20, default 1
+    repeat : a whole number from 1 to 8, default 1
         times that the step is taken in each round of an <orbit>
 
     Returns
@@ -147,7 +147,7 @@ def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = '
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
-    repeat : a whole number from 1 to 20, default 1
+    repeat : a whole number from 1 to 8, default 1
         times that the step is taken in each round of an <orbit>
 
     Returns
@@ -320,7 +320,7 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     bailout : a number > 1 and <= 1e+06, default 2.0
         the solid is where the last step is not larger than this
-    repeat : a whole number from 1 to 20, default 1
+    repeat : a whole number from 1 to 8, default 1
         times that the step is taken in each round of an <orbit>
 
     Returns
@@ -357,7 +357,7 @@ def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Lit
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
-    repeat : a whole number from 1 to 20, default 1
+    repeat : a whole number from 1 to 8, default 1
         times that the step is taken in each round of an <orbit>
 
     Returns
@@ -395,7 +395,7 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
         the solid is where the last step is not larger than this
     julia : 3 numbers >= -4 and <= 4
         adds this point in each step instead of the start point: a Julia set of the Mandelbulb
-    repeat : a whole number from 1 to 20, default 1
+    repeat : a whole number from 1 to 8, default 1
         times that the step is taken in each round of an <orbit>
 
     Returns
@@ -569,7 +569,7 @@ def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', juli
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
-    repeat : a whole number from 1 to 20, default 1
+    repeat : a whole number from 1 to 8, default 1
         times that the step is taken in each round of an <orbit>
 
     Returns

@@ -121,10 +121,8 @@ def step(w, c):  # type: ignore[no-untyped-def]
     return (x * x - y * y - z * z, 2.0 * x * y, 2.0 * x * z) + c, 2.0 * sqrt(x * x + y * y + z * z)
 
 
+@julia.step
 def julia_step(node: Node) -> Stepped:
     if node["c"][3]:
         raise node.fail("c: expected a last number of 0 inside <orbit>: its points have no k")
     return step, {}, node["c"][:3]
-
-
-julia.hooks["step"] = julia_step

@@ -304,11 +304,9 @@ def step(w, c, power):  # type: ignore[no-untyped-def]
     return raised(w, power) + c
 
 
+@mandelbulb.step
 def mandelbulb_step(node: Node) -> Stepped:
     power = node["power"]
     if power % 1:
         return step, {"power": power}, node["julia"]
     return whole_step, {**_products(power), "power": power}, node["julia"]
-
-
-mandelbulb.hooks["step"] = mandelbulb_step

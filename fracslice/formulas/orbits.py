@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ Stepped = tuple[Callable[..., Any], dict[str, Any], tuple[float, ...] | None]
 
 Affine = tuple[np.ndarray, np.ndarray]
 
-REPEAT = Count(1, "times that the step is taken in each round of an <orbit>", least=1, most=20)
+REPEAT = Count(1, "times that the step is taken in each round of an <orbit>", least=1, most=8)
 ITERATIONS = Count(
     AUTO,
     'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
@@ -39,13 +39,7 @@ OWN = {"iterations": ITERATIONS, "julia": JULIA, "repeat": REPEAT}
 class _Orbit(Formula):
     """Formula of hybrids, and the decorator of steps."""
 
-    @overload  # type: ignore[override]
-    def __call__(self, first: Node, /, *others: Node, place: str | None = None, **values: Any) -> Node: ...
-
-    @overload
-    def __call__(self, **parameters: Parameter) -> Callable[[Callable[..., Any]], Formula]: ...
-
-    def __call__(self, *steps: Node, place: str | None = None, **values: Any) -> Any:
+    def __call__(self, *steps: Any, place: str | None = None, **values: Any) -> Any:
         """Make a hybrid of some steps, or register the escape-time fractal of a step ``f(w, c, ...)``.
 
         A step returns the next point from the last one, w, and a constant c: the start point, or that of a
@@ -105,7 +99,13 @@ def _steps(node: Node) -> Iterator[tuple[Node, Affine | None]]:
             (a, b), inner = affine(inner), inner.children[0]
             linear, offset = product(linear, a), product(linear, b) + offset
         moved = (linear != np.eye(3)).any() or offset.any()
-        yield inner, (linear, offset) if moved else None
+        for _ in range(inner.values.get("repeat", 1)):
+            yield inner, (linear, offset) if moved else None
+
+
+def _step(node: Node) -> Stepped:
+    found: Stepped = node.formula.hooks["step"](node)
+    return found
 
 
 def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
@@ -121,9 +121,9 @@ def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
     (tuple of kernel.orbits.Code, dict)
         Steps in order; values by name.
     """
-    code, found, values = late("kernel.orbits.Code"), [], {}
+    code, found, values = late("kernel.orbits.Code"), [], dict[str, Any]()
     for place, (step, moved) in enumerate(_steps(node)):
-        function, own, constant = step.formula.hooks["step"](step)
+        function, own, constant = _step(step)
         fixed = tuple((name, v.value) for name, v in own.items() if isinstance(v, Fixed))
         passed = {name: v for name, v in own.items() if not isinstance(v, Fixed)}
         sizes = tuple((name, len(v) if isinstance(v, tuple) else 1) for name, v in passed.items())
@@ -139,10 +139,7 @@ def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
             constant = tuple((product(undone, point - offset) if moved else point).tolist())
         if constant is not None:
             values[f"c{place}"] = constant
-        if step["repeat"] > 1:
-            values[f"often{place}"] = step["repeat"]
-        flags = constant is not None, moved is not None, step["repeat"] > 1
-        found.append(code(function, sizes, fixed, *flags))
+        found.append(code(function, sizes, fixed, constant is not None, moved is not None))
     return tuple(found), values
 
 
@@ -203,8 +200,9 @@ def orbit_arguments(node: Node) -> dict[str, object]:
 
 
 def orbit_select(node: Node) -> Callable[..., Any]:
-    found: Callable[..., Any] = late("kernel.orbits.field")(steps(node)[0], grown(node).by_power)
-    return found
+    found = grown(node)
+    function: Callable[..., Any] = late("kernel.orbits.field")(steps(node)[0], found.by_power, found.scaled)
+    return function
 
 
 def orbit_steepening(node: Node) -> float:
@@ -216,12 +214,30 @@ def orbit_potential(node: Node) -> bool:
     return bool(grown(node).by_power)
 
 
+def _default(node: Node, name: str) -> Any:
+    kind = node.formula.parameters.get(name)
+    return kind.default if kind else None
+
+
+def orbit_check(node: Node) -> None:
+    """Refuse steps that are not in the language, elements without a step, and values of the whole in them."""
+    for step, _ in _steps(node):
+        if "step" not in step.formula.hooks:
+            raise step.fail("has no step: expected an escape-time fractal inside <orbit>, or one transformed")
+        for name in ("iterations", "bailout"):
+            if node is not step and step.values.get(name) != _default(step, name):
+                raise step.fail(f"{name}={step[name]}: expected none inside <orbit>")
+    for place, code in enumerate(steps(node)[0]):
+        code.traced(place)
+
+
 HOOKS: dict[str, Callable[..., Any]] = {
     "bounds": orbit_bounds,
     "arguments": orbit_arguments,
     "select": orbit_select,
     "steepening": orbit_steepening,
     "potential": orbit_potential,
+    "check": orbit_check,
 }
 
 
@@ -230,7 +246,7 @@ def _hybrid(w, c):  # type: ignore[no-untyped-def]
 
     A round takes the step of every element, `repeat` times each. A `transform` around an element is that of
     its step's coordinates; `julia` of an element is the constant of its step, in these coordinates. With one
-    element it is that fractal, transformed. L = 2 is measured.
+    element it is that fractal, transformed. L = 3 is measured.
     """
     return w
 
@@ -249,19 +265,7 @@ orbit = register(
         "julia": JULIA,
     },
     made=_Orbit,
-    lipschitz=2.0,
+    lipschitz=3.0,
     exterior_only=True,
 )(_hybrid)
 orbit.hooks.update(HOOKS)
-
-
-@orbit.check
-def orbit_check(node: Node) -> None:
-    """Refuse elements that have no step, and values that belong to the whole."""
-    for step, _ in _steps(node):
-        if "step" not in step.formula.hooks:
-            raise step.fail("has no step: expected an escape-time fractal inside <orbit>, or one transformed")
-        for name in ("iterations", "bailout"):
-            if name in step.values and step[name] != step.formula.parameters[name].default:
-                raise step.fail(f"{name}={step[name]}: expected none inside <orbit>")
-        step.formula.hooks["step"](step)

@@ -160,7 +160,8 @@ def power_over(w, e, n):  # type: ignore[no-untyped-def]
 def raise_whole(w, digits, turns, half_digits, even, linear, n):  # type: ignore[no-untyped-def]
     """Raise to a whole power in the triplex numbers by products, see `mandelbulb`.
 
-    The arguments but w are those of `whole_power`, and are compiled into the code.
+    Compiled into the code are the binary digits of n, n // 2 and (n - 1) // 2 after the first, and whether n
+    is even or 2.
     """
     x, y, z = w
     rho2 = maximum(x * x + y * y, 1e-30)

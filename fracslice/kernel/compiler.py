@@ -16,7 +16,8 @@ from .emitter import Emitter
 from .linker import CALLED, Linked
 from .loop_linker import link_loops
 from .loops import Loop
-from .values import DOUBLE, FLOAT, WHOLE, Lanes
+from .scalars import DOUBLE, FLOAT, WHOLE
+from .values import Lanes
 
 PART = ["x", "y", "z", "P", "P0"]
 """Arguments of a part's function."""

@@ -18,21 +18,9 @@ from llvmlite import ir
 
 from ..errors import KernelError
 from .expressions import Expressions
+from .scalars import WHOLE, MismatchError, number
 from .syntax import assigned_names
-from .values import (
-    WHOLE,
-    Kind,
-    Lanes,
-    MismatchError,
-    Value,
-    as_kind,
-    joined,
-    kind_of,
-    made_of,
-    number,
-    parts_of,
-    types_of,
-)
+from .values import Kind, Lanes, Value, as_kind, joined, kind_of, made_of, parts_of, types_of
 
 Names = dict[str, Value]
 

@@ -13,15 +13,15 @@ import numpy as np
 
 from ..formulas.box import Box
 from ..formulas.escape import CORE
-from . import language
+from . import functions
 from .cells import possible_cells
 from .orbits import Round, field, written
 
 DIRECTIONS, RADII, FARTHEST = 64, np.geomspace(1e-2, 1e4, 56).round(4), 1e6
 """Samples of the search for the radius of escape."""
 
-LIPSCHITZ, CELLS = 2.0, 1 << 15
-"""Lipschitz bound of the fields of orbits, and the most cells of the search for the box."""
+LIPSCHITZ, CELLS = 3.0, 1 << 15
+"""Lipschitz bound of the fields of hybrids, and the most cells of the search for the box."""
 
 ROUNDS = 60
 """Rounds after which an orbit counts as bounded."""
@@ -34,8 +34,10 @@ STOP = {False: 4.0, True: 300.0}
 depends little on the number of steps.
 """
 
-POWER, LARGEST = 1.2, 1e12
-"""Least growth that counts as a power; largest |w| one step past the radius where an orbit stops."""
+POWER, LARGEST, FLAT = 1.2, 27.0, 0.2
+"""Least growth that counts as a power; largest log |w| one step past the radius where an orbit stops; largest
+logarithm of a factor that counts as 1, for it changes the potential of an escaped orbit by a thirtieth.
+"""
 
 Image = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Image of points [3, n] with constants [3, n]."""
@@ -52,23 +54,23 @@ class Growth:
     ----------
     powers
         Of each step: |w| grows as this power far out, at least 1.
+    factors
+        Of each step: logarithm of the factor of this power.
     escapes
         Of each step: radius after it beyond which |w| grows with every round.
-    often
-        Times that each step is taken in a round.
     half
         Half sizes of a box around the solid.
     """
 
     powers: tuple[float, ...]
+    factors: tuple[float, ...]
     escapes: tuple[float, ...]
-    often: tuple[int, ...]
     half: tuple[float, float, float]
 
     @property
     def power(self) -> float:
         """Power by which a round grows."""
-        return math.prod(p**n for p, n in zip(self.powers, self.often, strict=True))
+        return math.prod(self.powers)
 
     @property
     def by_power(self) -> bool:
@@ -81,17 +83,35 @@ class Growth:
         return self.escapes[-1]
 
     @property
-    def fits(self) -> bool:
-        """True if every step can be computed from the radius where an orbit stops."""
-        return all(e**p < LARGEST for e, p in zip(self.escapes, self.following, strict=True))
+    def following(self) -> tuple[float, ...]:
+        """Power of the step after each step."""
+        return (*self.powers[1:], self.powers[0])
 
     @property
-    def following(self) -> list[float]:
-        """Largest power of the steps that can follow each step."""
-        after = [*self.powers[1:], self.powers[0]]
-        return [
-            max(p, q) if n > 1 else q for p, q, n in zip(self.powers, after, self.often, strict=True)
-        ]
+    def scales(self) -> tuple[float, ...]:
+        """Factors s after each step for which ``log (s |w|)`` grows by the powers alone, far out."""
+        power, last = 1.0, 0.0
+        for p, factor in zip(reversed(self.powers), reversed(self.factors), strict=True):
+            last += power * factor
+            power *= p
+        shift, found = last / (power - 1), []
+        for p, factor in zip(self.powers, self.factors, strict=True):
+            shift = p * shift - factor
+            found.append(math.exp(shift))
+        return tuple(found)
+
+    @property
+    def scaled(self) -> bool:
+        """True if factors are not 1."""
+        return self.by_power and any(self.factors)
+
+    @property
+    def fits(self) -> bool:
+        """True if every step can be computed from the radius where an orbit stops."""
+        after = (*self.factors[1:], self.factors[0])
+        return all(
+            f + p * math.log(e) < LARGEST for e, p, f in zip(self.escapes, self.following, after, strict=True)
+        )
 
 
 @lru_cache(maxsize=256)
@@ -114,51 +134,51 @@ def growth(steps: Round, values: tuple[tuple[str, Any], ...], iterations: int) -
     """
     known = dict(values)
     images = [image(steps, place, known) for place in range(len(steps))]
-    often = tuple(int(known.get(f"often{place}", 1)) for place in range(len(steps)))
-    taken = [place for place, n in enumerate(often) for _ in range(n)]
-    whole = _composed([images[place] for place in taken])
+    whole = _composed(images)
     rays, origin = _rays(), np.zeros(3)
     if not _norm(whole(rays * 1e4, origin)).min() > 1.02e4:
         return None
-    powers = tuple(_power(step, rays, origin) for step in images)
+    rates = [_power(step, rays, origin) for step in images]
     points = (rays[:, :, None] * RADII).reshape(3, -1)
     fixed = all(code.julia for code in steps)
     radius = bounded = _radius(whole, points, ROUNDS, FARTHEST)
     for _ in range(2):  # thin tips of the solid fall between samples; that of a few rounds has thicker ones
         radius = max(_escape(whole, points, 0.0 if fixed else bounded), 0.0 if fixed else bounded)
         bounded = max(bounded, _radius(whole, points, FEW, radius))
-    escapes = [0.0] * len(steps)
-    for k, place in enumerate(taken[:-1]):
-        turned = _composed([images[p] for p in (*taken[k + 1 :], *taken[: k + 1])])
-        escapes[place] = max(escapes[place], _escape(turned, points, 0.0 if fixed else bounded))
-    escapes[-1] = max(escapes[-1], radius)
+    size = 0.0 if fixed else bounded
+    escapes = [_escape(_composed([*images[k:], *images[:k]]), points, size) for k in range(1, len(steps))]
     sampled = 1.5 * _radius(whole, points, iterations, radius)
-    found = Growth(powers, tuple(escapes), often, (sampled, sampled, sampled))
+    powers, factors = zip(*rates, strict=True)
+    found = Growth(powers, factors, (*escapes, radius), (sampled, sampled, sampled))
     return replace(found, half=_half(steps, found, known, iterations)) if found.fits else found
 
 
-def _half(steps: Round, found: Growth, values: Mapping[str, Any], iterations: int) -> tuple[float, ...]:
+def _half(
+    steps: Round, found: Growth, values: Mapping[str, Any], iterations: int
+) -> tuple[float, float, float]:
     """Half sizes of a box around the cells that the field does not prove to be empty; the search begins with
     one half more than the samples reach.
     """
-    function = field(steps, found.by_power)
+    function = field(steps, found.by_power, found.scaled)
     own = {**arguments(steps, found, iterations), **values}
-    given = [own[name] for name in language.parameters(function)[3:]]
+    given = [own[name] for name in functions.parameters(function)[3:]]
 
     def evaluate(points: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
             return np.asarray(function(*points, *given))
 
     centres, _, size = possible_cells(evaluate, LIPSCHITZ, Box.centred(*found.half), CELLS)
-    reached = np.ceil((abs(centres).max(axis=1, initial=0) + size / 2) * 256) / 256
-    return tuple(reached.tolist())
+    x, y, z = (np.ceil((abs(centres).max(axis=1, initial=0) + size / 2) * 256) / 256).tolist()
+    return x, y, z
 
 
-def _power(step: Image, rays: np.ndarray, origin: np.ndarray) -> float:
-    """Power by which a step grows far out."""
-    near, far = (_norm(step(rays * r, origin)) for r in (1e4, 1e5))
-    rate = round(float(np.median(np.log10(np.maximum(far, 1e-300) / np.maximum(near, 1e-300)))), 3)
-    return rate if rate > POWER else 1.0
+def _power(step: Image, rays: np.ndarray, origin: np.ndarray) -> tuple[float, float]:
+    """Power by which a step grows far out, and the logarithm of its factor."""
+    near, far = (np.log(np.maximum(_norm(step(rays * r, origin)), 1e-300)) for r in (1e4, 1e5))
+    rate = round(float(np.median(far - near)) / math.log(10), 3)
+    rate = rate if rate > POWER else 1.0
+    factor = float(np.median(near)) - rate * math.log(1e4)
+    return rate, factor if abs(factor) > FLAT else 0.0
 
 
 def _escape(whole: Image, points: np.ndarray, size: float) -> float:
@@ -259,14 +279,17 @@ def arguments(steps: Round, found: Growth, iterations: int) -> dict[str, object]
         stops = {f"stop{k}": (STOP[False] * max(e, found.escape)) ** 2 for k, e in enumerate(found.escapes)}
         return {**own, **stops, "bailout": found.escape}
     counted = min(iterations, int(30 / math.log10(found.power)))
-    radius = max(found.escape, 1.1)
+    scales = found.scales if found.scaled else (1.0,) * len(steps)
+    radius = max(found.escape * scales[-1], 1.1)
     last = 2 * math.log(radius)
     least = radius**2 * math.exp(-max(0.2 / radius, 1e-4))
     own["levels"] = (last / found.power**counted, last, least)
-    for k, (escape, following) in enumerate(zip(found.escapes, found.following, strict=True)):
-        own[f"stop{k}"] = max(escape, STOP[True] ** (1 / following)) ** 2
+    escapes = (*found.escapes[:-1], radius / scales[-1])
+    for k, (escape, following, scale) in enumerate(zip(escapes, found.following, scales, strict=True)):
+        own[f"stop{k}"] = max(escape, STOP[True] ** (1 / following) / scale) ** 2
         own[f"rate{k}"] = power = found.powers[k]
+        if found.scaled:
+            own[f"scale{k}"] = scale
         if steps[k].julia:
             own[f"least{k}"] = power * CORE ** ((power - 1) / 2) if power > POWER else 0.0
-    own[f"stop{len(steps) - 1}"] = max(radius**2, own[f"stop{len(steps) - 1}"])  # type: ignore[type-var]
     return own

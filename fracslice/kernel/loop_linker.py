@@ -18,7 +18,7 @@ from types import FunctionType
 from typing import Any, NoReturn
 
 from ..errors import KernelError
-from . import language
+from . import functions, language
 from .intrinsics import is_intrinsic
 from .loops import Loop
 from .syntax import Folding
@@ -115,7 +115,7 @@ class _Resolver(Folding):
 
     def __init__(self, linker: _LoopLinker, function: Callable[..., Any], fixed: dict[str, Any]) -> None:
         self.linker, self.function, self.fixed = linker, function, fixed
-        self.scope = language.scope(function)
+        self.scope = functions.scope(function)
         self.local = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - fixed.keys()
 
     def tree(self, name: str) -> ast.FunctionDef:
@@ -164,7 +164,7 @@ class _Resolver(Folding):
             found = ast.Constant(int(value))
         elif isinstance(node, ast.Name) and value is getattr(builtins, node.id, _UNKNOWN):
             found = ast.Name(node.id, ast.Load())
-        elif name := language.word(value):
+        elif name := language.intrinsic(value):
             found = ast.Name(name, ast.Load())
         elif is_intrinsic(value):
             found = ast.Name(value.__name__, ast.Load())
@@ -182,10 +182,10 @@ class _Resolver(Folding):
             case ast.Call(ast.Name("tuple"), [ast.GeneratorExp(element, [generator])]):
                 return self.unrolled(node, element, generator)
         called = self.known(node.func)
-        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.word(called):
+        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.intrinsic(called):
             return self.generic_visit(node)
         fixed, passed = [], []
-        for parameter, argument in zip(language.parameters(called), node.args, strict=False):
+        for parameter, argument in zip(functions.parameters(called), node.args, strict=False):
             value = self.known(argument)
             if value is _UNKNOWN or isinstance(value, (int, float)):
                 passed.append(self.visit(argument))

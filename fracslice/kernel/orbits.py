@@ -16,7 +16,7 @@ from typing import Any
 
 from ..formulas import vocabulary
 from ..formulas.escape import potential_distance
-from .seen import seen
+from . import functions
 from .steps import Step, traced
 
 
@@ -36,8 +36,6 @@ class Code:
         True if its constant is the same at all points.
     moved
         True if it is taken in coordinates of its own.
-    repeated
-        True if it is taken several times in each round.
     """
 
     step: Callable[..., Any]
@@ -45,11 +43,10 @@ class Code:
     fixed: tuple[tuple[str, Any], ...] = ()
     julia: bool = False
     moved: bool = False
-    repeated: bool = False
 
     def traced(self, place: int) -> Step:
         """Straight-line code of the step at a place in the round."""
-        return _traced(self, place, seen(self.step))
+        return _traced(self, place, functions.fingerprint(self.step))
 
     def arguments(self, place: int) -> list[str]:
         """Names of the values that the step needs at a place in the round."""
@@ -99,7 +96,7 @@ def _traced(code: Code, place: int, _: object) -> Step:
     return traced(code.step, dict(code.sizes), dict(code.fixed), place)
 
 
-def field(steps: Round, by_power: bool) -> Callable[..., Any]:
+def field(steps: Round, by_power: bool, scaled: bool) -> Callable[..., Any]:
     """Write the function of an orbit's field.
 
     Parameters
@@ -108,6 +105,8 @@ def field(steps: Round, by_power: bool) -> Callable[..., Any]:
         Steps of a round.
     by_power
         True if rounds grow by a power.
+    scaled
+        True if the potential is that of ``scale |w|`` after each step.
 
     Returns
     -------
@@ -119,28 +118,28 @@ def field(steps: Round, by_power: bool) -> Callable[..., Any]:
     KernelError
         If a step is not in the language.
     """
-    return _field(steps, by_power, tuple(seen(code.step) for code in steps))
+    return _field(steps, by_power, scaled, tuple(functions.fingerprint(code.step) for code in steps))
 
 
 @lru_cache(maxsize=256)
-def _field(steps: Round, by_power: bool, _: object) -> Callable[..., Any]:
+def _field(steps: Round, by_power: bool, scaled: bool, _: object) -> Callable[..., Any]:
     given, setup, loop = [], [], []
     for place, code in enumerate(steps):
-        given += [*code.arguments(place), f"stop{place}", *([f"often{place}"] if code.repeated else [])]
+        given += [*code.arguments(place), f"stop{place}", *([f"scale{place}"] if scaled else [])]
         given += [f"rate{place}"] if by_power else []
         given += [f"least{place}"] if by_power and code.julia else []
         setup += [*code.unpacked(place), code.constant(place, ("x", "y", "z"))]
-        lines = _taken(code, place, by_power)
-        loop += [f"for _ in range(often{place}):", *_indented(lines)] if code.repeated else lines
+        loop += _taken(code, place, by_power, f"scale{place}" if scaled else "")
+    last = len(steps) - 1
     body = [
         *setup,
         *(["first_level, last_level, least_r2 = levels"] if by_power else []),
         *(["reached = first_level", "level = 0.0 * x + first_level"] if by_power else []),
         "r2 = x * x + y * y + z * z",
-        "end_r2 = r2",
         "dr = 0.0 * x + 1.0",
-        "slope = dr",
-        f"alive = r2 < stop{len(steps) - 1}",
+        *([f"end_r2 = scale{last} * scale{last} * r2", f"slope = scale{last} * dr"] if scaled else []),
+        *([] if scaled else ["end_r2 = r2", "slope = dr"]),
+        f"alive = r2 < stop{last}",
         "for _ in range(iterations):",
         *_indented(["if not any_of(alive):", "    break", *loop]),
         "return potential_distance(end_r2, slope * slope, level, first_level, last_level, least_r2)"
@@ -151,7 +150,7 @@ def _field(steps: Round, by_power: bool, _: object) -> Callable[..., Any]:
     return written(steps, ["x", "y", "z", "iterations", own, *given], body)
 
 
-def _taken(code: Code, place: int, by_power: bool) -> list[str]:
+def _taken(code: Code, place: int, by_power: bool, scale: str) -> list[str]:
     """Lines of the loop that take a step."""
     by_w, by_c = code.traced(place).stretch
     if code.julia and by_power:  # preimages of critical points outside the set, see `escape.CORE`
@@ -164,8 +163,8 @@ def _taken(code: Code, place: int, by_power: bool) -> list[str]:
         *assigned,
         "r2 = x * x + y * y + z * z",
         "orbit(r2, alive)",
-        "end_r2 = where(alive, r2, end_r2)",
-        "slope = where(alive, maximum(dr, slope), slope)",
+        f"end_r2 = where(alive, {f'{scale} * {scale} * r2' if scale else 'r2'}, end_r2)",
+        f"slope = where(alive, maximum({f'{scale} * dr' if scale else 'dr'}, slope), slope)",
         *([f"reached = reached * rate{place}", "level = where(alive, reached, level)"] if by_power else []),
         f"alive = alive & (r2 < stop{place})",
     ]

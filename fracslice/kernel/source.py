@@ -10,8 +10,7 @@ from functools import lru_cache
 from types import FunctionType
 from typing import Any
 
-from . import language
-from .seen import seen
+from . import functions, language
 from .syntax import Folding, stored_names
 
 
@@ -88,11 +87,11 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
         Text and called functions.
     """
     tree = _Forget().visit(tree)
-    scope = language.scope(function)
+    scope = functions.scope(function)
     names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
     stored = stored_names(tree) | {a.arg for a in tree.args.args}
     outside = sorted(names - stored - language.INTRINSICS - given)
-    numbers = {name: _plain(scope[name]) for name in outside if language.is_number(scope.get(name))}
+    numbers = {name: _plain(scope[name]) for name in outside if functions.is_number(scope.get(name))}
     calls = {name: scope[name] for name in outside if isinstance(scope.get(name), FunctionType)}
     tree = _Substitute(numbers).visit(tree)
     return Copy(tree.name, ast.unparse(ast.fix_missing_locations(tree)), calls)
@@ -122,7 +121,7 @@ def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], giv
     KernelError
         If the function is not in the language.
     """
-    return _shared(function, fixed, given, (seen(function), repr(fixed)))
+    return _shared(function, fixed, given, (functions.fingerprint(function), repr(fixed)))
 
 
 @lru_cache(maxsize=1024)

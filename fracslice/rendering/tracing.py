@@ -15,8 +15,9 @@ from typing import Any
 from ..formulas.material import material
 from ..formulas.registry import Node
 from ..kernel import source
-from ..kernel.linker import OF_FORMULAS, FieldDialect, folded, function, leading
-from ..kernel.structure import Arguments, Run, Subroutine, arguments, read
+from ..kernel.arguments import Arguments, arguments, read
+from ..kernel.dialects import OF_FORMULAS, FieldDialect, folded, function, leading
+from ..kernel.structure import Run, Subroutine
 
 
 @dataclass

@@ -6,19 +6,19 @@ from contextlib import suppress
 
 import numpy as np
 
-from fracslice.errors import SceneError
+from fracslice.errors import SceneError, VolumeError
 from fracslice.formulas import Formula, Node, orbit, transform
 from fracslice.formulas.orbits import ITERATIONS
 from fracslice.formulas.parameters import REQUIRED, Choice, Count, Number, Vector
-from fracslice.kernel import compile_scene
+from fracslice.kernel import compile_scene, reference
 from fracslice.scene.layout import formulas
-from fracslice.volume import plan, sample_scene
+from fracslice.volume import Plan, plan, sample_scene
 from fracslice.volume.bricks import INSIDE
 
 from .draws import number
 
 ORBITS = [f for f in formulas() if "step" in f.hooks]
-TRIES = 100
+TRIES, LOOKED, LEAST = 100, 4000, 40
 OF_THE_WHOLE = {"iterations", "bailout", "julia"}
 
 
@@ -28,15 +28,25 @@ def random_hybrid(seed: int) -> Node:
     for _ in range(TRIES):
         with suppress(SceneError):
             count = int(rng.integers(1, 4))
-            root = orbit(*(_step(rng) for _ in range(count)), iterations=int(rng.integers(2, 5)), **_julia(rng))
-            if 0.1 < max(root.bounds.box.size) < 100:
+            root = orbit(
+                *(_step(rng) for _ in range(count)), iterations=int(rng.integers(2, 5)), **_julia(rng)
+            )
+            if _inside(root):
                 return root
     raise AssertionError(f"seed {seed}: no hybrid escapes")
 
 
+def _inside(root: Node) -> bool:
+    """True if some of the points in the box are inside."""
+    points = np.random.default_rng(0).uniform(root.bounds.box.lo, root.bounds.box.hi, (LOOKED, 3))
+    return int((reference(root)(*points.T) < 0).sum()) > LEAST
+
+
 def _step(rng: np.random.Generator) -> Node:
     formula = ORBITS[rng.integers(len(ORBITS))]
-    values = {name: _value(rng, kind) for name, kind in formula.parameters.items() if name not in OF_THE_WHOLE}
+    values = {
+        name: _value(rng, kind) for name, kind in formula.parameters.items() if name not in OF_THE_WHOLE
+    }
     step = formula(**values, **_own(rng, formula))
     if rng.uniform() < 0.6:
         return step
@@ -67,15 +77,23 @@ def _value(rng: np.random.Generator, kind: object) -> object:
 
 
 def lost(root: Node, resolution: float) -> int:
-    """Grid points inside the solid that its sparse samples have outside, or do not have where it is cut."""
+    """Grid points inside the solid that are outside by its sparse samples."""
     planned = plan(root, resolution)
-    bricks = sample_scene(planned)
-    corners = np.indices(planned.lattice.bricks, np.int32).reshape(3, -1).T * np.int32(8)
-    values = np.empty((len(corners), 512), np.float32)
-    lattice = planned.lattice
-    compile_scene(planned.root).bricks(np.ascontiguousarray(corners), lattice.origin, lattice.voxel, values)
+    try:
+        bricks = sample_scene(planned)
+    except VolumeError:  # all of it is thinner than a voxel
+        return int((dense(planned) < 0).sum())
+    values = dense(planned)
     rows = bricks.index.reshape(-1)
-    sampled = rows >= 0
-    inside = values < 0
+    sampled, inside = rows >= 0, values < 0
     known = np.where(sampled[:, None], bricks.values[np.maximum(rows, 0)] < 0, (rows == INSIDE)[:, None])
     return int((inside & ~known).sum())
+
+
+def dense(planned: Plan) -> np.ndarray:
+    """Values on all grid points, one row per brick."""
+    lattice = planned.lattice
+    corners = np.indices(lattice.bricks, np.int32).reshape(3, -1).T * np.int32(8)
+    values = np.empty((len(corners), 512), np.float32)
+    compile_scene(planned.root).bricks(np.ascontiguousarray(corners), lattice.origin, lattice.voxel, values)
+    return values
