@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import shutil
-import tempfile
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from .closing import DENSITIES, of_mesh
 from .inputs import check_folder, check_targets, load_scene, refuse_options
 from .options import (
     NAME,
     job_of,
     job_options,
+    price_option,
     print_options,
     quiet_option,
     set_option,
@@ -37,10 +37,12 @@ GRID = ".vdb"
 
 def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
     """Parse a time of an animation into seconds."""
+    if text is None:
+        return None
     from fracslice.scene.animation import Seconds
 
     try:
-        return None if text is None else Seconds(0.0, "").read(text)
+        return Seconds(0.0, "").read(text)
     except ValueError as error:
         raise click.BadParameter(f"{text!r}: expected {error}") from None
 
@@ -79,6 +81,13 @@ def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | N
     default="cpu",
     help="The device that samples the field; cpu by default. auto: the GPU, if there is one.",
 )
+@click.option(
+    "--material",
+    type=click.Choice(list(DENSITIES)),
+    default="resin",
+    help="Material of the weight in the summary; resin by default.",
+)
+@price_option("kilogram")
 @threads_option
 @quiet_option
 @click.pass_context
@@ -93,6 +102,8 @@ def mesh(
     picture: str | None,
     cache: str | None,
     device: str,
+    material: str,
+    price: float | None,
     threads: int,
     quiet: bool,
     **options: Any,
@@ -116,12 +127,13 @@ def mesh(
     job = job_of(scene, **options)
     how = Work(threads, store=store_in(cache), device=chosen(device))
     with working(how, quiet) as work:
-        figures = made(scene, job, output, picture, work)
+        result = made(scene, job, output, picture, work)
         if report is not None:
-            write_report(figures, report)
+            write_report(result.report, report)
     if not quiet:
-        click.echo(summary(output, figures))
-    return 1 if figures.problems else 0
+        click.echo(summary(output, result.report))
+        click.echo(os.linesep.join(of_mesh(result, material, price).lines()))
+    return 1 if result.report.problems else 0
 
 
 def store_in(folder: str | None) -> Store | None:
@@ -135,13 +147,13 @@ def store_in(folder: str | None) -> Store | None:
     return Store(Path(folder))
 
 
-def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> Report:
+def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> MeshResult:
     """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.export import write
     from fracslice.job import make_mesh, metadata
 
     if picture is None and Path(output).suffix.lower() != GRID:
-        return make_mesh(scene, job, work, path=output).report
+        return make_mesh(scene, job, work, path=output)
     result = make_mesh(scene, job, work)
     work.check()
     if Path(output).suffix.lower() == GRID:
@@ -152,7 +164,7 @@ def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Wor
         from fracslice.viewer import picture as draw
 
         draw(result.mesh, picture)
-    return result.report
+    return result
 
 
 def check_outputs(source: str, output: str, report: str | None, picture: str | None) -> None:
@@ -173,6 +185,9 @@ def check_outputs(source: str, output: str, report: str | None, picture: str | N
 
 def write_grid(result: MeshResult, path: str, about: dict[str, str]) -> None:
     """Write the samples, in mm, as an OpenVDB file."""
+    import shutil
+    import tempfile
+
     from fracslice.export import replacing
     from fracslice.volume.grid import write_vdb
 
@@ -185,6 +200,8 @@ def write_grid(result: MeshResult, path: str, about: dict[str, str]) -> None:
 
 def write_report(report: Report, path: str) -> None:
     """Write the report as JSON."""
+    import json
+
     from fracslice.export import replacing
 
     with replacing(path) as file:

@@ -27,14 +27,15 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .mesh.simplify import Simplified
     from .surfaces import Surface
-    from .volume import Bricks, Plan
+    from .volume import Bricks, Plan, SignBricks
+    from .volume.sizing import Sizing
 
 STL = ".stl"
 
 
 @dataclass(frozen=True, eq=False)
 class MeshResult:
-    """MeshResult of `make_mesh`.
+    """Result of `make_mesh`.
 
     Attributes
     ----------
@@ -146,9 +147,16 @@ class _Job:
     clock: Clock
     path: Path | None
 
+    @cached_property
+    def size(self) -> Sizing:
+        """Size of the object."""
+        from .volume.sizing import sizing
+
+        return sizing(self.scene, self.what.size_mm, self.what.scale, self.clock.work)
+
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
-        self.what.voxels(self.scene)
+        self.what.voxels(self.size.longest)
         if self.path is not None:
             from .export import check_format, check_target
 
@@ -174,10 +182,12 @@ class _Job:
     def planned(self) -> _Sized:
         """Field to be meshed, with its edits."""
         from .volume import plan
+        from .volume.sizing import oriented
 
         how = self.what.how(self.scene)
         with self.clock("planning"):
-            planned = plan(self.scene.root, self.what.voxels(self.scene), self.clock.work)
+            root = oriented(self.scene.root, self.what.up, self.size.stretch, self.clock.work)
+            planned = plan(root, self.what.voxels(self.size.longest), self.clock.work)
         return _Sized(planned, None, how) if how.whole else self.edited(planned)
 
     def edited(self, planned: Plan) -> _Sized:
@@ -186,27 +196,30 @@ class _Job:
 
         how = self.what.how(self.scene)
         with self.clock("changing"):
-            made, scale = printable(planned, self.what.size(self.scene), how, self.clock.work)
+            made, scale = printable(planned, self.size, how, self.clock.work)
         # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.
         keep = how.keep if planned.root.bounds.exterior_only else "all"
         # Keep cavities: the hollow is one.
         return _Sized(made, scale, Print(keep=keep, cavities=how.cavities if how.whole else "keep"))
 
-    def surface(self, aside: Callable[[], Path] | None) -> tuple[_Sized, Surface, str]:
-        """Surface of the remaining bodies, and a note on walls thinner than a voxel."""
-        sized = self.planned()
-        surface = self.meshed(sized, aside)
-        thin, how = surface.thin, self.what.how(self.scene)
-        if thin and how.whole and how.sorts:  # only the field can distinguish bodies
-            sized = self.edited(sized.planned)
-            surface = self.meshed(sized, aside)
-            thin = surface.thin
-        return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, surface, thin
+    def sampled(self) -> tuple[_Sized, SignBricks]:
+        """Field, its samples, and the choice of bodies that is left to the mesh.
 
-    def meshed(self, sized: _Sized, aside: Callable[[], Path] | None) -> Surface:
-        """Surface, in one piece if it fits in memory."""
+        Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
+        """
+        sized, how = self.planned(), self.what.how(self.scene)
         signs = surfaces.sampled(sized.planned, self.clock)
-        most, voxel = len(signs), self.what.size(self.scene) / self.what.voxels(self.scene)
+        thin = how.sorts and surfaces.has_thin_walls(signs)
+        if thin and how.whole:
+            sized = self.edited(sized.planned)
+            signs = surfaces.sampled(sized.planned, self.clock)
+            thin = surfaces.has_thin_walls(signs)
+        return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, signs
+
+    def surface(self, aside: Callable[[], Path] | None) -> tuple[_Sized, Surface]:
+        """Surface, in one piece if it fits in memory, and the choice of bodies that is left."""
+        sized, signs = self.sampled()
+        most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
         except TooLargeError as error:
@@ -217,17 +230,17 @@ class _Job:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
         folder = aside() if aside and most < len(signs) else None
-        return surfaces.made(sized.planned, signs, most, folder, self.clock)
+        return sized, surfaces.made(sized.planned, signs, most, folder, self.clock)
 
-    def result(self, sized: _Sized, surface: Surface, thin: str) -> MeshResult:
+    def result(self, sized: _Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""
         from .mesh.missed import surface_to_mesh
         from .shown import mesh_amount
 
-        what, clock, size, refined = self.what, self.clock, self.what.size(self.scene), None
-        planned, signs = surface.planned, surface.signs
+        what, clock, size, refined = self.what, self.clock, self.size, None
+        planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord_mm is not None:
-            unit = sized.scale or size / max(planned.box.size)
+            unit = sized.scale or size.scale(planned.box)
             surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)
             refined = done.scaled(unit)
         with clock("finishing"):
@@ -244,7 +257,7 @@ class _Job:
             scene=self.scene.name,
             scene_hash=self.scene.hash,
             version=__version__,
-            size_mm=size,
+            size_mm=size.longest,
             voxel_mm=planned.voxel * scale,
             mesh=check.mesh,
             removed=finish.removed,
@@ -259,6 +272,8 @@ class _Job:
             simplified=simplified,
             notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
             depths=planned.depths,
+            contact_mm2=check.contact,
+            cavities_mm3=finish.cavities,
         )
         return MeshResult(report, finish.place, planned, whole, clock.work)
 

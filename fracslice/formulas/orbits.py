@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..late import late
+from ..providers import provider
 from .algebra import inverse, product, stretches
 from .box import Box
 from .parameters import AUTO, Count, Parameter, Vector
@@ -121,7 +121,7 @@ def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
     (tuple of kernel.orbits.Code, dict)
         Steps in order; values by name.
     """
-    code, found, values = late("kernel.orbits.Code"), [], dict[str, Any]()
+    code, found, values = provider("orbits").Code, [], dict[str, Any]()
     for place, (step, moved) in enumerate(_steps(node)):
         function, own, constant = _step(step)
         fixed = tuple((name, v.value) for name, v in own.items() if isinstance(v, Fixed))
@@ -162,7 +162,7 @@ def grown(node: Node) -> Growth:
     """
     made, values = steps(node)
     rounds = 1 if node["iterations"] == AUTO else node["iterations"]
-    found = late("kernel.growth.growth")(made, tuple(values.items()), rounds)
+    found = provider("growth").growth(made, tuple(values.items()), rounds)
     if found is None:
         raise node.fail("has orbits that do not escape: expected parameters that enlarge more")
     if not found.fits:
@@ -195,13 +195,13 @@ def orbit_bounds(node: Node) -> Box:
 
 def orbit_arguments(node: Node) -> dict[str, object]:
     made, values = steps(node)
-    found: dict[str, object] = late("kernel.growth.arguments")(made, grown(node), node["iterations"])
+    found: dict[str, object] = provider("growth").arguments(made, grown(node), node["iterations"])
     return {**found, **values}
 
 
 def orbit_select(node: Node) -> Callable[..., Any]:
     found = grown(node)
-    function: Callable[..., Any] = late("kernel.orbits.field")(steps(node)[0], found.by_power, found.scaled)
+    function: Callable[..., Any] = provider("orbits").field(steps(node)[0], found.by_power, found.scaled)
     return function
 
 

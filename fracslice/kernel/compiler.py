@@ -16,6 +16,7 @@ from .emitter import Emitter
 from .linker import CALLED, Linked
 from .loop_linker import link_loops
 from .loops import Loop
+from .parsing import parse
 from .scalars import DOUBLE, FLOAT, WHOLE
 from .values import Lanes
 
@@ -80,7 +81,7 @@ def _text(linked: Linked, target: Target, loops: Sequence[Loop]) -> str:
     Stack frames are aligned to whole registers; otherwise registers spilled to the stack would straddle two
     cache lines.
     """
-    trees = [tree for tree in ast.parse(linked.source).body if isinstance(tree, ast.FunctionDef)]
+    trees = [tree for tree in parse(linked.source).body if isinstance(tree, ast.FunctionDef)]
     called = frozenset(tree.name for tree in trees if CALLED in map(ast.unparse, tree.decorator_list))
     lanes = Lanes(target.bits, target.width, target.registers)
     own = link_loops(tuple(loops))

@@ -12,6 +12,7 @@ from ..formulas.parameters import AUTO
 from ..formulas.registry import Node
 from . import source
 from .arguments import Arguments, arguments
+from .parsing import parse, parse_expression
 from .structure import UNROLLED, Run, Subroutine
 from .syntax import CHILD
 
@@ -85,7 +86,7 @@ class FieldDialect:
         arguments = [a.arg for a in tree.args.args][4:]
         tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]
         tree = _CallsChild(runs[0]).visit(tree)
-        taken = [ast.parse(f"{a} = {p}").body[0] for a, p in zip(arguments, given.passed, strict=True)]
+        taken = [parse(f"{a} = {p}").body[0] for a, p in zip(arguments, given.passed, strict=True)]
         tree.body = [*taken, *tree.body]
         return self.linker.named(name, tree, given.function)
 
@@ -140,5 +141,5 @@ class _CallsChild(ast.NodeTransformer):
         self.generic_visit(node)
         if isinstance(node.func, ast.Name) and node.func.id == CHILD:
             points = ", ".join(map(ast.unparse, node.args))
-            return ast.parse(self.child.call(points=points), mode="eval").body
+            return parse_expression(self.child.call(points=points))
         return node

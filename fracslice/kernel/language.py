@@ -23,6 +23,7 @@ from ..errors import KernelError
 from ..formulas import vocabulary
 from ..nearest import hint
 from .functions import fingerprint, is_number, parameters, scope
+from .parsing import parse, parse_expression
 from .syntax import depends_on_points, point_names, stored_names
 
 _OF_THE_KERNEL = re.compile(r"[NT]\d+|P0?")
@@ -79,12 +80,12 @@ def _text(function: Callable[..., Any], _: object) -> str:
         raise KernelError(
             f"formula {function.__name__}: its source cannot be read; expected a def in a file or a notebook"
         ) from None
-    tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
+    tree = parse(textwrap.dedent("".join(lines))).body[0]
     place = f"{function.__code__.co_filename}:{{}}: formula {function.__name__}: "
     if not isinstance(tree, ast.FunctionDef):
         raise KernelError(place.format(first) + "expected a def")
     found = _Language(function, tree, place, first).visit(tree)
-    return ast.unparse(ast.fix_missing_locations(found))
+    return ast.unparse(found)
 
 
 def intrinsic(value: Any) -> str | None:
@@ -192,7 +193,7 @@ class _Language(ast.NodeTransformer):
             return self.power(node, node.left, node.right)
         if on_points and type(node.op) in _FLOORED:
             names = {"a": node.left, "b": node.right}
-            floored: ast.expr = _Named(names).visit(ast.parse(_FLOORED[type(node.op)], mode="eval").body)
+            floored: ast.expr = _Named(names).visit(parse_expression(_FLOORED[type(node.op)]))
             return floored
         return node
 

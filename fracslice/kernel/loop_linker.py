@@ -21,6 +21,7 @@ from ..errors import KernelError
 from . import functions, language
 from .intrinsics import is_intrinsic
 from .loops import Loop
+from .parsing import parse
 from .syntax import Folding
 
 OF_LOOPS = "l_"
@@ -219,7 +220,7 @@ def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
     last = _functions("".join(lines)).get(first)
     if last is None:
         raise KernelError(f"{code.co_filename}:{first}: loop {function.__name__}: expected a def in a module")
-    (tree,) = ast.parse("\n" * (first - 1) + "".join(lines[first - 1 : last])).body
+    (tree,) = parse("\n" * (first - 1) + "".join(lines[first - 1 : last])).body
     assert isinstance(tree, ast.FunctionDef)
     return tree
 
@@ -228,7 +229,7 @@ def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
 def _functions(text: str) -> dict[int, int]:
     """First and last line of each function of a file, decorators included."""
     found = {}
-    for node in ast.parse(text).body:
+    for node in parse(text).body:
         if isinstance(node, ast.FunctionDef):
             found[min([node.lineno, *(mark.lineno for mark in node.decorator_list)])] = node.end_lineno or 0
     return found

@@ -162,7 +162,7 @@ def _taken(code: Code, place: int, by_power: bool, scale: str) -> list[str]:
         f"dr = spread{place} * ({grown})" if code.moved else f"dr = {grown}",
         *assigned,
         "r2 = x * x + y * y + z * z",
-        "orbit(r2, alive)",
+        "orbit(r2, alive, x, y, z)",
         f"end_r2 = where(alive, {f'{scale} * {scale} * r2' if scale else 'r2'}, end_r2)",
         f"slope = where(alive, maximum({f'{scale} * dr' if scale else 'dr'}, slope), slope)",
         *([f"reached = reached * rate{place}", "level = where(alive, reached, level)"] if by_power else []),

@@ -11,6 +11,7 @@ from types import FunctionType
 from typing import Any
 
 from . import functions, language
+from .parsing import parse
 from .syntax import Folding, stored_names
 
 
@@ -62,7 +63,7 @@ def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.F
     KernelError
         If the function is not in the language.
     """
-    tree = ast.parse(language.text(function)).body[0]
+    tree = parse(language.text(function)).body[0]
     assert isinstance(tree, ast.FunctionDef)
     tree.args.args = [a for a in tree.args.args if a.arg not in fixed]
     pruned: ast.FunctionDef = _Substitute(fixed).visit(tree)
@@ -94,7 +95,7 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
     numbers = {name: _plain(scope[name]) for name in outside if functions.is_number(scope.get(name))}
     calls = {name: scope[name] for name in outside if isinstance(scope.get(name), FunctionType)}
     tree = _Substitute(numbers).visit(tree)
-    return Copy(tree.name, ast.unparse(ast.fix_missing_locations(tree)), calls)
+    return Copy(tree.name, ast.unparse(tree), calls)
 
 
 def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str]) -> Copy:
@@ -162,7 +163,7 @@ class _Substitute(Folding):
         for value in ast.literal_eval(node.iter):
             values = value if isinstance(node.target, ast.Tuple) else [value]
             inner = dict(zip(map(ast.unparse, names), values, strict=True))
-            body = ast.parse(ast.unparse(ast.Module(node.body, []))).body
+            body = parse(ast.unparse(ast.Module(node.body, []))).body
             unrolled += _Substitute({**self.values, **inner}).statements(body)
         return unrolled
 

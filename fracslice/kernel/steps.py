@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 
 from ..errors import KernelError
 from . import functions, language
+from .parsing import parse, parse_expression
 from .source import specialised
 from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector, as_number
 
@@ -101,7 +102,7 @@ def _used(lines: Sequence[str], wanted: set[str]) -> list[str]:
     for line in reversed(lines):
         target, value = line.split(" = ", 1)
         if target in live:
-            live |= {n.id for n in ast.walk(ast.parse(value)) if isinstance(n, ast.Name)}
+            live |= {n.id for n in ast.walk(parse(value)) if isinstance(n, ast.Name)}
             kept.append(line)
     return kept[::-1]
 
@@ -257,7 +258,7 @@ class _Reader:
 
 
 def _n(value: Scalar) -> ast.expr:
-    return ast.parse(value.atom, mode="eval").body
+    return parse_expression(value.atom)
 
 
 def _vector(value: Value, function: Callable[..., Any]) -> Vector:

@@ -11,6 +11,8 @@ import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from .parsing import parse_expression
+
 Slopes = tuple[str | None, ...]
 """Derivatives by w (three) and by c (three); None is zero."""
 
@@ -208,7 +210,7 @@ DERIVATIVES: dict[str, tuple[str, ...]] = {
 
 
 def _filled(text: str, places: Mapping[str, str]) -> str:
-    tree = ast.parse(text, mode="eval")
+    tree = parse_expression(text)
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and node.id in places:
             node.id = places[node.id]

@@ -78,8 +78,9 @@ class _Survey:
         here, there = (beside(mesh.vertices, seam, self.voxel / 2) for seam in (self.end, end))
         points, before = self.border
         _, theirs, mine = np.intersect1d(points, rows(mesh.vertices[here]), return_indices=True)
-        pairs = np.stack([before[theirs], labels[here[mine]]], axis=1)
-        self.same.append(np.unique(pairs, axis=0))
+        if len(mine):
+            pairs = np.stack([before[theirs], labels[here[mine]]], axis=1)
+            self.same.append(np.unique(pairs, axis=0))
         self.border = rows(mesh.vertices[there]), labels[there]
         self.end = end
 
@@ -189,7 +190,7 @@ class WholeShells:
         Returns
         -------
         Shells
-            Volumes and parents of the shells, without labels of triangles.
+            Volumes and parents of the shells.
         int
             Number of misplaced shells.
 
@@ -203,7 +204,7 @@ class WholeShells:
         count, hollow = len(self.volumes), self.volumes < 0
         parent, winding = np.full(count, -1, np.int64), np.zeros(count, np.int64)
         searched = hollow | (bodies and count > 1)
-        for number in np.unique(self.piece[searched]).tolist():
+        for number in sorted(set(self.piece[searched].tolist())):
             mesh, own = pieces.mesh(number), searched & (self.piece == number)
             first = np.where(own, self.first, -1)
             shell = self.of_label[pieces.labels(number)]
@@ -211,7 +212,7 @@ class WholeShells:
             parent[own], winding[own] = found.parent[own], found.winding[own]
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
-        return Shells(np.empty(0, np.int32), self.volumes, parent), int((winding != hollow)[searched].sum())
+        return Shells(self.volumes, parent), int((winding != hollow)[searched].sum())
 
     def thin_walls(self, voxel: float) -> str:
         """Note on walls thinner than a voxel; empty if there are none.

@@ -26,13 +26,18 @@ SHALLOW = 6
 """For a first look, where a depth is automatic."""
 
 ORBITS = {f.name for f in formulas() if "step" in f.hooks} - {"mandelbulb", "julia"}
-FAMILIES = {"flake", "cells", "prism", "superquadric", *WALLS, *ORBITS}
+FAMILIES = {
+    *("flake", "cells", "prism", "superquadric", "jerusalem", "koch", "hilbert", "tree", "gear", "thread"),
+    *("apollonian", "honeycomb", "pseudo_kleinian", "tetrabrot", "noise"),
+    *WALLS,
+    *ORBITS,
+}
 """Families with a suite of their own, `tests.formulas.test_families`."""
 
 LOOKED = 4000
 TREES, TRIES = 100, 10
 LEAVES = [f for f in formulas() if f.children[1] == 0 and f.name not in FAMILIES]
-OTHERS = [f for f in formulas() if f.kind != "shape" and f.name != "material"]
+OTHERS = [f for f in formulas() if f.kind != "shape" and f.name not in FAMILIES | {"material"}]
 Draw = Callable[[np.random.Generator, float], Any]
 
 
