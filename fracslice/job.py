@@ -35,7 +35,7 @@ STL = ".stl"
 
 @dataclass(frozen=True, eq=False)
 class MeshResult:
-    """MeshResult of `make_mesh`.
+    """Result of `make_mesh`.
 
     Attributes
     ----------

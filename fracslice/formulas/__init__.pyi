@@ -717,7 +717,7 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     Node
     """
 
-def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, roughness: float = 0.0, metallic: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """The appearance of the element in pictures. A material nested deeper takes precedence.
 
     The field is that of the element: L = the element's.
@@ -728,6 +728,10 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats
         What it is applied to; several are a union.
     colour : 3 or 6 or 9 or 12 or 15 or 18 or 21 or 24 numbers >= 0 and <= 1, default (0.8, 0.8, 0.8)
         red, green and blue; several colours, three numbers each, are a palette for the orbit
+    palette : colours, viridis, plasma, inferno, magma, cividis or twilight, default 'colours'
+        a palette by name in place of the colours
+    trap : point, axes, planes, sphere, steps or direction, default 'point'
+        property of the orbit that the palette shows: its smallest distance to the origin, to the axes, to the coordinate planes or the unit sphere, its number of steps, or its last angle about the z axis
     repeats : a number > 0 and <= 1000, default 1.0
         how often the palette is run through
     shift : a number >= 0 and <= 1, default 0.0
@@ -740,6 +744,10 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats
         light of its own, in its colour
     reflect : a number >= 0 and <= 1, default 0.0
         the part of light that is mirrored head on; more is at grazing angles
+    roughness : a number >= 0 and <= 1, default 0.0
+        roughness of the reflection: 0 is a mirror, 1 is dull
+    metallic : a number >= 0 and <= 1, default 0.0
+        1 for a metal, which reflects in its colour and has no other light
     clear : a number >= 0 and <= 1, default 0.0
         the part of light that goes through
     index : a number >= 1 and <= 4, default 1.5

@@ -46,7 +46,7 @@ def apollonian(x, y, z, level, swell):  # type: ignore[no-untyped-def]
     within = 0.0 * x
     for _ in range(level):
         r2 = x * x + y * y + z * z
-        orbit(r2, r2 < 4.0)
+        orbit(r2, r2 < 4.0, x, y, z)
         x = where(r2 < 1e-12, 1e-6, x)  # the centre has no image
         for cx, cy, cz, square in MIRRORS:
             px, py, pz = x - cx, y - cy, z - cz
@@ -100,7 +100,7 @@ def pseudo_kleinian(x, y, z, size, ball, c, thickness, steps):  # type: ignore[n
         y = 2.0 * minimum(maximum(y, -sy), sy) - y
         z = 2.0 * minimum(maximum(z, -sz), sz) - z
         r2 = x * x + y * y + z * z
-        orbit(r2, grown > 0.0)
+        orbit(r2, grown > 0.0, x, y, z)
         k = maximum(ratio(ball, maximum(r2, 1e-12)), 1.0)
         x, y, z = k * x + cx, k * y + cy, k * z + cz
         grown = minimum(k * grown, 1e20)

@@ -42,7 +42,7 @@ def jerusalem(x, y, z, steps):  # type: ignore[no-untyped-def]
             u, v, w = maximum(high, w), maximum(low, minimum(high, w)), minimum(low, w)
             u, v, w = u - a * size, v - a * size, w - b * size
             size = factor * size
-            orbit((u * u + v * v + w * w) / (size * size), u == u)
+            orbit((u * u + v * v + w * w) / (size * size), u == u, u / size, v / size, w / size)
         if ends:
             f = minimum(f, maximum(absolute(u), maximum(absolute(v), absolute(w))) - size)
     return f

@@ -51,7 +51,7 @@ def plane_distance(a, b, iterations, first_level, last_level, escape2, least):  
         level = where(alive, level + level, level)
         x, y = x * x - y * y + a, 2.0 * x * y + b
         r2 = where(alive, x * x + y * y, r2)
-        orbit(r2, alive)
+        orbit(r2, alive, x, y, 0.0 * x)
         alive = r2 < escape2
     return HALF * potential_distance(r2, slope2, level, first_level, last_level, least)
 

@@ -205,12 +205,12 @@ def check_solid(
         for found, limit in ((floors, limits.floor), (thick, limits.wall))
     )
     speck = max(limits.speck, SPECK * (bricks.voxel * scale) ** 3) / scale**3
-    found = _volumes(bricks, speck)
+    result = _volumes(bricks, speck)
     missed = thin.walls + tight.walls
-    fine = resolved(root, bricks, limits.thin / scale**2, len(found[0]) > 1, work, missed)
+    fine = resolved(root, bricks, limits.thin / scale**2, len(result[0]) > 1, work, missed)
     if fine is not bricks:
-        found = _volumes(fine, speck)
-    bodies, cavities = ([v * scale**3 for v in volumes] for volumes in found)
+        result = _volumes(fine, speck)
+    bodies, cavities = ([v * scale**3 for v in volumes] for volumes in result)
     middle = np.array(origin or (*Samples(bricks).bounds.box.centre[:2], bricks.origin[2]))
     problems = []
     if len(bodies) > 1:
@@ -240,17 +240,17 @@ def check_solid(
     )
 
 
-def _widths(found: Walls, scale: float) -> Widths | None:
+def _widths(walls: Walls, scale: float) -> Widths | None:
     """Statistics of widths in mm, weighted by their surface."""
-    return widths_of(found.width * scale, found.area * scale**2)
+    return widths_of(walls.width * scale, walls.area * scale**2)
 
 
-def _unseen(found: Walls, finest: float, least: float, scale: float) -> str:
+def _unseen(walls: Walls, finest: float, least: float, scale: float) -> str:
     """Describe the walls thinner than `finest` mm: area, least thickness and its place in the scene.
 
     Empty if their area is below `least` mm2.
     """
-    lost = found.chosen(found.width * scale < finest)
+    lost = walls.chosen(walls.width * scale < finest)
     area = float(lost.area.sum()) * scale**2
     if area < least:
         return ""
@@ -272,9 +272,9 @@ def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
     return bodies, cavities
 
 
-def _under(found: Walls, limit: float, scale: float) -> Walls:
+def _under(walls: Walls, limit: float, scale: float) -> Walls:
     """Walls thinner than `limit` mm by more than a hundredth of it, the rims of wedges excepted."""
-    return found.chosen((found.width * scale < 0.99 * limit) & (found.facing < PARALLEL))
+    return walls.chosen((walls.width * scale < 0.99 * limit) & (walls.facing < PARALLEL))
 
 
 def _off_rims(found: Walls, drains: Sequence[Drain], near: float) -> Walls:

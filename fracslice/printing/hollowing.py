@@ -18,7 +18,7 @@ POCKET = 0.1
 
 
 def hollows(solid: Bricks, wall: float, drain: float, outer: Box) -> tuple[list[Field], tuple[Drain, ...]]:
-    """Return what to cut: everything deeper than the wall, and two drain holes for each hollow.
+    """Hollows to cut, everything deeper than the wall, and two drain holes for each of them.
 
     With drain holes, hollows under `POCKET` of the largest stay solid.
 

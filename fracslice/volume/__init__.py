@@ -130,9 +130,9 @@ def plan(root: Field, resolution: float, work: Work | None = None) -> Plan:
     """
     tree = root.tree
     known = with_depths(tree, work) if tree else None
-    found = extent(known or root, resolution, work)
-    voxel = max(found.box.size) / resolution
-    planned = Plan(known or root, found.box, found.outer, found.tips, voxel)
+    extents = extent(known or root, resolution, work)
+    voxel = max(extents.box.size) / resolution
+    planned = Plan(known or root, extents.box, extents.outer, extents.tips, voxel)
     if tree is None or known is None:
         return planned
     shown, notes = visible(known, voxel)
