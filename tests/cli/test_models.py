@@ -11,8 +11,11 @@ from xml.etree import ElementTree as Tree
 import numpy as np
 import pytest
 import trimesh
+from fracslice.cli.check import placed
 from fracslice.cli.main import run
 from PIL import Image
+
+from fracslice.mesh import Mesh
 
 COARSE = ["--layer", "0.5mm", "--pixel", "0.5mm", "-q"]
 PLATE = (20, 20, 2)
@@ -110,3 +113,11 @@ def test_a_page_holds_figures_problems_pictures_and_the_cross_section(
     assert "36 layers, 8.00 x 8.00 x 18.00 mm" in page.read_text()
     assert run(["check", str(balls), *COARSE, "--html", "page.txt"]) == 2
     assert "page.txt: expected a file name that ends in .html" in capfd.readouterr().err
+
+
+def test_a_model_is_turned_and_scaled_before_it_is_examined() -> None:
+    part = box((10, 20, 5))
+    model = Mesh(np.asarray(part.vertices, np.float64), np.asarray(part.faces, np.int32))
+    options = {"up": (1.0, 0.0, 0.0), "scale": (1.02, 1.0, 1.1)}
+    assert placed(model, options).size.tolist() == pytest.approx([5.1, 20, 11])
+    assert placed(model, {"up": (0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}) is model
