@@ -210,8 +210,8 @@ class _Job:
             simplified=simplified,
             notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
             depths=planned.depths,
-            contact_mm2=check.contact,
-            cavities_mm3=finish.cavities,
+            contact_mm2=float(f"{check.contact:.9g}"),  # sums over pieces differ in the last digit
+            cavities_mm3=float(f"{finish.cavities:.9g}"),
         )
         return MeshResult(report, finish.place, planned, whole, clock.work)
 
