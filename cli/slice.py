@@ -13,7 +13,7 @@ import click
 from .closing import of_layers
 from .cluster import cluster_options, pooled
 from .inputs import check_targets, load_scene
-from .layers import LAYER, PIXEL_MM, heights, printer_option, shift
+from .layers import LAYER, PIXEL_MM, ending, heights, html_option, printer_option, shift, write_page
 from .options import (
     NAME,
     NUMBER,
@@ -103,9 +103,11 @@ if TYPE_CHECKING:
 @click.option(
     "--preview",
     type=NAME,
+    callback=ending(".png", ".webp"),
     metavar="FILE",
     help="Write a contact sheet (.png) or an animation (.webp) of the layers.",
 )
+@html_option
 @click.option(
     "--send",
     "address",
@@ -145,9 +147,7 @@ def slice_(
     if options["address"] is not None:
         refuse_to_send(output, kind, options["address"])
     preview = options["preview"]
-    if preview and Path(preview).suffix.lower() not in (".png", ".webp"):
-        raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
-    check_targets(source, None if Path(output).is_dir() else output, preview)
+    check_targets(source, None if Path(output).is_dir() else output, preview, options["html"])
     scene = load_scene(source, settings)
     shared = (options[name] for name in ("cluster", "shard", "store"))
     with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
@@ -171,9 +171,14 @@ def slice_(
         if preview:
             write_preview(stack, preview, work)
         sent = uploaded(output, options["address"], work)
-        if not quiet:
+        if not quiet or options["html"]:
             off = layers_amount(run.slicer, work)[1]
             last = list(of_layers(run, options["price"]).lines())
+        if options["html"]:
+            from fracslice.slicing.checks import check_layers
+
+            report = check_layers(stack, printer=options["machine"], work=work)
+            write_page(stack, report, last, output, options["html"], work)
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape
