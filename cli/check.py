@@ -5,12 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .inputs import check_targets, is_model, load_model, load_scene, refuse_options
+from .layers import (
+    LAYER,
+    PIXEL_MM,
+    as_high_as_wanted,
+    ending,
+    heights,
+    html_option,
+    printer_option,
+    write_page,
+)
 from .options import (
     NAME,
     job_of,
@@ -23,7 +32,6 @@ from .options import (
     source_argument,
     threads_option,
 )
-from .slice import LAYER, PIXEL_MM, as_high_as_wanted, heights, printer_option
 from .summary import figures, summary
 from .working import working
 
@@ -34,9 +42,10 @@ if TYPE_CHECKING:
     from fracslice.scene import Print
     from fracslice.slicing import Stack
     from fracslice.slicing.checks import PrintReport
+    from fracslice.volume.sizing import Sizing
     from fracslice.work import Work
 
-OF_LAYERS = {"pixel", "machine", "picture", "fix"}
+OF_LAYERS = {"pixel", "machine", "picture", "html", "fix"}
 OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
 OF_SCENES = {*OF_MESHES, "settings", "size"}
 
@@ -61,7 +70,14 @@ def limit(name: str, text: str) -> Callable[..., Any]:
     help="With layers: pixel size; the printer's by default, or 0.05mm.",
 )
 @printer_option('With layers: the printer it has to fit; "list" shows all.')
-@click.option("--picture", type=NAME, metavar="FILE.png", help="With layers: draw the worst layers.")
+@click.option(
+    "--picture",
+    type=NAME,
+    callback=ending(".png"),
+    metavar="FILE.png",
+    help="With layers: draw the worst layers.",
+)
+@html_option
 @click.option("--fix", is_flag=True, help="With layers: mend what can be mended, and check again.")
 @limit("wall", "walls")
 @limit("floor", "floors and roofs")
@@ -89,7 +105,10 @@ def check(
         refuse_options(context, OF_MESHES, "only for meshes, and --layer checks layers")
         scene = load_scene(source, options["settings"])
         with working(threads, quiet) as work:
-            size, how = options["size"] or scene.size_mm, printing_of(scene, options)
+            from fracslice.volume.sizing import sizing
+
+            size = sizing(scene, options["size"], options["scale"], work)
+            how = printing_of(scene, options)
             numbers, lines, problems = of_layers(source, scene.root, size, how, options, work)
     else:
         refuse_options(context, OF_LAYERS, "only with --layer")
@@ -124,8 +143,9 @@ def of_model(source: str, options: dict[str, Any], work: Work) -> Checked:
     from fracslice.mesh.check import check_mesh
     from fracslice.mesh.field import MeshField
     from fracslice.scene import Print
+    from fracslice.volume.sizing import UP, Sizing
 
-    mesh = load_model(source)
+    mesh = placed(load_model(source), options)
     report = check_mesh(mesh, threads=work.threads)
     line, numbers = f"{source}: {figures(report)}", report.as_dict()
     if not report.watertight:
@@ -137,8 +157,20 @@ def of_model(source: str, options: dict[str, Any], work: Work) -> Checked:
         "pixel": options["pixel"] or (None if options["machine"] else max(height, PIXEL_MM)),
     }
     given = {name: value for name, value in options.items() if name in Print.kinds() and value is not None}
-    layers, lines, problems = of_layers(source, MeshField(mesh), size, Print(**given), options, work)
+    options = options | {"up": UP}
+    how = Sizing(size, 1.0), Print(**given)
+    layers, lines, problems = of_layers(source, MeshField(mesh), *how, options, work)
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
+
+
+def placed(mesh: Mesh, options: dict[str, Any]) -> Mesh:
+    """Mesh turned and scaled as the options say."""
+    from fracslice.formulas.algebra import product
+    from fracslice.volume.sizing import SAME, UP, orientation
+
+    if options["up"] == UP and options["scale"] == SAME:
+        return mesh
+    return replace(mesh, vertices=product(mesh.vertices, orientation(options["up"], options["scale"])))
 
 
 def longest(mesh: Mesh) -> float:
@@ -147,28 +179,27 @@ def longest(mesh: Mesh) -> float:
 
 
 def of_layers(
-    source: str, root: Field, size: float, how: Print, options: dict[str, Any], work: Work
+    source: str, root: Field, size: Sizing, how: Print, options: dict[str, Any], work: Work
 ) -> Checked:
     """Check the layers of an object; with --fix, mend it and check it again."""
     from fracslice.printing.problems import mended
     from fracslice.scene import Print
 
-    if options["picture"] and Path(options["picture"]).suffix.lower() != ".png":
-        raise click.UsageError(f"{options['picture']}: expected a file name that ends in .png")
-    check_targets(source, options["picture"])
+    check_targets(source, options["picture"], options["html"])
     numbers, lines, problems = examined(source, root, size, how, options, work)
     settings = mended(problems) if options["fix"] else {}
     if not settings:
         return numbers, lines, problems
     flags = " ".join(f"--{name} {value}" for name, value in settings.items())
-    size = float(settings.pop("size", f"{size}mm")[:-2])
+    if smaller := settings.pop("size", None):
+        size = replace(size, side=float(smaller[:-2]) / max(size.factors), unit=None)
     values = {name: Print.kinds()[name].read(text) for name, text in settings.items()}
     after, again, left = examined(f"with {flags}", root, size, replace(how, **values), options, work)
     return {"before": numbers, "flags": flags, "after": after}, [*lines, *again], left
 
 
 def examined(
-    name: str, root: Field, size: float, how: Print, options: dict[str, Any], work: Work
+    name: str, root: Field, size: Sizing, how: Print, options: dict[str, Any], work: Work
 ) -> tuple[dict[str, Any], list[str], list[Any]]:
     """Check the layers of an object once."""
     from fracslice.slicing import SliceJob, plan_stack
@@ -179,7 +210,8 @@ def examined(
     if pixel is not None and machine is not None:
         raise click.UsageError("--pixel and --printer: expected one of them")
     square = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
-    stack = plan_stack(root, SliceJob(size, options["layer"][0], square, printing=how), work)
+    sides = size.side, options["layer"][0], square, options["up"], how, size.factors, size.unit
+    stack = plan_stack(root, SliceJob(*sides), work)
     if machine and (unfit := misfit(stack, machine)):
         return (
             {"size": stack.size, "fits": False, "problems": [str(unfit)]},
@@ -190,6 +222,8 @@ def examined(
     report = check_layers(stack, limits_of(options), machine, work)
     if options["picture"]:
         draw(stack, report, options["picture"], work)
+    if options["html"]:
+        write_page(stack, report, [figures_of(report)], name, options["html"], work)
     return report.as_dict(), described(name, report), report.problems
 
 
@@ -211,9 +245,13 @@ def limits_of(options: dict[str, Any]) -> Limits:
 
 def described(name: str, report: PrintReport) -> list[str]:
     """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
+    return [f"{name}: {figures_of(report)}, {verdict(report.problems)}", report.solid.unseen]
+
+
+def figures_of(report: PrintReport) -> str:
+    """Layers, size, volume and weight of a print report."""
     size = " x ".join(f"{s:.2f}" for s in report.size)
-    figures = f"{report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
-    return [f"{name}: {figures}, {verdict(report.problems)}", report.solid.unseen]
+    return f"{report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
 
 
 def verdict(problems: Sequence[object]) -> str:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from .closing import DENSITIES, of_mesh
 from .inputs import check_folder, check_targets, load_scene, refuse_options
 from .options import (
     NAME,
     job_of,
     job_options,
+    price_option,
     print_options,
     quiet_option,
     set_option,
@@ -22,8 +25,8 @@ from .summary import summary
 from .working import working
 
 if TYPE_CHECKING:
-    from fracslice.job import MeshResult
     from fracslice.meshjob import MeshJob
+    from fracslice.meshresult import MeshResult
     from fracslice.report import Report
     from fracslice.scene import Scene
     from fracslice.store import Store
@@ -78,6 +81,13 @@ def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | N
     default="cpu",
     help="The device that samples the field; cpu by default. auto: the GPU, if there is one.",
 )
+@click.option(
+    "--material",
+    type=click.Choice(list(DENSITIES)),
+    default="resin",
+    help="Material of the weight in the summary; resin by default.",
+)
+@price_option("kilogram")
 @threads_option
 @quiet_option
 @click.pass_context
@@ -92,6 +102,8 @@ def mesh(
     picture: str | None,
     cache: str | None,
     device: str,
+    material: str,
+    price: float | None,
     threads: int,
     quiet: bool,
     **options: Any,
@@ -115,12 +127,13 @@ def mesh(
     job = job_of(scene, **options)
     how = Work(threads, store=store_in(cache), device=chosen(device))
     with working(how, quiet) as work:
-        figures = made(scene, job, output, picture, work)
+        result = made(scene, job, output, picture, work)
         if report is not None:
-            write_report(figures, report)
+            write_report(result.report, report)
     if not quiet:
-        click.echo(summary(output, figures))
-    return 1 if figures.problems else 0
+        click.echo(summary(output, result.report))
+        click.echo(os.linesep.join(of_mesh(result, material, price).lines()))
+    return 1 if result.report.problems else 0
 
 
 def store_in(folder: str | None) -> Store | None:
@@ -134,13 +147,13 @@ def store_in(folder: str | None) -> Store | None:
     return Store(Path(folder))
 
 
-def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> Report:
+def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> MeshResult:
     """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.export import write
     from fracslice.job import make_mesh, metadata
 
     if picture is None and Path(output).suffix.lower() != GRID:
-        return make_mesh(scene, job, work, path=output).report
+        return make_mesh(scene, job, work, path=output)
     result = make_mesh(scene, job, work)
     work.check()
     if Path(output).suffix.lower() == GRID:
@@ -151,7 +164,7 @@ def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Wor
         from fracslice.viewer import picture as draw
 
         draw(result.mesh, picture)
-    return result.report
+    return result
 
 
 def check_outputs(source: str, output: str, report: str | None, picture: str | None) -> None:

@@ -81,6 +81,25 @@ def amount(_: click.Context, __: click.Parameter, value: float | None) -> float 
     return value
 
 
+def direction(
+    _: click.Context, __: click.Parameter, value: tuple[float, float, float] | None
+) -> tuple[float, float, float]:
+    """Check a direction; up without one."""
+    if value is not None and not any(value):
+        raise click.BadParameter("0 0 0: expected a direction")
+    return value or (0.0, 0.0, 1.0)
+
+
+def factors(_: click.Context, __: click.Parameter, text: str | None) -> tuple[float, ...]:
+    """Parse the compensation of shrinkage into factors along x, y and z."""
+    from fracslice.scene.lengths import Percent
+
+    try:
+        return Percent(None, "").read(text or "100%")
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: expected {error}") from None
+
+
 def job_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Decorator that adds the mesh options, which `job_of` takes."""
     for option in reversed(_JOB):
@@ -88,13 +107,31 @@ def job_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+size_option = click.option(
+    "--size",
+    callback=length,
+    metavar="LENGTH",
+    help="The longest side, such as 80mm, 8cm or 3.1in; the scene's by default.",
+)
+up_option = click.option(
+    "--up",
+    nargs=3,
+    type=NUMBER,
+    callback=direction,
+    metavar="X Y Z",
+    help="The object's direction that is up; 0 0 1 by default.",
+)
+scale_option = click.option(
+    "--scale",
+    callback=factors,
+    metavar="N%[,N%,N%]",
+    help="Compensate shrinkage: 102%, or 102%,102%,101% along x, y and z; 100% by default.",
+)
+
 _JOB = [
-    click.option(
-        "--size",
-        callback=length,
-        metavar="LENGTH",
-        help="The longest side, such as 80mm, 8cm or 3.1in; the scene's by default.",
-    ),
+    size_option,
+    up_option,
+    scale_option,
     click.option("--voxel", callback=length, metavar="LENGTH", help="Voxel size, such as 0.25mm."),
     click.option(
         "--resolution",
@@ -163,6 +200,11 @@ def printing_of(scene: Scene, options: dict[str, Any]) -> Print:
     return replace(scene.printing, **{n: options[n] for n in names if options[n] is not None})
 
 
+def price_option(of: str) -> Callable[..., Any]:
+    """Decorator that adds --price, the price of a unit of material."""
+    return click.option("--price", type=NUMBER, callback=amount, metavar="N", help=f"Price of a {of}.")
+
+
 set_option = click.option(
     "--set",
     "settings",
@@ -200,4 +242,6 @@ def job_of(
         printing=printing_of(scene, others),
         chord_mm=others["chord"],
         simplify_mm=others["simplify"],
+        up=others["up"],
+        scale=others["scale"],
     )

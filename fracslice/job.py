@@ -14,84 +14,23 @@ import numpy as np
 
 from . import surfaces
 from .errors import SceneError, TooLargeError
-from .finishing import Check, Finish, Placement
+from .finishing import Check, Finish
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
+from .meshresult import MeshResult
 from .report import Report, SurfaceError, SurfaceToMesh
 from .scene import Print, Scene
 from .version import __version__
 from .work import Clock, Work, ahead
 
 if TYPE_CHECKING:
-    from .kernel import Field
     from .mesh import Mesh
     from .mesh.simplify import Simplified
     from .surfaces import Surface
-    from .volume import Bricks, Plan, SignBricks
+    from .volume import Plan, SignBricks
+    from .volume.sizing import Sizing
 
 STL = ".stl"
-
-
-@dataclass(frozen=True, eq=False)
-class MeshResult:
-    """MeshResult of `make_mesh`.
-
-    Attributes
-    ----------
-    report : Report
-        Measures, checks and costs.
-    place : Placement
-        Map from the scene to the mesh.
-    planned : Plan
-        Sampled field.
-    whole : Mesh or None
-        The mesh; None if it is larger than memory and only in the file.
-    work : Work
-        Threads, progress and cancellation of the job.
-    """
-
-    report: Report
-    place: Placement
-    planned: Plan
-    whole: Mesh | None
-    work: Work
-
-    @property
-    def mesh(self) -> Mesh:
-        """The mesh in mm, standing on z = 0, quantised to float32.
-
-        Raises
-        ------
-        TooLargeError
-            If the mesh was written in pieces.
-        """
-        if self.whole is None:
-            raise TooLargeError("the mesh does not fit in memory; it is in the file that was written")
-        return self.whole
-
-    @property
-    def root(self) -> Field:
-        """Field that was meshed."""
-        return self.planned.root
-
-    @cached_property
-    def bricks(self) -> Bricks:
-        """Samples of the field around the surface, scene units; computed on first access."""
-        from .volume import sample_scene
-
-        return sample_scene(self.planned, self.work)
-
-    @property
-    def bricks_mm(self) -> Bricks:
-        """Samples in print space: positions and values in mm."""
-        scale, (x, y, z) = self.place.scale, self.bricks.origin
-        dx, dy, dz = self.place.offset
-        return replace(
-            self.bricks,
-            origin=(scale * x + dx, scale * y + dy, scale * z + dz),
-            voxel=scale * self.bricks.voxel,
-            values=self.bricks.values * np.float32(scale),
-        )
 
 
 def make_mesh(
@@ -146,9 +85,16 @@ class _Job:
     clock: Clock
     path: Path | None
 
+    @cached_property
+    def size(self) -> Sizing:
+        """Size of the object."""
+        from .volume.sizing import sizing
+
+        return sizing(self.scene, self.what.size_mm, self.what.scale, self.clock.work)
+
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
-        self.what.voxels(self.scene)
+        self.what.voxels(self.size.longest)
         if self.path is not None:
             from .export import check_format, check_target
 
@@ -174,10 +120,12 @@ class _Job:
     def planned(self) -> _Sized:
         """Field to be meshed, with its edits."""
         from .volume import plan
+        from .volume.sizing import oriented
 
         how = self.what.how(self.scene)
         with self.clock("planning"):
-            planned = plan(self.scene.root, self.what.voxels(self.scene), self.clock.work)
+            root = oriented(self.scene.root, self.what.up, self.size.stretch, self.clock.work)
+            planned = plan(root, self.what.voxels(self.size.longest), self.clock.work)
         return _Sized(planned, None, how) if how.whole else self.edited(planned)
 
     def edited(self, planned: Plan) -> _Sized:
@@ -186,7 +134,7 @@ class _Job:
 
         how = self.what.how(self.scene)
         with self.clock("changing"):
-            made, scale = printable(planned, self.what.size(self.scene), how, self.clock.work)
+            made, scale = printable(planned, self.size, how, self.clock.work)
         # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.
         keep = how.keep if planned.root.bounds.exterior_only else "all"
         # Keep cavities: the hollow is one.
@@ -209,7 +157,7 @@ class _Job:
     def surface(self, aside: Callable[[], Path] | None) -> tuple[_Sized, Surface]:
         """Surface, in one piece if it fits in memory, and the choice of bodies that is left."""
         sized, signs = self.sampled()
-        most, voxel = len(signs), self.what.size(self.scene) / self.what.voxels(self.scene)
+        most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
         except TooLargeError as error:
@@ -228,10 +176,10 @@ class _Job:
         from .mesh.touching import touching_note
         from .shown import mesh_amount
 
-        what, clock, size, refined = self.what, self.clock, self.what.size(self.scene), None
+        what, clock, size, refined = self.what, self.clock, self.size, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord_mm is not None:
-            unit = sized.scale or size / max(planned.box.size)
+            unit = sized.scale or size.scale(planned.box)
             surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)
             refined = done.scaled(unit)
         with clock("finishing"):
@@ -251,7 +199,7 @@ class _Job:
             scene=self.scene.name,
             scene_hash=self.scene.hash,
             version=__version__,
-            size_mm=size,
+            size_mm=size.longest,
             voxel_mm=planned.voxel * scale,
             mesh=check.mesh,
             removed=finish.removed,
@@ -272,6 +220,8 @@ class _Job:
                 *off,
             ),
             depths=planned.depths,
+            contact_mm2=check.contact,
+            cavities_mm3=finish.cavities,
         )
         return MeshResult(report, finish.place, planned, whole, clock.work)
 

@@ -17,7 +17,7 @@ from .rendering import Renderer
 from .scene import Scene
 from .scene.view import Film, View
 from .slicing import SliceJob
-from .slicing.stack import turned
+from .volume.sizing import oriented
 from .work import Work
 
 LARGEST = 800, 480
@@ -46,7 +46,7 @@ class StackModel:
 
     @cached_property
     def _upright(self) -> Node:
-        return cast(Node, turned(self.scene.root, self.job.up, self.work))
+        return cast(Node, oriented(self.scene.root, self.job.up, work=self.work))
 
     def mesh(self) -> Mesh:
         """Mesh of the object, simplified to the printer's resolution.
@@ -58,14 +58,17 @@ class StackModel:
             mesh is simplified within a quarter of a pixel.
         """
         job = self.job
-        voxel = max(*job.pixel, job.size / RESOLUTION)
+        longest = job.sizing.longest
+        voxel = max(*job.pixel, longest / RESOLUTION)
         what = MeshJob(
-            size_mm=job.size,
-            voxel_mm=min(voxel, job.size / COARSEST),
+            voxel_mm=min(voxel, longest / COARSEST),
             printing=job.printing,
             simplify_mm=min(job.pixel) / 4,
+            up=job.up,
+            scale=job.scale,
         )
-        return make_mesh(replace(self.scene, root=self._upright), what, self.work).mesh
+        scene = replace(self.scene, size_mm=None if job.unit else job.size, unit_mm=job.unit)
+        return make_mesh(scene, what, self.work).mesh
 
     def picture(self) -> NDArray[np.uint8]:
         """Render the scene as it stands on the printer, without its print preparation.

@@ -15,8 +15,9 @@ from ..export.images import write_image
 from ..files import replacing, reported
 from ..formulas.parameters import Number, validated
 from ..keys import key, program
-from ..rendering import Renderer, develop
+from ..rendering import Renderer, develop, picture
 from ..rendering.sequence import Samples
+from ..rendering.setup import default_lights
 from ..scene.model import Scene
 from ..work import Work
 from .timeline import Timeline
@@ -112,20 +113,20 @@ class FilmJob:
 
         Returns
         -------
-        ndarray of float32, shape (height, width, 3)
-            Linear light.
+        ndarray of float32, shape (height, width, 4)
+            Mean of the samples; see `Pass.mean`.
         """
         animation = self.timeline.animation
         times = min(animation.times, self.samples) if animation.shutter else 1
         share = self.samples // times
-        mean = np.zeros((self.size[1], self.size[0], 3), np.float32)
+        mean = np.zeros((self.size[1], self.size[0], 4), np.float32)
         for k in range(times):
             time = (number + animation.shutter * (k + 0.5) / times if times > 1 else number) / self.fps
             scene = self.timeline.at(time)
             part = Samples(k * share, number + 1 if animation.noise == "moving" else 0)
             renderer = Renderer(scene.root, scene.view, self.size, work, self.device, part)
             *_, done = renderer.passes(share)
-            mean += done.image / np.float32(times)
+            mean += done.mean / np.float32(times)
         return mean
 
 
@@ -161,9 +162,10 @@ def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: boo
         work.progress(f"frame {number}", done / len(paths))
         if resume and path.exists():
             continue
-        light, film = job.light(number, replace(work, progress=lambda *_: None)), job.scene(number).view
+        mean, at = job.light(number, replace(work, progress=lambda *_: None)), job.scene(number)
+        view = replace(at.view, lights=at.view.lights or default_lights(at.root))
         text = {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
-        write_image(path, develop(light, film.film, film.shading.mode), light, text=text)
+        write_image(path, develop(mean, view), picture(mean, view.shading.mode), text=text)
     work.progress("frames", 1.0)
     return paths
 

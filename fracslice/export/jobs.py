@@ -1,4 +1,4 @@
-"""Slice runs, and the ways in which their layers get into a file or a folder."""
+"""Slice runs, and how their layers are written to a file or a folder."""
 
 from __future__ import annotations
 

@@ -34,6 +34,10 @@ TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
     reflect=Number(
         0.0, "the part of light that is mirrored head on; more is at grazing angles", least=0, most=1
     ),
+    roughness=Number(0.0, "roughness of the reflection: 0 is a mirror, 1 is dull", least=0, most=1),
+    metallic=Number(
+        0.0, "1 for a metal, which reflects in its colour and has no other light", least=0, most=1
+    ),
     clear=Number(0.0, "the part of light that goes through", least=0, most=1),
     index=Number(1.5, "how strongly that light is bent: 1.33 water, 1.5 glass, 2.4 diamond", least=1, most=4),
     absorb=Vector(

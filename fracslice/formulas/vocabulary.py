@@ -32,14 +32,14 @@ def any_of(mask: np.ndarray) -> bool:
 
 def rsqrt(a: np.ndarray) -> np.ndarray:
     """1/sqrt(a) of a positive, finite argument; SIMD units have an instruction for it."""
-    found: np.ndarray = 1.0 / np.sqrt(a)
-    return found
+    result: np.ndarray = 1.0 / np.sqrt(a)
+    return result
 
 
 def ratio(a: np.ndarray | float, b: np.ndarray) -> np.ndarray:
     """a/b for a normal, finite b whose inverse is normal, too; GPUs have an instruction for the inverse."""
-    found: np.ndarray = a / b
-    return found
+    result: np.ndarray = a / b
+    return result
 
 
 def orbit(r2: np.ndarray, alive: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> None:

@@ -18,39 +18,10 @@ from fracslice.mesh.quantisation import (
     Frame,
     placed,
     quantise,
-    used,
     welded,
 )
 
 PASSES = 8
-
-
-def clean(mesh: Mesh) -> Mesh:
-    """Round a closed, oriented manifold to float32 and remove the triangles that this flattens or turns over.
-
-    A triangle with collinear corners gives its middle corner to the neighbour across its longest edge: an
-    edge flip, which does not change the shape. A triangle with two coincident corners, or without a possible
-    flip, is removed by collapsing its shortest edge. Neither is done where it would pinch the surface or turn
-    a neighbour over (the link condition of Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge
-    contraction", 1999). Triangles that cannot be removed stay, and `check_mesh` reports them. Equal positions
-    are welded last.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Closed, oriented manifold, mm.
-
-    Returns
-    -------
-    Mesh
-        Quantised and welded.
-
-    Raises
-    ------
-    MeshError
-        If a coordinate is not finite or an index is out of range.
-    """
-    return cleaned(mesh, used(mesh)).mesh
 
 
 class Cleaned(NamedTuple):
@@ -82,6 +53,13 @@ def cleaned(
     threads: int = 0,
 ) -> Cleaned:
     """Place, clean and quantise a mesh, or a piece of one.
+
+    A triangle with collinear corners gives its middle corner to the neighbour across its longest edge: an
+    edge flip, which does not change the shape. A triangle with two coincident corners, or without a possible
+    flip, is removed by collapsing its shortest edge. Neither is done where it would pinch the surface or turn
+    a neighbour over (the link condition of Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge
+    contraction", 1999). Triangles that cannot be removed stay, and `check_mesh` reports them. Equal positions
+    are welded last.
 
     Parameters
     ----------

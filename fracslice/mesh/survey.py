@@ -190,7 +190,7 @@ class WholeShells:
         Returns
         -------
         Shells
-            Volumes and parents of the shells, without labels of triangles.
+            Volumes and parents of the shells.
         int
             Number of misplaced shells.
 
@@ -212,7 +212,7 @@ class WholeShells:
             parent[own], winding[own] = found.parent[own], found.winding[own]
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
-        return Shells(np.empty(0, np.int32), self.volumes, parent), int((winding != hollow)[searched].sum())
+        return Shells(self.volumes, parent), int((winding != hollow)[searched].sum())
 
     def thin_walls(self, voxel: float) -> str:
         """Note on walls thinner than a voxel; empty if there are none.

@@ -23,12 +23,15 @@ class Optics:
         Smallest hit tolerance, scene units: the rounding error of positions.
     far : float
         Distance beyond which the scene is empty, scene units.
+    origin : tuple of int
+        Upper left pixel of the part of the film that is rendered.
     """
 
     size: tuple[int, int]
     cone: float
     least: float
     far: float
+    origin: tuple[int, int] = (0, 0)
 
 
 def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> Optics:

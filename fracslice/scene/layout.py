@@ -58,7 +58,12 @@ SCENE = TopElement(
 SOLID = TopElement(
     "solid",
     "The object to make. Several elements inside it are a union.",
-    MappingProxyType({"size": Length(REQUIRED, "the longest side of the finished object")}),
+    MappingProxyType(
+        {
+            "size": Length(None, "the longest side of the finished object"),
+            "unit": Length(None, "or the length of a scene unit"),
+        }
+    ),
     (1, None),
 )
 

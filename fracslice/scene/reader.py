@@ -92,7 +92,9 @@ def _scene(data: bytes, source: str, name: str) -> Scene:
     others = (Print, Animation, Track)
     printing = next((part for part in builder.parts if isinstance(part, Print)), Print())
     view = View.of(part for part in builder.parts if not isinstance(part, others))
-    made = scene(*solid.children, size=solid.values["size"], name=name, view=view, printing=printing)
+    if len(solid.values) != 1:
+        raise solid.fail('expected size="...", the longest side, or unit="...", the length of a scene unit')
+    made = scene(*solid.children, **solid.values, name=name, view=view, printing=printing)
     animation = next((part for part in builder.parts if isinstance(part, Animation)), None)
     return replace(
         made, animation=animation, tracks=tuple(part for part in builder.parts if isinstance(part, Track))
@@ -195,7 +197,7 @@ class _Builder:
             with computing(closed.fail):
                 node = closed.element(*closed.children, place=closed.place, **closed.values)
         except SceneError as error:
-            placed = str(error).startswith(closed.place)
+            placed = str(error).startswith(f"{self.source}:")
             raise error if placed else SceneError(f"{closed.place}: {error}") from None
         self.open[-1].children.append(node)
 

@@ -15,7 +15,7 @@ from ..printing.limits import Limits
 from ..printing.problems import Problem
 from ..printing.widths import Widths, widths_of
 from ..work import Work
-from .graph import Found, Graph
+from .graph import Feature, Graph
 from .layers import Layer, Slicer
 from .necks import Neck, weakest
 from .overhangs import Overhang, farthest, unsupported
@@ -46,15 +46,17 @@ class PrintReport:
         Size of the object.
     fits : bool or None
         True if the object fits the printer; None without a printer.
+    areas : list of float
+        Area of each layer.
     volume, weight_g : float
         Volume of the solid, and weight in grams.
-    bodies, islands : list of Found
+    bodies, islands : list of Feature
         Connected components, and components with nothing below them, without specks.
     specks : int
         Number of islands and bodies below the limit.
     overhang_area, largest_overhang : float
         Total over all layers, and maximum in a layer.
-    cups, traps, cavities : list of Found
+    cups, traps, cavities : list of Feature
         Suction cups, resin traps and sealed cavities.
     walls, gaps : Widths or None
         Widths in layers.
@@ -74,16 +76,17 @@ class PrintReport:
     pixels: tuple[int, int]
     size: tuple[float, float, float]
     fits: bool | None
+    areas: list[float]
     volume: float
     weight_g: float
-    bodies: list[Found]
-    islands: list[Found]
+    bodies: list[Feature]
+    islands: list[Feature]
     specks: int
     overhang_area: float
     largest_overhang: float
-    cups: list[Found]
-    traps: list[Found]
-    cavities: list[Found]
+    cups: list[Feature]
+    traps: list[Feature]
+    cavities: list[Feature]
     walls: Widths | None
     gaps: Widths | None
     overhang: Overhang | None
@@ -153,7 +156,7 @@ def check_layers(
 
     limits, work = limits or Limits(), work or Work()
     finest, origin = max(stack.pixel), stack.origin
-    solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin)
+    solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin, stack.drains)
     return _Collector(stack, limits, printer, solid).report(Slicer(stack, work).map(make))
 
 
@@ -170,7 +173,7 @@ class _Collector:
         """The report of findings in the order of the layers."""
         stack, solid, empty = self.stack, Graph(), Graph()
         square = stack.pixel[0] * stack.pixel[1]
-        volume, overhangs, walls, gaps = 0.0, [], [np.empty((0, 2))], [np.empty((0, 2))]
+        areas, overhangs, walls, gaps = list[float](), [], [np.empty((0, 2))], [np.empty((0, 2))]
         limits, far = self.limits, list[Overhang]()
         for k, now in enumerate(findings):
             below = solid.last
@@ -182,10 +185,11 @@ class _Collector:
                 far.extend([worst] if worst else [])
             solid.add(now.solid)
             empty.add(now.empty)
-            volume += now.area * float(stack.heights[k])
+            areas.append(now.area)
             if now.walls is not None and now.gaps is not None:
                 walls.append(now.walls)
                 gaps.append(now.gaps)
+        volume = sum(area * height for area, height in zip(areas, stack.heights.tolist(), strict=True))
         unfit = misfit(stack, self.printer)
         overhang = np.array(overhangs)
         islands = self.found(solid, solid.islands())
@@ -199,6 +203,7 @@ class _Collector:
             pixels=stack.shape[::-1],
             size=stack.size,
             fits=not unfit if self.printer else None,
+            areas=areas,
             volume=volume,
             weight_g=volume * self.limits.density / 1000,
             bodies=kept,
@@ -219,21 +224,21 @@ class _Collector:
         report.problems.extend([*([unfit] if unfit else []), *problems_of(report, stack, self.limits)])
         return report
 
-    def found(self, graph: Graph, chosen: np.ndarray) -> list[Found]:
+    def found(self, graph: Graph, chosen: np.ndarray) -> list[Feature]:
         """Chosen nodes as connected groups."""
         return graph.groups(chosen, self.stack.heights, self.stack.pixel, self.stack.shape)
 
-    def shut(self, hollows: Graph, backwards: bool) -> list[Found]:
+    def shut(self, hollows: Graph, backwards: bool) -> list[Feature]:
         """Large groups of shut nodes, see `Graph.shut`."""
         return [p for p in self.found(hollows, hollows.shut(backwards)) if p.area >= self.limits.cup]
 
-    def height(self, part: Found) -> float:
+    def height(self, part: Feature) -> float:
         """Height of a group, mm."""
         first, last = part.layers
         return float(self.stack.heights[first : last + 1].sum())
 
 
-def _worst(overhang: np.ndarray, islands: list[Found], far: list[Overhang]) -> list[int]:
+def _worst(overhang: np.ndarray, islands: list[Feature], far: list[Overhang]) -> list[int]:
     """Layers in which the largest islands begin, then those with the farthest and the most overhang."""
     first = [i.layers[0] for i in sorted(islands, key=lambda i: -i.area)[: WORST // 2]]
     most = [int(k) for k in np.argsort(-overhang, kind="stable")[:WORST] if overhang[k] > 0]

@@ -40,6 +40,8 @@ EFFECTS = {
     "0.15915494309189535 * atan2(": {"root": material(BULB, palette="magma", trap="direction")},
     "def reflects(": {"root": material(BULB, reflect=0.2)},
     "def goes_on(": {"root": material(BULB, clear=0.9)},
+    "def glossy(": {"root": material(BULB, roughness=0.5, reflect=0.1)},
+    "def upward(nx": {"shading": Shading(paths="yes")},
     "glow": {"root": material(BULB, glow=1)},
     "paint": {"root": union(material(BULB), sphere(radius=0.3))},
 }
@@ -51,7 +53,7 @@ def test_an_effect_is_in_the_kernel_of_a_scene_that_uses_it_and_in_no_other(line
     assert line not in frame().linked.source
 
 
-@pytest.mark.parametrize("mode", ["normal", "depth", "distance", "steps"])
+@pytest.mark.parametrize("mode", ["normal", "position", "depth", "distance", "steps"])
 def test_modes_that_show_a_number_light_nothing(mode: str) -> None:
     source = frame(shading=Shading(mode=mode), lights=(Light(),)).linked.source
     assert "phong" not in source

@@ -130,7 +130,11 @@ def test_wrong_sizes(size):
         ),
         (
             "<scene version='1'><solid><box/></solid></scene>",
-            'f.xml:1: <solid> needs the attribute size="..."',
+            'f.xml:1: <solid> expected size="...", the longest side, or unit="..."',
+        ),
+        (
+            "<scene version='1'><solid size='4cm' unit='1mm'><box/></solid></scene>",
+            'f.xml:1: <solid> expected size="...", the longest side, or unit="..."',
         ),
         (
             around(BALL).replace("</scene>", "<solid size='1'><box/></solid></scene>"),
