@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from .cluster import cluster_options, pooled
 from .inputs import check_folder, check_targets, load_scene, refuse_options
 from .options import (
     NAME,
@@ -79,6 +81,7 @@ def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | N
     default="cpu",
     help="The device that samples the field; cpu by default. auto: the GPU, if there is one.",
 )
+@cluster_options
 @threads_option
 @quiet_option
 @click.pass_context
@@ -93,6 +96,9 @@ def mesh(
     picture: str | None,
     cache: str | None,
     device: str,
+    cluster: str | None,
+    shard: str | None,
+    store: str | None,
     threads: int,
     quiet: bool,
     **options: Any,
@@ -107,7 +113,8 @@ def mesh(
 
     check_outputs(source, output, report, picture)
     if Path(output).suffix.lower() == GRID:
-        refuse_options(context, {"chord", "simplify"}, "only for meshes, and a .vdb file holds samples")
+        names = {"chord", "simplify", "cluster", "shard", "store"}
+        refuse_options(context, names, "only for meshes, and a .vdb file holds samples")
     scene = load_scene(source, settings)
     if seconds is not None:
         from fracslice.animation import Timeline
@@ -115,7 +122,10 @@ def mesh(
         scene = Timeline(scene).at(seconds)
     job = job_of(scene, **options)
     how = Work(threads, store=store_in(cache), device=chosen(device))
-    with working(how, quiet) as work:
+    with (
+        pooled(output, threads, cluster, shard, store) as pool,
+        working(replace(how, cluster=pool), quiet) as work,
+    ):
         figures = made(scene, job, output, picture, work)
         if report is not None:
             write_report(figures, report)
