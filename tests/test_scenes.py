@@ -14,6 +14,8 @@ from fracslice.scene.schema import PATH
 from .stability.random_scenes import FAMILIES
 
 NAMES = library.names()
+FINE = ("lattice-cube", "mandelbulb", "pendant", "three-worlds")
+"""Scenes that are made at 256 voxels, too."""
 
 
 def test_there_are_at_least_ten_and_they_show_what_there_is():
@@ -31,8 +33,9 @@ def test_it_fits_the_schema_and_survives_writing(name):
     assert len(library.about(name)) > 20
 
 
-@pytest.mark.parametrize("resolution", [128, 256])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("name", "resolution"), [*((name, 128) for name in NAMES), *((name, 256) for name in FINE)]
+)
 def test_it_becomes_a_solid_that_prints(name, resolution):
     scene = read(library.path(name))
     result = make_mesh(scene, MeshJob(resolution=resolution))

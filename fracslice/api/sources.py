@@ -9,7 +9,8 @@ from typing import TypeAlias
 from ..errors import SceneError
 from ..formulas import Formula, Node, get
 from ..formulas import names as formula_names
-from ..formulas.parameters import REQUIRED, shown
+from ..formulas.conversion import shown
+from ..formulas.parameters import REQUIRED
 from ..nearest import hint
 from ..scene import Scene, library, parse_length, read
 from ..volume import extent, with_depths

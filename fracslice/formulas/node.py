@@ -126,21 +126,19 @@ class Node(Operators, Field):
     @cached_property
     def bounds(self) -> Bounds:
         """Box, Lipschitz bound and kind of this field."""
-        hooks, below = self.formula.hooks, [child.bounds for child in self.children]
-        box = hooks["bounds"](self) if "bounds" in hooks else Box.everywhere()
-        slope = (
-            hooks["slope"](self)
-            if "slope" in hooks
-            else max([self.formula.lipschitz, *(b.lipschitz for b in below)])
-        )
-        steepening = (
-            hooks["steepening"](self)
-            if "steepening" in hooks
-            else max((b.steepening for b in below), default=0.0)
-        )
-        names = [*(n for b in below for n in b.boxless), *([] if "bounds" in hooks else [self.formula.name])]
+        below = [child.bounds for child in self.children]
+        box = self._hooked("bounds", Box.everywhere())
+        slope = self._hooked("slope", max([self.formula.lipschitz, *(b.lipschitz for b in below)]))
+        steepening = self._hooked("steepening", max((b.steepening for b in below), default=0.0))
+        own = [] if "bounds" in self.formula.hooks else [self.formula.name]
+        boxless = dict.fromkeys([*(name for b in below for name in b.boxless), *own])
         exterior_only = self.formula.exterior_only or any(b.exterior_only for b in below)
-        return Bounds(box, slope, exterior_only, steepening, tuple(dict.fromkeys(names)))
+        return Bounds(box, slope, exterior_only, steepening, tuple(boxless))
+
+    def _hooked(self, name: str, default: Any, *arguments: Any) -> Any:
+        """Value of a hook of the formula, or the default of a formula without it."""
+        hook = self.formula.hooks.get(name)
+        return hook(self, *arguments) if hook else default
 
     @property
     def tree(self) -> Node:
@@ -150,7 +148,8 @@ class Node(Operators, Field):
     @property
     def escape_time_only(self) -> bool:
         """See `Field.escape_time_only`."""
-        return all(map(_has_potential, (node for node in self.walk() if node.formula.kind == "shape")))
+        shapes = (node for node in self.walk() if node.formula.kind == "shape")
+        return all(shape._hooked("potential", shape.formula.exterior_only) for shape in shapes)
 
     @property
     def key(self) -> str:
@@ -171,14 +170,14 @@ class Node(Operators, Field):
     @property
     def arguments(self) -> dict[str, Any]:
         """Arguments of the kernel function by name: numbers, tuples of numbers, or `Fixed`."""
-        hook = self.formula.hooks.get("arguments")
-        return hook(self) if hook else dict(self.values)
+        values: dict[str, Any] = self._hooked("arguments", dict(self.values))
+        return values
 
     @property
     def function(self) -> Callable[..., Any]:
         """Function to compile for this node."""
-        hook = self.formula.hooks.get("select")
-        return hook(self) if hook else self.formula.function
+        function: Callable[..., Any] = self._hooked("select", self.formula.function)
+        return function
 
     def visible(self, voxel: float) -> Node:
         """This node without detail finer than a voxel; its children are unchanged.
@@ -192,20 +191,18 @@ class Node(Operators, Field):
         -------
         Node
         """
-        hook = self.formula.hooks.get("visible")
-        return hook(self, voxel) if hook else self
+        node: Node = self._hooked("visible", self, voxel)
+        return node
 
     @property
     def is_identity(self) -> bool:
         """True if the node changes nothing and can be left out."""
-        hook = self.formula.hooks.get("identity")
-        return bool(hook and hook(self))
+        return bool(self._hooked("identity", False))
 
     @property
     def is_unordered(self) -> bool:
         """True if the elements but the first may be folded in any order, to the same bits."""
-        hook = self.formula.hooks.get("unordered")
-        return bool(hook and hook(self))
+        return bool(self._hooked("unordered", False))
 
 
 def _restored(formula: Formula, values: dict[str, Any], *fields: Any) -> Node:
@@ -216,9 +213,3 @@ def _restored(formula: Formula, values: dict[str, Any], *fields: Any) -> Node:
 def _given(node: Node) -> dict[str, Any]:
     """Parameter values that are not None."""
     return {name: value for name, value in node.values.items() if value is not None}
-
-
-def _has_potential(shape: Node) -> bool:
-    """True if the field is that of a potential; orbits that grow linearly have none."""
-    hook = shape.formula.hooks.get("potential")
-    return bool(hook(shape)) if hook else shape.formula.exterior_only

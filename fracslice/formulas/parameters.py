@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any
+
+from .conversion import finite, items, plain, shortest, shown
 
 REQUIRED: Any = ...
 AUTO = "auto"
@@ -97,7 +99,7 @@ class Limits(Parameter):
     def parsed(self, text: str) -> float:
         """Number that a text spells."""
         try:
-            return float(_plain(text))
+            return float(plain(text))
         except ValueError:
             raise ValueError(self.expects) from None
 
@@ -126,7 +128,7 @@ class Number(Limits):
         return self.checked(value)
 
     def text(self, value: Any) -> str:
-        return _shortest(value)
+        return shortest(value)
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,7 @@ class Count(Parameter):
 
     def read(self, text: str) -> Any:
         try:
-            return self.check(text.strip() if self.auto and text.strip() == AUTO else int(_plain(text)))
+            return self.check(text.strip() if self.auto and text.strip() == AUTO else int(plain(text)))
         except ValueError:
             raise ValueError(self.expects) from None
 
@@ -192,17 +194,17 @@ class Vector(Limits):
         return self.check(tuple(map(self.parsed, text.split())))
 
     def check(self, value: Any) -> Any:
-        items = _items(value)
-        if len(items) not in self.sizes:
+        given = items(value)
+        if len(given) not in self.sizes:
             raise ValueError(self.expects)
-        numbers = tuple(map(self.checked, items))
+        numbers = tuple(map(self.checked, given))
         zero = self.nonzero and not any(abs(n) >= SMALLEST for n in numbers)
         if zero or (self.whole and any(n != int(n) for n in numbers)):
             raise ValueError(self.expects)
         return tuple(map(int, numbers)) if self.whole else numbers
 
     def text(self, value: Any) -> str:
-        return " ".join(map(_shortest, value))
+        return " ".join(map(shortest, value))
 
 
 @dataclass(frozen=True)
@@ -276,51 +278,3 @@ def validated(name: str, value: Any, kind: Any, fail: Callable[[str], Exception]
         return kind.check(value)
     except ValueError as error:
         raise fail(f"{name}={shown(value)}: expected {error}") from None
-
-
-def shown(value: Any) -> str:
-    """Representation of any value on one line of at most 60 characters."""
-    try:
-        line = " ".join(repr(value).split())
-    except ValueError:  # a whole number with more digits than Python prints
-        line = f"a huge {type(value).__name__}"
-    return line if len(line) <= 60 else line[:57] + "..."
-
-
-def finite(value: Any) -> float | None:
-    """Convert a real number to a float.
-
-    Parameters
-    ----------
-    value : object
-        Any value; NumPy scalars count as numbers, booleans do not.
-
-    Returns
-    -------
-    float or None
-        None if the value is not a real number, or not finite.
-    """
-    if isinstance(value, bool) or not isinstance(value, Real):
-        return None
-    try:
-        number = float(value)
-    except OverflowError:
-        return None
-    return number if math.isfinite(number) else None
-
-
-def _items(value: Any) -> Sequence[Any]:
-    """Items of a sequence or an array; any other value is one item."""
-    plain = value.tolist() if hasattr(value, "tolist") else value
-    return plain if isinstance(plain, Sequence) and not isinstance(plain, (str, bytes)) else (plain,)
-
-
-def _plain(text: str) -> str:
-    """Reject numbers in Python's extended syntax: underscores and non-ASCII digits."""
-    if "_" in text or not text.isascii():
-        raise ValueError
-    return text
-
-
-def _shortest(value: Any) -> str:
-    return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))

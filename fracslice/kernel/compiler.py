@@ -16,7 +16,9 @@ from .emitter import Emitter
 from .linker import CALLED, Linked
 from .loop_linker import link_loops
 from .loops import Loop
-from .values import DOUBLE, FLOAT, WHOLE, Lanes
+from .parsing import parse
+from .scalars import DOUBLE, FLOAT, WHOLE
+from .values import Lanes
 
 PART = ["x", "y", "z", "P", "P0"]
 """Arguments of a part's function."""
@@ -79,7 +81,7 @@ def _text(linked: Linked, target: Target, loops: Sequence[Loop]) -> str:
     Stack frames are aligned to whole registers; otherwise registers spilled to the stack would straddle two
     cache lines.
     """
-    trees = [tree for tree in ast.parse(linked.source).body if isinstance(tree, ast.FunctionDef)]
+    trees = [tree for tree in parse(linked.source).body if isinstance(tree, ast.FunctionDef)]
     called = frozenset(tree.name for tree in trees if CALLED in map(ast.unparse, tree.decorator_list))
     lanes = Lanes(target.bits, target.width, target.registers)
     own = link_loops(tuple(loops))

@@ -16,6 +16,7 @@ from ..formulas.vocabulary import NAMES
 from .linker import CALLED, Linked
 from .loop_linker import link_loops
 from .loops import Loop
+from .parsing import parse
 
 INTRINSICS = "fracslice.kernel.cuda_intrinsics"
 """Module that the text imports its intrinsics from."""
@@ -74,7 +75,7 @@ def typed(source: str) -> str:
     str
         Rewritten text.
     """
-    tree = ast.parse(source)
+    tree = parse(source)
     return ast.unparse(ast.fix_missing_locations(_Typed(tree).visit(tree))) + "\n"
 
 
@@ -154,7 +155,7 @@ class _Typed(ast.NodeTransformer):
         """
         match node:
             case ast.For(ast.Name(i), ast.Call(ast.Name("range"), [end])):
-                first, after = ast.parse(f"{i} = whole(0)\n{i} = whole({i} + 1)").body
+                first, after = parse(f"{i} = whole(0)\n{i} = whole({i} + 1)").body
                 end = self.visit(end) if isinstance(end, ast.Call) else _call("whole", end)
                 body = [part for s in node.body for part in _listed(self.visit(s))]
                 return [first, ast.While(ast.Compare(ast.Name(i), [ast.Lt()], [end]), [*body, after], [])]

@@ -18,21 +18,10 @@ from llvmlite import ir
 
 from ..errors import KernelError
 from .expressions import Expressions
+from .parsing import parse_expression
+from .scalars import WHOLE, MismatchError, number
 from .syntax import assigned_names
-from .values import (
-    WHOLE,
-    Kind,
-    Lanes,
-    MismatchError,
-    Value,
-    as_kind,
-    joined,
-    kind_of,
-    made_of,
-    number,
-    parts_of,
-    types_of,
-)
+from .values import Kind, Lanes, Value, as_kind, joined, kind_of, made_of, parts_of, types_of
 
 Names = dict[str, Value]
 
@@ -156,7 +145,7 @@ class Body(Expressions):
             case ast.Assign([target], value):
                 self.assign(target, self.value(value))
             case ast.AugAssign(target, op, value):
-                before = self.value(ast.parse(ast.unparse(target), mode="eval").body)
+                before = self.value(parse_expression(ast.unparse(target)))
                 self.assign(target, self.binary(op, before, self.value(value)))
             case ast.Expr(value):
                 self.value(value)

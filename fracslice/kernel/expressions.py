@@ -14,28 +14,8 @@ from llvmlite import ir
 
 from . import lanes_math
 from .registers import Vec
-from .values import (
-    BOOL,
-    DOUBLE,
-    WHOLE,
-    Kind,
-    Lanes,
-    MismatchError,
-    Value,
-    as_kind,
-    common,
-    compare,
-    is_mask,
-    joined,
-    kind_of,
-    made_of,
-    number,
-    operate,
-    parts_of,
-    truth,
-    types_of,
-    widened,
-)
+from .scalars import BOOL, DOUBLE, WHOLE, MismatchError, common, compare, number, operate, truth, widened
+from .values import Kind, Lanes, Value, as_kind, is_mask, joined, kind_of, made_of, parts_of, types_of
 
 if TYPE_CHECKING:
     from .emitter import Emitter

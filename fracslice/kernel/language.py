@@ -22,7 +22,8 @@ from typing import Any, NoReturn
 from ..errors import KernelError
 from ..formulas import vocabulary
 from ..nearest import hint
-from .seen import seen
+from .functions import fingerprint, is_number, parameters, scope
+from .parsing import parse, parse_expression
 from .syntax import depends_on_points, point_names, stored_names
 
 _OF_THE_KERNEL = re.compile(r"[NT]\d+|P0?")
@@ -50,30 +51,6 @@ _FLOORED = {ast.Mod: "a - b * floor(a / b)", ast.FloorDiv: "floor(a / b)"}
 """Operators of Python on points, in the vocabulary."""
 
 
-def parameters(function: Callable[..., Any]) -> list[str]:
-    """Return the names of a function's parameters."""
-    code = function.__code__
-    return list(code.co_varnames[: code.co_argcount])
-
-
-def scope(function: Callable[..., Any]) -> dict[str, Any]:
-    """Return the names visible to a function from outside: builtins, its module's globals and its closure.
-
-    Parameters
-    ----------
-    function
-        Python function.
-
-    Returns
-    -------
-    dict
-        Values by name.
-    """
-    assert isinstance(function, FunctionType)
-    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
-    return {**vars(builtins), **function.__globals__, **{name: cell.cell_contents for name, cell in cells}}
-
-
 def text(function: Callable[..., Any]) -> str:
     """Return a function rewritten in the language of formulas.
 
@@ -92,7 +69,7 @@ def text(function: Callable[..., Any]) -> str:
     KernelError
         If the function is not in the language or its source cannot be read.
     """
-    return _text(function, seen(function))
+    return _text(function, fingerprint(function))
 
 
 @lru_cache(maxsize=1024)
@@ -103,7 +80,7 @@ def _text(function: Callable[..., Any], _: object) -> str:
         raise KernelError(
             f"formula {function.__name__}: its source cannot be read; expected a def in a file or a notebook"
         ) from None
-    tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
+    tree = parse(textwrap.dedent("".join(lines))).body[0]
     place = f"{function.__code__.co_filename}:{{}}: formula {function.__name__}: "
     if not isinstance(tree, ast.FunctionDef):
         raise KernelError(place.format(first) + "expected a def")
@@ -111,7 +88,7 @@ def _text(function: Callable[..., Any], _: object) -> str:
     return ast.unparse(ast.fix_missing_locations(found))
 
 
-def word(value: Any) -> str | None:
+def intrinsic(value: Any) -> str | None:
     """Return the name of the intrinsic that a value stands for, or None: ``np.sqrt`` is ``sqrt``."""
     return _INTRINSICS.get(id(value))
 
@@ -216,7 +193,7 @@ class _Language(ast.NodeTransformer):
             return self.power(node, node.left, node.right)
         if on_points and type(node.op) in _FLOORED:
             names = {"a": node.left, "b": node.right}
-            floored: ast.expr = _Named(names).visit(ast.parse(_FLOORED[type(node.op)], mode="eval").body)
+            floored: ast.expr = _Named(names).visit(parse_expression(_FLOORED[type(node.op)]))
             return floored
         return node
 
@@ -288,7 +265,7 @@ class _Language(ast.NodeTransformer):
         return self.known(node, self.scope.get(node.id), node.id)
 
     def known(self, node: ast.expr, value: Any, name: str) -> ast.AST:
-        meant = word(value) or (name if value is None and name in vocabulary.NAMES else None)
+        meant = intrinsic(value) or (name if value is None and name in vocabulary.NAMES else None)
         if meant:
             return ast.Name(meant, ast.Load())
         if isinstance(value, (int, float)) and isinstance(node, ast.Attribute):
@@ -298,7 +275,7 @@ class _Language(ast.NodeTransformer):
         ):
             return node
         near = hint(name, {*vocabulary.NAMES, *self.local, *_PYTHON}, "{}")
-        self.fail(node, f"{_short(node)} is not a word of the language of formulas; {near}")
+        self.fail(node, f"{_short(node)} is not in the language of formulas; {near}")
 
 
 class _Named(ast.NodeTransformer):
@@ -318,13 +295,6 @@ def _breaks(body: Sequence[ast.stmt]) -> Iterator[ast.Break]:
             yield statement
         elif isinstance(statement, ast.If):
             yield from _breaks([*statement.body, *statement.orelse])
-
-
-def is_number(value: Any) -> bool:
-    """Return True for a number, or a tuple of numbers, that a function takes from outside."""
-    if isinstance(value, tuple):
-        return all(map(is_number, value))
-    return isinstance(value, (int, float))
 
 
 def _call(name: str, *arguments: ast.expr) -> ast.Call:

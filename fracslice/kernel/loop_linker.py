@@ -18,9 +18,10 @@ from types import FunctionType
 from typing import Any, NoReturn
 
 from ..errors import KernelError
-from . import language
+from . import functions, language
 from .intrinsics import is_intrinsic
 from .loops import Loop
+from .parsing import parse
 from .syntax import Folding
 
 OF_LOOPS = "l_"
@@ -115,7 +116,7 @@ class _Resolver(Folding):
 
     def __init__(self, linker: _LoopLinker, function: Callable[..., Any], fixed: dict[str, Any]) -> None:
         self.linker, self.function, self.fixed = linker, function, fixed
-        self.scope = language.scope(function)
+        self.scope = functions.scope(function)
         self.local = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - fixed.keys()
 
     def tree(self, name: str) -> ast.FunctionDef:
@@ -164,7 +165,7 @@ class _Resolver(Folding):
             found = ast.Constant(int(value))
         elif isinstance(node, ast.Name) and value is getattr(builtins, node.id, _UNKNOWN):
             found = ast.Name(node.id, ast.Load())
-        elif name := language.word(value):
+        elif name := language.intrinsic(value):
             found = ast.Name(name, ast.Load())
         elif is_intrinsic(value):
             found = ast.Name(value.__name__, ast.Load())
@@ -182,10 +183,10 @@ class _Resolver(Folding):
             case ast.Call(ast.Name("tuple"), [ast.GeneratorExp(element, [generator])]):
                 return self.unrolled(node, element, generator)
         called = self.known(node.func)
-        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.word(called):
+        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.intrinsic(called):
             return self.generic_visit(node)
         fixed, passed = [], []
-        for parameter, argument in zip(language.parameters(called), node.args, strict=False):
+        for parameter, argument in zip(functions.parameters(called), node.args, strict=False):
             value = self.known(argument)
             if value is _UNKNOWN or isinstance(value, (int, float)):
                 passed.append(self.visit(argument))
@@ -219,7 +220,7 @@ def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
     last = _functions("".join(lines)).get(first)
     if last is None:
         raise KernelError(f"{code.co_filename}:{first}: loop {function.__name__}: expected a def in a module")
-    (tree,) = ast.parse("\n" * (first - 1) + "".join(lines[first - 1 : last])).body
+    (tree,) = parse("\n" * (first - 1) + "".join(lines[first - 1 : last])).body
     assert isinstance(tree, ast.FunctionDef)
     return tree
 
@@ -228,7 +229,7 @@ def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
 def _functions(text: str) -> dict[int, int]:
     """First and last line of each function of a file, decorators included."""
     found = {}
-    for node in ast.parse(text).body:
+    for node in parse(text).body:
         if isinstance(node, ast.FunctionDef):
             found[min([node.lineno, *(mark.lineno for mark in node.decorator_list)])] = node.end_lineno or 0
     return found

@@ -21,9 +21,8 @@ import numpy as np
 from ..formulas import vocabulary
 from ..formulas.box import Box
 from ..formulas.escape import CORE, potential_distance
-from . import language
+from . import functions
 from .cells import possible_cells
-from .seen import seen
 from .steps import Step, traced
 
 DIRECTIONS, RADII, FARTHEST = 64, np.geomspace(1e-2, 1e4, 56).round(4), 1e6
@@ -64,7 +63,7 @@ class Code:
 
     def traced(self) -> Step:
         """Straight-line code of the step."""
-        return _traced(self, seen(self.step))
+        return _traced(self, functions.fingerprint(self.step))
 
     @property
     def arguments(self) -> str:
@@ -108,7 +107,7 @@ def field(code: Code, by_power: bool, julia: bool) -> Callable[..., Any]:
     KernelError
         If the step is not in the language.
     """
-    return _field(code, by_power, julia, seen(code.step))
+    return _field(code, by_power, julia, functions.fingerprint(code.step))
 
 
 @lru_cache(maxsize=256)
@@ -240,7 +239,7 @@ def _half(code: Code, found: Growth, values: Any, iterations: int, julia: Any) -
     """
     function = field(code, found.by_power, julia is not None)
     own = arguments(found, iterations, julia) | {f"v_{name}": value for name, value in values}
-    given = [own[name] for name in language.parameters(function)[3:]]
+    given = [own[name] for name in functions.parameters(function)[3:]]
 
     def evaluate(points: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):

@@ -10,8 +10,8 @@ from functools import lru_cache
 from types import FunctionType
 from typing import Any
 
-from . import language
-from .seen import seen
+from . import functions, language
+from .parsing import parse
 from .syntax import Folding, stored_names
 
 
@@ -63,7 +63,7 @@ def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.F
     KernelError
         If the function is not in the language.
     """
-    tree = ast.parse(language.text(function)).body[0]
+    tree = parse(language.text(function)).body[0]
     assert isinstance(tree, ast.FunctionDef)
     tree.args.args = [a for a in tree.args.args if a.arg not in fixed]
     pruned: ast.FunctionDef = _Substitute(fixed).visit(tree)
@@ -88,11 +88,11 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
         Text and called functions.
     """
     tree = _Forget().visit(tree)
-    scope = language.scope(function)
+    scope = functions.scope(function)
     names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
     stored = stored_names(tree) | {a.arg for a in tree.args.args}
     outside = sorted(names - stored - language.INTRINSICS - given)
-    numbers = {name: _plain(scope[name]) for name in outside if language.is_number(scope.get(name))}
+    numbers = {name: _plain(scope[name]) for name in outside if functions.is_number(scope.get(name))}
     calls = {name: scope[name] for name in outside if isinstance(scope.get(name), FunctionType)}
     tree = _Substitute(numbers).visit(tree)
     return Copy(tree.name, ast.unparse(ast.fix_missing_locations(tree)), calls)
@@ -122,7 +122,7 @@ def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], giv
     KernelError
         If the function is not in the language.
     """
-    return _shared(function, fixed, given, (seen(function), repr(fixed)))
+    return _shared(function, fixed, given, (functions.fingerprint(function), repr(fixed)))
 
 
 @lru_cache(maxsize=1024)
@@ -163,7 +163,7 @@ class _Substitute(Folding):
         for value in ast.literal_eval(node.iter):
             values = value if isinstance(node.target, ast.Tuple) else [value]
             inner = dict(zip(map(ast.unparse, names), values, strict=True))
-            body = ast.parse(ast.unparse(ast.Module(node.body, []))).body
+            body = parse(ast.unparse(ast.Module(node.body, []))).body
             unrolled += _Substitute({**self.values, **inner}).statements(body)
         return unrolled
 

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..formulas.registry import Fixed, Node
-from ..kernel import language
-from ..kernel.linker import FieldDialect, Linked, Linker
+from ..kernel import functions
+from ..kernel.dialects import FieldDialect
+from ..kernel.linker import Linked, Linker
 from ..kernel.structure import link_tree
 from ..scene.view import Camera, Light, View
 from .colours import Look, linear, opaque_part
@@ -340,7 +341,7 @@ def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:
     str
         Source text.
     """
-    names = ", ".join(language.parameters(function))
+    names = ", ".join(functions.parameters(function))
     return "\n    ".join([f"def {function.__name__}({names}):", *lines])
 
 

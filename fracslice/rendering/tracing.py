@@ -15,8 +15,10 @@ from typing import Any
 from ..formulas.material import material
 from ..formulas.registry import Node
 from ..kernel import source
-from ..kernel.linker import OF_FORMULAS, FieldDialect, folded, function, leading
-from ..kernel.structure import Arguments, Run, Subroutine, arguments, read
+from ..kernel.arguments import Arguments, arguments, read
+from ..kernel.dialects import OF_FORMULAS, FieldDialect, folded, function, leading
+from ..kernel.parsing import parse
+from ..kernel.structure import Run, Subroutine
 
 
 @dataclass
@@ -151,7 +153,7 @@ class TraceDialect(FieldDialect):
             Source text.
         """
         tree = _KeepsNearest().visit(source.specialised(given.function, dict(given.fixed)))
-        tree.body.insert(0, ast.parse("nearest = 0.0 * x + 1e30").body[0])
+        tree.body.insert(0, parse("nearest = 0.0 * x + 1e30").body[0])
         called = f"{name}_of"
         self.linker.functions[called] = self.linker.named(called, tree, given.function)
         return function(
@@ -216,7 +218,7 @@ class TraceDialect(FieldDialect):
         tree = _KeepsChild(runs[0]).visit(tree)
         start = [f"{a} = {p}" for a, p in zip(arguments, given.passed, strict=True)]
         start += ["lowest = 0.0 * x + 1e30", "paint = 0.0 * x", "tone = 0.0 * x"]
-        tree.body = [*(ast.parse(line).body[0] for line in start), *tree.body]
+        tree.body = [*(parse(line).body[0] for line in start), *tree.body]
         return self.linker.named(name, tree, given.function)
 
 
@@ -228,11 +230,11 @@ class _KeepsNearest(ast.NodeTransformer):
             return node
         assert isinstance(node.value, ast.Call)
         r2, alive = map(ast.unparse, node.value.args)
-        return ast.parse(f"nearest = where({alive}, minimum(nearest, {r2}), nearest)").body[0]
+        return parse(f"nearest = where({alive}, minimum(nearest, {r2}), nearest)").body[0]
 
     def visit_Return(self, node: ast.Return) -> Any:
         assert node.value is not None
-        return ast.parse(f"return {ast.unparse(node.value)}, nearest").body[0]
+        return parse(f"return {ast.unparse(node.value)}, nearest").body[0]
 
 
 class _KeepsChild(ast.NodeTransformer):
@@ -250,7 +252,7 @@ class _KeepsChild(ast.NodeTransformer):
     def visit_Return(self, node: ast.Return) -> Any:
         lines = self.taken(node)
         value = ast.unparse(lines[-1].value)
-        return [*lines[:-1], ast.parse(f"return {value}, paint, tone").body[0]]
+        return [*lines[:-1], parse(f"return {value}, paint, tone").body[0]]
 
     def taken(self, node: Any) -> list[Any]:
         calls = [
@@ -272,4 +274,4 @@ class _KeepsChild(ast.NodeTransformer):
     @staticmethod
     def parsed(line: str) -> list[Any]:
         # `ast.parse` accepts a return statement outside a function.
-        return ast.parse(line).body
+        return parse(line).body

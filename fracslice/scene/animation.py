@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from ..formulas.parameters import REQUIRED, Choice, Count, Number, Parameter, finite
+from ..formulas.conversion import finite
+from ..formulas.parameters import REQUIRED, Choice, Count, Number, Parameter
 from .lengths import NUMBER
 from .view import Part, described
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import SceneError
-from ..formulas.parameters import Parameter, finite, shown
+from ..formulas.conversion import finite, shown
+from ..formulas.parameters import Parameter
 
 MILLIMETRES = {"um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
 SMALLEST, LARGEST = 1e-6, 1e6

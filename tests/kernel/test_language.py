@@ -83,8 +83,8 @@ def test_pythons_own_words_are_those_of_the_vocabulary(module, body: str) -> Non
 
 
 REFUSED = {
-    "return sqr(x) - radius": "11: formula mine: 'sqr' is not a word .*did you mean sqrt?",
-    "return np.arcsinh(x)": "11: formula mine: 'np.arcsinh' is not a word",
+    "return sqr(x) - radius": "11: formula mine: 'sqr' is not in the language .*did you mean sqrt?",
+    "return np.arcsinh(x)": "11: formula mine: 'np.arcsinh' is not in the language",
     "for s in x:\n        y = s\n    return y": "11: formula mine: 'for s in x: y = s' .*a range or a tuple",
     "for s in (1.0, 2.0):\n        break\n    return x": "12: formula mine: 'break' .*a loop over a range",
     "return not (x > y)": "11: .*expected ~",
@@ -94,7 +94,7 @@ REFUSED = {
     "while radius:\n        x = y\n    return x": "11: .*not in the language",
     "return [x][0]": "11: .*not in the language",
     "return x ** radius": "11: .*whole exponent",
-    "return x.sum()": "11: .*'x.sum' is not a word",
+    "return x.sum()": "11: .*'x.sum' is not in the language",
     "return (lambda a: a)(x)": "11: .*not in the language",
     "return 'radius'": "11: .*not in the language",
     "return max(a=x, b=y)": "11: .*by their place",

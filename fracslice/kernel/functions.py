@@ -1,15 +1,49 @@
-"""Fingerprints of functions: in a notebook, the values that a function's text depends on may change."""
+"""Python functions: their parameters, the names they use from outside, and their fingerprints."""
 
 from __future__ import annotations
 
+import builtins
 from collections.abc import Callable, Hashable
 from functools import lru_cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 
-def seen(function: Callable[..., Any]) -> Hashable:
+def parameters(function: Callable[..., Any]) -> list[str]:
+    """Return the names of a function's parameters."""
+    code = function.__code__
+    return list(code.co_varnames[: code.co_argcount])
+
+
+def scope(function: Callable[..., Any]) -> dict[str, Any]:
+    """Return the names visible to a function from outside: builtins, its module's globals and its closure.
+
+    Parameters
+    ----------
+    function
+        Python function.
+
+    Returns
+    -------
+    dict
+        Values by name.
+    """
+    assert isinstance(function, FunctionType)
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    return {**vars(builtins), **function.__globals__, **{name: cell.cell_contents for name, cell in cells}}
+
+
+def is_number(value: Any) -> bool:
+    """Return True for a number, or a tuple of numbers, that a function takes from outside."""
+    if isinstance(value, tuple):
+        return all(map(is_number, value))
+    return isinstance(value, (int, float))
+
+
+def fingerprint(function: Callable[..., Any]) -> Hashable:
     """Return a fingerprint, equal while a function's code and all values it uses from outside are the same.
+
+    In a notebook, the values that a function's text depends on may change.
 
     Parameters
     ----------

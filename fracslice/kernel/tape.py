@@ -1,0 +1,224 @@
+"""Arithmetic as straight-line code, with its derivatives in forward mode.
+
+Every number is an expression with three derivatives by a point w and three by a constant c (Wengert 1964,
+"A simple automatic derivative evaluation program"). A vector also carries its stretch as far as sums and
+constant factors are known to keep it.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from .parsing import parse_expression
+
+Slopes = tuple[str | None, ...]
+"""Derivatives by w (three) and by c (three); None is zero."""
+
+FLAT: Slopes = (None,) * 6
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """Expression that is a name or a number, and its derivatives."""
+
+    atom: str
+    slopes: Slopes = FLAT
+
+    @property
+    def constant(self) -> bool:
+        """True if it depends on neither w nor c."""
+        return self.slopes == FLAT
+
+
+Stretch = tuple[str | None, str | None]
+"""Stretch by w and by c; None is zero."""
+
+
+@dataclass(frozen=True)
+class Vector:
+    """Three scalars, and the stretch if it is known."""
+
+    parts: tuple[Scalar, Scalar, Scalar]
+    stretch: Stretch | None = None
+
+
+@dataclass
+class Tape:
+    """Assignments, one for each expression.
+
+    Attributes
+    ----------
+    prefix
+        Prefix of the assigned names.
+    lines
+        Assignments.
+    names
+        Names by expression.
+    """
+
+    prefix: str
+    lines: list[str] = field(default_factory=list)
+    names: dict[str, str] = field(default_factory=dict)
+
+    def variable(self, names: str, first: int) -> Vector:
+        """Point of three names; its derivatives are those from the given index on."""
+        parts = [
+            Scalar(name, tuple("1.0" if i == first + k else None for i in range(6)))
+            for k, name in enumerate(names.split())
+        ]
+        return Vector(tuple(parts), (None, "1.0") if first else ("1.0", None))  # type: ignore[arg-type]
+
+    def name(self, code: str | None) -> str | None:
+        """Name of an expression; equal expressions have one."""
+        if code is None or code.isidentifier() or _number(code) is not None:
+            return code
+        if code not in self.names:
+            self.names[code] = f"{self.prefix}{len(self.names)}"
+            self.lines.append(f"{self.names[code]} = {code}")
+        return self.names[code]
+
+    def times(self, a: str | None, b: str | None) -> str | None:
+        """Product of two expressions."""
+        if a is None or b is None:
+            return None
+        if _number(a) == 1 or _number(b) == 1:
+            return b if _number(a) == 1 else a
+        return self.name(f"{a} * {b}")
+
+    def plus(self, a: str | None, b: str | None, sign: str = "+") -> str | None:
+        """Sum or difference of two expressions."""
+        if b is None:
+            return a
+        return self.name(f"{a} {sign} {b}" if a is not None else b if sign == "+" else f"-{b}")
+
+    def scalar(self, code: str, *slopes: tuple[str | None, Scalar]) -> Scalar:
+        """Scalar of an expression, with factors of the derivatives of others."""
+        total: list[str | None] = [None] * 6
+        for factor, of in slopes:
+            total = [self.plus(t, self.times(factor, s)) for t, s in zip(total, of.slopes, strict=True)]
+        return Scalar(str(self.name(code)), tuple(total))
+
+    def sum(self, a: Scalar, b: Scalar, sign: str) -> Scalar:
+        """Sum or difference of two scalars."""
+        slopes = [self.plus(x, y, sign) for x, y in zip(a.slopes, b.slopes, strict=True)]
+        return Scalar(str(self.plus(a.atom, b.atom, sign)), tuple(slopes))
+
+    def vector_sum(self, a: Vector, b: Vector, sign: str) -> Vector:
+        """Sum or difference of two vectors; the stretch of both is at most the sum."""
+        stretch = None
+        if a.stretch and b.stretch:
+            stretch = self.plus(a.stretch[0], b.stretch[0]), self.plus(a.stretch[1], b.stretch[1])
+        parts = tuple(self.sum(p, q, sign) for p, q in zip(a.parts, b.parts, strict=True))
+        return Vector(parts, stretch)  # type: ignore[arg-type]
+
+    def product(self, a: Scalar, b: Scalar) -> Scalar:
+        """Product of two scalars."""
+        product = str(self.times(a.atom, b.atom))
+        return Scalar(product, self.scalar(product, (b.atom, a), (a.atom, b)).slopes)
+
+    def scaled(self, a: Scalar, b: Vector) -> Vector:
+        """Vector times a scalar."""
+        stretch = None
+        if a.constant and b.stretch:
+            number = _number(a.atom)
+            size = self.name(f"absolute({a.atom})" if number is None else repr(abs(number)))
+            stretch = self.times(size, b.stretch[0]), self.times(size, b.stretch[1])
+        return Vector(tuple(self.product(a, part) for part in b.parts), stretch)  # type: ignore[arg-type]
+
+    def inverse(self, b: Scalar) -> Scalar:
+        """Reciprocal of a scalar."""
+        number = _number(b.atom)
+        if number:
+            return Scalar(repr(1.0 / number))
+        over = str(self.name(f"ratio(1.0, {b.atom})"))
+        return self.scalar(over, (self.name(f"-{over} * {over}") if not b.constant else None, b))
+
+    def intrinsic(self, name: str, given: list[Scalar]) -> Scalar:
+        """Value of an intrinsic of `DERIVATIVES`, or of ``where``."""
+        atoms = [v.atom for v in given]
+        result = str(self.name(f"{name}({', '.join(atoms)})"))
+        if all(v.constant for v in given):
+            return Scalar(result)
+        if name in ("minimum", "maximum", "where"):
+            sign = "<" if name == "minimum" else ">"
+            mask = self.name(atoms[0] if name == "where" else f"{atoms[0]} {sign} {atoms[1]}")
+            pairs = zip(given[-2].slopes, given[-1].slopes, strict=True)
+            return Scalar(result, tuple(self.chosen(mask, a, b) for a, b in pairs))
+        places = dict(zip("abc", atoms, strict=False)) | {"r": result}
+        factors = [
+            (self.name(_filled(text, places)) if text and not of.constant else None, of)
+            for text, of in zip(DERIVATIVES[name], given, strict=True)
+        ]
+        return self.scalar(result, *factors)
+
+    def chosen(self, mask: str | None, a: str | None, b: str | None) -> str | None:
+        """Expression of a where a mask holds, else of b; None is zero."""
+        return a if a == b else self.name(f"where({mask}, {a or '0.0'}, {b or '0.0'})")
+
+    def norms(self, vector: Vector) -> Stretch:
+        """Bounds of the norms of the Jacobians by w and by c."""
+        rows = [part.slopes for part in vector.parts]
+        return self.norm([r[:3] for r in rows]), self.norm([r[3:] for r in rows])
+
+    def norm(self, rows: Sequence[Slopes]) -> str | None:
+        """Bound of the norm of a matrix.
+
+        The largest eigenvalue of J J^T is at most its mean plus sqrt(2) deviations (Wolkowicz and Styan 1980,
+        "Bounds for eigenvalues using traces"), which is exact for similarities and for rank one.
+        """
+        if all(entry is None for row in rows for entry in row):
+            return None
+        if all(_number(rows[i][k] or "0") == (i == k) for i in range(3) for k in range(3)):
+            return "1.0"
+        gram = {(i, k): self.dot(rows[i], rows[k]) for i in range(3) for k in range(i, 3)}
+        trace = self.plus(self.plus(gram[0, 0], gram[1, 1]), gram[2, 2])
+        mean = self.name(f"minimum(maximum({trace} * 0.3333333333333333, 1e-30), 1e30)")
+        inverse = self.name(f"ratio(1.0, {mean})")
+        spread: str | None = None
+        for (i, k), entry in gram.items():
+            part = self.times(entry, inverse)
+            part = self.plus(part or "0.0", "1.0", "-") if i == k else part
+            square = self.times(part, part)
+            spread = self.plus(spread, square if i == k else self.times("2.0", square))
+        return self.name(f"sqrt({mean} * (1.0 + sqrt(minimum(0.6666666666666666 * {spread}, 4.0))))")
+
+    def dot(self, a: Slopes, b: Slopes) -> str | None:
+        """Dot product of two rows."""
+        total: str | None = None
+        for x, y in zip(a, b, strict=True):
+            total = self.plus(total, self.times(x, y))
+        return total
+
+
+DERIVATIVES: dict[str, tuple[str, ...]] = {
+    "sqrt": ("ratio(0.5, maximum(r, 1e-15))",),
+    "rsqrt": ("-0.5 * r * r * r",),
+    "ratio": ("ratio(1.0, b)", "-r * ratio(1.0, b)"),
+    "log": ("ratio(1.0, a)",),
+    "exp": ("r",),
+    "sin": ("cos(a)",),
+    "cos": ("-sin(a)",),
+    "atan2": ("b * ratio(1.0, a * a + b * b)", "-a * ratio(1.0, a * a + b * b)"),
+    "floor": ("",),
+    "absolute": ("where(a < 0.0, -1.0, 1.0)",),
+    "minimum": (),
+    "maximum": (),
+}
+"""Derivatives of the vocabulary by each argument, in terms of a, b and the result r."""
+
+
+def _filled(text: str, places: Mapping[str, str]) -> str:
+    tree = parse_expression(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and node.id in places:
+            node.id = places[node.id]
+    return ast.unparse(tree)
+
+
+def _number(code: str) -> float | None:
+    try:
+        return float(code)
+    except ValueError:
+        return None
