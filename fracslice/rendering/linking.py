@@ -19,9 +19,9 @@ from ..kernel.dialects import FieldDialect
 from ..kernel.linker import Linked, Linker
 from ..kernel.structure import link_tree
 from ..scene.view import Camera, Light, View
+from .cameras import camera_unit
 from .colours import Look, linear, opaque_part
 from .optics import Optics
-from .units import camera as cameras
 from .units import lights, march, shade
 from .units.intrinsics import GIVEN, background, blocker, surface
 from .units.normal import normal
@@ -118,8 +118,8 @@ class _Frame:
         self.bounces = self.view.shading.bounces if look.bounces and self.view.shading.mode == "light" else 0
         linker.functions |= {"surface": self.surface(look), "background": self.background()}
         linked = Linked(linker.text(), np.array(linker.parameters, np.float64))
-        samples, sharp = (camera_samples, self.dimensions), self.camera.aperture == 0
-        return Frame(linked, *samples, self.bounces, sharp, far, self.block)
+        samples = camera_samples, self.dimensions
+        return Frame(linked, *samples, self.bounces, self.sharp, far, self.block)
 
     def marching(self) -> None:
         """Bind the units that march rays and cones."""
@@ -142,23 +142,15 @@ class _Frame:
 
     def cameras(self) -> int:
         """Bind the camera; return the number of random numbers per camera ray."""
-        camera, (width, height) = self.camera, self.seen.size
-        scale = 2 * self.seen.cone
-        right, up = np.array(camera.right), np.array(camera.above)
-        corner = np.array(camera.forward) - right * (scale * width / 2) + up * (scale * height / 2)
-        values: dict[str, Any] = {
-            "eye": camera.eye,
-            "corner": tuple(corner),
-            "across": tuple(right * scale),
-            "down": tuple(-up * scale),
-        }
-        if camera.aperture == 0:
-            self.linker.bind("camera_ray", cameras.pinhole, values)
-            return 2
-        focus = camera.focus or math.dist(camera.eye, camera.target)
-        values |= {"right": tuple(right * camera.aperture), "up": tuple(up * camera.aperture), "focus": focus}
-        self.linker.bind("camera_ray", cameras.lens, values)
-        return 4
+        function, values = camera_unit(self.camera, self.seen.size)
+        self.linker.bind("camera_ray", function, values)
+        return 2 if self.sharp else 4
+
+    @property
+    def sharp(self) -> bool:
+        """True if all rays start at the eye."""
+        camera = self.camera
+        return not (camera.aperture or camera.stereo or camera.kind == "orthographic")
 
     def draw(self, count: int) -> list[str]:
         """Reserve random numbers and return their expressions."""
