@@ -33,10 +33,11 @@ CASES: dict[str, tuple[Node, View]] = {
     "depth of field": (torus(), View(camera=Camera(aperture=0.05), lights=(SKY,))),
     "glass and mirrors": (_glass(), View(lights=(SKY, SUN), shading=Shading(bounces=4))),
     "normals": (torus(), View(shading=Shading(mode="normal"))),
-    "parallel rays": (torus(), View(camera=Camera(kind="orthographic"), lights=(SUN,))),
-    "fisheye": (torus(), View(camera=Camera(kind="fisheye", fov=200.0), lights=(SUN,))),
-    "all around": (torus(), View(camera=Camera(kind="equirectangular", stereo=0.1), lights=(SUN,))),
-    "two eyes": (torus(), View(camera=Camera(stereo=0.1), lights=(SUN,))),
+    "fisheye": (torus(), View(camera=Camera(kind="fisheye", fov=200.0, eye=(0.0, -1.0, 0.6)), lights=(SUN,))),
+    "all around": (
+        torus(),
+        View(camera=Camera(kind="equirectangular", stereo=0.1, eye=(0.0, -1.0, 0.6)), lights=(SUN,)),
+    ),
     "steps": (torus(), View(shading=Shading(mode="steps"))),
 }
 
