@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .cluster import cluster_options, pooled
+from .families import MOST, families, going_on, suffixed
 from .inputs import check_folder, check_targets, load_scene, refuse_options
 from .options import (
     NAME,
@@ -67,6 +68,12 @@ def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | N
     metavar="TIME",
     help="Mesh the scene of this time of its <animation>, such as 2.5s.",
 )
+@click.option(
+    "--every",
+    callback=moment,
+    metavar="TIME",
+    help="Mesh the scene every so often, such as 0.5s, from the begin to the end of its <animation>.",
+)
 @click.option("--report", type=NAME, metavar="FILE.json", help="Write the figures that prove the mesh.")
 @click.option("--picture", type=NAME, metavar="FILE.png", help="Write a shaded picture of the mesh.")
 @click.option(
@@ -85,6 +92,7 @@ def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | N
 @threads_option
 @quiet_option
 @click.pass_context
+@families("output", "report", "picture")
 def mesh(
     context: click.Context,
     /,
@@ -92,6 +100,7 @@ def mesh(
     output: str,
     settings: tuple[str, ...],
     seconds: float | None,
+    every: float | None,
     report: str | None,
     picture: str | None,
     cache: str | None,
@@ -115,23 +124,41 @@ def mesh(
     if Path(output).suffix.lower() == GRID:
         names = {"chord", "simplify", "cluster", "shard", "store"}
         refuse_options(context, names, "only for meshes, and a .vdb file holds samples")
-    scene = load_scene(source, settings)
-    if seconds is not None:
-        from fracslice.animation import Timeline
-
-        scene = Timeline(scene).at(seconds)
-    job = job_of(scene, **options)
+    scenes = moments(load_scene(source, settings), seconds, every)
     how = Work(threads, store=store_in(cache), device=chosen(device))
+    problems = False
     with (
         pooled(output, threads, cluster, shard, store) as pool,
         working(replace(how, cluster=pool), quiet) as work,
     ):
-        figures = made(scene, job, output, picture, work)
-        if report is not None:
-            write_report(figures, report)
-    if not quiet:
-        click.echo(summary(output, figures))
-    return 1 if figures.problems else 0
+        for suffix, scene in scenes:
+            file, *others = (path and suffixed(path, suffix) for path in (output, picture, report))
+            with going_on(str(file)):
+                figures = made(scene, job_of(scene, **options), str(file), others[0], work)
+                if others[1] is not None:
+                    write_report(figures, others[1])
+                if not quiet:
+                    click.echo(summary(str(file), figures))
+                problems |= bool(figures.problems)
+    return 1 if problems else 0
+
+
+def moments(scene: Scene, seconds: float | None, every: float | None) -> list[tuple[str, Scene]]:
+    """Scenes of --time and --every, and what their file names end in."""
+    if seconds is None and every is None:
+        return [("", scene)]
+    from fracslice.animation import Timeline
+
+    timeline = Timeline(scene)
+    if every is None:
+        return [("", timeline.at(seconds or 0.0))]
+    if seconds is not None or not every:
+        raise click.UsageError("--every: expected a time above zero, and no --time")
+    count = int(timeline.animation.duration / every + 1e-9) + 1
+    if count > MOST:
+        raise click.UsageError(f"--every: expected at most {MOST} outputs, and this makes {count}")
+    times = [float(f"{k * every:.6g}") for k in range(count)]
+    return [(f"-{time:g}s", timeline.at(time)) for time in times]
 
 
 def store_in(folder: str | None) -> Store | None:

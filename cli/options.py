@@ -164,7 +164,8 @@ set_option = click.option(
     "settings",
     multiple=True,
     metavar="NAME.ATTRIBUTE=VALUE",
-    help="Change a value of the scene, such as mandelbulb.power=6; repeatable.",
+    help="Change a value of the scene, such as mandelbulb.power=6; repeatable. mesh, slice and render take a "
+    "range, such as mandelbulb.power=2..9:0.5, and make a file for each value.",
 )
 threads_option = click.option(
     "--threads",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .cluster import cluster_options, pooled
+from .families import families
 from .inputs import check_targets, load_scene
 from .options import (
     NAME,
@@ -159,6 +160,7 @@ def printer_option(text: str) -> Callable[..., Any]:
 @set_option
 @threads_option
 @quiet_option
+@families("output", "preview")
 def slice_(
     source: str,
     output: str,
