@@ -64,6 +64,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+from .providers import register
+
 _WHERE = {
     "Camera": "scene.view",
     "FracsliceError": "errors",
@@ -87,6 +89,14 @@ _WHERE = {
     "to_xml": "scene",
     "write": "export",
 }
+
+
+register(
+    compiler="fracslice.kernel.tree",
+    orbits="fracslice.kernel.orbits",
+    distances="fracslice.api.distances",
+    files="fracslice.export",
+)
 
 
 def __getattr__(name: str) -> Any:

@@ -61,6 +61,78 @@ def marching_cubes(
 def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
     """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) is set if < 0."""
 
+Entry = tuple[Function, NDArray[Any]] | Callable[[NDArray[float64], NDArray[float64]], None]
+"""A field: `Kernel.entry`, machine code and its parameters, or a function of points [3, n] and of values
+[1, n] to be written.
+"""
+
+class Sides:
+    """Six sides of the object within a box, proven by free balls: -x, -y, -z, x, y and z.
+
+    Parameters
+    ----------
+    sign : Entry
+        Field; its signs count.
+    conservative : Entry
+        Field to skip space by: its values divided by `lipschitz` are radii of free balls.
+    lipschitz : float
+        Lipschitz bound of `conservative`.
+    far : bool
+        True if these radii are nearly maximal, from far away too.
+    lo, hi : tuple of float
+        Box to search.
+    threads : int, optional
+        Threads; 0 for all cores. The sides do not depend on it.
+    """
+
+    def __init__(
+        self,
+        sign: Entry,
+        conservative: Entry,
+        lipschitz: float,
+        far: bool,
+        lo: Point,
+        hi: Point,
+        threads: int = 0,
+    ) -> None: ...
+    def learn(self, points: NDArray[float64]) -> None:
+        """Add interior points [3, 6, n], n for each side; those that are NaN are ignored."""
+
+    def guess(self, share: float, aim: float, most: int) -> None:
+        """Search for tips with a fraction of the Lipschitz bound; `aim` and `most` as for `prove`."""
+
+    def prove(self, aim: float, most: int) -> None:
+        """Lower the ceilings of columns to `aim` above the highest interior point; about `most` columns are
+        processed at most.
+        """
+
+    @property
+    def best(self) -> NDArray[float64]:
+        """Highest interior points of each side, [3, 6, 4], the highest first; NaN where none is known."""
+
+    @property
+    def known(self) -> NDArray[float64]:
+        """Height of the highest interior point of each side, outwards, [6]; -inf where none is known."""
+
+    @property
+    def above(self) -> NDArray[float64]:
+        """Height above which nothing is, of each side, [6]."""
+
+    @property
+    def spent(self) -> NDArray[float64]:
+        """Columns processed by each side, [6]."""
+
+def climb(
+    field: Entry,
+    starts: NDArray[float64],
+    ways: NDArray[float64],
+    gain: NDArray[float64],
+    first: float,
+    exact: float,
+    threads: int = 0,
+) -> NDArray[float64]:
+    """Extreme points of a solid in given directions; call `fracslice.volume.climbing.climb`."""
+
 class RootLoops:
     """Compiled loops that locate crossings on grid edges; keeps its arguments alive.
 
@@ -72,9 +144,8 @@ class RootLoops:
         Minimum segments of an efficient call.
     guess, find, polish : Loop
         Loops of `fracslice.volume.root_loops`: `find` in float32, `find` in float64, and `polish`.
-    field : tuple or callable
-        The same float64 field: `CpuKernel.entry`, or a function of points [3, n] and of values [1, n] to be
-        written.
+    field : Entry
+        The same float64 field.
     steps : tuple of int
         Steps for all segments, and for those that have not converged by then.
     sure : float
@@ -88,7 +159,7 @@ class RootLoops:
         guess: Loop,
         find: Loop,
         polish: Loop,
-        field: tuple[Function, NDArray[float64]] | Callable[[NDArray[float64], NDArray[float64]], None],
+        field: Entry,
         steps: tuple[int, int],
         sure: float,
     ) -> None: ...

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .scene import Print
-from .work import Clock, Work, chunks
+from .work import Clock, Work
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -148,12 +148,7 @@ def off_surface(
     """
     from .volume.accuracy import surface_error
 
-    alone = Work(1)
-
-    def task(part: slice) -> NDArray[np.float64]:
-        return surface_error(planned.root, place.units(vertices[part]), planned.voxel, alone)
-
-    return np.concatenate([np.empty(0), *work.collect(task, chunks(len(vertices), 1 << 14))])
+    return surface_error(planned.root, place.units(vertices), planned.voxel, work)
 
 
 class Finish:

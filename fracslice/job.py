@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from .mesh.check import MeshReport
     from .mesh.simplify import Simplified
     from .surfaces import Surface
-    from .volume import Bricks, Plan
+    from .volume import Bricks, Plan, SignBricks
 
 STL = ".stl"
 
@@ -187,27 +187,30 @@ class _Job:
             if length is not None:
                 yield name, length
 
-    def surface(self, aside: Callable[[], Path] | None) -> tuple[Sized, Surface, str]:
-        """Surface of the remaining bodies, and a note on walls thinner than a voxel."""
-        sized = planned(self.scene, self.what, self.clock)
-        surface = self.meshed(sized, aside)
-        thin, how = surface.thin, self.what.how(self.scene)
-        if thin and how.whole and how.sorts:  # only the field can distinguish bodies
-            sized = edited(sized.planned, self.scene, self.what, self.clock)
-            surface = self.meshed(sized, aside, again=True)
-            thin = surface.thin
-        return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, surface, thin
+    def sampled(self) -> tuple[Sized, SignBricks, bool]:
+        """Field, its samples, and the choice of bodies that is left to the mesh; true if the field chose.
 
-    def meshed(self, sized: Sized, aside: Callable[[], Path] | None, again: bool = False) -> Surface:
-        """Surface, in one piece if it fits in memory; `again`: its bodies are chosen in the field."""
+        Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
+        """
+        sized, how = planned(self.scene, self.what, self.clock), self.what.how(self.scene)
         signs = surfaces.sampled(sized.planned, self.clock)
+        thin = how.sorts and surfaces.has_thin_walls(signs)
+        if again := thin and how.whole:
+            sized = edited(sized.planned, self.scene, self.what, self.clock)
+            signs = surfaces.sampled(sized.planned, self.clock)
+            thin = surfaces.has_thin_walls(signs)
+        return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, signs, again
+
+    def surface(self, aside: Callable[[], Path] | None) -> tuple[Sized, Surface]:
+        """Surface, in one piece if it fits in memory, and the choice of bodies that is left."""
+        sized, signs, again = self.sampled()
         if (pool := self.clock.work.cluster) is not None:
             from .meshtasks import MeshRecipe
             from .scene.writer import to_xml
             from .sharedmesh import made
 
             recipe = MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
-            return made(recipe, sized.planned, signs, pool, self.clock)
+            return sized, made(recipe, sized.planned, signs, pool, self.clock)
         most, voxel = len(signs), self.what.size(self.scene) / self.what.voxels(self.scene)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
@@ -218,14 +221,14 @@ class _Job:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
         folder = aside() if aside and most < len(signs) else None
-        return surfaces.made(sized.planned, signs, most, folder, self.clock)
+        return sized, surfaces.made(sized.planned, signs, most, folder, self.clock)
 
-    def result(self, sized: Sized, surface: Surface, thin: str) -> MeshResult:
+    def result(self, sized: Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""
         from .shown import mesh_amount
 
         what, clock, size, refined = self.what, self.clock, self.what.size(self.scene), None
-        planned, signs = surface.planned, surface.signs
+        planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord_mm is not None:
             unit = sized.scale or size / max(planned.box.size)
             surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)

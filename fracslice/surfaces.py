@@ -96,6 +96,25 @@ def sampled(planned: Plan, clock: Clock) -> SignBricks:
         return sample_scene_signs(planned, clock.work)
 
 
+def has_thin_walls(signs: SignBricks) -> bool:
+    """True if walls thinner than a voxel hold too much of the material for the samples to distinguish bodies.
+
+    Parameters
+    ----------
+    signs : SignBricks
+        Samples of the surface.
+
+    Returns
+    -------
+    bool
+        True from the share on that `WholeShells.thin_walls` notes.
+    """
+    from .mesh.components import PIECES
+    from .printing.components import thin_share
+
+    return thin_share(signs) >= PIECES
+
+
 def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:
     """Raise an error for a surface that needs more memory than is available.
 

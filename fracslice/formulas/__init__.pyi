@@ -456,7 +456,7 @@ def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
     *elements : Node
         What it is applied to; several are a union.
     axis : x, y or z
-        the axis that is mirrored: what is on its positive side also appears on its negative side
+        normal of the mirror plane: the half on its positive side is mirrored to the other side
 
     Returns
     -------

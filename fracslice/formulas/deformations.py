@@ -46,7 +46,7 @@ def _twist_radius(node: Node) -> float:
     radius = node.children[0].bounds.box.radius(*across)
     if not math.isfinite(radius):
         raise node.fail(
-            f"can only twist what is bounded across the {node['axis']} axis; put <bounds> around it"
+            f"expected a solid that is bounded across the {node['axis']} axis; put <bounds> around it"
         )
     return max(radius, 1e-30)
 

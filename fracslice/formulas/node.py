@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ..errors import SceneError
-from ..late import late
+from ..providers import provider
 from . import signatures
 from .box import Box
 from .field import Bounds, Device, Field, Kernel, Loops, Precision
@@ -154,17 +154,17 @@ class Node(Operators, Field):
     @property
     def key(self) -> str:
         """See `Field.key`. All depths must be resolved, as for kernels and loops."""
-        found: str = late("kernel.tree.key")(self)
+        found: str = provider("compiler").key(self)
         return found
 
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
         """See `Field.kernel`."""
-        found: Kernel = late("kernel.tree.kernel")(self, device, precision)
+        found: Kernel = provider("compiler").kernel(self, device, precision)
         return found
 
     def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
         """See `Field.loops`."""
-        found: Loops = late("kernel.tree.loops")(self, loops, precision)
+        found: Loops = provider("compiler").loops(self, loops, precision)
         return found
 
     @property

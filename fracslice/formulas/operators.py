@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from ..late import late
+from ..providers import provider
 
 if TYPE_CHECKING:
     import numpy as np
@@ -274,7 +274,7 @@ class Operators:
         >>> sphere(0.5).distance([[0, 0, 0], [2, 0, 0]])
         array([-0.5,  1.5])
         """
-        found: NDArray[np.floating] = late("api.distances.distance")(self, points)
+        found: NDArray[np.floating] = provider("distances").distance(self, points)
         return found
 
 

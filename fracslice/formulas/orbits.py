@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..late import late
+from ..providers import provider
 from .box import Box
 from .parameters import AUTO, Count, Parameter, Vector
 from .registry import Formula, Node, shape
@@ -75,7 +75,7 @@ def code(node: Node) -> Any:
     own = {name: value for name, value in node.values.items() if name not in OWN}
     fixed = {name: value for name, value in own.items() if isinstance(value, (int, str))}
     sizes = {name: len(v) if isinstance(v, tuple) else 1 for name, v in own.items() if name not in fixed}
-    return late("kernel.orbits.Code")(STEPS[node.formula.name], tuple(sizes.items()), tuple(fixed.items()))
+    return provider("orbits").Code(STEPS[node.formula.name], tuple(sizes.items()), tuple(fixed.items()))
 
 
 def grown(node: Node) -> Any:
@@ -83,7 +83,7 @@ def grown(node: Node) -> Any:
     made = code(node)
     values = tuple((name, node[name]) for name, _ in made.sizes)
     steps = 1 if node["iterations"] == AUTO else node["iterations"]
-    found = late("kernel.orbits.growth")(made, values, node["julia"], steps)
+    found = provider("orbits").growth(made, values, node["julia"], steps)
     if found is None:
         raise node.fail("has orbits that do not escape: expected parameters that enlarge more")
     return found
@@ -95,14 +95,12 @@ def orbit_bounds(node: Node) -> Box:
 
 def orbit_arguments(node: Node) -> dict[str, object]:
     own = {f"v_{name}": node[name] for name, _ in code(node).sizes}
-    values: dict[str, object] = late("kernel.orbits.arguments")(
-        grown(node), node["iterations"], node["julia"]
-    )
+    values: dict[str, object] = provider("orbits").arguments(grown(node), node["iterations"], node["julia"])
     return {**values, **own}
 
 
 def orbit_select(node: Node) -> Callable[..., Any]:
-    found: Callable[..., Any] = late("kernel.orbits.field")(
+    found: Callable[..., Any] = provider("orbits").field(
         code(node), grown(node).by_power, node["julia"] is not None
     )
     return found

@@ -123,7 +123,8 @@ def transform_bounds(node: Node) -> Box:
 
 @domain_operator(
     axis=Axis(
-        REQUIRED, "the axis that is mirrored: what is on its positive side also appears on its negative side"
+        REQUIRED,
+        "normal of the mirror plane: the half on its positive side is mirrored to the other side",
     )
 )
 def mirror(child, x, y, z, axis):  # type: ignore[no-untyped-def]

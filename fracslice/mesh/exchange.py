@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from fracslice.errors import MeshError
 from fracslice.extras import lacking
-from fracslice.late import late
+from fracslice.providers import provider
 
 if TYPE_CHECKING:
     import trimesh
@@ -41,7 +41,7 @@ class Exchange:
         ExportError
             For an empty mesh, an unknown extension, or a file that cannot be written.
         """
-        written: Path = late("export.write")(self, path, metadata)
+        written: Path = provider("files").write(self, path, metadata)
         return written
 
     def to_trimesh(self) -> trimesh.Trimesh:

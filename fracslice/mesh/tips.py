@@ -283,7 +283,7 @@ def _found(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Wor
 
     def climbed(starts: NDArray[np.float64], ups: NDArray[np.float64], last: float) -> NDArray[np.float64]:
         ways = np.einsum("nij,jw->inw", _frames(_unit(ups)), SLANTS)
-        return climb(inside, starts.T[..., None], ways, STEP * voxel, last)[..., 0].T
+        return climb(kernel, starts.T[..., None], ways, STEP * voxel, last, work)[..., 0].T
 
     ends, starts, ups = _above(pieces, points, voxel)
     on = inside(starts.T)

@@ -2,6 +2,7 @@
 #include <nanobind/nanobind.h>
 
 namespace fracslice::volume {
+void bind_extent(nanobind::module_& module);
 void bind_signs(nanobind::module_& module);
 }  // namespace fracslice::volume
 
@@ -12,6 +13,7 @@ void bind_reduction(nanobind::module_& module);
 }  // namespace fracslice::mesh
 
 NB_MODULE(_native, module) {
+    fracslice::volume::bind_extent(module);
     fracslice::volume::bind_signs(module);
     fracslice::mesh::bind_contour(module);
     fracslice::mesh::bind_mesh(module);

@@ -7,7 +7,8 @@ import numpy as np
 from ..kernel import Field
 from ..volume.values import values_at
 from ..work import Work
-from .walls import OPPOSITE, Walls, slopes
+from .crossings import slopes
+from .walls import OPPOSITE, Walls
 
 STEP = 0.05
 """Step of central differences, voxels."""

@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import VolumeError
-from ..formulas import Box, Node, box, cylinder, plane, transform, union
+from ..formulas import Box, box, plane, transform
 from ..kernel import Field
 from ..meshjob import DUST
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
-from ..volume.grid import from_grid, to_grid
 from ..work import Work
 from .edits import edited
 
@@ -32,9 +31,6 @@ COARSE, FINE = 128, 640
 
 SHARP = 6
 """Samples across a length to thicken, close or keep, as far as `FINE` permits."""
-
-POCKET = 0.1
-"""Fraction of the largest hollow's volume below which another hollow stays solid instead of being drained."""
 
 THIN = 1.0
 """Area of walls or gaps that samples may miss, from which finer samples are taken, mm^2."""
@@ -258,46 +254,16 @@ class _Preparation:
         return edited(self.thing, "add", made)
 
     def hollowed(self) -> Field:
-        """Remove everything deeper than the wall thickness, and drill two drain holes into each hollow.
+        """Remove everything deeper than the wall thickness, and drill drain holes."""
+        from .hollowing import hollows
 
-        With drain holes, hollows under `POCKET` of the largest stay solid.
-        """
-        from .components import components_of
-        from .samples import Samples, positions
-
-        swept = to_grid(self.sampled(self.how.hollow)).redistance()
-        hollow = from_grid(swept.offset(-self.how.hollow / self.scale))
-        found = components_of(hollow)
-        numbers, count = found.bodies, found.count
-        if not len(numbers):
-            raise VolumeError(f"walls of {self.how.hollow:g} mm leave nothing to hollow out")
-        if not self.how.drain:
-            return edited(self.thing, "cut", Samples(hollow))
-        large, holes = count[numbers] >= POCKET * count[numbers[0]], list[Node]()
-        thing = edited(self.thing, "cut", Samples(found.without(numbers[~large])))
-        for number in numbers[large]:
-            at = (found.labels == number) & (hollow.values > -hollow.voxel)
-            points = np.array(hollow.origin) + hollow.voxel * positions(hollow, *np.nonzero(at))
-            holes += self.drains(points, -hollow.values[at])
-        return edited(thing, "cut", union(*holes))
-
-    def drains(self, hollow: np.ndarray, depth: np.ndarray) -> Iterator[Node]:
-        """Drain holes of one hollow: one sideways, one upwards.
-
-        The first leads from the lowest point to the nearer side along x, as the plate would close a hole
-        downwards. The second leads upwards from the highest point, which hangs lowest on the printer. hollow:
-        points in the hollow next to its wall, [n, 3]. depth: their distances from the wall, [n].
-        """
-        radius, outer = self.how.drain / self.scale / 2, self.planned.outer
-        lowest, highest = (hollow[:, 2] - depth).argmin(), (hollow[:, 2] + depth).argmax()
-        x, y, z = hollow[lowest].tolist()
-        z -= float(depth[lowest])
-        to = outer.hi[0] + radius if x - outer.lo[0] > outer.hi[0] - x else outer.lo[0] - radius
-        side = cylinder(radius=radius, height=abs(to - x))
-        yield transform(side, rotate=(0, 1, 0, 90), translate=((x + to) / 2, y, z + radius))
-        x, y, z = hollow[highest].tolist()
-        low, high = z - radius, outer.hi[2] + radius
-        yield transform(cylinder(radius=radius, height=high - low), translate=(x, y, (low + high) / 2))
+        samples, how, thing = self.sampled(self.how.hollow), self.how, self.thing
+        cuts = hollows(samples, how.hollow / self.scale, how.drain / self.scale, self.planned.outer)
+        if not cuts:
+            raise VolumeError(f"walls of {how.hollow:g} mm leave nothing to hollow out")
+        for cut in cuts:
+            thing = edited(thing, "cut", cut)
+        return thing
 
 
 def _spaced(points: np.ndarray, voxel: float) -> np.ndarray:

@@ -7,22 +7,21 @@ the object begins, and on to where it ends. For gaps all signs are reversed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from ..compiled import compiled
 from ..errors import VolumeError
 from ..kernel import Field, Kernel
-from ..rows import Rows
 from ..volume import Lattice, sample
 from ..volume.values import values_at
 from ..work import Work
+from .crossings import crossed, slopes
 from .offset_field import OffsetField
+from .rays import Rays, first_negative
 from .samples import Samples
-from .walls import AT_ONCE, OPPOSITE, Direction, Walls, crossed, gathered, slopes, walls
+from .walls import AT_ONCE, OPPOSITE, Direction, Walls, gathered, walls
 
 NEAR = 0.9
 """Offset in voxels: more than the distance from any point to the nearest sample, half the diagonal."""
@@ -38,9 +37,6 @@ STEP = 0.05
 
 SLACK = 0.25
 """Voxels before a thick wall or gap in which nothing else is searched for."""
-
-ROUNDS = 400
-"""Maximum number of steps along a ray."""
 
 RAYS = 1 << 13
 """Rays traced at a time by one thread."""
@@ -115,25 +111,6 @@ def thin_features(root: Field, seen: Samples, work: Work) -> tuple[ThinFeatures,
 
 
 @dataclass(frozen=True, eq=False)
-class _Rays(Rows):
-    """Rays that start next to a surface and pass through it.
-
-    start, directions: float64 [n, 3]. area: [n], surface that each represents. enter, leave: [n], distances
-    along the ray to the beginning and the end of the thin wall or gap.
-    """
-
-    start: np.ndarray
-    directions: np.ndarray
-    area: np.ndarray
-    enter: np.ndarray
-    leave: np.ndarray
-
-    def points(self, s: np.ndarray) -> np.ndarray:
-        """Points at distances `s` along the rays, [3, n]."""
-        return np.asarray(self.start.T + s * self.directions.T)
-
-
-@dataclass(frozen=True, eq=False)
 class _Look:
     """A search for the thin features of a field: its samples, and the maximum width in scene units."""
 
@@ -155,7 +132,7 @@ class _Look:
         return ThinFeatures(found, 0.0 if self.root.bounds.exterior_only else self.most)
 
     @cached_property
-    def inwards(self) -> _Rays:
+    def inwards(self) -> Rays:
         """Rays through all thin walls."""
         return self.rays(1.0)
 
@@ -189,7 +166,7 @@ class _Look:
         back = self.first(replace(rays, directions=-rays.directions), 0 * limit, limit, -1.0)
         return self.facing(rays.chosen(rays.enter + back > limit))
 
-    def stretch(self, rays: _Rays, begin: np.ndarray, sign: float) -> _Rays:
+    def stretch(self, rays: Rays, begin: np.ndarray, sign: float) -> Rays:
         """Rays along which the field times `sign`, positive from `begin` on, turns negative within `most`.
 
         They enter at `begin` and leave at the change of sign.
@@ -198,22 +175,22 @@ class _Look:
         leave = self.first(rays, begin, end, sign)
         return replace(rays, enter=begin, leave=leave).chosen(leave < end)
 
-    def rays(self, sign: float) -> _Rays:
+    def rays(self, sign: float) -> Rays:
         """Rays through all thin walls (sign 1), or from within thick walls through thin gaps (sign -1)."""
         reach = NEAR * self.voxel * self.root.bounds.lipschitz
         offset_field = self.offset_field(sign * reach)
 
-        def look(rows: slice) -> _Rays:
+        def look(rows: slice) -> Rays:
             start, normals, area = crossed(offset_field, rows)
             far = np.full(len(start), 2 * (reach + self.voxel))
-            rays = self.limited(_Rays(start, -sign * normals, area, 0 * area, far), sign)
+            rays = self.limited(Rays(start, -sign * normals, area, 0 * area, far), sign)
             enter = self.first(rays, np.full(len(rays.start), BEFORE * self.voxel), rays.leave, sign)
             rays = replace(rays, enter=enter).chosen(enter < rays.leave)
             return self.stretch(rays, rays.enter, -sign)
 
         return gathered(look, len(offset_field.bricks), AT_ONCE, self.work)
 
-    def limited(self, rays: _Rays, sign: float) -> _Rays:
+    def limited(self, rays: Rays, sign: float) -> Rays:
         """Rays that may enter something thin, with the distance up to which they are traced.
 
         If the field's values are distances, these are all rays that may leave within `most` what they enter
@@ -228,7 +205,7 @@ class _Look:
         f = sign * self.field(rays.points(middle))
         return rays.chosen(~(f <= -half * self.root.bounds.lipschitz))
 
-    def missed(self, rays: _Rays, s: np.ndarray) -> _Rays:
+    def missed(self, rays: Rays, s: np.ndarray) -> Rays:
         """Rays to continue at distance `s`; of a fractal, only where its samples miss the surface."""
         if not self.root.bounds.exterior_only:
             return rays
@@ -246,22 +223,22 @@ class _Look:
                 failure = error
         raise failure
 
-    def first(self, rays: _Rays, begin: np.ndarray, end: np.ndarray, sign: float) -> np.ndarray:
+    def first(self, rays: Rays, begin: np.ndarray, end: np.ndarray, sign: float) -> np.ndarray:
         """Distance along each ray at which the field times `sign` first turns negative after `begin`.
 
         Beyond `end` if it does not.
         """
 
         def field(which: np.ndarray, s: np.ndarray) -> np.ndarray:
-            return sign * self.field(_points(rays.start, rays.directions, which, s))
+            return sign * self.field(rays.some_points(which, s))
 
-        return _first(field, begin, end, self.root.bounds.lipschitz, STEP * self.voxel)
+        return first_negative(field, begin, end, self.root.bounds.lipschitz, STEP * self.voxel)
 
     def field(self, points: np.ndarray) -> np.ndarray:
         """Field values at points [3, n]."""
         return values_at(self.kernel, points, self.work)
 
-    def facing(self, rays: _Rays) -> Walls:
+    def facing(self, rays: Rays) -> Walls:
         """Rays whose two faces look away from each other, as walls."""
 
         def look(part: slice) -> Walls:
@@ -312,44 +289,3 @@ def all_walls(root: Field, seen: Samples, limit: float, work: Work, *, gaps: boo
     if exterior_only:
         found = walls(seen, limit, work, gaps=gaps) + found
     return found.chosen(found.width < limit)
-
-
-@compiled
-def _points(start, directions, which, s):  # type: ignore[no-untyped-def]
-    """Points at distances `s` along some rays, [3, n]."""
-    points = np.empty((3, len(s)))
-    for i in range(len(s)):
-        for axis in range(3):
-            points[axis, i] = start[which[i], axis] + s[i] * directions[which[i], axis]
-    return points
-
-
-def _first(
-    field: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    begin: np.ndarray,
-    end: np.ndarray,
-    bound: float,
-    least: float,
-) -> np.ndarray:
-    """Distance along each ray at which a field first turns negative after `begin`; beyond `end` if never.
-
-    field: values from numbers of rays and distances along them. bound: its Lipschitz bound. Steps follow the
-    distance (sphere tracing, Hart 1996). Over the last step, of length `least`, the field is taken as linear.
-    """
-    s, before, todo = begin + least, begin.copy(), np.arange(len(begin))
-    high, low = np.full((2, len(begin)), least * bound / 2)
-    for _ in range(ROUNDS):
-        f = field(todo, s[todo])
-        on, below = todo[f >= 0], todo[f < 0]
-        before[on], high[on], low[below] = s[on], f[f >= 0], f[f < 0]
-        s[on] += np.maximum(high[on] / bound, least)
-        far = below[s[below] - before[below] > 1.01 * least]
-        s[far] = (before[far] + s[far]) / 2
-        todo = np.concatenate([on[s[on] < end[on]], far])
-        if not len(todo):
-            break
-    s[todo] = end[todo]
-    found = s < end
-    share = low[found] / (low[found] - high[found])
-    s[found] -= share * (s[found] - before[found])
-    return s

@@ -10,8 +10,8 @@ from typing import Any
 
 from ..formulas.conversion import finite
 from ..formulas.parameters import REQUIRED, Choice, Count, Number, Parameter
+from .element import Part, described
 from .lengths import NUMBER
-from .view import Part, described
 
 LONGEST = 1e5
 """Longest time, seconds."""

@@ -11,9 +11,10 @@ from ..formulas.parameters import REQUIRED, Choice, Parameter
 from ..formulas.plugins import load_installed
 from ..formulas.registry import Formula
 from .animation import Animation, Track
+from .element import Part
 from .lengths import Length
 from .printing import Print
-from .view import PARTS, Part
+from .view import PARTS
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..formulas.parameters import Choice
+from .element import Part, described
 from .lengths import Length
-from .view import Part, described
 
 
 def _length(doc: str, default: float = 0.0) -> Length:
@@ -24,28 +24,23 @@ class Print(Part):
 
     element = "print"
     cavities: Literal["keep", "fill"] = described(
-        Choice("keep", "hollows that nothing reaches stay or are filled", ("keep", "fill"))
+        Choice("keep", "sealed cavities stay or are filled", ("keep", "fill"))
     )
     keep: Literal["all", "largest"] = described(
         Choice("all", "all bodies stay, or the largest alone", ("all", "largest"))
     )
     bridge: float = described(_length("loose bodies are joined where they are nearest, by struts this thick"))
     gap: float = described(_length("gaps up to this width are closed"))
-    thickness: float = described(_length("what is thinner is thickened to this"))
+    thickness: float = described(_length("thinner walls are thickened to this"))
     hollow: float = described(_length("the object is hollowed out, leaving walls this thick"))
     drain: float = described(_length("diameter of the two holes that let the resin out of the hollow", 3.0))
-    base: float = described(_length("so much is cut off at the bottom, to stand flat"))
+    base: float = described(_length("height that is cut off at the bottom, to stand flat"))
     raft: float = described(_length("the object stands on a plate of this height"))
 
     def validate(self) -> None:
         """Raise `SceneError` for `keep` combined with `bridge`."""
         if self.keep == "largest" and self.bridge:
             raise self.fail("keep and bridge: expected one of them; where one body stays, none is loose")
-
-    @property
-    def chooses(self) -> bool:
-        """True if the result depends on the connected components."""
-        return self.keep == "largest" or self.bridge > 0
 
     @property
     def sorts(self) -> bool:

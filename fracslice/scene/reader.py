@@ -19,10 +19,11 @@ from ..formulas.parameters import REQUIRED
 from ..formulas.registry import DEEPEST, TOO_DEEP
 from ..nearest import hint
 from .animation import Animation, Track
+from .element import Part
 from .layout import SCENE, SECTIONS, SOLID, Element, TopElement, formulas
 from .model import Scene, computing, scene
 from .printing import Print
-from .view import Part, View
+from .view import View
 
 LARGEST_FILE = 16 << 20
 BEFORE = b"\0\xff\xfe\xef\xbb\xbf \t\r\n"

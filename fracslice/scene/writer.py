@@ -7,10 +7,10 @@ from html import escape
 from typing import Any
 
 from ..formulas import Node
+from .element import Part
 from .layout import SCENE, SECTIONS, SOLID, VERSION, Element
 from .model import Scene
 from .printing import Print
-from .view import Part
 
 
 def to_xml(scene: Scene) -> str:

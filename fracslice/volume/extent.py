@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._native import Sides
 from ..errors import VolumeError
 from ..formulas.box import Box
 from ..kernel import Field
 from ..work import Work
 from .climbing import SLANTS, climb
-from .sides import UNKNOWN, FreeSpace, Side
+from .values import values_at
 
 TURNS = 8
 """Attempts to enlarge the searched box because the object leaves it, or to shrink it."""
@@ -41,8 +42,11 @@ LITTLE, MOST = 1 << 14, 1 << 17
 EXACT = 2.5e-7
 """Last step of the outward search for tips, as a fraction of the longest side."""
 
-OUTWARDS = np.array([[-1], [1]])
-"""Signs of the lower and upper sides."""
+SIGNS = np.repeat([-1, 1], 3)
+"""Outward signs of the sides -x, -y, -z, x, y and z."""
+
+WAYS = np.stack([sign * np.roll(SLANTS, side % 3 - 2, 0) for side, sign in enumerate(SIGNS)], 1)
+"""Steps of the sides, [3, 6, w]."""
 
 BENEATH = np.array([0.0, 1e-3, 0.01, 0.1, 0.5])
 """Depths beneath a vertex in voxels, tested for an interior point."""
@@ -105,9 +109,9 @@ def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
         along = f"{', '.join(axes)} and {last}" if axes else last
         state = "".join(f", or state the box of {n} with @{n}.bounds" for n in root.bounds.boxless[:1])
         raise VolumeError(f"the scene has no end along {along}; put <bounds> around it{state}")
-    field = _free_space(root, work or Work())
+    search = _Search(root, work or Work())
     for _ in range(TURNS):
-        found = _search(field, box, resolution)
+        found = search.extent(box, resolution)
         if found and max(found.outer.size) > max(box.size) / 2:
             return found
         box = found.outer if found else box.grown(max(box.size) / 2)
@@ -138,75 +142,81 @@ def reached(root: Field, points: np.ndarray, voxel: float, work: Work | None = N
     Box
         Bounds, scene units.
     """
-    field = _free_space(root, work or Work())
-    found = _box(np.stack([points.min(1), points.max(1)]))
-    exact = EXACT * max(found.size)
-    sides = _sides(field, found)
-    for side in sides:
-        beneath = np.zeros((3, len(BENEATH)))
-        beneath[side.axis] = -side.sign * voxel * BENEATH
-        near = (points[:, :, None] + beneath[:, None]).reshape(3, -1)
-        side.learn(near[:, field.inside(near)])
-    _climb(field, sides, voxel / 2, exact)
-    known = [s.known if np.isfinite(s.known) else s.above for s in sides]
-    return found | _box(OUTWARDS * np.reshape(known, (2, 3)))
+    within, search = _box(np.stack([points.min(1), points.max(1)])), _Search(root, work or Work())
+    sides = search.sides(within)
+    beneath = -voxel * BENEATH * SIGNS[:, None]
+    near = points[:, None, :, None] + np.eye(3)[:, np.arange(6) % 3, None, None] * beneath[None, :, None]
+    near = near.reshape(3, 6, -1)
+    sides.learn(np.where(search.inside(near), near, np.nan))
+    search.climb(sides, voxel / 2, EXACT * max(within.size))
+    known = np.where(np.isfinite(sides.known), sides.known, sides.above)
+    return within | _box((SIGNS * known).reshape(2, 3))
 
 
-def _free_space(root: Field, work: Work) -> FreeSpace:
-    conservative = root.conservative()
-    bounds = conservative.bounds
-    return FreeSpace(root.kernel(), conservative.kernel(), bounds.lipschitz, not bounds.exterior_only, work)
+class _Search:
+    """Search for the sides of a field's object.
+
+    Parameters
+    ----------
+    root
+        Field.
+    work
+        Execution settings.
+    """
+
+    def __init__(self, root: Field, work: Work) -> None:
+        conservative = root.conservative()
+        self.kernel, self.work, bounds = root.kernel(), work, conservative.bounds
+        self.far = not bounds.exterior_only
+        self._free = conservative.kernel().entry, bounds.lipschitz, self.far
+
+    def sides(self, region: Box) -> Sides:
+        """Sides of the object within a box."""
+        return Sides(self.kernel.entry, *self._free, region.lo, region.hi, self.work.threads)
+
+    def inside(self, points: np.ndarray) -> np.ndarray:
+        """Mask of the interior points, bool [...], of points [3, ...]."""
+        found: np.ndarray = values_at(self.kernel, points.reshape(3, -1), self.work) < 0
+        return found.reshape(points.shape[1:])
+
+    def climb(self, sides: Sides, first: float, exact: float) -> None:
+        """Move the tips of all sides outwards."""
+        sides.learn(climb(self.kernel, sides.best, WAYS, first, exact, self.work))
+
+    def extent(self, box: Box, resolution: float) -> Extent | None:
+        """Extent of the object if `box` contains it, else None."""
+        longest = max(box.size) or 1.0
+        sides = self.sides(box.grown(MARGIN * longest))
+        cells = (np.indices((FIRST,) * 3).reshape(3, -1) + SHIFT) / FIRST
+        points = np.array(box.lo)[:, None] + cells * np.array(box.size)[:, None]
+        _learn(sides, points[:, self.inside(points)])
+        step, aim, exact, most = longest / FIRST, SHARE * longest / resolution, EXACT * longest, MOST
+        for share in () if self.far else BOLD:
+            self.climb(sides, step, exact)
+            sides.guess(share, exact, LITTLE)
+        while True:
+            self.climb(sides, step, exact)
+            sides.prove(aim, most)
+            if not np.isfinite(sides.known).all():
+                raise VolumeError("there is no surface: nothing in the scene is inside")
+            _learn(sides, sides.best[:, :, 0])
+            if aim <= exact or (sides.spent >= LITTLE).all():
+                break
+            step, aim, most = aim, max(aim / FINER, exact), LITTLE
+        self.climb(sides, aim, exact)
+        limits, longest_out = np.array([box.lo, box.hi]), MARGIN / 2 * longest
+        reach, above = ((SIGNS * heights).reshape(2, 3) for heights in (sides.known, sides.above))
+        outwards = SIGNS.reshape(2, 3)
+        if (outwards * (reach - limits) > longest_out).any():
+            return None
+        found = _box(np.where(np.abs(reach - limits) <= 2 * exact, limits, reach + outwards * exact / 2))
+        outer = _box(above) | found.grown(exact)
+        return Extent(found, outer.about(found.centre), np.ascontiguousarray(sides.best[:, :, 0]))
 
 
-def _sides(field: FreeSpace, region: Box) -> list[Side]:
-    """Six sides in the order of the tips of an extent."""
-    return [Side(field, region, axis, sign, UNKNOWN) for sign in (-1, 1) for axis in range(3)]
-
-
-def _search(field: FreeSpace, box: Box, resolution: float) -> Extent | None:
-    """Extent of the object if `box` contains it, else None."""
-    longest = max(box.size) or 1.0
-    sides = _sides(field, box.grown(MARGIN * longest))
-    cells = (np.indices((FIRST,) * 3).reshape(3, -1) + SHIFT) / FIRST
-    points = np.array(box.lo)[:, None] + cells * np.array(box.size)[:, None]
-    _learn(sides, points[:, field.inside(points)])
-    step, aim, exact, most = longest / FIRST, SHARE * longest / resolution, EXACT * longest, MOST
-    for share in () if field.far else BOLD:
-        _climb(field, sides, step, exact)
-        for side in sides:
-            side.guess(share, exact, LITTLE)
-    while True:
-        _climb(field, sides, step, exact)
-        for side in sides:
-            side.prove(aim, most)
-        if not np.isfinite([side.known for side in sides]).all():
-            raise VolumeError("there is no surface: nothing in the scene is inside")
-        _learn(sides, np.stack([side.tip for side in sides], 1))
-        if aim <= exact or all(side.spent >= LITTLE for side in sides):
-            break
-        step, aim, most = aim, max(aim / FINER, exact), LITTLE
-    _climb(field, sides, aim, exact)
-    limits = np.array([box.lo, box.hi])
-    reach = OUTWARDS * np.reshape([side.known for side in sides], (2, 3))
-    above = OUTWARDS * np.reshape([side.above for side in sides], (2, 3))
-    if (OUTWARDS * (reach - limits) > MARGIN / 2 * longest).any():
-        return None
-    found = _box(np.where(np.abs(reach - limits) <= 2 * exact, limits, reach + OUTWARDS * exact / 2))
-    outer = _box(above) | found.grown(exact)
-    return Extent(found, outer.about(found.centre), np.stack([side.tip for side in sides], 1))
-
-
-def _learn(sides: list[Side], points: np.ndarray) -> None:
-    for side in sides:
-        side.learn(points)
-
-
-def _climb(field: FreeSpace, sides: list[Side], first: float, exact: float) -> None:
-    """Move the tips of all sides outwards."""
-    ways = np.stack([side.sign * np.roll(SLANTS, side.axis - 2, 0) for side in sides], 1)
-    here = climb(field.inside, np.stack([side.best for side in sides], 1), ways, first, exact)
-    for side, points in zip(sides, here.swapaxes(0, 1), strict=True):
-        side.learn(points)
+def _learn(sides: Sides, points: np.ndarray) -> None:
+    """Add interior points [3, n] to all sides."""
+    sides.learn(np.ascontiguousarray(np.broadcast_to(points[:, None], (3, 6, points.shape[1]))))
 
 
 def _box(corners: np.ndarray) -> Box:

@@ -7,14 +7,16 @@ import pytest
 
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, julia, mandelbulb, shell, sphere, transform, union
+from fracslice.mesh import extract
+from fracslice.mesh.extract import contour_pieces
 from fracslice.printing import connectivity, printable
-from fracslice.printing.components import Components, components_of
+from fracslice.printing.components import Components, components_of, thin_share
 from fracslice.printing.connectivity import resolved
 from fracslice.printing.edits import EditedField
 from fracslice.printing.make import COARSE
 from fracslice.printing.thin_features import thin_features
 from fracslice.scene import Print, scene
-from fracslice.volume import Lattice, Plan, plan, sample
+from fracslice.volume import Lattice, Plan, plan, sample, sample_scene_signs
 from fracslice.work import Work
 
 SIZE = 20.0
@@ -142,11 +144,22 @@ THIN = scene(union(shell(sphere(), thickness=0.01), BALL), size="20mm")
 """Of which a mesh of 48 voxels has crumbs, the ball the largest of them."""
 
 
-def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest() -> None:
+@pytest.fixture
+def contoured(monkeypatch: pytest.MonkeyPatch) -> list[object]:
+    """Calls of the mesher."""
+    calls: list[object] = []
+    monkeypatch.setattr(
+        extract, "contour_pieces", lambda *those: calls.append(those) or contour_pieces(*those)
+    )
+    return calls
+
+
+def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest(contoured: list[object]) -> None:
     """The field does: of the shell all crumbs stay, at the shell's size, and it is said that they are."""
     whole, kept = (
         make_mesh(THIN, MeshJob(resolution=48, printing=Print(keep=keep))) for keep in ("all", "largest")
     )
+    assert len(contoured) == 2  # once for each: bodies are chosen before anything is meshed
     assert whole.report.mesh.components == kept.report.mesh.components + 1 > 100
     assert kept.mesh.size == pytest.approx([20] * 3, rel=0.03)
     for result, size in ((whole, 20 / 48), (kept, 20 / 48 * 2.4 / 2)):
@@ -155,10 +168,18 @@ def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest() -> None:
         assert float(note.split()[-2]) == pytest.approx(2 * size, rel=0.05)
 
 
-def test_a_mesh_in_pieces_is_filled_by_what_the_field_tells() -> None:
+@pytest.mark.parametrize("thickness", [0.4, 0.8, 1.25, 2.5])
+def test_the_share_of_thin_walls_is_that_of_the_thickness(thickness: float) -> None:
+    """Of a shell in voxels and a thick ball of a twentieth of its area."""
+    planned = plan(union(shell(sphere(), thickness=thickness / 24), at(sphere(radius=0.25), 1.4, 0, 0)), 64)
+    share = thin_share(sample_scene_signs(planned))
+    assert share > 0.5 if thickness < 1 else share == 0
+
+
+def test_a_mesh_in_pieces_is_filled_by_what_the_field_tells(contoured: list[object]) -> None:
     filled = make_mesh(THIN, MeshJob(resolution=48, printing=Print(cavities="fill"))).report
     scale = 20 / 2.4
-    assert filled.notes == ()
+    assert filled.notes == () and len(contoured) == 1
     assert filled.mesh.volume_mm3 == pytest.approx(4 / 3 * np.pi * (1 + 0.1**3) * scale**3, rel=0.02)
 
 

@@ -60,7 +60,7 @@ def refused(text: str | bytes) -> str:
         ("<box round='3'/>", "f.xml:3: <box> round=3: expected at most half the shortest edge, 0.5"),
         (
             "<twist degrees='9'><plane/></twist>",
-            "f.xml:3: <twist> can only twist what is bounded across the z axis",
+            "f.xml:3: <twist> expected a solid that is bounded across the z axis",
         ),
         (
             "<transform scale='0'><box/></transform>",

@@ -99,7 +99,7 @@ def test_several_elements_are_a_union():
         (lambda: scene(size=1), "at least one element"),
         (lambda: scene(sphere(), size="0mm"), "size '0mm': expected a length above zero"),
         (lambda: scene(sphere(), size=float("nan")), "size nan: expected a length"),
-        (lambda: scene(twist(plane(), degrees=9), size=1), "<twist> can only twist what is bounded"),
+        (lambda: scene(twist(plane(), degrees=9), size=1), "<twist> expected a solid that is bounded"),
     ],
 )
 def test_impossible_scenes_are_refused_in_python_too(make, message):

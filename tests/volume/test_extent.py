@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from fracslice import MeshJob, make_mesh
-from fracslice.errors import VolumeError
+from fracslice.errors import Cancelled, VolumeError
 from fracslice.formulas import (
     Node,
     box,
@@ -23,10 +25,13 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.formulas.box import Box
+from fracslice.formulas.field import Bounds, Device, Kernel, Precision
 from fracslice.kernel import compile_scene
+from fracslice.kernel.arrays import ArrayField
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.volume import extent, plan
+from fracslice.work import Work
 
 PLATE = box(size=(60, 40, 2))
 VOXELS = 256
@@ -159,3 +164,42 @@ def test_a_tip_that_was_lost_is_told() -> None:
 def test_a_plate_that_coarse_samples_miss_has_its_size() -> None:
     root = union(box(size=(210, 210, 1)), transform(box(size=(9, 9, 40)), translate=(0, 0, 20)))
     assert plan(root, 64).box.size == pytest.approx((210, 210, 40.5), rel=1e-5)
+
+
+@dataclass(frozen=True, eq=False)
+class Interpreted(ArrayField):
+    """A field without machine code, as edited ones are."""
+
+    root: Node
+
+    @property
+    def bounds(self) -> Bounds:
+        return self.root.bounds
+
+    @property
+    def key(self) -> str:
+        return "interpreted"
+
+    def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
+        return _Interpreted(self.root.kernel(device, precision))
+
+
+class _Interpreted(Kernel):
+    def __init__(self, kernel: Kernel) -> None:
+        self.dtype, self.points = kernel.dtype, kernel.points  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize("root", [mandelbulb(iterations=3), thing(1)], ids=["exterior only", "distances"])
+def test_the_extent_is_the_same_for_any_threads_and_without_machine_code(root: Node) -> None:
+    alone, many = extent(root, 48, Work(threads=1)), extent(root, 48, Work(threads=6))
+    interpreted = extent(Interpreted(root), 48, Work(threads=2))
+    for other in (many, interpreted):
+        assert (other.box, other.outer) == (alone.box, alone.outer)
+        assert np.array_equal(other.tips, alone.tips)
+
+
+def test_planning_stops_when_it_is_cancelled() -> None:
+    work = Work(threads=2)
+    work.cancel.set()
+    with pytest.raises(Cancelled):
+        extent(thing(0), 48, work)

@@ -1,0 +1,144 @@
+// The sides of an object, and climbs to its tips, for fracslice._native.
+#include "../machine.h"
+#include "../numpy.h"
+#include "../unlocked.h"
+#include "climb.h"
+#include "side.h"
+
+#include <tbb/parallel_for.h>
+
+namespace fracslice::volume {
+namespace {
+
+using Rows3 = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using Row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+template <class Real>
+FieldValues compiled(const Machine<Real>& code) {
+    using R = const Real*;
+    auto run = code.template function<R, R, R, R, Real*, ptrdiff_t>();
+    return in_batches<Real>([code, run, p = code.array(1)](R x, R y, R z, Real* f, size_t n) { run(p, x, y, z, f, ptrdiff_t(n)); });
+}
+
+// Of `Kernel.entry`: machine code in either precision, or a function of points [3, n] that writes their values to [1, n].
+FieldValues field_values(nb::object entry) {
+    if (nb::isinstance<nb::tuple>(entry)) {
+        const bool single = nb::cast<nb::ndarray<nb::ro>>(entry[1]).dtype() == nb::dtype<float>();
+        return single ? compiled(Machine<float>(entry)) : compiled(Machine<double>(entry));
+    }
+    return [entry](const Rows& rows, size_t n) {
+        nb::gil_scoped_acquire locked;
+        Array<double> points(3, n), values(1, n);
+        size_t k = 0;
+        for (const double* row : {rows.x, rows.y, rows.z}) std::copy_n(row, n, &points.data[n * k++]);
+        double* f = values.data.get();  // the array below owns it
+        nb::object out = to_numpy(std::move(values), {1, n});
+        entry(to_numpy(std::move(points), {3, n}), out);
+        std::copy_n(f, n, rows.f);
+    };
+}
+
+// The six sides of an object, lower ones first, in the order of the axes.
+class Sides {
+  public:
+    Sides(const Sides&) = delete;  // field_ refers to members
+    Sides(nb::object sign, nb::object conservative, double lipschitz, bool far, const Point& lo, const Point& hi, int threads)
+        : sign_(field_values(sign)), conservative_(field_values(conservative)), field_{sign_, conservative_, lipschitz, far},
+          threads_(threads) {
+        for (int k = 0; k < 6; ++k) sides_.emplace_back(lo, hi, k % 3, k < 3 ? -1 : 1);
+    }
+
+    // points[:, k] are of side k.
+    void learn(const Rows3& points) {
+        if (points.shape(0) != 3 || points.shape(1) != sides_.size()) throw nb::value_error("expected rows of x, y, z by side");
+        const size_t n = points.shape(2), row = n * sides_.size();
+        for (size_t k = 0; k < sides_.size(); ++k) {
+            for (const double* p = points.data() + n * k; p < points.data() + n * (k + 1); ++p) {
+                if (p[0] == p[0]) sides_[k].learn({p[0], p[row], p[2 * row]});
+            }
+        }
+    }
+    void guess(double share, double aim, size_t most) {
+        each([&](Side& side) { side.guess(field_, share, aim, most); });
+    }
+    void prove(double aim, size_t most) {
+        each([&](Side& side) { side.prove(field_, aim, most); });
+    }
+
+    nb::object best() const {
+        Array<double> points(3, sides_.size() * kBest);
+        double* to = points.data.get();
+        for (size_t axis = 0; axis < 3; ++axis) {
+            for (const Side& side : sides_) {
+                for (const Point& p : side.best()) *to++ = p[axis];
+            }
+        }
+        return to_numpy(std::move(points), {3, sides_.size(), kBest});
+    }
+    nb::object known() const {
+        return of_sides([](const Side& side) { return side.known(); });
+    }
+    nb::object above() const {
+        return of_sides([](const Side& side) { return side.above(); });
+    }
+    nb::object spent() const {
+        return of_sides([](const Side& side) { return double(side.spent()); });
+    }
+
+  private:
+    template <class Do>
+    void each(const Do& act) {
+        unlocked(threads_, [&] {
+            tbb::parallel_for(size_t(0), sides_.size(), [&](size_t k) { act(sides_[k]); });
+            return 0;
+        });
+    }
+    template <class Value>
+    nb::object of_sides(const Value& value) const {
+        Array<double> values(sides_.size(), 1);
+        for (size_t k = 0; k < sides_.size(); ++k) values.data[k] = value(sides_[k]);
+        return to_numpy(std::move(values), {sides_.size()});
+    }
+
+    FieldValues sign_, conservative_;
+    FreeSpace field_;
+    int threads_;
+    std::vector<Side> sides_;
+};
+
+nb::object climbed(nb::object entry, const Rows3& starts, const Rows3& ways, const Row& gain, double first, double exact,
+                   int threads) {
+    const size_t n = starts.shape(1), each = starts.shape(2), steps = gain.shape(0), row = n * each, way = n * steps;
+    if (starts.shape(0) != 3 || ways.shape(0) != 3 || ways.shape(1) != n || ways.shape(2) != steps) {
+        throw nb::value_error("expected starts and ways of as many directions, and gains of as many steps");
+    }
+    FieldValues field = field_values(entry);
+    Array<double> points(3, row);
+    double* p = points.data.get();
+    std::copy_n(starts.data(), 3 * row, p);
+    const double* w = ways.data();
+    unlocked(threads, [&] {
+        climb(field, {p, p + row, p + 2 * row}, n, each, {w, w + way, w + 2 * way, gain.data(), steps}, first, exact);
+        return 0;
+    });
+    return to_numpy(std::move(points), {3, n, each});
+}
+
+}  // namespace
+
+void bind_extent(nb::module_& module) {
+    using namespace nanobind::literals;
+    nb::class_<Sides>(module, "Sides")
+        .def(nb::init<nb::object, nb::object, double, bool, const Point&, const Point&, int>(), "sign"_a, "conservative"_a,
+             "lipschitz"_a, "far"_a, "lo"_a, "hi"_a, "threads"_a = 0)
+        .def("learn", &Sides::learn, "points"_a)
+        .def("guess", &Sides::guess, "share"_a, "aim"_a, "most"_a)
+        .def("prove", &Sides::prove, "aim"_a, "most"_a)
+        .def_prop_ro("best", &Sides::best)
+        .def_prop_ro("known", &Sides::known)
+        .def_prop_ro("above", &Sides::above)
+        .def_prop_ro("spent", &Sides::spent);
+    module.def("climb", &climbed, "field"_a, "starts"_a, "ways"_a, "gain"_a, "first"_a, "exact"_a, "threads"_a = 0);
+}
+
+}  // namespace fracslice::volume

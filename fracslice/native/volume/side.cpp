@@ -1,0 +1,172 @@
+#include "side.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fracslice::volume {
+namespace {
+
+constexpr size_t kColumns = 32;            // initial ones along each axis
+constexpr double kNarrowest = 1.0 / 65536;  // smallest width: the field is zero there, but not below
+constexpr size_t kFront = size_t(1) << 13;  // about as many columns are processed together
+constexpr double kDepths[] = {2, 8};        // below a ceiling, in radii of the column: probed for interior points
+constexpr size_t kProbes = 64;              // columns whose segment up to the ceiling is probed
+constexpr int kSteps = 16;                  // of such a segment
+constexpr double kRounding = 4 * double(std::numeric_limits<float>::epsilon());  // of a distance, by the largest coordinate
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+// NaN comes last.
+bool before(double a, double b) { return a < b || (std::isnan(b) && !std::isnan(a)); }
+
+}  // namespace
+
+Side::Side(const Point& lo, const Point& hi, int axis, int sign) : axis_(axis), sign_(sign), lo_(lo), hi_(hi) {
+    best_.fill({NAN, NAN, NAN});
+    floor_ = std::min(sign * lo[axis], sign * hi[axis]);
+    above_ = std::max(sign * lo[axis], sign * hi[axis]);
+    longest_ = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
+    const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+    half_ = {(hi[a] - lo[a]) / kColumns / 2, (hi[b] - lo[b]) / kColumns / 2};
+    radius_ = std::hypot(half_[0], half_[1]);
+    for (size_t i = 0; i < kColumns * kColumns; ++i) {
+        columns_.push(lo[a] + half_[0] * double(2 * (i / kColumns) + 1), lo[b] + half_[1] * double(2 * (i % kColumns) + 1), 1,
+                      above_);
+    }
+}
+
+void Side::learn(const Point& point) {
+    const double key = -sign_ * point[axis_];
+    size_t k = 0;
+    while (k < kBest && !before(key, -sign_ * best_[k][axis_])) ++k;  // behind equal ones
+    if (k < kBest) {
+        std::move_backward(best_.begin() + k, best_.end() - 1, best_.end());
+        best_[k] = point;
+    }
+    const double height = sign_ * best_[0][axis_];
+    known_ = std::isnan(height) ? -kInfinite : height;
+}
+
+void Side::guess(const FreeSpace& field, double share, double aim, size_t most) {
+    const FreeSpace bold{field.sign, field.conservative, share * field.lipschitz, field.far};
+    Side other(lo_, hi_, axis_, sign_);
+    for (int k = 0; k < 2; ++k) {  // twice, so that the two highest are the starts of the next climb
+        for (const Point& p : best_) other.learn(p);
+    }
+    other.prove(bold, aim, most);
+    best_ = other.best_;
+}
+
+void Side::prove(const FreeSpace& field, double aim, size_t most) {
+    std::vector<double> tops;
+    while (spent_ < most) {
+        Columns left, front;
+        tops.clear();
+        const double least = std::max(known_, floor_);
+        auto waits = [&](size_t i) { return high(columns_.top[i], aim) && columns_.width[i] > kNarrowest; };
+        for (size_t i = 0; i < columns_.size(); ++i) {
+            if (columns_.top[i] > least && waits(i)) tops.push_back(columns_.top[i]);
+        }
+        double lowest = -kInfinite;
+        if (tops.size() > kFront) {
+            const auto rank = tops.end() - kFront;
+            std::nth_element(tops.begin(), rank, tops.end());
+            lowest = *rank;
+        }
+        for (size_t i = 0; i < columns_.size(); ++i) {
+            if (columns_.top[i] <= least) continue;
+            (waits(i) && columns_.top[i] >= lowest ? front : left).push(columns_, i);
+        }
+        columns_ = std::move(left);
+        if (!front.size()) break;
+        lower(field, front, aim);
+    }
+    above_ = std::max(known_, floor_);
+    for (double top : columns_.top) above_ = std::max(above_, top);
+}
+
+Point Side::point(double u, double v, double height) const {
+    Point found;
+    found[(axis_ + 1) % 3] = u, found[(axis_ + 2) % 3] = v, found[axis_] = sign_ * height;
+    return found;
+}
+
+// Whether a ceiling is to be lowered.
+bool Side::high(double ceiling, double aim) const { return ceiling > std::max(known_ + aim, floor_); }
+
+// Lowers the ceilings of columns, and splits in four those not lowered much.
+void Side::lower(const FreeSpace& field, const Columns& front, double aim) {
+    const size_t n = front.size();
+    spent_ += n;
+    std::vector<double> lower = front.top;
+    drop(field, front, front.top, lower);
+    if (field.far && std::isfinite(known_)) {
+        // From this height, a ball that spans the column comes within `aim` of a flat face.
+        std::vector<double> heights(n);
+        for (size_t i = 0; i < n; ++i) {
+            const double r = radius(front.width[i]);
+            heights[i] = known_ + std::min(std::max(r * r / aim, front.top[i] - known_), longest_ / 2);
+        }
+        drop(field, front, heights, lower);
+    }
+    Columns stuck;
+    for (size_t i = 0; i < n; ++i) {
+        const bool splits = front.top[i] - lower[i] < radius(front.width[i]) / 2 && high(lower[i], aim);
+        (splits ? stuck : columns_).push(front.u[i], front.v[i], front.width[i], lower[i]);
+    }
+    probe(field, stuck);
+    for (size_t i = 0; i < stuck.size(); ++i) {
+        for (double a : {-0.5, 0.5}) {
+            for (double b : {-0.5, 0.5}) {
+                columns_.push(stuck.u[i] + a * half_[0] * stuck.width[i], stuck.v[i] + b * half_[1] * stuck.width[i],
+                              stuck.width[i] / 2, stuck.top[i]);
+            }
+        }
+    }
+}
+
+// Lowers to where free balls around some heights empty the columns that they span.
+void Side::drop(const FreeSpace& field, const Columns& front, const std::vector<double>& heights, std::vector<double>& lower) {
+    points_.clear();
+    double largest = 0;
+    for (size_t i = 0; i < front.size(); ++i) {
+        const Point p = point(front.u[i], front.v[i], heights[i]);
+        for (double x : p) largest = std::max(largest, std::abs(x));
+        points_.push(p);
+    }
+    points_.evaluate(field.conservative);
+    for (size_t i = 0; i < front.size(); ++i) {
+        const double f = points_.f[i], free = f > 0 ? f / field.lipschitz - kRounding * largest : 0;
+        const double r = radius(front.width[i]);
+        if (free > r) lower[i] = std::min(lower[i], heights[i] - std::sqrt(std::max(free * free - r * r, 0.0)));
+    }
+}
+
+// Searches for interior points slightly below the ceilings; from the highest ones found, up to the ceilings too.
+void Side::probe(const FreeSpace& field, const Columns& stuck) {
+    for (double depth : kDepths) {
+        points_.clear();
+        auto deep = [&](size_t i) { return stuck.top[i] - depth * radius(stuck.width[i]); };
+        for (size_t i = 0; i < stuck.size(); ++i) points_.push(point(stuck.u[i], stuck.v[i], deep(i)));
+        points_.evaluate(field.sign);
+        std::vector<size_t> inside;
+        for (size_t i = 0; i < stuck.size(); ++i) {
+            if (points_.f[i] < 0 && deep(i) > known_) inside.push_back(i);
+        }
+        for (size_t i : inside) learn(points_[i]);
+        std::stable_sort(inside.begin(), inside.end(), [&](size_t i, size_t j) { return stuck.top[i] > stuck.top[j]; });
+        inside.resize(std::min(inside.size(), kProbes));
+        points_.clear();
+        for (int step = 1; step < kSteps; ++step) {
+            for (size_t i : inside) {
+                const double height = stuck.top[i] - depth * radius(stuck.width[i]) * (double(step) / kSteps);
+                points_.push(point(stuck.u[i], stuck.v[i], height));
+            }
+        }
+        points_.evaluate(field.sign);
+        for (size_t i = 0; i < points_.size(); ++i) {
+            if (points_.f[i] < 0) learn(points_[i]);
+        }
+    }
+}
+
+}  // namespace fracslice::volume

@@ -1,0 +1,71 @@
+"""Hollows of an object, and the holes that drain them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..formulas import Box, Node, cylinder, transform, union
+from ..kernel import Field
+from ..volume import Bricks
+from ..volume.grid import from_grid, to_grid
+from .components import components_of
+from .samples import Samples, positions
+
+POCKET = 0.1
+"""Fraction of the largest hollow's volume below which another hollow stays solid instead of being drained."""
+
+
+def hollows(solid: Bricks, wall: float, drain: float, outer: Box) -> list[Field]:
+    """Return what to cut: everything deeper than the wall, and two drain holes for each hollow.
+
+    With drain holes, hollows under `POCKET` of the largest stay solid.
+
+    Parameters
+    ----------
+    solid : Bricks
+        Samples of the object.
+    wall : float
+        Thickness of the walls, scene units.
+    drain : float
+        Diameter of the holes, scene units; 0 for none.
+    outer : Box
+        Conservative bounds of the object, scene units.
+
+    Returns
+    -------
+    list of Field
+        Fields to cut, in order; empty if the walls leave nothing to hollow out.
+    """
+    inner = from_grid(to_grid(solid).redistance().offset(-wall))
+    components = components_of(inner)
+    numbers, count = components.bodies, components.count
+    if not len(numbers):
+        return []
+    if not drain:
+        return [Samples(inner)]
+    large, holes = count[numbers] >= POCKET * count[numbers[0]], list[Node]()
+    for number in numbers[large]:
+        at = (components.labels == number) & (inner.values > -inner.voxel)
+        points = np.array(inner.origin) + inner.voxel * positions(inner, *np.nonzero(at))
+        holes += _drains(points, -inner.values[at], drain / 2, outer)
+    return [Samples(components.without(numbers[~large])), union(*holes)]
+
+
+def _drains(hollow: np.ndarray, depth: np.ndarray, radius: float, outer: Box) -> Iterator[Node]:
+    """Drain holes of one hollow: one sideways, one upwards.
+
+    The first leads from the lowest point to the nearer side along x, as the plate would close a hole
+    downwards. The second leads upwards from the highest point, which hangs lowest on the printer. hollow:
+    points in the hollow next to its wall, [n, 3]. depth: their distances from the wall, [n].
+    """
+    lowest, highest = (hollow[:, 2] - depth).argmin(), (hollow[:, 2] + depth).argmax()
+    x, y, z = hollow[lowest].tolist()
+    z -= float(depth[lowest])
+    to = outer.hi[0] + radius if x - outer.lo[0] > outer.hi[0] - x else outer.lo[0] - radius
+    side = cylinder(radius=radius, height=abs(to - x))
+    yield transform(side, rotate=(0, 1, 0, 90), translate=((x + to) / 2, y, z + radius))
+    x, y, z = hollow[highest].tolist()
+    low, high = z - radius, outer.hi[2] + radius
+    yield transform(cylinder(radius=radius, height=high - low), translate=(x, y, (low + high) / 2))

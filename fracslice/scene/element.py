@@ -1,0 +1,85 @@
+"""Records behind the elements of a scene file.
+
+Every field carries a parameter kind that reads, validates, writes and documents it, as in formulas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar
+
+from ..errors import SceneError
+from ..formulas.parameters import validate
+
+
+def described(kind: Any) -> Any:
+    """Return a dataclass field with a parameter kind.
+
+    Parameters
+    ----------
+    kind : Parameter
+        Parameter kind; its default is the field's.
+
+    Returns
+    -------
+    Any
+        The field.
+    """
+    return field(default=kind.default, metadata={"kind": kind})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """Base of the records of a scene file.
+
+    Attributes
+    ----------
+    element : str
+        Element name.
+    many : bool
+        True if the element may be repeated.
+    place : str or None
+        Position in the file, "file:line".
+
+    Raises
+    ------
+    SceneError
+        If a value is invalid.
+    """
+
+    element: ClassVar[str]
+    many: ClassVar[bool] = False
+    place: str | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        validate(self, self.kinds(), self.fail)
+        self.validate()
+
+    def validate(self) -> None:
+        """Raise `SceneError` for values that are invalid in combination."""
+
+    @classmethod
+    def kinds(cls) -> dict[str, Any]:
+        """Return the parameter kinds.
+
+        Returns
+        -------
+        dict of str to Parameter
+            Kinds by field name.
+        """
+        return {f.name: f.metadata["kind"] for f in fields(cls) if "kind" in f.metadata}
+
+    def fail(self, message: str) -> SceneError:
+        """Return the error to raise about this element.
+
+        Parameters
+        ----------
+        message : str
+            The message.
+
+        Returns
+        -------
+        SceneError
+            The error.
+        """
+        return SceneError(f"{self.place + ': ' if self.place else ''}<{self.element}> {message}")
