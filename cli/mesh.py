@@ -18,6 +18,7 @@ from .options import (
     NAME,
     job_of,
     job_options,
+    moment,
     print_options,
     quiet_option,
     set_option,
@@ -36,16 +37,6 @@ if TYPE_CHECKING:
     from fracslice.work import Work
 
 GRID = ".vdb"
-
-
-def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
-    """Parse a time of an animation into seconds."""
-    from fracslice.scene.animation import Seconds
-
-    try:
-        return None if text is None else Seconds(0.0, "").read(text)
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r}: expected {error}") from None
 
 
 @click.command()

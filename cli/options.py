@@ -72,6 +72,16 @@ def length(_: click.Context, __: click.Parameter, value: str | None) -> float | 
         raise click.BadParameter(str(error)) from None
 
 
+def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
+    """Parse a time of an animation into seconds."""
+    from fracslice.scene.animation import Seconds
+
+    try:
+        return None if text is None else Seconds(0.0, "").read(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: expected {error}") from None
+
+
 def amount(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
     """Check that a number is at least zero."""
     if value is not None and value < 0:
