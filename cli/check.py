@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .inputs import check_targets, is_model, load_model, load_scene, refuse_options
+from .layers import LAYER, PIXEL_MM, as_high_as_wanted, heights, printer_option
 from .options import (
     NAME,
     job_of,
@@ -24,7 +24,6 @@ from .options import (
     source_argument,
     threads_option,
 )
-from .slice import LAYER, PIXEL_MM, as_high_as_wanted, heights, printer_option
 from .summary import figures, summary
 from .working import working
 
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from fracslice.scene import Print
     from fracslice.slicing import Stack
     from fracslice.slicing.checks import PrintReport
+    from fracslice.volume.sizing import Sizing
     from fracslice.work import Work
 
 OF_LAYERS = {"pixel", "machine", "picture", "fix"}
@@ -90,12 +90,17 @@ def check(
         refuse_options(context, OF_MESHES, "only for meshes, and --layer checks layers")
         scene = load_scene(source, options["settings"])
         with working(threads, quiet) as work:
-            size, how = options["size"] or scene.size_mm, printing_of(scene, options)
+            from fracslice.volume.sizing import sizing
+
+            size = sizing(scene, options["size"], options["scale"], work)
+            how = printing_of(scene, options)
             numbers, lines, problems = of_layers(source, scene.root, size, how, options, work)
     else:
         refuse_options(context, OF_LAYERS, "only with --layer")
         with working(threads, quiet) as work:
             numbers, lines, problems = of_mesh(source, options, work)
+    import json
+
     click.echo(json.dumps(numbers, indent=2) if as_json else os.linesep.join(filter(None, lines)))
     return 1 if problems else 0
 
@@ -123,8 +128,9 @@ def of_model(source: str, options: dict[str, Any], work: Work) -> Checked:
     from fracslice.mesh.check import check_mesh
     from fracslice.mesh.field import MeshField
     from fracslice.scene import Print
+    from fracslice.volume.sizing import UP, Sizing
 
-    mesh = load_model(source)
+    mesh = placed(load_model(source), options)
     report = check_mesh(mesh, threads=work.threads)
     line, numbers = f"{source}: {figures(report)}", report.as_dict()
     if not report.watertight:
@@ -136,8 +142,20 @@ def of_model(source: str, options: dict[str, Any], work: Work) -> Checked:
         "pixel": options["pixel"] or (None if options["machine"] else max(height, PIXEL_MM)),
     }
     given = {name: value for name, value in options.items() if name in Print.kinds() and value is not None}
-    layers, lines, problems = of_layers(source, MeshField(mesh), size, Print(**given), options, work)
+    options = options | {"up": UP}
+    how = Sizing(size, 1.0), Print(**given)
+    layers, lines, problems = of_layers(source, MeshField(mesh), *how, options, work)
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
+
+
+def placed(mesh: Mesh, options: dict[str, Any]) -> Mesh:
+    """Mesh turned and scaled as the options say."""
+    from fracslice.formulas.algebra import product
+    from fracslice.volume.sizing import SAME, UP, orientation
+
+    if options["up"] == UP and options["scale"] == SAME:
+        return mesh
+    return replace(mesh, vertices=product(mesh.vertices, orientation(options["up"], options["scale"])))
 
 
 def longest(mesh: Mesh) -> float:
@@ -146,7 +164,7 @@ def longest(mesh: Mesh) -> float:
 
 
 def of_layers(
-    source: str, root: Field, size: float, how: Print, options: dict[str, Any], work: Work
+    source: str, root: Field, size: Sizing, how: Print, options: dict[str, Any], work: Work
 ) -> Checked:
     """Check the layers of an object; with --fix, mend it and check it again."""
     from fracslice.printing.problems import mended
@@ -160,14 +178,15 @@ def of_layers(
     if not settings:
         return numbers, lines, problems
     flags = " ".join(f"--{name} {value}" for name, value in settings.items())
-    size = float(settings.pop("size", f"{size}mm")[:-2])
+    if smaller := settings.pop("size", None):
+        size = replace(size, side=float(smaller[:-2]) / max(size.factors), unit=None)
     values = {name: Print.kinds()[name].read(text) for name, text in settings.items()}
     after, again, left = examined(f"with {flags}", root, size, replace(how, **values), options, work)
     return {"before": numbers, "flags": flags, "after": after}, [*lines, *again], left
 
 
 def examined(
-    name: str, root: Field, size: float, how: Print, options: dict[str, Any], work: Work
+    name: str, root: Field, size: Sizing, how: Print, options: dict[str, Any], work: Work
 ) -> tuple[dict[str, Any], list[str], list[Any]]:
     """Check the layers of an object once."""
     from fracslice.slicing import SliceJob, plan_stack
@@ -178,7 +197,8 @@ def examined(
     if pixel is not None and machine is not None:
         raise click.UsageError("--pixel and --printer: expected one of them")
     square = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
-    stack = plan_stack(root, SliceJob(size, options["layer"][0], square, printing=how), work)
+    sides = size.side, options["layer"][0], square, options["up"], how, size.factors, size.unit
+    stack = plan_stack(root, SliceJob(*sides), work)
     if machine and (unfit := misfit(stack, machine)):
         return (
             {"size": stack.size, "fits": False, "problems": [str(unfit)]},

@@ -24,9 +24,9 @@ def formulas(name: str | None, file: str | None) -> None:
     from fracslice.kernel.trial import trial
 
     trials = [(formula.name, trial(formula)) for formula in run_file(file)]
-    for formula, found in trials:
-        click.echo("\n".join([f"{formula}:", *(f"  {line}" for line in found.lines)]))
+    for formula, result in trials:
+        click.echo("\n".join([f"{formula}:", *(f"  {line}" for line in result.lines)]))
     if not trials:
         raise KernelError(f"{file}: registers no formulas")
-    if any(found.faults for _, found in trials):
+    if any(result.faults for _, result in trials):
         raise KernelError("faults were found")

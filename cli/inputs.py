@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from fracslice.scene import Scene
 
 
+MODELS = frozenset({".stl", ".3mf", ".ply", ".obj", ".glb"})
+"""Extensions of `fracslice.mesh.reading.READERS`, which commands of scenes need not import."""
+
+
 class BadInput(click.ClickException):
     """The input of a command cannot be used."""
 
@@ -44,9 +48,7 @@ def load_scene(source: str, settings: Iterable[str] = ()) -> Scene:
 
 def is_model(source: str) -> bool:
     """True if the file name has the extension of a model."""
-    from fracslice.mesh.reading import READERS
-
-    return Path(source).suffix.lower() in READERS
+    return Path(source).suffix.lower() in MODELS
 
 
 def load_model(source: str) -> Mesh:

@@ -30,9 +30,11 @@ from fracslice.version import __version__
 from .animate import animate
 from .bench import bench
 from .check import check
+from .explore import explore
 from .fly import fly
 from .formulas import formulas
 from .mesh import mesh
+from .print import print_
 from .render import render
 from .scenes import scenes
 from .show import show
@@ -68,7 +70,7 @@ def run_formulas(context: click.Context, option: click.Parameter, files: Sequenc
         run_file(file)
 
 
-for command in (mesh, render, animate, slice_, check, show, fly, formulas, scenes, bench):
+for command in (mesh, render, animate, explore, slice_, print_, check, show, fly, formulas, scenes, bench):
     command.params.append(
         click.Option(
             ["--formulas"],

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import shutil
-import tempfile
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from .closing import DENSITIES, of_mesh
 from .cluster import cluster_options, pooled
 from .families import MOST, families, going_on, suffixed
 from .inputs import check_folder, check_targets, load_scene, refuse_options
@@ -19,6 +18,7 @@ from .options import (
     job_of,
     job_options,
     moment,
+    price_option,
     print_options,
     quiet_option,
     set_option,
@@ -80,6 +80,13 @@ GRID = ".vdb"
     help="The device that samples the field; cpu by default. auto: the GPU, if there is one.",
 )
 @cluster_options
+@click.option(
+    "--material",
+    type=click.Choice(list(DENSITIES)),
+    default="resin",
+    help="Material of the weight in the summary; resin by default.",
+)
+@price_option("kilogram")
 @threads_option
 @quiet_option
 @click.pass_context
@@ -99,6 +106,8 @@ def mesh(
     cluster: str | None,
     shard: str | None,
     store: str | None,
+    material: str,
+    price: float | None,
     threads: int,
     quiet: bool,
     **options: Any,
@@ -125,12 +134,13 @@ def mesh(
         for suffix, scene in scenes:
             file, *others = (path and suffixed(path, suffix) for path in (output, picture, report))
             with going_on(str(file)):
-                figures = made(scene, job_of(scene, **options), str(file), others[0], work)
+                result = made(scene, job_of(scene, **options), str(file), others[0], work)
                 if others[1] is not None:
-                    write_report(figures, others[1])
+                    write_report(result.report, others[1])
                 if not quiet:
-                    click.echo(summary(str(file), figures))
-                problems |= bool(figures.problems)
+                    click.echo(summary(str(file), result.report))
+                    click.echo(os.linesep.join(of_mesh(result, material, price).lines()))
+                problems |= bool(result.report.problems)
     return 1 if problems else 0
 
 
@@ -163,13 +173,13 @@ def store_in(folder: str | None) -> Store | None:
     return Store(Path(folder))
 
 
-def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> Report:
+def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> MeshResult:
     """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.export import write
     from fracslice.job import make_mesh, metadata
 
     if picture is None and Path(output).suffix.lower() != GRID:
-        return make_mesh(scene, job, work, path=output).report
+        return make_mesh(scene, job, work, path=output)
     result = make_mesh(scene, job, work)
     work.check()
     if Path(output).suffix.lower() == GRID:
@@ -180,7 +190,7 @@ def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Wor
         from fracslice.viewer import picture as draw
 
         draw(result.mesh, picture)
-    return result.report
+    return result
 
 
 def check_outputs(source: str, output: str, report: str | None, picture: str | None) -> None:
@@ -201,6 +211,9 @@ def check_outputs(source: str, output: str, report: str | None, picture: str | N
 
 def write_grid(result: MeshResult, path: str, about: dict[str, str]) -> None:
     """Write the samples, in mm, as an OpenVDB file."""
+    import shutil
+    import tempfile
+
     from fracslice.export import replacing
     from fracslice.volume.grid import write_vdb
 
@@ -213,6 +226,8 @@ def write_grid(result: MeshResult, path: str, about: dict[str, str]) -> None:
 
 def write_report(report: Report, path: str) -> None:
     """Write the report as JSON."""
+    import json
+
     from fracslice.export import replacing
 
     with replacing(path) as file:

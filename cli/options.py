@@ -64,10 +64,12 @@ def source_argument(metavar: str) -> Callable[..., Any]:
 
 def length(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
     """Parse a length into mm."""
+    if value is None:
+        return None
     from fracslice.scene import parse_length
 
     try:
-        return None if value is None else parse_length(value)
+        return parse_length(value)
     except SceneError as error:
         raise click.BadParameter(str(error)) from None
 
@@ -89,6 +91,25 @@ def amount(_: click.Context, __: click.Parameter, value: float | None) -> float 
     return value
 
 
+def direction(
+    _: click.Context, __: click.Parameter, value: tuple[float, float, float] | None
+) -> tuple[float, float, float]:
+    """Check a direction; up without one."""
+    if value is not None and not any(value):
+        raise click.BadParameter("0 0 0: expected a direction")
+    return value or (0.0, 0.0, 1.0)
+
+
+def factors(_: click.Context, __: click.Parameter, text: str | None) -> tuple[float, ...]:
+    """Parse the compensation of shrinkage into factors along x, y and z."""
+    from fracslice.scene.lengths import Percent
+
+    try:
+        return Percent(None, "").read(text or "100%")
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: expected {error}") from None
+
+
 def job_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Decorator that adds the mesh options, which `job_of` takes."""
     for option in reversed(_JOB):
@@ -96,13 +117,31 @@ def job_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+size_option = click.option(
+    "--size",
+    callback=length,
+    metavar="LENGTH",
+    help="The longest side, such as 80mm, 8cm or 3.1in; the scene's by default.",
+)
+up_option = click.option(
+    "--up",
+    nargs=3,
+    type=NUMBER,
+    callback=direction,
+    metavar="X Y Z",
+    help="The object's direction that is up; 0 0 1 by default.",
+)
+scale_option = click.option(
+    "--scale",
+    callback=factors,
+    metavar="N%[,N%,N%]",
+    help="Compensate shrinkage: 102%, or 102%,102%,101% along x, y and z; 100% by default.",
+)
+
 _JOB = [
-    click.option(
-        "--size",
-        callback=length,
-        metavar="LENGTH",
-        help="The longest side, such as 80mm, 8cm or 3.1in; the scene's by default.",
-    ),
+    size_option,
+    up_option,
+    scale_option,
     click.option("--voxel", callback=length, metavar="LENGTH", help="Voxel size, such as 0.25mm."),
     click.option(
         "--resolution",
@@ -134,10 +173,12 @@ _JOB = [
 
 def print_value(context: click.Context, option: click.Parameter, text: str | None) -> Any:
     """Parse the value of an attribute of `<print>`."""
+    if text is None:
+        return None
     from fracslice.scene import Print
 
     try:
-        return None if text is None else Print.kinds()[str(option.name)].read(text)
+        return Print.kinds()[str(option.name)].read(text)
     except ValueError as error:
         raise click.BadParameter(f"{text!r}: expected {error}") from None
 
@@ -167,6 +208,11 @@ def printing_of(scene: Scene, options: dict[str, Any]) -> Print:
     """Print settings of the scene, overridden by the given options."""
     names = [name for name, *_ in _PRINT]
     return replace(scene.printing, **{n: options[n] for n in names if options[n] is not None})
+
+
+def price_option(of: str) -> Callable[..., Any]:
+    """Decorator that adds --price, the price of a unit of material."""
+    return click.option("--price", type=NUMBER, callback=amount, metavar="N", help=f"Price of a {of}.")
 
 
 set_option = click.option(
@@ -207,4 +253,6 @@ def job_of(
         printing=printing_of(scene, others),
         chord_mm=others["chord"],
         simplify_mm=others["simplify"],
+        up=others["up"],
+        scale=others["scale"],
     )

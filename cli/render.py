@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import click
 
 from fracslice.errors import Cancelled, SharedError
-from fracslice.work import Work
 
 from .cluster import cluster_options, pooled
 from .families import families
@@ -21,6 +20,8 @@ from .options import NAME, Whole, device_option, quiet_option, set_option, sourc
 from .working import KeptError, working
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from fracslice.rendering import Pass, Renderer
     from fracslice.scene import Scene
 
@@ -37,6 +38,17 @@ def pixels(_: click.Context, __: click.Parameter, value: str | None) -> tuple[in
             f"{value!r}: expected pixels across and down, such as 1280x720, from 1 to 32768"
         )
     return int(match[1]), int(match[2])
+
+
+def part(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int, int, int] | None:
+    """Parse a part of a picture such as 100,50,640,480."""
+    if value is None:
+        return None
+    match = re.fullmatch(r"\s*(\d{1,5})\s*,\s*(\d{1,5})\s*,\s*(\d{1,5})\s*,\s*(\d{1,5})\s*", value)
+    if not match:
+        raise click.BadParameter(f"{value!r}: expected left, top, width and height, such as 100,50,640,480")
+    x, y, width, height = map(int, match.groups())
+    return x, y, width, height
 
 
 def duration(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
@@ -57,7 +69,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     type=NAME,
     required=True,
     metavar="FILE",
-    help="A .png file, or .exr or .tif for linear floats.",
+    help="A .png, .jpg or .webp file, or .exr or .tif for linear floats.",
 )
 @click.option(
     "--samples",
@@ -70,6 +82,22 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     callback=pixels,
     metavar="WxH",
     help="Pixels across and down; the scene's by default, or 1280x720.",
+)
+@click.option(
+    "--crop",
+    callback=part,
+    metavar="X,Y,W,H",
+    help="Render only this part: left, top, width and height in pixels.",
+)
+@click.option(
+    "--seed",
+    type=Whole(0, 2**31 - 1),
+    default=0,
+    metavar="N",
+    help="Number of the random samples; 0 by default.",
+)
+@click.option(
+    "--layers", is_flag=True, help="Add depth, normal, position, albedo and samples to the .exr file."
 )
 @device_option
 @click.option(
@@ -102,6 +130,9 @@ def render(
     output: str,
     samples: int | None,
     size: tuple[int, int] | None,
+    crop: tuple[int, int, int, int] | None,
+    seed: int,
+    layers: bool,
     device: str,
     limit: float | None,
     bits: str,
@@ -117,8 +148,12 @@ def render(
     """Render a picture of SCENE, as its camera, lights and materials say."""
     from fracslice.export.images import check_image
     from fracslice.rendering import Renderer
+    from fracslice.rendering.layers import layers as rendered_layers
+    from fracslice.rendering.sequence import Samples
+    from fracslice.work import Work
 
-    check_image(output)
+    if check_image(output) != ".exr" and layers:
+        raise click.BadParameter("expected an .exr file as --output, which holds them", param_hint="--layers")
     check_targets(source, output, state)
     if pass_images:
         check_folder(Path(pass_images))
@@ -127,7 +162,7 @@ def render(
         pooled(output, threads, cluster, shard, store) as pool,
         working(Work(threads, cluster=pool), quiet) as work,
     ):
-        renderer = Renderer(scene.root, scene.view, size, work, device)
+        renderer = Renderer(scene.root, scene.view, size, work, device, Samples(seed=seed), crop)
         aside = None if pool is None or state else pool.pieces.path(f"{renderer.key}.npz")
         state = state or aside
         if state and Path(state).exists():
@@ -136,7 +171,7 @@ def render(
 
         def write(path: str | Path, done: Pass, bits: str) -> str:
             save(path, done, scene, bits, threads)
-            return f"{path}: {renderer.width} x {renderer.height} pixels, {reached(done)}"
+            return described(path, renderer)
 
         try:
             for done in timed(renderer, samples, limit):
@@ -155,12 +190,15 @@ def render(
             raise KeptError(write(output, renderer.seen(), bits)) from None
     if not first:
         raise SharedError("the samples are made; shard 1 writes the file")
-    written = write(output, renderer.seen(), bits)
+    more = rendered_layers(renderer) if layers else None
+    save(output, renderer.seen(), scene, bits, threads, more)
     if aside:
         Path(aside).unlink(missing_ok=True)
     if not quiet:
         took = time.monotonic() - start
-        click.echo(f"{written}, {renderer.setup.precision}, {renderer.device}, {took:.1f} s")
+        click.echo(
+            f"{described(output, renderer)}, {renderer.setup.precision}, {renderer.device}, {took:.1f} s"
+        )
 
 
 def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
@@ -183,6 +221,8 @@ def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Itera
     finally:
         if timer:
             timer.cancel()
+        if expired.is_set():
+            renderer.work.cancel.clear()
 
 
 def reached(done: Pass) -> str:
@@ -195,10 +235,23 @@ def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
     return min(done.samples / (samples or renderer.setup.view.film.samples), 1.0)
 
 
-def save(path: str | Path, done: Pass, scene: Scene, bits: str, threads: int) -> None:
+def described(path: str | Path, renderer: Renderer) -> str:
+    """Line on a written picture."""
+    return f"{path}: {renderer.width} x {renderer.height} pixels, {reached(renderer.seen())}"
+
+
+def save(
+    path: str | Path,
+    done: Pass,
+    scene: Scene,
+    bits: str,
+    threads: int,
+    layers: dict[str, np.ndarray] | None = None,
+) -> None:
     """Write the picture of a pass, with the scene and the samples in its metadata."""
     from fracslice.export import application
     from fracslice.export.images import write_image
+    from fracslice.work import Work
 
     text = {
         "Title": scene.name,
@@ -206,7 +259,8 @@ def save(path: str | Path, done: Pass, scene: Scene, bits: str, threads: int) ->
         "scene_hash": scene.hash,
         "samples": f"{done.samples:.2f}",
     }
-    write_image(path, done.developed, done.image, int(bits), text, Work(threads))
+    light = done.mean if done.view.film.transparent else done.image
+    write_image(path, done.developed, light, int(bits), text, Work(threads), layers)
 
 
 def save_state(renderer: Renderer, path: str) -> None:

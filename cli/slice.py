@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,19 +10,25 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .closing import of_layers
 from .cluster import cluster_options, pooled
 from .families import families
 from .inputs import check_targets, load_scene
+from .layers import LAYER, PIXEL_MM, heights, printer_option, shift
 from .options import (
     NAME,
     NUMBER,
     length,
+    price_option,
     print_options,
     printing_of,
     quiet_option,
+    scale_option,
     set_option,
+    size_option,
     source_argument,
     threads_option,
+    up_option,
 )
 from .working import working
 
@@ -31,50 +36,7 @@ if TYPE_CHECKING:
     from fracslice.export.resins import Resin
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Stack
-    from fracslice.slicing.printers import Printer
     from fracslice.work import Work
-
-LAYER, PIXEL_MM = "0.05mm", 0.05
-
-
-def shift(_: click.Context, __: click.Parameter, text: str) -> float:
-    """Parse a length, zero or negative ones included, into mm."""
-    from fracslice.scene.lengths import Shift
-
-    try:
-        return Shift(0.0, "").read(text)
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r}: expected {error}") from None
-
-
-def heights(
-    context: click.Context, option: click.Parameter, text: str | None
-) -> tuple[float, float | None] | None:
-    """Parse a layer height into mm, or the minimum and maximum of adaptive layers."""
-    if text is None:
-        return None
-    low, _, high = text.partition("..")
-    least = length(context, option, low)
-    assert least is not None
-    return least, length(context, option, high) if ".." in text else None
-
-
-def printer(context: click.Context, _: click.Parameter, name: str | None) -> Printer | None:
-    """Look up a printer by name; "list" prints all printers and ends the command."""
-    from fracslice.slicing import printers
-
-    if name != "list":
-        return None if name is None else printers.printer(name)
-    for p in printers.PRINTERS.values():
-        volume = " x ".join(f"{r:g}" for r in p.build_volume)
-        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {volume} mm, .{p.file}")
-    context.exit()
-
-
-def printer_option(text: str) -> Callable[..., Any]:
-    """Decorator that adds --printer, parsed before missing options are reported. text: its help."""
-    names = "--printer", "machine"
-    return click.option(*names, callback=printer, is_eager=True, metavar="NAME|FILE", help=text)
 
 
 @click.command("slice")
@@ -95,12 +57,9 @@ def printer_option(text: str) -> Callable[..., Any]:
     help="png, sl1, goo, ctb, cbddlp, pwmx, nanodlp, 3mf, svg, slic3r, cli, cli-binary or json; by default, "
     "that of the extension of OUT.",
 )
-@click.option(
-    "--size",
-    callback=length,
-    metavar="LENGTH",
-    help="The longest side, such as 80mm; the scene's by default.",
-)
+@size_option
+@up_option
+@scale_option
 @click.option(
     "--layer",
     callback=heights,
@@ -112,13 +71,6 @@ def printer_option(text: str) -> Callable[..., Any]:
     "--pixel", callback=length, metavar="LENGTH", help="Pixel size; the printer's by default, or 0.05mm."
 )
 @printer_option('The printer whose screen the layers are for, or a .toml file of it; "list" shows all.')
-@click.option(
-    "--up",
-    nargs=3,
-    type=NUMBER,
-    metavar="X Y Z",
-    help="The scene's direction that is up; 0 0 1 by default.",
-)
 @click.option(
     "--compensation",
     callback=shift,
@@ -155,6 +107,13 @@ def printer_option(text: str) -> Callable[..., Any]:
     metavar="FILE",
     help="Write a contact sheet (.png) or an animation (.webp) of the layers.",
 )
+@click.option(
+    "--send",
+    "address",
+    metavar="ADDRESS",
+    help="Upload the file: prusalink://HOST or sdcp://HOST. Nothing is started.",
+)
+@price_option("litre of resin; the resin's by default")
 @cluster_options
 @print_options
 @set_option
@@ -174,6 +133,7 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
+    from fracslice.export.sending import send
     from fracslice.export.slices import PICTURES, PRINTS, printers_file, slice_format, write_slices
     from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
@@ -185,34 +145,38 @@ def slice_(
         raise click.UsageError(f"{output}: --sections is for pictures; contours are of one section per layer")
     if kind in PRINTS:
         refuse_what_no_print_has(output, kind, options, resin)
+    if options["address"] is not None:
+        refuse_to_send(output, kind, options["address"])
     preview = options["preview"]
     if preview and Path(preview).suffix.lower() not in (".png", ".webp"):
         raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
     check_targets(source, None if Path(output).is_dir() else output, preview)
     scene = load_scene(source, settings)
-    recipe = SliceRecipe(
-        to_xml(scene),
-        scene.name,
-        job(scene, options),
-        options["layer"][1],
-        Path(output).name,
-        kind,
-        options["machine"],
-        options["compensation"],
-        options["gamma"],
-        options["mirror"],
-        resin,
-        created(),
-        int(options["sections"]),
-    )
     shared = (options[name] for name in ("cluster", "shard", "store"))
     with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
-        run = recipe.run(work)
+        run = SliceRecipe(
+            to_xml(scene),
+            scene.name,
+            job(scene, options, work),
+            options["layer"][1],
+            Path(output).name,
+            kind,
+            options["machine"],
+            options["compensation"],
+            options["gamma"],
+            options["mirror"],
+            resin,
+            created(),
+            int(options["sections"]),
+        ).run(work)
         stack, screen = run.stack, run.screen
         write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
-        off = () if quiet else layers_amount(run.slicer, work)[1]
+        sent = send(output, options["address"], work) if options["address"] is not None else None
+        if not quiet:
+            off = layers_amount(run.slicer, work)[1]
+            last = list(of_layers(run, options["price"]).lines())
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape
@@ -220,6 +184,7 @@ def slice_(
         other = printers_file(screen.printer, output) if screen.printer else ""
         for note in stack.notes + off + ((other,) if other else ()):
             click.echo(note)
+        click.echo(os.linesep.join([*last, *([sent] if sent else [])]))
     return 0
 
 
@@ -261,6 +226,16 @@ def refuse_what_no_print_has(output: str, kind: str, options: dict[str, Any], re
         raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")
 
 
+def refuse_to_send(output: str, kind: str, address: str) -> None:
+    """Raise an error for a file that no printer reads, or an invalid address, before any work is done."""
+    from fracslice.export.sending import printer_address
+    from fracslice.export.slices import PRINTS
+
+    if kind not in PRINTS:
+        raise click.UsageError(f"{output}: --send is for printers' files")
+    printer_address(address)
+
+
 def created() -> datetime:
     """Date of print files, UTC: now, or of SOURCE_DATE_EPOCH."""
     seconds = os.environ.get("SOURCE_DATE_EPOCH")
@@ -268,25 +243,18 @@ def created() -> datetime:
     return datetime.fromtimestamp(int(seconds), UTC) if seconds else now
 
 
-def job(scene: Scene, options: dict[str, Any]) -> SliceJob:
+def job(scene: Scene, options: dict[str, Any], work: Work) -> SliceJob:
     """Slice job with the given options."""
     from fracslice.slicing import SliceJob
+    from fracslice.volume.sizing import sizing
 
     pixel, machine = options["pixel"], options["machine"]
     if pixel is not None and machine is not None:
         raise click.UsageError("--pixel and --printer: expected one of them")
     given = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
-    up = tuple(options.get("up") or (0.0, 0.0, 1.0))
-    size = options["size"] or scene.size_mm
-    return SliceJob(size, options["layer"][0], given, up, printing_of(scene, options))
-
-
-def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:
-    """Adaptive layers if a range of heights is given; otherwise the stack itself."""
-    from fracslice.slicing import adapted
-
-    most = options["layer"][1]
-    return stack if most is None else adapted(stack, most, work)
+    size = sizing(scene, options["size"], options["scale"], work)
+    how = printing_of(scene, options), size.factors, size.unit
+    return SliceJob(size.side, options["layer"][0], given, options["up"], *how)
 
 
 def write_preview(stack: Stack, path: str, work: Work) -> None:

@@ -9,9 +9,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from fracslice.errors import Cancelled, FracsliceError
-from fracslice.work import Work
+
+if TYPE_CHECKING:
+    from fracslice.work import Work
 
 Progress = Callable[[str, float], None]
 
@@ -54,6 +57,8 @@ def working(how: int | Work, quiet: bool) -> Iterator[Work]:
     StoppedError
         When the work is cancelled.
     """
+    from fracslice.work import Work
+
     like = Work(how) if isinstance(how, int) else how
     with _bar(quiet) as progress, _cancelled_by_signals() as cancel:
         yield replace(like, progress=progress, cancel=cancel)

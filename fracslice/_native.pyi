@@ -451,6 +451,7 @@ class Nearest:
         tolerance: float,
         threads: int = 0,
     ) -> tuple[NDArray[float64], NDArray[int32]]: ...
+    def points(self, points: NDArray[float64], threads: int = 0) -> NDArray[float64]: ...
     def samples(
         self,
         vertices: NDArray[float64],

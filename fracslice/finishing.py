@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .mesh.window import Finished, Tally
     from .surfaces import Surface
     from .volume import Plan, SignBricks
+    from .volume.sizing import Sizing
 
 MOST_ERRORS = 1 << 20
 """Approximate maximum of vertices whose distance from the surface is measured, evenly distributed over it."""
@@ -162,8 +163,8 @@ class Finish:
         Choice of bodies and cavities.
     dust : callable
         Maps the volume of the object to the volume below which a body is removed, mm3.
-    size : float
-        Longest side of the remaining bodies, mm.
+    size : Sizing
+        Size of the remaining bodies.
     scale : float or None
         mm per scene unit; None to derive it from the size.
     clock : Clock
@@ -180,7 +181,7 @@ class Finish:
         surface: Surface,
         how: Print,
         dust: Callable[[float], float],
-        size: float,
+        size: Sizing,
         scale: float | None,
         clock: Clock,
     ) -> None:
@@ -189,7 +190,7 @@ class Finish:
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
         self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
-        unit = (scale or size / max(planned.box.size)) ** 3
+        unit = (scale or size.scale(planned.box)) ** 3
         nested, self.misplaced = surface.nested(how.cavities == "fill", clock.work.threads)
         sized = replace(nested, volumes=nested.volumes * unit)
         limit = dust(float(sized.volumes.sum()))
@@ -197,13 +198,16 @@ class Finish:
         rest = shells.bounds(self.stays)
         tips = shells.tips(self.stays)
         box = box_of_the_rest(planned, shells.bounds(), rest, tips, clock.work)
-        exact = scale or size / max(box.size)
+        exact = scale or size.scale(box)
         x, y, _ = box.centre
         self.place = Placement(exact, (-exact * x, -exact * y, -exact * float(rest[0, 2])))
         self.removed: Removed = removed
         self.volume = float(nested.volumes[self.stays].sum()) * exact**3
         """Volume of all bodies, removed ones included, mm3."""
         self.volume += removed.bodies_mm3 - removed.filled_mm3
+        volumes = nested.volumes[self.stays]
+        self.cavities = -float(volumes[volumes < 0].sum()) * exact**3
+        """Volume of the cavities that stay, mm3."""
         self._planes, self._frame = placing(planned, surface.signs, self.place)
 
     def report(self, tally: Tally) -> MeshReport:
@@ -265,6 +269,8 @@ class Check:
         self._finish, self._tally = finish, Tally(finish.clock.work.threads)
         self._stride = stride(bricks)
         self._errors: list[NDArray[np.float64]] = []
+        self.contact = 0.0
+        """Area on the plate, mm2."""
 
     def passing(self, pieces: Iterable[Finished]) -> Iterator[Mesh]:
         """Pass pieces on and check them.
@@ -283,6 +289,7 @@ class Check:
             yield piece.passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
+                self.contact += on_the_plate(piece.passed)
                 finish = self._finish
                 vertices = piece.points[:: self._stride]
                 self._errors.append(off_surface(finish.planned, finish.place, vertices, finish.clock.work))
@@ -296,3 +303,22 @@ class Check:
     def errors(self) -> NDArray[np.float64]:
         """Distances of vertices from the surface, scene units."""
         return np.concatenate(self._errors)
+
+
+def on_the_plate(mesh: Mesh) -> float:
+    """Return the area of the triangles at z = 0.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Finished triangles, mm.
+
+    Returns
+    -------
+    float
+        Area, mm2.
+    """
+    lying = (mesh.vertices[:, 2] == 0)[mesh.triangles].all(1)
+    x, y = np.moveaxis(mesh.vertices[mesh.triangles[lying], :2], 2, 0)
+    double = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    return float(np.abs(double).sum()) / 2

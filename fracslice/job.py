@@ -30,13 +30,14 @@ if TYPE_CHECKING:
     from .mesh.simplify import Simplified
     from .surfaces import Surface
     from .volume import Bricks, Plan, SignBricks
+    from .volume.sizing import Sizing
 
 STL = ".stl"
 
 
 @dataclass(frozen=True, eq=False)
 class MeshResult:
-    """MeshResult of `make_mesh`.
+    """Result of `make_mesh`.
 
     Attributes
     ----------
@@ -132,7 +133,7 @@ def make_mesh(
 
 class _Made(NamedTuple):
     """The mesh, if in one piece; its simplification, if any; its checks; and distances between its vertices,
-    or points of the surface, and the other, scene units.
+    or points of the surface, and the other, scene units; area on the plate, mm2.
     """
 
     whole: Mesh | None
@@ -140,6 +141,7 @@ class _Made(NamedTuple):
     report: MeshReport
     errors: np.ndarray
     back: np.ndarray
+    contact: float
 
 
 @dataclass(frozen=True)
@@ -151,9 +153,16 @@ class _Job:
     clock: Clock
     path: Path | None
 
+    @cached_property
+    def size(self) -> Sizing:
+        """Size of the object."""
+        from .volume.sizing import sizing
+
+        return sizing(self.scene, self.what.size_mm, self.what.scale, self.clock.work)
+
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
-        self.what.voxels(self.scene)
+        self.what.voxels(self.size.longest)
         if self.clock.work.cluster is not None:
             for name, length in self.needing_all():
                 raise SceneError(
@@ -192,11 +201,11 @@ class _Job:
 
         Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
         """
-        sized, how = planned(self.scene, self.what, self.clock), self.what.how(self.scene)
+        sized, how = planned(self.scene, self.what, self.size, self.clock), self.what.how(self.scene)
         signs = surfaces.sampled(sized.planned, self.clock)
         thin = how.sorts and surfaces.has_thin_walls(signs)
         if again := thin and how.whole:
-            sized = edited(sized.planned, self.scene, self.what, self.clock)
+            sized = edited(sized.planned, self.scene, self.what, self.size, self.clock)
             signs = surfaces.sampled(sized.planned, self.clock)
             thin = surfaces.has_thin_walls(signs)
         return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, signs, again
@@ -211,7 +220,7 @@ class _Job:
 
             recipe = MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
             return sized, made(recipe, sized.planned, signs, pool, self.clock)
-        most, voxel = len(signs), self.what.size(self.scene) / self.what.voxels(self.scene)
+        most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
         except TooLargeError as error:
@@ -227,10 +236,10 @@ class _Job:
         """Finished mesh and report."""
         from .shown import mesh_amount
 
-        what, clock, size, refined = self.what, self.clock, self.what.size(self.scene), None
+        what, clock, size, refined = self.what, self.clock, self.size, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord_mm is not None:
-            unit = sized.scale or size / max(planned.box.size)
+            unit = sized.scale or size.scale(planned.box)
             surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)
             refined = done.scaled(unit)
         with clock("finishing"):
@@ -244,7 +253,7 @@ class _Job:
             scene=self.scene.name,
             scene_hash=self.scene.hash,
             version=__version__,
-            size_mm=size,
+            size_mm=size.longest,
             voxel_mm=planned.voxel * scale,
             mesh=made.report,
             removed=finish.removed,
@@ -259,6 +268,8 @@ class _Job:
             simplified=made.simplified,
             notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
             depths=planned.depths,
+            contact_mm2=made.contact,
+            cavities_mm3=finish.cavities,
         )
         return MeshResult(report, finish.place, planned, made.whole, clock.work)
 
@@ -271,7 +282,7 @@ class _Job:
             back = surface_to_mesh(planned, surface.pieces.meshes, 1.0, work)
         check = Check(finish, len(surface.signs))
         whole, simplified = self.written(finish, check, finish.place.mm(surface.tips))
-        return _Made(whole, simplified, check.mesh, check.errors, back)
+        return _Made(whole, simplified, check.mesh, check.errors, back, check.contact)
 
     def joined(self, surface: Surface, finish: Finish) -> _Made:
         """Write the file from the pieces of a pool."""
@@ -290,7 +301,8 @@ class _Job:
                 else:
                     FORMATS[ending](mesh, file, about)
         check.end()
-        return _Made(mesh, None, finish.report(check.tally), np.concatenate(check.off), check.back)
+        errors = np.concatenate(check.off)
+        return _Made(mesh, None, finish.report(check.tally), errors, check.back, check.contact)
 
     @contextmanager
     def file(self, path: Path) -> Iterator[tuple[BinaryIO, dict[str, str]]]:

@@ -8,7 +8,6 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-import scipy
 
 HERE = Path(__file__).parent
 
@@ -67,6 +66,8 @@ def program() -> str:
     str
         Key of this installation.
     """
+    import scipy  # here, since few jobs need its version and importing it takes longer than hashing
+
     native = (find_spec(f"{__package__}.{name}") for name in ("_native", "_slices", "_vdb"))
     compiled = (Path(module.origin) for module in native if module and module.origin)
     return key(texts(*sorted(HERE.rglob("*.py")), *compiled), np.__version__, scipy.__version__)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .errors import SceneError
-from .formulas.parameters import Number, validate
+from .formulas.parameters import Number, Vector, validate
 from .scene import Print, Scene
-from .scene.lengths import Length
+from .scene.lengths import Length, Percent
 
 RESOLUTION = 256.0
 """Default number of voxels along the longest side, and the detail that automatic depths resolve."""
@@ -43,6 +43,10 @@ class MeshJob:
         Refine smooth surfaces until no triangle is farther from them than this.
     simplify_mm : float, optional
         Simplify the mesh within this tolerance.
+    up : tuple of float
+        Direction of the scene that is up in the print.
+    scale : tuple of float
+        Compensation of shrinkage along x, y and z; one factor or percentage for all, or three.
 
     Raises
     ------
@@ -57,26 +61,13 @@ class MeshJob:
     printing: Print | None = None
     chord_mm: float | None = None
     simplify_mm: float | None = None
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:
             raise SceneError("voxel and resolution: expected one of them")
         validate(self, _KINDS, SceneError)
-
-    def size(self, scene: Scene) -> float:
-        """Longest side.
-
-        Parameters
-        ----------
-        scene : Scene
-            Scene to mesh.
-
-        Returns
-        -------
-        float
-            Length, mm.
-        """
-        return scene.size_mm if self.size_mm is None else self.size_mm
 
     def how(self, scene: Scene) -> Print:
         """Changes for printing.
@@ -116,13 +107,13 @@ class MeshJob:
             raise SceneError(f"dust {dust:.4g}mm3: expected at most the object's volume, {volume:.4g}mm3")
         return dust
 
-    def voxels(self, scene: Scene) -> float:
+    def voxels(self, size: float) -> float:
         """Voxels along the longest side.
 
         Parameters
         ----------
-        scene : Scene
-            Scene to mesh.
+        size : float
+            Longest side, mm.
 
         Returns
         -------
@@ -136,7 +127,6 @@ class MeshJob:
         """
         if self.voxel_mm is None:
             return RESOLUTION if self.resolution is None else self.resolution
-        size = self.size(scene)
         if not COARSEST <= size / self.voxel_mm <= FINEST:
             low, high = size / FINEST, size / COARSEST
             raise SceneError(
@@ -149,4 +139,6 @@ _KINDS = {
     **dict.fromkeys(("size_mm", "voxel_mm", "chord_mm", "simplify_mm"), Length(None, "a length")),
     "resolution": Number(None, "voxels along the longest side", least=COARSEST, most=FINEST),
     "dust_mm3": Number(None, "a volume", least=0),
+    "up": Vector((0.0, 0.0, 1.0), "a direction", nonzero=True),
+    "scale": Percent((1.0, 1.0, 1.0), "compensation of shrinkage"),
 }

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .cluster import Pieces
 from .errors import ClusterError
-from .finishing import Placement, off_surface, placing
+from .finishing import Placement, off_surface, on_the_plate, placing
 from .keys import key, program
 from .mesh.extract import Contours, layers
 from .mesh.halo import Kept, finished_alone
@@ -28,6 +28,7 @@ from .planning import edited, planned
 from .scene.reader import reads
 from .volume import Plan, SignBricks
 from .volume.lattice import BRICK
+from .volume.sizing import sizing
 from .work import Clock, Work
 
 MOST, LEAST, COUNT = 1 << 13, 1 << 10, 256
@@ -65,8 +66,9 @@ class MeshRecipe:
             The same in every process.
         """
         scene, clock = reads(self.scene, self.name), Clock(Work(threads=1))
-        sized = planned(scene, self.what, clock)
-        return (edited(sized.planned, scene, self.what, clock) if self.edited else sized).planned
+        size = sizing(scene, self.what.size_mm, self.what.scale, clock.work)
+        sized = planned(scene, self.what, size, clock)
+        return (edited(sized.planned, scene, self.what, size, clock) if self.edited else sized).planned
 
 
 @dataclass(frozen=True)
@@ -190,6 +192,7 @@ class FinishTask(MeshTask):
             stl=np.frombuffer(stl(plain.vertices, plain.triangles).data, np.uint8),
             late=late[late >= 0],
             corners=made.passed.corners[late >= 0],
+            contact=np.array(on_the_plate(made.passed)),
             tally=np.array(json.dumps(asdict(tally))),
             errors=off_surface(of.planned, choice.place, made.points[:: choice.stride], work),
             distances=nearest([own.mesh], choice.points, NEARBY * voxel, work),

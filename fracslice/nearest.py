@@ -7,7 +7,7 @@ from difflib import get_close_matches
 
 
 def hint(wrong: str, right: Iterable[str], form: str = "{}") -> str:
-    """What to say about an unknown name: the nearest right one, or all of them; `form` writes a name.
+    """Suggestion for an unknown name: the nearest known one, or a list of all; `form` formats a name.
 
     >>> hint("mandelblub", ["julia", "mandelbulb"], "<{}>")
     'did you mean <mandelbulb>?'

@@ -11,6 +11,7 @@ from .work import Clock
 
 if TYPE_CHECKING:
     from .volume import Plan
+    from .volume.sizing import Sizing
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Sized:
     left: Print
 
 
-def planned(scene: Scene, what: MeshJob, clock: Clock) -> Sized:
+def planned(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
     """Plan the field to be meshed, with its edits.
 
     Parameters
@@ -40,7 +41,9 @@ def planned(scene: Scene, what: MeshJob, clock: Clock) -> Sized:
     scene : Scene
         Scene to mesh.
     what : MeshJob
-        Size, resolution and changes of the mesh.
+        Resolution and changes of the mesh.
+    size : Sizing
+        Size of the object.
     clock : Clock
         Threads, progress, cancellation and timing.
 
@@ -55,21 +58,23 @@ def planned(scene: Scene, what: MeshJob, clock: Clock) -> Sized:
         For a scene that cannot be meshed.
     """
     from .volume import plan
+    from .volume.sizing import oriented
 
     how = what.how(scene)
     with clock("planning"):
-        made = plan(scene.root, what.voxels(scene), clock.work)
-    return Sized(made, None, how) if how.whole else edited(made, scene, what, clock)
+        root = oriented(scene.root, what.up, size.stretch, clock.work)
+        made = plan(root, what.voxels(size.longest), clock.work)
+    return Sized(made, None, how) if how.whole else edited(made, scene, what, size, clock)
 
 
-def edited(made: Plan, scene: Scene, what: MeshJob, clock: Clock) -> Sized:
+def edited(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
     """Make all edits for printing.
 
     Parameters
     ----------
     made : Plan
         Plan without edits.
-    scene, what, clock
+    scene, what, size, clock
         As for `planned`.
 
     Returns
@@ -86,7 +91,7 @@ def edited(made: Plan, scene: Scene, what: MeshJob, clock: Clock) -> Sized:
 
     how = what.how(scene)
     with clock("changing"):
-        changed, scale = printable(made, what.size(scene), how, clock.work)
+        changed, scale = printable(made, size, how, clock.work)
     # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.
     keep = how.keep if made.root.bounds.exterior_only else "all"
     # Keep cavities: the hollow is one.

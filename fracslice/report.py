@@ -132,6 +132,10 @@ class Report:
         Features that the voxel is too large for.
     depths : tuple of str
         Automatic depths of fractals.
+    contact_mm2 : float
+        Area on the plate, mm2.
+    cavities_mm3 : float
+        Volume of sealed cavities, mm3.
     """
 
     scene: str
@@ -152,6 +156,8 @@ class Report:
     simplified: Simplified | None = None
     notes: tuple[str, ...] = ()
     depths: tuple[str, ...] = ()
+    contact_mm2: float = 0.0
+    cavities_mm3: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))

@@ -160,6 +160,8 @@ class SharedCheck:
         Points of the field's surface.
     tally : Tally
         Sums.
+    contact : float
+        Area on the plate, mm2.
     off : list of ndarray
         Distances of vertices from the surface, scene units.
     back : ndarray of float64, shape (n,)
@@ -169,12 +171,14 @@ class SharedCheck:
     surface: SharedSurface
     points: NDArray[np.float64]
     tally: Tally = field(default_factory=Tally)
+    contact: float = 0.0
     off: list[NDArray[np.float64]] = field(default_factory=list)
     back: NDArray[np.float64] = field(default_factory=lambda: np.array(np.inf))
 
     def add(self, files: Files) -> None:
         """Add the result of a `FinishTask`."""
         self.tally.include(Tally(**json.loads(str(files["tally"]))))
+        self.contact += float(files["contact"])
         self.off.append(np.asarray(files["errors"]))
         self.back = np.minimum(self.back, files["distances"])
 

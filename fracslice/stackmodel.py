@@ -8,7 +8,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps
 
 from .formulas import Node
 from .job import make_mesh
@@ -18,7 +17,7 @@ from .rendering import Renderer
 from .scene import Scene
 from .scene.view import Film, View
 from .slicing import SliceJob
-from .slicing.stack import turned
+from .volume.sizing import oriented
 from .work import Work
 
 LARGEST = 800, 480
@@ -47,7 +46,7 @@ class StackModel:
 
     @cached_property
     def _upright(self) -> Node:
-        return cast(Node, turned(self.scene.root, self.job.up, self.work))
+        return cast(Node, oriented(self.scene.root, self.job.up, work=self.work))
 
     def mesh(self) -> Mesh:
         """Mesh of the object, simplified to the printer's resolution.
@@ -59,36 +58,28 @@ class StackModel:
             mesh is simplified within a quarter of a pixel.
         """
         job = self.job
-        voxel = max(*job.pixel, job.size / RESOLUTION)
+        longest = job.sizing.longest
+        voxel = max(*job.pixel, longest / RESOLUTION)
         what = MeshJob(
-            size_mm=job.size,
-            voxel_mm=min(voxel, job.size / COARSEST),
+            voxel_mm=min(voxel, longest / COARSEST),
             printing=job.printing,
             simplify_mm=min(job.pixel) / 4,
+            up=job.up,
+            scale=job.scale,
         )
-        return make_mesh(replace(self.scene, root=self._upright), what, self.work).mesh
+        scene = replace(self.scene, size_mm=None if job.unit else job.size, unit_mm=job.unit)
+        return make_mesh(scene, what, self.work).mesh
 
-    @cached_property
-    def _image(self) -> Image.Image:
-        width, height = LARGEST
-        film = Film(width=width, height=height, samples=SAMPLES)
-        renderer = Renderer(self._upright, View(film=film), work=self.work, device="cpu")
-        *_, last = renderer.passes(SAMPLES)
-        return Image.fromarray(np.asarray(last.shown))
-
-    def picture(self, width: int, height: int) -> NDArray[np.uint8]:
+    def picture(self) -> NDArray[np.uint8]:
         """Render the scene as it stands on the printer, without its print preparation.
-
-        Pictures of all sizes are cut from one.
-
-        Parameters
-        ----------
-        width, height : int
-            Size, pixels.
 
         Returns
         -------
         uint8 [height, width, 3]
-            sRGB.
+            sRGB, as large as the largest preview of a format.
         """
-        return np.asarray(ImageOps.fit(self._image, (width, height), Image.Resampling.LANCZOS))
+        width, height = LARGEST
+        film = Film(width=width, height=height, samples=SAMPLES)
+        renderer = Renderer(self._upright, View(film=film), work=self.work, device="cpu")
+        *_, last = renderer.passes(SAMPLES)
+        return np.asarray(last.shown)

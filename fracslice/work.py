@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import islice
 from typing import TYPE_CHECKING, TypeVar
 
@@ -229,6 +230,33 @@ class Work:
         for helper in begun:
             helper.result()
         self.check()
+
+
+@contextmanager
+def beside(task: Callable[[], R], threads: int) -> Iterator[Callable[[], R]]:
+    """Run a task in another thread during a block; without other threads, when its result is asked for.
+
+    Parameters
+    ----------
+    task
+        Function without arguments.
+    threads
+        Number of threads of the job.
+
+    Yields
+    ------
+    callable
+        Waits for the task and returns its result.
+    """
+    if threads == 1:
+        yield cache(task)
+        return
+    begun = _POOL.submit(task)
+    try:
+        yield begun.result
+    finally:
+        begun.cancel()
+        wait([begun])
 
 
 def ahead(items: Iterator[T]) -> Iterator[T]:

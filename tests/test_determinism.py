@@ -123,9 +123,9 @@ def test_no_bit_depends_on_the_processor_s_algebra() -> None:
 def summed() -> None:
     """Prints the hashes of sums over the coordinates or colours of many points, and of a turned scene."""
     rng = np.random.default_rng(0)
-    light, ends = rng.random((64, 64, 3), np.float32), rng.random((2, 1000, 3))
+    light, ends = rng.random((64, 64, 4), np.float32), rng.random((2, 1000, 3))
     sums = (
-        develop(light, Film(tone="reinhard")),
+        develop(light, View(film=Film(tone="reinhard"))),
         Walls(*ends, *rng.random((3, 1000))).along((0.48, 0.6, 0.64)).width,
     )
     turned = [transform(sphere(), rotate=(1, k, 2, 7 * k), scale=0.1 * k) for k in range(1, 41)]

@@ -93,6 +93,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (tmp_path / name).write_text(scene)
     for name in ("my.stl", "my.3mf", "part.stl"):
         write(shapes.cube(), tmp_path / name)
+    (tmp_path / "my.ini").write_text("")
     (tmp_path / "scenes").symlink_to(ROOT / "scenes")
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -111,6 +112,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
     ):
         monkeypatch.setattr(f"fracslice.{work}", begin)
     monkeypatch.setattr("fracslice.viewer.show", begin)
+    monkeypatch.setattr("shutil.which", lambda name: name)
     monkeypatch.setattr("fracslice.viewer.need_screen", lambda: None)
     words = shlex.split(line)[1:]
     if words[0] in ("scenes", "formulas") or words[-1] == "list":

@@ -76,13 +76,13 @@ def test_streamed_is_what_would_have_been_made_in_memory(
     request.getfixturevalue("pieces")
     result = make_mesh(SCENES[name], what, path=streamed)
     assert streamed.read_bytes() == whole.read_bytes()
-    told, expected = result.report.as_dict(), made.report.as_dict()
+    reported, expected = result.report.as_dict(), made.report.as_dict()
     for key in ("volume_mm3", "area_mm2"):
-        assert told.pop(key) == pytest.approx(expected.pop(key), rel=1e-9)
-    for one in (told, expected):
+        assert reported.pop(key) == pytest.approx(expected.pop(key), rel=1e-9)
+    for one in (reported, expected):
         for key in ("surface_error_mm", "amount_mm3", "removed", "seconds", "peak_rss_mb"):
             one.pop(key)
-    assert told == expected and told["printable"]
+    assert reported == expected and reported["printable"]
     removed, there = result.report.removed, made.report.removed
     assert (removed.bodies, removed.cavities) == (there.bodies, there.cavities)
     assert result.report.amount_mm3.made == pytest.approx(made.report.amount_mm3.made, rel=1e-6)
@@ -141,11 +141,11 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
         finished = window.add(piece.mesh.selected(keep), piece.end)
         tally.add(finished)
         passed += len(finished.passed.triangles)
-    truth, told = check_mesh(whole.selected(~lost)), tally.report(1, 0, 0)
-    assert len(pieces) > 4 and passed == truth.triangles == told.triangles
-    assert told.open_edges == truth.open_edges > 100
-    assert (told.vertices, told.nonmanifold_vertices) == (truth.vertices, truth.nonmanifold_vertices)
-    assert not told.watertight and told.genus is None
+    truth, reported = check_mesh(whole.selected(~lost)), tally.report(1, 0, 0)
+    assert len(pieces) > 4 and passed == truth.triangles == reported.triangles
+    assert reported.open_edges == truth.open_edges > 100
+    assert (reported.vertices, reported.nonmanifold_vertices) == (truth.vertices, truth.nonmanifold_vertices)
+    assert not reported.watertight and reported.genus is None
 
 
 @pytest.mark.parametrize(("name", "job"), [("chord", {"chord_mm": 0.1}), ("simplify", {"simplify_mm": 0.1})])

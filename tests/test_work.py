@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future
+from contextlib import suppress
 
 import pytest
 
 from fracslice.errors import Cancelled
-from fracslice.work import Work, ahead
+from fracslice.work import Work, ahead, beside
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7])
@@ -152,3 +154,34 @@ def test_an_error_of_the_consumer_waits_for_the_next_item() -> None:
     next(coming)
     coming.close()  # type: ignore[attr-defined]
     assert done == ["next"]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_task_beside_is_computed_once(threads: int) -> None:
+    calls: list[threading.Thread] = []
+
+    def task() -> int:
+        calls.append(threading.current_thread())
+        return 7
+
+    with beside(task, threads) as result:
+        assert result() == result() == 7
+    assert len(calls) == 1 and (calls[0] is threading.current_thread()) == (threads == 1)
+
+
+def test_a_task_beside_ends_before_its_block_does() -> None:
+    ended = threading.Event()
+
+    def task() -> None:
+        time.sleep(0.05)
+        ended.set()
+
+    with suppress(ZeroDivisionError), beside(task, 2):
+        time.sleep(0.01)
+        raise ZeroDivisionError
+    assert ended.is_set()
+
+
+def test_errors_of_a_task_beside_are_raised_where_its_result_is_wanted() -> None:
+    with beside(lambda: [0][1], 2) as result, pytest.raises(IndexError):
+        result()

@@ -17,8 +17,9 @@ from ..files import replacing, reported
 from ..formulas.parameters import Number, validated
 from ..formulas.registry import Node
 from ..keys import key, program
-from ..rendering import Renderer, develop
+from ..rendering import Renderer, develop, picture
 from ..rendering.sequence import Samples
+from ..rendering.setup import default_lights
 from ..scene.model import Scene
 from ..work import Work
 from .depths import gradual_depths
@@ -119,18 +120,18 @@ class FilmJob:
 
         Returns
         -------
-        ndarray of float32, shape (height, width, 3)
-            Linear light.
+        ndarray of float32, shape (height, width, 4)
+            Mean of the samples; see `Pass.mean`.
         """
         moments, shift = self.moments(number), number + 1 if self.timeline.animation.noise == "moving" else 0
         share, begin = self.samples // len(moments), 0
-        mean = np.zeros((self.size[1], self.size[0], 3), np.float32)
+        mean = np.zeros((self.size[1], self.size[0], 4), np.float32)
         for scene, same in groupby(moments):
             count = len(list(same))
             part = Samples(begin, shift)
             renderer = Renderer(scene.root, scene.view, self.size, work, self.device, part)
             *_, done = renderer.passes(count * share)
-            mean += done.image * np.float32(count / len(moments))
+            mean += done.mean * np.float32(count / len(moments))
             begin += count * share
         return mean
 
@@ -196,9 +197,10 @@ def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: boo
         work.progress(f"frame {number}", done / len(paths))
         if resume and path.exists():
             continue
-        light, film = job.light(number, replace(work, progress=lambda *_: None)), job.scene(number).view
+        mean, at = job.light(number, replace(work, progress=lambda *_: None)), job.scene(number)
+        view = replace(at.view, lights=at.view.lights or default_lights(at.root))
         text = {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
-        write_image(path, develop(light, film.film, film.shading.mode), light, text=text)
+        write_image(path, develop(mean, view), picture(mean, view.shading.mode), text=text)
     work.progress("frames", 1.0)
     return paths
 

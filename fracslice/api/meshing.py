@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from ..errors import SceneError
 from ..job import MeshResult
 from ..job import make_mesh as make_mesh_job
 from ..mesh import Mesh
 from ..meshjob import MeshJob
-from ..scene import Scene, parse_length
+from ..scene import parse_length
 from ..work import Work
-from .options import Length, Options, keywords, print_of, work_of
-from .sources import Source, as_scene, found
+from .options import Length, Options, Scale, keywords, print_of, work_of
+from .sources import Source, as_scene
 
 if TYPE_CHECKING:
     import numpy as np
@@ -95,6 +95,8 @@ def make_mesh(
     work: Work | None = None,
     *,
     size: Length | None = None,
+    up: Sequence[float] | None = None,
+    scale: Scale | None = None,
     resolution: float | None = None,
     voxel: Length | None = None,
     chord: Length | None = None,
@@ -119,6 +121,10 @@ def make_mesh(
         Threads, progress, cancellation, store and device, as a record.
     size : float or str, optional
         Longest side. A scene has its own; for a shape the default is one millimetre per scene unit.
+    up : three numbers, optional
+        Direction of the shape that is up in the print.
+    scale : float, str or three factors, optional
+        Compensation of shrinkage: 1.02, "102%", or "102%,102%,101%" along x, y and z.
     resolution : float, optional
         Voxels along the longest side; 256 if neither this nor `voxel` is given.
     voxel : float or str, optional
@@ -176,12 +182,9 @@ def make_mesh(
     given: dict[str, Any] = {
         f"{name}_mm": parse_length(value, name) for name, value in lengths.items() if value is not None
     }
-    others = {"resolution": resolution, "dust_mm3": dust}
+    others = {"resolution": resolution, "dust_mm3": dust, "up": up, "scale": scale}
     given |= {name: value for name, value in others.items() if value is not None}
     job, how = replace(what or MeshJob(), **given), work_of(options, work)
-    source = found(shape)
-    scene = as_scene(source, job.size_mm, how)
+    scene = as_scene(shape)
     printing = print_of(replace(scene, printing=job.how(scene)), options)
-    if printing.keep == "largest" and job.size_mm is None and not isinstance(source, Scene):
-        raise SceneError("keep='largest': expected a size, too, such as size='40mm', of the body that stays")
     return Result(make_mesh_job(scene, replace(job, printing=printing), how, path))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from inspect import Parameter, signature
@@ -19,6 +19,9 @@ R = TypeVar("R")
 
 Length = float | str
 """A number in mm, or text with a unit, such as "0.5mm"."""
+
+Scale = float | str | Sequence[float]
+"""One factor for all axes, three, or text such as "102%" or "102%,102%,101%"."""
 
 
 class WorkOptions(TypedDict, total=False):

@@ -13,8 +13,9 @@ from ..errors import SliceError
 from ..extras import lacking
 from ..scene import parse_length
 from ..slicing import Contours, Layer, SliceJob, Slicer, Stack, adapted, plan_stack
+from ..volume.sizing import sizing
 from ..work import Work
-from .options import Length, Options, keywords, print_of, work_of
+from .options import Length, Options, Scale, keywords, print_of, work_of
 from .sources import Source, as_scene
 
 if TYPE_CHECKING:
@@ -122,6 +123,7 @@ def slice_layers(
     size: Length | None = None,
     pixel: Length | tuple[Length, Length] = "0.05mm",
     up: Sequence[float] = (0.0, 0.0, 1.0),
+    scale: Scale = 1.0,
     **options: Unpack[Options],
 ) -> Slices:
     """Slice a shape into the layers of a print, directly from its field.
@@ -141,6 +143,8 @@ def slice_layers(
         Width and height of a pixel, or one length for both.
     up : three numbers
         Direction of the shape that is up in the print.
+    scale : float, str or three factors, optional
+        As for `make_mesh`.
     cavities, keep, bridge, gap, thickness, hollow, drain, base, raft : optional
         Print preparation: the fields of `Print`.
     threads, progress, cancel, device : optional
@@ -172,10 +176,12 @@ def slice_layers(
     12.57
     """
     work = work_of(options)
-    scene = as_scene(shape, size, work)
+    scene = as_scene(shape, size)
     low, high = layer if isinstance(layer, (tuple, list)) else (layer, None)
-    side = scene.size_mm if size is None else parse_length(size, "size")
-    job = SliceJob(side, low, pixel, up, print_of(scene, options))  # type: ignore[arg-type]
+    longest = None if size is None else parse_length(size, "size")
+    given = sizing(scene, longest, work=work)
+    how = print_of(scene, options), scale, given.unit
+    job = SliceJob(given.side, low, pixel, up, *how)  # type: ignore[arg-type]
     stack = plan_stack(scene.root, job, work)
     if high is not None:
         stack = adapted(stack, parse_length(high, "layer"), work)

@@ -12,15 +12,10 @@ from ..formulas import names as formula_names
 from ..formulas.conversion import shown
 from ..formulas.parameters import REQUIRED
 from ..nearest import hint
-from ..scene import Scene, library, parse_length, read
-from ..volume import extent, with_depths
-from ..work import Work
+from ..scene import Scene, library, read, scene
 from .options import Length
 
 Source: TypeAlias = Node | Scene | str | os.PathLike[str]
-
-RESOLUTION = 64
-"""Voxels along the longest side for measuring a shape."""
 
 
 def found(source: Source) -> Node | Scene:
@@ -64,7 +59,7 @@ def _is_ready(formula: Formula) -> bool:
     return formula.kind == "shape" and "bounds" in formula.hooks and not required
 
 
-def as_scene(source: Source, size: Length | None, work: Work) -> Scene:
+def as_scene(source: Source, size: Length | None = None) -> Scene:
     """Resolve a source to a scene.
 
     Parameters
@@ -73,8 +68,6 @@ def as_scene(source: Source, size: Length | None, work: Work) -> Scene:
         A shape, a scene, a scene file, or the name of a shipped scene or formula.
     size : float or str, optional
         Longest side of a shape; by default, its scene unit is a millimetre.
-    work : Work
-        Threads, progress and cancellation while the shape is measured.
 
     Returns
     -------
@@ -83,14 +76,9 @@ def as_scene(source: Source, size: Length | None, work: Work) -> Scene:
     Raises
     ------
     SceneError
-        As `found`, and for an unbounded shape.
+        As `found`.
     """
     what = found(source)
     if isinstance(what, Scene):
         return what
-    return Scene(what, _measured(what, work) if size is None else parse_length(size, "size"))
-
-
-def _measured(shape: Node, work: Work) -> float:
-    """Longest side of a shape, scene units."""
-    return max(extent(with_depths(shape, work), RESOLUTION, work).box.size)
+    return scene(what, unit=1.0) if size is None else scene(what, size=size)

@@ -74,10 +74,10 @@ def errors(mesh: Mesh, what: Workload, resolution: int) -> dict[str, Any]:
     """
     voxel = what.voxel(resolution)
     off = surface_error(what.root, spread(mesh, SAMPLES), voxel) / voxel
-    found = {"triangles": len(mesh.triangles), "error_voxels": float(off.mean())}
+    result = {"triangles": len(mesh.triangles), "error_voxels": float(off.mean())}
     if what.volume is not None and what.area is not None:
-        found |= {"volume": mesh.volume / what.volume - 1, "area": mesh.area / what.area - 1}
-    return found
+        result |= {"volume": mesh.volume / what.volume - 1, "area": mesh.area / what.area - 1}
+    return result
 
 
 def spread(mesh: Mesh, count: int) -> np.ndarray:

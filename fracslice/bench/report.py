@@ -47,12 +47,12 @@ def require_plots() -> None:
         raise BenchError(reason)
 
 
-def write_report(found: list[Measurement], folder: Path) -> list[Path]:
+def write_report(measured: list[Measurement], folder: Path) -> list[Path]:
     """Write report.md, numbers.json and the plots.
 
     Parameters
     ----------
-    found : list of Measurement
+    measured : list of Measurement
         The measurements.
     folder : Path
         Existing folder.
@@ -68,12 +68,12 @@ def write_report(found: list[Measurement], folder: Path) -> list[Path]:
         If a file cannot be written.
     """
     about = {"version": __version__, "machine": _machine()}
-    numbers = about | {"measurements": [asdict(one) for one in found]}
-    texts = {"report.md": _page(found, about), "numbers.json": json.dumps(numbers, indent=1) + "\n"}
+    numbers = about | {"measurements": [asdict(one) for one in measured]}
+    texts = {"report.md": _page(measured, about), "numbers.json": json.dumps(numbers, indent=1) + "\n"}
     for name, text in texts.items():
         with replacing(folder / name) as file:
             file.write(text.encode())
-    measured = [one for one in found if not one.failed]
+    measured = [one for one in measured if not one.failed]
     _plots(measured, folder)
     return [folder / name for name in (*texts, *PLOTS)]
 
@@ -83,7 +83,7 @@ def _machine() -> str:
     return f"{platform.system()} {platform.machine()}, {cores} cores, Python {python}"
 
 
-def _page(found: list[Measurement], about: dict[str, str]) -> str:
+def _page(measured: list[Measurement], about: dict[str, str]) -> str:
     parts = [
         "# Run time against error",
         f"fracslice {about['version']}; {about['machine']}. Warm, each run in a process of its own, "
@@ -92,8 +92,8 @@ def _page(found: list[Measurement], about: dict[str, str]) -> str:
         "Evaluations are those of the field on the grid, probing included, for each sample that is kept.",
         *(f"![{name}]({name})" for name in PLOTS),
     ]
-    for workload in _unique(one.workload for one in found):
-        rows = [one for one in found if one.workload == workload]
+    for workload in _unique(one.workload for one in measured):
+        rows = [one for one in measured if one.workload == workload]
         parts.append(f"## {workload}\n\n{_table(rows)}")
     return "\n\n".join(parts) + "\n"
 
@@ -125,11 +125,11 @@ def _cell(value: float | None) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2g}"
 
 
-def _plots(found: list[Measurement], folder: Path) -> None:
+def _plots(measured: list[Measurement], folder: Path) -> None:
     """Draw small multiples, one per workload."""
-    _plot(found, folder / PLOTS[0], "mean error, voxels of the finest", "CPU seconds", _error)
-    _plot(found, folder / PLOTS[1], "voxels along the cube", "CPU seconds", _growth)
-    _plot(found, folder / PLOTS[2], "voxels along the cube", "peak memory, MB", _memory)
+    _plot(measured, folder / PLOTS[0], "mean error, voxels of the finest", "CPU seconds", _error)
+    _plot(measured, folder / PLOTS[1], "voxels along the cube", "CPU seconds", _growth)
+    _plot(measured, folder / PLOTS[2], "voxels along the cube", "peak memory, MB", _memory)
 
 
 def _error(one: Measurement, finest: int) -> tuple[float, float] | None:
@@ -148,16 +148,16 @@ def _memory(one: Measurement, finest: int) -> tuple[float, float] | None:
 Point = Callable[[Measurement, int], tuple[float, float] | None]
 
 
-def _plot(found: list[Measurement], path: Path, x: str, y: str, point: Point) -> None:
+def _plot(measured: list[Measurement], path: Path, x: str, y: str, point: Point) -> None:
     from matplotlib.figure import Figure
 
-    workloads, methods = _unique(one.workload for one in found), _unique(one.method for one in found)
+    workloads, methods = _unique(one.workload for one in measured), _unique(one.method for one in measured)
     columns = 2 if len(workloads) == 4 else min(3, max(1, len(workloads)))
     rows = max(1, -(-len(workloads) // columns))
     figure = Figure(figsize=(4 * columns, 3.1 * rows + 0.7), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for panel, workload in zip(axes, workloads, strict=False):
-        _panel(panel, [one for one in found if one.workload == workload], methods, point)
+        _panel(panel, [one for one in measured if one.workload == workload], methods, point)
         panel.set(title=workload, xlabel=x, ylabel=y)
     for panel in axes[len(workloads) :]:
         panel.remove()
@@ -167,10 +167,10 @@ def _plot(found: list[Measurement], path: Path, x: str, y: str, point: Point) ->
         figure.savefig(file, format="png", dpi=110, metadata={"Software": None})
 
 
-def _panel(panel: Axes, found: list[Measurement], methods: list[str], point: Point) -> None:
-    finest = max((one.resolution for one in found), default=1)
+def _panel(panel: Axes, measured: list[Measurement], methods: list[str], point: Point) -> None:
+    finest = max((one.resolution for one in measured), default=1)
     for method in methods:
-        points = [point(one, finest) for one in found if one.method == method]
+        points = [point(one, finest) for one in measured if one.method == method]
         drawn = [p for p in points if p is not None]
         if drawn:
             line = _line(method, methods)

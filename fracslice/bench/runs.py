@@ -167,7 +167,7 @@ def measure(task: Task, work: Work) -> list[Measurement]:
     methods: list[str | Peer] = [name for name in METHODS if "scikit" not in name or find_spec("skimage")]
     methods += task.peers
     cases = [(w, n, m) for w in task.workloads for n in sorted(task.resolutions) for m in methods]
-    found: list[Measurement] = []
+    result: list[Measurement] = []
     slow = set()
     for i, (workload, resolution, method) in enumerate(cases):
         work.progress("measuring", i / len(cases))
@@ -178,13 +178,13 @@ def measure(task: Task, work: Work) -> list[Measurement]:
         try:
             runs = list(_runs(task.repeats, workload, resolution, method, work))
             middle = {key: median(run[key] for run in runs) for key in runs[0]}
-            found.append(Measurement(workload, resolution, name, middle))
+            result.append(Measurement(workload, resolution, name, middle))
         except _FailedError as error:
-            found.append(Measurement(workload, resolution, name, {}, str(error)))
+            result.append(Measurement(workload, resolution, name, {}, str(error)))
         if time.perf_counter() - started > task.limit_s * task.repeats:
             slow.add((workload, name))
     work.progress("measuring", 1.0)
-    return found
+    return result
 
 
 class _FailedError(FracsliceError):

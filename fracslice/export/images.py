@@ -1,4 +1,4 @@
-"""Image files with text metadata, written atomically: PNG of 8 or 16 bits, OpenEXR and TIFF of floats."""
+"""Image files with text metadata, written atomically: PNG, JPEG, WebP, OpenEXR and TIFF of floats."""
 
 from __future__ import annotations
 
@@ -16,7 +16,18 @@ from fracslice.errors import ExportError
 from fracslice.files import replacing
 from fracslice.work import Work, chunks
 
-IMAGES = (".png", ".exr", ".tif", ".tiff")
+IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".tif", ".tiff")
+LOSSY = {".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
+QUALITY = 95
+"""Quality of JPEG and WebP."""
+LAYERS = {
+    "depth": ("Z",),
+    "normal": ("Normal.X", "Normal.Y", "Normal.Z"),
+    "position": ("Position.X", "Position.Y", "Position.Z"),
+    "albedo": ("Albedo.R", "Albedo.G", "Albedo.B"),
+    "samples": ("Samples.X",),
+}
+"""Channels of the layers of an OpenEXR file, by the names that Blender and Nuke know."""
 STRIP, LEVEL = 64, 6
 """Rows of a PNG that are compressed as one, and the level of compression."""
 ZLIB = b"\x78\x9c"
@@ -54,6 +65,7 @@ def write_image(
     bits: int = 8,
     text: Mapping[str, str] | None = None,
     work: Work | None = None,
+    layers: Mapping[str, np.ndarray] | None = None,
 ) -> Path:
     """Write an image to a file, in the format of its extension.
 
@@ -61,16 +73,18 @@ def write_image(
     ----------
     path : str or path
         The file to write.
-    shown : ndarray, float32 [height, width, 3]
-        sRGB in [0, 1], for PNG.
-    light : ndarray, float32 [height, width, 3]
-        Linear light, for OpenEXR and TIFF.
+    shown : ndarray, float32 [height, width, 3 or 4]
+        sRGB in [0, 1], and unassociated alpha, for PNG, JPEG (without alpha) and WebP.
+    light : ndarray, float32 [height, width, 3 or 4]
+        Linear light, and alpha that it is multiplied by, for OpenEXR and TIFF.
     bits : {8, 16}
         Bits per channel of a PNG.
     text : mapping of str to str, optional
         Keywords and texts of the metadata.
     work : Work, optional
         Threads that compress a PNG; one by default.
+    layers : mapping of str to ndarray, float32 [height, width] or [height, width, 3], optional
+        Further layers of an OpenEXR file; see `LAYERS`.
 
     Returns
     -------
@@ -79,19 +93,63 @@ def write_image(
     Raises
     ------
     ExportError
-        For an unknown extension, another number of bits, or an error of the file system.
+        For an unknown extension, another number of bits, layers of another format, or an error of the file
+        system.
     """
     if bits not in (8, 16):
         raise ExportError(f"{path}: {bits} bits: expected 8 or 16")
     metadata, ending = text or {}, check_image(path)
-    data = (
-        png(shown, bits, metadata, work)
-        if ending == ".png"
-        else (exr if ending == ".exr" else tiff)(light, metadata)
-    )
+    if layers and ending != ".exr":
+        raise ExportError(f"{path}: expected an .exr file, which holds layers")
+    if ending == ".png":
+        data = png(shown, bits, metadata, work)
+    elif ending in LOSSY:
+        data = lossy(shown, LOSSY[ending], metadata)
+    else:
+        data = exr(light, metadata, layers or {}) if ending == ".exr" else tiff(light, metadata)
     with replacing(path) as file:
         file.write(data)
     return Path(path)
+
+
+def lossy(shown: np.ndarray, kind: str, text: Mapping[str, str]) -> bytes:
+    """Encode a JPEG or WebP file by Pillow, with sRGB of 8 bits and a description.
+
+    Parameters
+    ----------
+    shown : ndarray, float [height, width, 3 or 4]
+        sRGB in [0, 1], and alpha, which JPEG leaves out.
+    kind : {"JPEG", "WEBP"}
+        The format.
+    text : mapping of str to str
+        Keywords and texts of the metadata.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    ExportError
+        If the format cannot hold the size.
+    """
+    from PIL import Image
+
+    pixels = shown[..., :3] if kind == "JPEG" else shown
+    image, file = Image.fromarray(_levels(pixels, 8)), BytesIO()
+    exif = image.getexif()
+    exif[0x010E] = "\n".join(f"{k}: {v}" for k, v in text.items())  # ImageDescription
+    try:
+        image.save(file, kind, quality=QUALITY, subsampling=0, exif=exif)
+    except (OSError, ValueError) as error:
+        raise ExportError(f"{kind}: {error}") from None
+    return file.getvalue()
+
+
+def _levels(shown: np.ndarray, bits: int) -> np.ndarray:
+    """Levels of 8 or 16 bits, big-endian."""
+    levels = np.round(np.clip(shown, 0, 1) * np.float64(2**bits - 1))
+    return np.asarray(levels, ">u2" if bits == 16 else np.uint8)
 
 
 def png(shown: np.ndarray, bits: int, text: Mapping[str, str], work: Work | None = None) -> bytes:
@@ -99,8 +157,8 @@ def png(shown: np.ndarray, bits: int, text: Mapping[str, str], work: Work | None
 
     Parameters
     ----------
-    shown : ndarray, float [height, width, 3]
-        sRGB in [0, 1].
+    shown : ndarray, float [height, width, 3 or 4]
+        sRGB in [0, 1], and unassociated alpha.
     bits : {8, 16}
         Bits per channel.
     text : mapping of str to str
@@ -112,14 +170,13 @@ def png(shown: np.ndarray, bits: int, text: Mapping[str, str], work: Work | None
     -------
     bytes
     """
-    height, width, _ = shown.shape
-    most = 2**bits - 1
+    height, width, channels = shown.shape
 
     def compressed(rows: slice) -> tuple[bytes, bytes]:
         """Filtered rows, and the same as blocks of a deflate stream that end at a byte."""
         part = shown[max(rows.start - 1, 0) : rows.stop]
-        levels = np.round(np.clip(part, 0, 1) * np.float64(most)).astype(">u2" if bits == 16 else np.uint8)
-        filtered = _filtered(levels.reshape(len(part), -1).view(np.uint8), 3 * bits // 8)
+        levels = _levels(part, bits)
+        filtered = _filtered(levels.reshape(len(part), -1).view(np.uint8), channels * bits // 8)
         data = filtered[rows.start > 0 :].tobytes()
         packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
         return data, packer.compress(data) + packer.flush(
@@ -129,7 +186,10 @@ def png(shown: np.ndarray, bits: int, text: Mapping[str, str], work: Work | None
     strips = (work or Work(1)).collect(compressed, chunks(height, STRIP))
     checksum = reduce(lambda sum_, strip: zlib.adler32(strip[0], sum_), strips, 1)
     stream = ZLIB + b"".join(blocks for _, blocks in strips) + struct.pack(">I", checksum)
-    parts = [(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)), (b"sRGB", b"\0")]
+    parts = [
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 6 if channels == 4 else 2, 0, 0, 0)),
+        (b"sRGB", b"\0"),
+    ]
     parts += [(b"iTXt", f"{k}\0\0\0\0\0{v}".encode()) for k, v in text.items()]
     parts += [(b"IDAT", stream), (b"IEND", b"")]
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in parts)
@@ -155,15 +215,17 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def exr(light: np.ndarray, text: Mapping[str, str]) -> bytes:
+def exr(light: np.ndarray, text: Mapping[str, str], layers: Mapping[str, np.ndarray]) -> bytes:
     """Encode an OpenEXR file (Academy Software Foundation): 32-bit floats, losslessly compressed.
 
     Parameters
     ----------
-    light : ndarray, float32 [height, width, 3]
-        Linear red, green and blue.
+    light : ndarray, float32 [height, width, 3 or 4]
+        Linear red, green and blue, and alpha that they are multiplied by.
     text : mapping of str to str
         Keywords and texts of the metadata.
+    layers : mapping of str to ndarray, float32 [height, width] or [height, width, 3]
+        Layers of `LAYERS`.
 
     Returns
     -------
@@ -172,9 +234,14 @@ def exr(light: np.ndarray, text: Mapping[str, str]) -> bytes:
     import OpenEXR
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **text}
+    channels = {name: light[..., k] for k, name in enumerate("RGBA"[: light.shape[2]])}
+    for layer, values in layers.items():
+        parts = np.atleast_3d(values)
+        channels |= {name: parts[..., k] for k, name in enumerate(LAYERS[layer])}
     with TemporaryDirectory() as folder:  # the library only writes to named files
         path = Path(folder) / "picture.exr"
-        with OpenEXR.File(header, {"RGB": np.ascontiguousarray(light, np.float32)}) as file:
+        arrays = {name: np.ascontiguousarray(part, np.float32) for name, part in channels.items()}
+        with OpenEXR.File(header, arrays) as file:
             file.write(str(path))
         return path.read_bytes()
 
@@ -184,8 +251,8 @@ def tiff(light: np.ndarray, text: Mapping[str, str]) -> bytes:
 
     Parameters
     ----------
-    light : ndarray, float32 [height, width, 3]
-        Linear red, green and blue.
+    light : ndarray, float32 [height, width, 3 or 4]
+        Linear red, green and blue, and alpha that they are multiplied by.
     text : mapping of str to str
         Keywords and texts of the metadata, in the description.
 
@@ -197,5 +264,14 @@ def tiff(light: np.ndarray, text: Mapping[str, str]) -> bytes:
 
     file, note = BytesIO(), "\n".join(f"{k}: {v}" for k, v in text.items())
     pixels = np.ascontiguousarray(light, np.float32)
-    imwrite(file, pixels, photometric="rgb", description=note.encode(), metadata=None, software=False)
+    alpha = ["assocalpha"] if light.shape[2] == 4 else None
+    imwrite(
+        file,
+        pixels,
+        photometric="rgb",
+        extrasamples=alpha,
+        description=note.encode(),
+        metadata=None,
+        software=False,
+    )
     return file.getvalue()

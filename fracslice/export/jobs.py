@@ -1,4 +1,4 @@
-"""Slice runs, and the ways in which their layers get into a file or a folder."""
+"""Slice runs, and how their layers are written to a file or a folder."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class SliceRun:
     mesh : callable, optional
         Makes the mesh of the object for 3MF files, mm, standing on z = 0 and centred as the layers are.
     picture : callable, optional
-        Renders the object for print files: from width and height in pixels, uint8 [height, width, 3], sRGB.
+        Renders the object for print files: uint8 [height, width, 3], sRGB.
     created : datetime
         Date in print files, UTC.
     sections : int
@@ -69,7 +69,7 @@ class SliceRun:
     resin: Resin | None = None
     metadata: dict[str, str] = field(default_factory=dict)
     mesh: Callable[[], Mesh] | None = None
-    picture: Callable[[int, int], NDArray[np.uint8]] | None = None
+    picture: Callable[[], NDArray[np.uint8]] | None = None
     created: datetime = EPOCH
     sections: int = 1
     recipe: Recipe | None = None

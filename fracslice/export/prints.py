@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageOps
 
 from fracslice.errors import ExportError
 from fracslice.export.jobs import SliceRun
@@ -18,6 +19,7 @@ from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal
 from fracslice.slicing import Layer
 from fracslice.slicing.printers import Printer
+from fracslice.work import beside
 
 _AREA = struct.Struct("<d")
 """Area before the picture in a record, mm^2."""
@@ -37,12 +39,15 @@ class Print:
         Exposure and motion.
     journal : Journal
         Area and picture of each layer.
+    picture : callable or None
+        Returns the picture of the object.
     """
 
     run: SliceRun
     printer: Printer
     resin: Resin
     journal: Journal
+    picture: Callable[[], NDArray[np.uint8]] | None = None
 
     def __iter__(self) -> Iterator[bytes]:
         """Iterate over the encoded pictures."""
@@ -116,7 +121,7 @@ class Print:
         return self.printer.title.encode("ascii", "replace")
 
     def preview(self, width: int, height: int) -> NDArray[np.uint8]:
-        """Picture of the object.
+        """Picture of the object, cut from one for all sizes.
 
         Parameters
         ----------
@@ -128,9 +133,10 @@ class Print:
         uint8 [height, width, 3]
             sRGB; black if the run has no pictures.
         """
-        if self.run.picture is None:
+        if self.picture is None:
             return np.zeros((height, width, 3), np.uint8)
-        return self.run.picture(width, height)
+        whole = Image.fromarray(self.picture())
+        return np.asarray(ImageOps.fit(whole, (width, height), Image.Resampling.LANCZOS))
 
 
 @contextmanager
@@ -167,8 +173,9 @@ def printing(run: SliceRun, path: str | Path, form: str, encode: Callable[[Layer
         data = encode(layer)
         return _AREA.pack(layer.area) + data
 
-    with run.encoded(path, form, record) as journal:
-        yield Print(run, run.screen.printer, run.resin, journal)
+    drawn = nullcontext(None) if run.picture is None else beside(run.picture, run.work.threads)
+    with drawn as picture, run.encoded(path, form, record) as journal:
+        yield Print(run, run.screen.printer, run.resin, journal, picture)
 
 
 def one_height(run: SliceRun, path: str | Path, form: str) -> None:

@@ -57,6 +57,46 @@ def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1
     Node
     """
 
+def amazing_surf(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Amazing Surf (Kali 2011, fractalforums.com): a Mandelbox that is not folded along z. L = 2 is
+    measured.
+
+    Parameters
+    ----------
+    scale : a number >= -10 and <= 10, default 2.0
+        how much each step enlarges; less than -1 or more than 1
+    inner : a number > 0 and <= 1, default 0.5
+        radius within which the ball's fold only scales
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
+def apollonian(level: int = 4, swell: float = 1.02) -> Node:
+    """Apollonian packing of balls in the unit ball (Soddy 1936, "The kiss precise"; Boyd 1973).
+
+    Inversions in the five spheres at right angles to four of the five first ones, the four balls and the
+    outside, make all others. A ball of radius d around an image
+    point comes from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured: balls of
+    further levels are left out.
+
+    Parameters
+    ----------
+    level : a whole number from 0 to 12, default 4
+        how often the gaps are filled
+    swell : a number >= 0.5 and <= 1.1, default 1.02
+        radius of the balls in units of that at which they touch
+
+    Returns
+    -------
+    Node
+    """
+
 def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
     """The element bent: a straight axis becomes an arc (Barr 1984, "Global and Local Deformations of Solid
     Primitives").
@@ -75,6 +115,29 @@ def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') ->
         how far to turn per unit of length along the bent axis
     axis : x, y or z, default 'z'
         the hinge, which stays straight: z bends x towards y, x bends y towards z, y bends z towards x
+
+    Returns
+    -------
+    Node
+    """
+
+def benesi(scale: float = 1.0, offset: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """Folds in a frame along the space diagonal, then a square about the x axis (Benesi 2010,
+    fractalforums.com: "Pine tree" and the transform T1).
+
+    The square doubles the angle about the x axis and that to it: lengths grow by 2 r along meridians and by
+    4 |x| along circles. L = 2 is measured.
+
+    Parameters
+    ----------
+    scale : a number > 0 and <= 4, default 1.0
+        how much space is enlarged before it is squared
+    offset : a number >= -4 and <= 4, default 0.0
+        how far it is moved along the x axis before that
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
 
     Returns
     -------
@@ -201,6 +264,26 @@ def cone(radius: float = 0.5, height: float = 1.0) -> Node:
     Node
     """
 
+def cosine_bulb(power: float = 9.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Mandelbulb with angles counted from the equator (Nylander 2009, bugman123.com): odd powers.
+
+    Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |cos n theta / cos theta|,
+    without limit near the poles if n is not odd: space tears there. L = 2 is measured.
+
+    Parameters
+    ----------
+    power : a number >= 2 and <= 16, default 9.0
+        the exponent
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
 def cylinder(radius: float = 0.5, height: float = 1.0) -> Node:
     """A cylinder along the z axis, with flat ends. L = 1: an exact distance.
 
@@ -231,6 +314,24 @@ def difference(*elements: Node, smooth: float = 0.0) -> Node:
     Node
     """
 
+def fischer_koch_s(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+    """A wall along the surface S of Fischer and Koch 1987. The gradient of its level function is at most
+    2.444: L = 1.
+
+    Parameters
+    ----------
+    period : a number > 0, default 1.0
+        length after which the surface repeats
+    thickness : a number > 0, default 0.1
+        of the wall at the origin, at its thinnest
+    grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        growth of the thickness per length along x, y and z
+
+    Returns
+    -------
+    Node
+    """
+
 def flake(solid: Literal['tetrahedron', 'octahedron', 'dodecahedron', 'icosahedron'] = 'icosahedron', level: int = 3) -> Node:
     """The flake of a Platonic solid with corners on the unit sphere.
 
@@ -250,7 +351,50 @@ def flake(solid: Literal['tetrahedron', 'octahedron', 'dodecahedron', 'icosahedr
     Node
     """
 
-def gyroid(period: float = 1.0, thickness: float = 0.1) -> Node:
+def frd(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+    """A wall along the surface F-RD of Schoen 1970. The gradient of its level function is at most 7.041:
+    L = 1.
+
+    Parameters
+    ----------
+    period : a number > 0, default 1.0
+        length after which the surface repeats
+    thickness : a number > 0, default 0.1
+        of the wall at the origin, at its thinnest
+    grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        growth of the thickness per length along x, y and z
+
+    Returns
+    -------
+    Node
+    """
+
+def gear(teeth: int = 16, radius: float = 1.0, height: float = 0.4, bore: float = 0.2, angle: float = 20.0) -> Node:
+    """A spur gear along the z axis with involute flanks (Euler 1765; Litvin and Fuentes 2004, "Gear Geometry
+    and Applied Theory"): addendum 1 and dedendum 1.25 modules.
+
+    Involutes of one circle are parallel, so the distance to a flank is the base radius times an angle. Below
+    the base circle flanks are radial: L = sqrt(1 + (pi / teeth)^2).
+
+    Parameters
+    ----------
+    teeth : a whole number from 6 to 1000, default 16
+        number of teeth
+    radius : a number > 0, default 1.0
+        of the pitch circle
+    height : a number > 0, default 0.4
+        the height along z, centred at the origin
+    bore : a number >= 0, default 0.2
+        radius of the hole along the axis
+    angle : a number >= 10 and <= 30, default 20.0
+        pressure angle, degrees
+
+    Returns
+    -------
+    Node
+    """
+
+def gyroid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the gyroid (Schoen 1970, "Infinite periodic minimal surfaces without
     self-intersections"). The gradient of its level function is at most sqrt(3): L = 1.
 
@@ -259,7 +403,50 @@ def gyroid(period: float = 1.0, thickness: float = 0.1) -> Node:
     period : a number > 0, default 1.0
         length after which the surface repeats
     thickness : a number > 0, default 0.1
-        of the wall, at its thinnest
+        of the wall at the origin, at its thinnest
+    grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        growth of the thickness per length along x, y and z
+
+    Returns
+    -------
+    Node
+    """
+
+def hilbert(level: int = 2, thickness: float = 0.5) -> Node:
+    """A tube along a Hilbert curve in the cube [-1, 1]^3 (Hilbert 1891; as a Lindenmayer system by
+    Prusinkiewicz and Lindenmayer 1990, "The Algorithmic Beauty of Plants").
+
+    The distance to the two halves of the curve's edges in the point's cell, clipped at half a cell, which is
+    nearer than those of any other cell: L = 1.
+
+    Parameters
+    ----------
+    level : a whole number from 1 to 10, default 2
+        how often every cell is cut into eight
+    thickness : a number > 0 and < 1, default 0.5
+        diameter of the tube in cells
+
+    Returns
+    -------
+    Node
+    """
+
+def honeycomb(kind: Literal['435', '534', '535', '353'] = '534', thickness: float = 0.16, reach: float = 0.95) -> Node:
+    """Struts along the edges of a regular honeycomb of hyperbolic space, in Poincare's ball (Coxeter 1954,
+    "Regular honeycombs in hyperbolic space"; Nelson and Segerman 2017): a Kleinian group of reflections.
+
+    Points of the hyperboloid are reflected into a cell of the group. The hyperbolic distance to the edge
+    there bounds that in space, as the ball of radius artanh t around a point at r holds one of radius
+    (1 - r^2) t / (1 + r t): L = 1.
+
+    Parameters
+    ----------
+    kind : 435, 534, 535 or 353, default '534'
+        Schlaefli symbol: p-gons, q at a corner of a cell, r cells at an edge
+    thickness : a number > 0 and <= 2, default 0.16
+        hyperbolic diameter of the struts
+    reach : a number > 0 and <= 0.995, default 0.95
+        radius of the ball that is filled; at 1 is infinity
 
     Returns
     -------
@@ -281,7 +468,7 @@ def intersection(*elements: Node, smooth: float = 0.0) -> Node:
     Node
     """
 
-def iwp(period: float = 1.0, thickness: float = 0.1) -> Node:
+def iwp(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the surface I-WP of Schoen 1970. The gradient of its level function is at most
     3 sqrt(3): L = 1.
 
@@ -290,7 +477,26 @@ def iwp(period: float = 1.0, thickness: float = 0.1) -> Node:
     period : a number > 0, default 1.0
         length after which the surface repeats
     thickness : a number > 0, default 0.1
-        of the wall, at its thinnest
+        of the wall at the origin, at its thinnest
+    grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        growth of the thickness per length along x, y and z
+
+    Returns
+    -------
+    Node
+    """
+
+def jerusalem(level: int = 3) -> Node:
+    """The Jerusalem cube in [-1, 1]^3 (Baird 2011): 8 cubes of size sqrt(2) - 1 at the corners, and 12 of its
+    square on the edges, which are one level ahead.
+
+    Space is folded into the part nearest to one corner and one edge; the smallest of the fields of both is
+    taken in every step, so L = 1. Volume V(n) = 8 k^3 V(n - 1) + 12 k^6 V(n - 2), k = sqrt(2) - 1.
+
+    Parameters
+    ----------
+    level : a whole number from 0 to 5, default 3
+        how often every cube is replaced by 20
 
     Returns
     -------
@@ -320,7 +526,125 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
     Node
     """
 
-def lidinoid(period: float = 1.0, thickness: float = 0.1) -> Node:
+def kifs_dodecahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The dodecahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
+
+    Parameters
+    ----------
+    scale : a number >= 1.1 and <= 10, default 2.0
+        how much each step enlarges
+    angle : a number, default 0.0
+        rotation about the corner's axis in each step, degrees
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
+def kifs_icosahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The icosahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
+
+    Parameters
+    ----------
+    scale : a number >= 1.1 and <= 10, default 2.0
+        how much each step enlarges
+    angle : a number, default 0.0
+        rotation about the corner's axis in each step, degrees
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
+def kifs_octahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The octahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
+
+    Parameters
+    ----------
+    scale : a number >= 1.1 and <= 10, default 2.0
+        how much each step enlarges
+    angle : a number, default 0.0
+        rotation about the corner's axis in each step, degrees
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
+def kifs_tetrahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 2 is measured.
+
+    Parameters
+    ----------
+    scale : a number >= 1.1 and <= 10, default 2.0
+        how much each step enlarges
+    angle : a number, default 0.0
+        rotation about the corner's axis in each step, degrees
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
+def koch(radius: float = 1.0, height: float = 0.5, level: int = 4) -> Node:
+    """A prism over the snowflake of von Koch 1904.
+
+    L = 1: an exact distance. The triangle is folded onto half an edge, and every edge onto a quarter, by
+    mirrors that take the curve on one side to that on the other.
+
+    Parameters
+    ----------
+    radius : a number > 0, default 1.0
+        from the axis to the corners
+    height : a number > 0, default 0.5
+        the height along z, centred at the origin
+    level : a whole number from 0 to 12, default 4
+        how often the middle third of every edge is replaced by two
+
+    Returns
+    -------
+    Node
+    """
+
+def lambda_bulb(power: float = 4.0, factor: float = 1.1, angle: float = 30.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The filled Julia set of lambda (w - w^n) in the triplex numbers, after the logistic map (May 1976,
+    "Simple mathematical models with very complicated dynamics"). L = 2 is measured.
+
+    Parameters
+    ----------
+    power : a number >= 2 and <= 16, default 4.0
+        the exponent
+    factor : a number > 0 and <= 4, default 1.1
+        size of lambda
+    angle : a number, default 30.0
+        angle of lambda, about the z axis, degrees
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
+def lidinoid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the lidinoid (Lidin and Larsson 1990). The gradient of its level function is at most
     1.5 sqrt(3): L = 1.
 
@@ -329,7 +653,9 @@ def lidinoid(period: float = 1.0, thickness: float = 0.1) -> Node:
     period : a number > 0, default 1.0
         length after which the surface repeats
     thickness : a number > 0, default 0.1
-        of the wall, at its thinnest
+        of the wall at the origin, at its thinnest
+    grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        growth of the thickness per length along x, y and z
 
     Returns
     -------
@@ -391,7 +717,7 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     Node
     """
 
-def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, roughness: float = 0.0, metallic: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """The appearance of the element in pictures. A material nested deeper takes precedence.
 
     The field is that of the element: L = the element's.
@@ -402,6 +728,10 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats
         What it is applied to; several are a union.
     colour : 3 or 6 or 9 or 12 or 15 or 18 or 21 or 24 numbers >= 0 and <= 1, default (0.8, 0.8, 0.8)
         red, green and blue; several colours, three numbers each, are a palette for the orbit
+    palette : colours, viridis, plasma, inferno, magma, cividis or twilight, default 'colours'
+        a palette by name in place of the colours
+    trap : point, axes, planes, sphere, steps or direction, default 'point'
+        property of the orbit that the palette shows: its smallest distance to the origin, to the axes, to the coordinate planes or the unit sphere, its number of steps, or its last angle about the z axis
     repeats : a number > 0 and <= 1000, default 1.0
         how often the palette is run through
     shift : a number >= 0 and <= 1, default 0.0
@@ -414,6 +744,10 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), repeats
         light of its own, in its colour
     reflect : a number >= 0 and <= 1, default 0.0
         the part of light that is mirrored head on; more is at grazing angles
+    roughness : a number >= 0 and <= 1, default 0.0
+        roughness of the reflection: 0 is a mirror, 1 is dull
+    metallic : a number >= 0 and <= 1, default 0.0
+        1 for a metal, which reflects in its colour and has no other light
     clear : a number >= 0 and <= 1, default 0.0
         the part of light that goes through
     index : a number >= 1 and <= 4, default 1.5
@@ -463,7 +797,7 @@ def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
     Node
     """
 
-def neovius(period: float = 1.0, thickness: float = 0.1) -> Node:
+def neovius(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7: L = 1.
 
     Parameters
@@ -471,7 +805,36 @@ def neovius(period: float = 1.0, thickness: float = 0.1) -> Node:
     period : a number > 0, default 1.0
         length after which the surface repeats
     thickness : a number > 0, default 0.1
-        of the wall, at its thinnest
+        of the wall at the origin, at its thinnest
+    grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        growth of the thickness per length along x, y and z
+
+    Returns
+    -------
+    Node
+    """
+
+def noise(*elements: Node, kind: Literal['perlin', 'simplex'] = 'simplex', amplitude: float = 0.1, period: float = 0.5, octaves: int = 1, seed: int = 0) -> Node:
+    """The element with its surface displaced by gradient noise: Perlin 2002, "Improving noise", or simplex
+    noise (Gustavson 2005, "Simplex noise demystified").
+
+    The noise of every octave has the same steepest gradient, so L = the element's + 3.225 octaves amplitude /
+    period, with simplex noise 7.803. The result is clipped at the element's box grown by all amplitudes.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    kind : perlin or simplex, default 'simplex'
+        the noise
+    amplitude : a number > 0, default 0.1
+        largest displacement by the first octave
+    period : a number > 0, default 0.5
+        distance between lattice points of the first octave
+    octaves : a whole number from 1 to 8, default 1
+        layers of noise, each half as large and twice as fine
+    seed : a whole number from 0 to 288, default 0
+        another number is another noise
 
     Returns
     -------
@@ -546,6 +909,30 @@ def prism(sides: int = 6, radius: float = 0.5, height: float = 1.0) -> Node:
     Node
     """
 
+def pseudo_kleinian(size: Sequence[float] = (0.92436, 0.90756, 0.92436), ball: float = 1.0, c: Sequence[float] = (0.0, 0.0, 0.0), thickness: float = 0.05, steps: int = 8) -> Node:
+    """Folds into a box and out of a ball, around a cross of a plane and an axis (Theli-at and Knighty 2011,
+    fractalforums.com: "Scale 1 JuliaBox + something"). Without end; put `bounds` around it.
+
+    Steps are similarities beside their creases: the stretch is a number. L = 2 is measured.
+
+    Parameters
+    ----------
+    size : 3 numbers > 0 and <= 4, default (0.92436, 0.90756, 0.92436)
+        half sizes of the box that is folded into
+    ball : a number > 0 and <= 4, default 1.0
+        square of the radius of the ball that is folded out of
+    c : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        added in each step
+    thickness : a number > 0 and <= 1, default 0.05
+        of the innermost shape
+    steps : a whole number from 1 to 60, default 8
+        steps of the orbit
+
+    Returns
+    -------
+    Node
+    """
+
 def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
     """The Mandelbrot set of q^2 + c in the quaternions, cut at k = 0 (Norton 1982).
 
@@ -553,6 +940,27 @@ def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', juli
 
     Parameters
     ----------
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+    julia : 3 numbers >= -100 and <= 100
+        adds this point in each step instead of the start point: a Julia set
+
+    Returns
+    -------
+    Node
+    """
+
+def quaternion_power(power: int = 3, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+    """The Mandelbrot set of q^n + c in the quaternions, cut at k = 0, or with `julia` the Julia set (Bedding
+    and Briggs 1995, "Iteration of quaternion maps").
+
+    With q = x + u, |u|^2 = y^2 + z^2, the real part and the factor of u are polynomials. The derivative of
+    q^n has the norm n |q|^(n-1) at most. L = 2 is measured.
+
+    Parameters
+    ----------
+    power : a whole number from 2 to 9, default 3
+        the exponent
     iterations : a whole number from 1 to 10000 or "auto", default 'auto'
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
@@ -584,7 +992,7 @@ def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 
     Node
     """
 
-def schwarz_d(period: float = 1.0, thickness: float = 0.1) -> Node:
+def schwarz_d(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
 
@@ -593,14 +1001,16 @@ def schwarz_d(period: float = 1.0, thickness: float = 0.1) -> Node:
     period : a number > 0, default 1.0
         length after which the surface repeats
     thickness : a number > 0, default 0.1
-        of the wall, at its thinnest
+        of the wall at the origin, at its thinnest
+    grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        growth of the thickness per length along x, y and z
 
     Returns
     -------
     Node
     """
 
-def schwarz_p(period: float = 1.0, thickness: float = 0.1) -> Node:
+def schwarz_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
 
@@ -609,7 +1019,9 @@ def schwarz_p(period: float = 1.0, thickness: float = 0.1) -> Node:
     period : a number > 0, default 1.0
         length after which the surface repeats
     thickness : a number > 0, default 0.1
-        of the wall, at its thinnest
+        of the wall at the origin, at its thinnest
+    grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        growth of the thickness per length along x, y and z
 
     Returns
     -------
@@ -644,6 +1056,45 @@ def sphere(radius: float = 1.0) -> Node:
     Node
     """
 
+def split_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+    """A wall along the surface Split P of Lord and Mackay 2003. The gradient of its level function is at most
+    3.6201: L = 1.
+
+    Parameters
+    ----------
+    period : a number > 0, default 1.0
+        length after which the surface repeats
+    thickness : a number > 0, default 0.1
+        of the wall at the origin, at its thinnest
+    grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
+        growth of the thickness per length along x, y and z
+
+    Returns
+    -------
+    Node
+    """
+
+def struts(kind: Literal['cubic', 'bcc', 'fcc', 'octet', 'kelvin'] = 'octet', period: float = 1.0, thickness: float = 0.1) -> Node:
+    """Struts along a cubic lattice: its edges, the space diagonals (bcc), the face diagonals (fcc), these and
+    an octahedron (octet truss: Fuller 1961; Deshpande, Fleck and Ashby 2001), or the edges of truncated
+    octahedra (Kelvin cells: Thomson 1887, "On the division of space with minimum partitional area").
+
+    L = 1: an exact distance. Space is folded into an eighth of a cell, by mirrors of the lattice.
+
+    Parameters
+    ----------
+    kind : cubic, bcc, fcc, octet or kelvin, default 'octet'
+        the lattice
+    period : a number > 0, default 1.0
+        length of the edges of a cell
+    thickness : a number > 0, default 0.1
+        diameter of the struts
+
+    Returns
+    -------
+    Node
+    """
+
 def superquadric(size: Sequence[float] = (1.0, 1.0, 1.0), exponent: float = 4.0) -> Node:
     """A superellipsoid (Barr 1981, "Superquadrics and angle-preserving transformations").
 
@@ -656,6 +1107,43 @@ def superquadric(size: Sequence[float] = (1.0, 1.0, 1.0), exponent: float = 4.0)
         the three diameters
     exponent : a number >= 2 and <= 100, default 4.0
         2 is an ellipsoid; larger numbers come near to a box
+
+    Returns
+    -------
+    Node
+    """
+
+def tetrabrot(iterations: Union[int, Literal['auto']] = 'auto') -> Node:
+    """The Tetrabrot (Rochon 2000, "A generalized Mandelbrot set for bicomplex numbers").
+
+    Idempotents split the bicomplex square into two complex ones: a point is inside if both x + (y - z) i and
+    x + (y + z) i are in the complex Mandelbrot set. It is the intersection of two skew cylinders, whose maps
+    stretch lengths by sqrt(2). L = 2 is Koebe's bound for both.
+
+    Parameters
+    ----------
+    iterations : a whole number from 1 to 10000 or "auto", default 'auto'
+        steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+
+    Returns
+    -------
+    Node
+    """
+
+def thread(radius: float = 0.5, pitch: float = 0.2, height: float = 1.5) -> Node:
+    """A right-handed screw along the z axis with the basic profile of ISO metric threads (ISO 68-1).
+
+    Oberg and Jones 1914, "Machinery's Handbook". The radial distance to the profile, times the
+    cosine of its steepest slope, is clipped deep inside, where a turn moves points too little: L = 1.
+
+    Parameters
+    ----------
+    radius : a number > 0, default 0.5
+        outer radius
+    pitch : a number > 0, default 0.2
+        height of one turn
+    height : a number > 0, default 1.5
+        the height along z, centred at the origin
 
     Returns
     -------
@@ -701,6 +1189,31 @@ def transform(*elements: Node, translate: Sequence[float] = (0.0, 0.0, 0.0), rot
     Node
     """
 
+def tree(branches: int = 3, level: int = 4, angle: float = 35.0, ratio: float = 0.7, thickness: float = 0.2) -> Node:
+    """The tree of the Lindenmayer system A -> F [&A] [/&A] ..., from the origin along the z axis (Honda 1971;
+    Prusinkiewicz and Lindenmayer 1990, "The Algorithmic Beauty of Plants").
+
+    Space is folded onto one branch of every fork, so branches end where they meet the plane between two, and
+    L = 1.
+
+    Parameters
+    ----------
+    branches : a whole number from 2 to 12, default 3
+        branches at the end of every branch
+    level : a whole number from 0 to 12, default 4
+        how often branches fork
+    angle : a number >= 0 and <= 90, default 35.0
+        between a branch and the one before, degrees
+    ratio : a number > 0 and <= 0.9, default 0.7
+        size of a branch in units of the one before
+    thickness : a number > 0 and <= 1, default 0.2
+        diameter of the trunk, whose length is 1
+
+    Returns
+    -------
+    Node
+    """
+
 def twist(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
     """The element twisted about an axis (Barr 1984, "Global and Local Deformations of Solid Primitives").
 
@@ -736,6 +1249,32 @@ def union(*elements: Node, smooth: float = 0.0) -> Node:
         What it is made of.
     smooth : a number >= 0, default 0.0
         width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)
+
+    Returns
+    -------
+    Node
+    """
+
+def voronoi(kind: Literal['struts', 'walls'] = 'struts', period: float = 1.0, thickness: float = 0.1, irregularity: float = 0.8, seed: int = 0) -> Node:
+    """A foam of Voronoi cells, without end; put `bounds` around it (Voronoi 1908; cells by Worley 1996,
+    "A cellular texture basis function").
+
+    Half the difference of the distances to the nearest and to the second nearest centre, of struts to the
+    third: each distance has slope 1, so L = 1. Distances are clipped where a centre out of the 27 nearest
+    lattice cells could be nearer.
+
+    Parameters
+    ----------
+    kind : struts or walls, default 'struts'
+        along the edges of the cells or their faces
+    period : a number > 0, default 1.0
+        distance between cell centres before they are moved
+    thickness : a number > 0, default 0.1
+        of struts or walls, at their thinnest
+    irregularity : a number >= 0 and <= 1, default 0.8
+        how far cell centres are moved at random, in periods
+    seed : a whole number from 0 to 288, default 0
+        another number is another foam
 
     Returns
     -------

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from .orbits import orbit
-from .parameters import Number
-from .verbs import positive
+from .parameters import Count, Number
+from .verbs import positive, turn
 from .verbs import power as raised
-from .vocabulary import sqrt
+from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, sin, sqrt, where
 
 POWER = Number(8.0, "the exponent", least=2, most=16)
+
+DIAGONAL_AXIS, DIAGONAL = (0.0, 0.7071067811865476, -0.7071067811865476), 54.735610317245346
+"""Rotation that takes the x axis to the space diagonal."""
 
 
 @orbit()
@@ -35,3 +38,81 @@ def burning_ship(w, c, power):  # type: ignore[no-untyped-def]
     L = 2 is measured.
     """
     return raised(positive(w), power) + c
+
+
+@orbit(power=Count(3, "the exponent", least=2, most=9))
+def quaternion_power(w, c, power):  # type: ignore[no-untyped-def]
+    """The Mandelbrot set of q^n + c in the quaternions, cut at k = 0, or with `julia` the Julia set (Bedding
+    and Briggs 1995, "Iteration of quaternion maps").
+
+    With q = x + u, |u|^2 = y^2 + z^2, the real part and the factor of u are polynomials. The derivative of
+    q^n has the norm n |q|^(n-1) at most. L = 2 is measured.
+    """
+    x, y, z = w
+    u2 = y * y + z * z
+    a, b = x, 1.0 + 0.0 * x
+    r, stretch = sqrt(x * x + u2), 1.0 * power
+    for _ in range(power - 1):
+        a, b = x * a - u2 * b, x * b + a
+        stretch = stretch * r
+    return (a, b * y, b * z) + c, stretch
+
+
+@orbit(power=Number(9.0, "the exponent", least=2, most=16))
+def cosine_bulb(w, c, power):  # type: ignore[no-untyped-def]
+    """The Mandelbulb with angles counted from the equator (Nylander 2009, bugman123.com): odd powers.
+
+    Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |cos n theta / cos theta|,
+    without limit near the poles if n is not odd: space tears there. L = 2 is measured.
+    """
+    x, y, z = w
+    rho2 = maximum(x * x + y * y, 1e-30)
+    r2 = maximum(rho2 + z * z, 1e-30)
+    rho = sqrt(rho2)
+    rn = exp(0.5 * power * log(r2))
+    theta, phi = power * atan2(rho, absolute(z)), power * atan2(y, x)
+    # Angles are counted from the nearer pole: rounding of those near pi / 2 is not small against rho.
+    half_turns = floor(0.5 * power)
+    sign = 1.0 - 2.0 * (half_turns - 2.0 * floor(0.5 * half_turns))
+    rest = 1.5707963267948966 * (power - 2.0 * half_turns - 1.0)
+    sine, cosine = sign * cos(rest), -sign * sin(rest)
+    p, q = sin(theta), cos(theta)
+    across, along = rn * (cosine * q + sine * p), rn * (sine * q - cosine * p)
+    stretch = power * maximum(rn * rsqrt(r2), absolute(across) / rho)
+    return (across * cos(phi), across * sin(phi), where(z < 0.0, -along, along)) + c, stretch
+
+
+@orbit(
+    power=Number(4.0, "the exponent", least=2, most=16),
+    factor=Number(1.1, "size of lambda", above=0, most=4),
+    angle=Number(30.0, "angle of lambda, about the z axis, degrees"),
+)
+def lambda_bulb(w, c, power, factor, angle):  # type: ignore[no-untyped-def]
+    """The filled Julia set of lambda (w - w^n) in the triplex numbers, after the logistic map (May 1976,
+    "Simple mathematical models with very complicated dynamics"). L = 2 is measured.
+    """
+    return factor * turn(w - raised(w, power), (0.0, 0.0, 1.0), angle)
+
+
+@orbit(
+    scale=Number(1.0, "how much space is enlarged before it is squared", above=0, most=4),
+    offset=Number(0.0, "how far it is moved along the x axis before that", least=-4, most=4),
+)
+def benesi(w, c, scale, offset):  # type: ignore[no-untyped-def]
+    """Folds in a frame along the space diagonal, then a square about the x axis (Benesi 2010,
+    fractalforums.com: "Pine tree" and the transform T1).
+
+    The square doubles the angle about the x axis and that to it: lengths grow by 2 r along meridians and by
+    4 |x| along circles. L = 2 is measured.
+    """
+    w = turn(positive(turn(w, DIAGONAL_AXIS, DIAGONAL)), DIAGONAL_AXIS, -DIAGONAL)
+    return pine(scale * w - offset * (1.0, 0.0, 0.0)) + c
+
+
+def pine(w):  # type: ignore[no-untyped-def]
+    """Square about the x axis."""
+    x, y, z = w
+    rho = sqrt(maximum(y * y + z * z, 1e-30))
+    k = 2.0 * x / rho
+    image = (x * x - y * y - z * z, k * (y * y - z * z), k * 2.0 * y * z)
+    return image, maximum(2.0 * sqrt(x * x + y * y + z * z), 4.0 * absolute(x))

@@ -49,7 +49,7 @@ def cells(x, y, z, level, runs):  # type: ignore[no-untyped-def]
             if last < 3:
                 beyond = -least if last == 0 else -middle if last == 1 else -most
             kept = minimum(kept, maximum(inside, beyond))
-        orbit(u * u + v * v + w * w, kept * cell > f)
+        orbit(u * u + v * v + w * w, kept * cell > f, u, v, w)
         f = maximum(f, kept * cell)
     return f
 

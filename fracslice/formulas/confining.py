@@ -76,7 +76,7 @@ def offset(child, x, y, z, distance, centre, half):  # type: ignore[no-untyped-d
 def offset_arguments(node: Node) -> dict[str, object]:
     only_grown = node.is_conservative and node.bounds.exterior_only
     distance = max(node["distance"], 0.0) if only_grown else node["distance"]
-    return {"distance": distance, **_frame(node.bounds.box)}
+    return {"distance": distance, **frame(node.bounds.box)}
 
 
 @offset.bounds
@@ -113,7 +113,7 @@ def offset_identity(node: Node) -> bool:
     return bool(node["distance"] == 0)
 
 
-def _frame(box: Box) -> dict[str, object]:
+def frame(box: Box) -> dict[str, object]:
     """Centre of a box, 0 along unbounded axes, and its half sizes."""
     return {
         "centre": tuple(c if math.isfinite(c) else 0.0 for c in box.centre),
@@ -181,12 +181,12 @@ def repeat_arguments(node: Node) -> dict[str, object]:
     number = [c or ENDLESS for c in count]
     first = tuple(-((c - 1) / 2) if c else -float(ENDLESS // 2) for c in count)
     gaps = [w / 2 * p - s / 2 for w, p, s, n in zip(windows, period, box.size, number, strict=True) if n > w]
-    whole = _frame(repeat_bounds(node))
+    whole = frame(repeat_bounds(node))
     return {
         "period": period,
         "first": first,
         "last": tuple(float(n - 1) for n in number),
-        **_frame(box),
+        **frame(box),
         "middle": whole["centre"],
         "reach": whole["half"],
         "gap": min(gaps, default=math.inf),

@@ -80,7 +80,7 @@ def flake(x, y, z, level, scale, corner, face, height, mirrors):  # type: ignore
             x, y, z = x - s * a, y - s * b, z - s * c
         size = size / scale
         x, y, z = x - size * vx, y - size * vy, z - size * vz
-        orbit((x * x + y * y + z * z) / size, x == x)
+        orbit((x * x + y * y + z * z) / size, x == x, x / size, y / size, z / size)
     for a, b, c in mirrors:
         s = 2.0 * minimum(a * x + b * y + c * z, 0.0)
         x, y, z = x - s * a, y - s * b, z - s * c

@@ -65,7 +65,7 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat,
             k = twice * k + ck
             imaginary2 = imaginary2 + k * k
         r2 = where(alive, x * x + imaginary2, r2)
-        orbit(r2, alive)
+        orbit(r2, alive, x, y, z)
         alive = r2 < escape2
     return potential_distance(r2, slope2, level, first_level, last_level, least)
 

@@ -28,3 +28,11 @@ def abox(w, c, scale, inner, size, angle):  # type: ignore[no-untyped-def]
     With a third size of 1e6, z is never folded: the Amazing Surf (Kali 2011). L = 2 is measured.
     """
     return scale * turn(ball(fold_to(w, size), inner), (0.0, 0.0, 1.0), angle) + c
+
+
+@orbit(scale=SCALE, inner=INNER)
+def amazing_surf(w, c, scale, inner):  # type: ignore[no-untyped-def]
+    """The Amazing Surf (Kali 2011, fractalforums.com): a Mandelbox that is not folded along z. L = 2 is
+    measured.
+    """
+    return scale * ball(fold_to(w, (1.0, 1.0, 1e6)), inner) + c

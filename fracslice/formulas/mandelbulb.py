@@ -175,7 +175,7 @@ def mandelbulb(  # type: ignore[no-untyped-def]
         dr = maximum(meridian, latitude) * (power * dr) + grow
         rho2 = x * x + y * y
         r2 = rho2 + z * z
-        orbit(r2, alive)
+        orbit(r2, alive, x, y, z)
         end_r2 = where(alive, r2, end_r2)
         slope = where(alive, maximum(dr, slope), slope)
         reached = reached * power

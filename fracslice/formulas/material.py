@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from .box import Box
-from .parameters import Number, Vector
+from .palettes import OWN, PALETTES
+from .parameters import Choice, Number, Vector
 from .registry import Node, domain_operator
+
+TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
+"""Properties of an orbit that a palette shows."""
 
 
 @domain_operator(
@@ -15,6 +19,13 @@ from .registry import Node, domain_operator
         least=0,
         most=1,
     ),
+    palette=Choice(OWN, "a palette by name in place of the colours", (OWN, *PALETTES)),
+    trap=Choice(
+        "point",
+        "property of the orbit that the palette shows: its smallest distance to the origin, to the axes, to "
+        "the coordinate planes or the unit sphere, its number of steps, or its last angle about the z axis",
+        TRAPS,
+    ),
     repeats=Number(1.0, "how often the palette is run through", above=0, most=1000),
     shift=Number(0.0, "where in the palette it starts, from 0 to 1", least=0, most=1),
     specular=Number(0.2, "strength of the highlight", least=0, most=100),
@@ -22,6 +33,10 @@ from .registry import Node, domain_operator
     glow=Number(0.0, "light of its own, in its colour", least=0, most=1000),
     reflect=Number(
         0.0, "the part of light that is mirrored head on; more is at grazing angles", least=0, most=1
+    ),
+    roughness=Number(0.0, "roughness of the reflection: 0 is a mirror, 1 is dull", least=0, most=1),
+    metallic=Number(
+        0.0, "1 for a metal, which reflects in its colour and has no other light", least=0, most=1
     ),
     clear=Number(0.0, "the part of light that goes through", least=0, most=1),
     index=Number(1.5, "how strongly that light is bent: 1.33 water, 1.5 glass, 2.4 diamond", least=1, most=4),
@@ -45,3 +60,20 @@ def material_bounds(node: Node) -> Box:
 @material.identity
 def material_identity(node: Node) -> bool:
     return True
+
+
+def stops(node: Node) -> tuple[float, ...]:
+    """Return the sRGB colours of a material, three numbers each; several are a palette.
+
+    Parameters
+    ----------
+    node : Node
+        A `material`.
+
+    Returns
+    -------
+    tuple of float
+        Components in [0, 1].
+    """
+    colours: tuple[float, ...] = PALETTES.get(node["palette"], node["colour"])
+    return colours

@@ -1,7 +1,7 @@
 """Walls along triply periodic minimal surfaces, without end; put `bounds` around them.
 
 Level sets: von Schnering and Nesper 1991, "Nodal surfaces of Fourier series". Every field is divided by a
-bound of its gradient, so L = 1; walls are thinner where the gradient is smaller.
+bound of its gradient, so L = 1 without a grade; walls are thicker where the gradient is smaller.
 """
 
 from __future__ import annotations
@@ -10,65 +10,78 @@ import math
 from typing import Any
 
 from .box import Box
-from .parameters import Number
+from .parameters import Number, Vector
 from .registry import Node, shape
 from .vocabulary import absolute, cos, sin
 
 WALL: dict[str, Any] = {
     "period": Number(1.0, "length after which the surface repeats", above=0),
-    "thickness": Number(0.1, "of the wall, at its thinnest", above=0),
+    "thickness": Number(0.1, "of the wall at the origin, at its thinnest", above=0),
+    "grade": Vector((0.0, 0.0, 0.0), "growth of the thickness per length along x, y and z", least=-4, most=4),
 }
 
 
+def graded(x, y, z, half, grade):  # type: ignore[no-untyped-def]
+    """Half the thickness of the wall at a point."""
+    gx, gy, gz = grade
+    return half + gx * x + gy * y + gz * z
+
+
 @shape(**WALL)
-def gyroid(x, y, z, k, half):  # type: ignore[no-untyped-def]
+def gyroid(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
     """A wall along the gyroid (Schoen 1970, "Infinite periodic minimal surfaces without
     self-intersections"). The gradient of its level function is at most sqrt(3): L = 1.
     """
+    half = graded(x, y, z, half, grade)
     x, y, z = k * x, k * y, k * z
     return absolute(sin(x) * cos(y) + sin(y) * cos(z) + sin(z) * cos(x)) / (1.7320509 * k) - half
 
 
 @shape(**WALL)
-def schwarz_p(x, y, z, k, half):  # type: ignore[no-untyped-def]
+def schwarz_p(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
     """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
     """
+    half = graded(x, y, z, half, grade)
     return absolute(cos(k * x) + cos(k * y) + cos(k * z)) / (1.7320509 * k) - half
 
 
 @shape(**WALL)
-def schwarz_d(x, y, z, k, half):  # type: ignore[no-untyped-def]
+def schwarz_d(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
     """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
     """
+    half = graded(x, y, z, half, grade)
     x, y, z = k * x, k * y, k * z
     f = sin(x) * sin(y) * sin(z) + sin(x) * cos(y) * cos(z) + cos(x) * sin(y) * cos(z)
     return absolute(f + cos(x) * cos(y) * sin(z)) / (1.7320509 * k) - half
 
 
 @shape(**WALL)
-def neovius(x, y, z, k, half):  # type: ignore[no-untyped-def]
+def neovius(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
     """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7: L = 1."""
+    half = graded(x, y, z, half, grade)
     x, y, z = cos(k * x), cos(k * y), cos(k * z)
     return absolute(3.0 * (x + y + z) + 4.0 * x * y * z) / (7.0 * k) - half
 
 
 @shape(**WALL)
-def iwp(x, y, z, k, half):  # type: ignore[no-untyped-def]
+def iwp(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
     """A wall along the surface I-WP of Schoen 1970. The gradient of its level function is at most
     3 sqrt(3): L = 1.
     """
+    half = graded(x, y, z, half, grade)
     x, y, z = cos(k * x), cos(k * y), cos(k * z)
     squares = 2.0 * (x * x + y * y + z * z) - 3.0
     return absolute(2.0 * (x * y + y * z + z * x) - squares) / (5.1961525 * k) - half
 
 
 @shape(**WALL)
-def lidinoid(x, y, z, k, half):  # type: ignore[no-untyped-def]
+def lidinoid(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
     """A wall along the lidinoid (Lidin and Larsson 1990). The gradient of its level function is at most
     1.5 sqrt(3): L = 1.
     """
+    half = graded(x, y, z, half, grade)
     x, y, z = k * x, k * y, k * z
     a, b, c = sin(2.0 * x), sin(2.0 * y), sin(2.0 * z)
     p, q, r = cos(2.0 * x), cos(2.0 * y), cos(2.0 * z)
@@ -76,14 +89,60 @@ def lidinoid(x, y, z, k, half):  # type: ignore[no-untyped-def]
     return absolute(0.5 * (twisted - p * q - q * r - r * p) + 0.15) / (2.5980763 * k) - half
 
 
+@shape(**WALL)
+def frd(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
+    """A wall along the surface F-RD of Schoen 1970. The gradient of its level function is at most 7.041:
+    L = 1.
+    """
+    half = graded(x, y, z, half, grade)
+    x, y, z = cos(k * x), cos(k * y), cos(k * z)
+    p, q, r = 2.0 * x * x - 1.0, 2.0 * y * y - 1.0, 2.0 * z * z - 1.0
+    return absolute(4.0 * x * y * z - (p * q + q * r + r * p)) / (7.041 * k) - half
+
+
+@shape(**WALL)
+def fischer_koch_s(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
+    """A wall along the surface S of Fischer and Koch 1987. The gradient of its level function is at most
+    2.444: L = 1.
+    """
+    half = graded(x, y, z, half, grade)
+    x, y, z = k * x, k * y, k * z
+    p, q, r = cos(x), cos(y), cos(z)
+    f = (2.0 * p * p - 1.0) * sin(y) * r + p * (2.0 * q * q - 1.0) * sin(z)
+    return absolute(f + sin(x) * q * (2.0 * r * r - 1.0)) / (2.444 * k) - half
+
+
+@shape(**WALL)
+def split_p(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
+    """A wall along the surface Split P of Lord and Mackay 2003. The gradient of its level function is at most
+    3.6201: L = 1.
+    """
+    half = graded(x, y, z, half, grade)
+    x, y, z = k * x, k * y, k * z
+    a, b, c = sin(x), sin(y), sin(z)
+    p, q, r = cos(x), cos(y), cos(z)
+    u, v, w = 2.0 * p * p - 1.0, 2.0 * q * q - 1.0, 2.0 * r * r - 1.0
+    f = 2.2 * (a * p * c * q + b * q * a * r + c * r * b * p)
+    return absolute(f - 0.2 * (u * v + v * w + w * u) - 0.4 * (u + v + w)) / (3.6201 * k) - half
+
+
 def wall_arguments(node: Node) -> dict[str, object]:
-    return {"k": 2 * math.pi / node["period"], "half": node["thickness"] / 2}
+    return {
+        "k": 2 * math.pi / node["period"],
+        "half": node["thickness"] / 2,
+        "grade": tuple(g / 2 for g in node["grade"]),
+    }
 
 
 def wall_bounds(node: Node) -> Box:
     return Box.everywhere()
 
 
-for _surface in (gyroid, schwarz_p, schwarz_d, neovius, iwp, lidinoid):
+def wall_slope(node: Node) -> float:
+    return 1.0 + math.hypot(*node["grade"]) / 2
+
+
+for _surface in (gyroid, schwarz_p, schwarz_d, neovius, iwp, lidinoid, frd, fischer_koch_s, split_p):
     _surface.arguments(wall_arguments)
     _surface.bounds(wall_bounds)
+    _surface.slope(wall_slope)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import traceback
 from functools import cache
-from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
@@ -58,6 +57,8 @@ def run_file(path: str) -> list[Formula]:
 @cache
 def load_installed() -> None:
     """Load the formulas of installed packages."""
+    from importlib.metadata import entry_points  # imports an e-mail parser
+
     for entry in entry_points(group=GROUP):
         entry.load()
 

@@ -10,7 +10,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, minimum, ratio, rsqrt, sin, sqrt
+from .vocabulary import (
+    absolute,
+    atan2,
+    cos,
+    exp,
+    floor,
+    log,
+    maximum,
+    minimum,
+    ratio,
+    rsqrt,
+    sin,
+    sqrt,
+    where,
+)
 
 OVER: dict[Callable[..., Any], Callable[..., Any]] = {}
 """Stretch of each verb over the ball of radius e around a point: a function of the point, e and the verb's
@@ -144,10 +158,16 @@ def power(w, n):  # type: ignore[no-untyped-def]
     r2 = maximum(rho2 + z * z, 1e-30)
     rho = sqrt(rho2)
     rn = exp(0.5 * n * log(r2))
-    theta, phi = n * atan2(rho, z), n * atan2(y, x)
-    s = rn * sin(theta)
-    stretch = n * maximum(rn * rsqrt(r2), absolute(s) / rho)
-    return (s * cos(phi), s * sin(phi), rn * cos(theta)), stretch
+    theta, phi = n * atan2(rho, absolute(z)), n * atan2(y, x)
+    # Angles are counted from the nearer pole: rounding of those near pi is not small against rho.
+    half_turns = floor(n + 0.5)
+    sign = 1.0 - 2.0 * (half_turns - 2.0 * floor(0.5 * half_turns))
+    rest = 3.141592653589793 * (n - half_turns)
+    sine, cosine = sign * sin(rest), sign * cos(rest)
+    s, c = sin(theta), cos(theta)
+    s, c = where(z < 0.0, sine * c - cosine * s, s), where(z < 0.0, cosine * c + sine * s, c)
+    stretch = n * maximum(rn * rsqrt(r2), rn * absolute(s) / rho)
+    return (rn * s * cos(phi), rn * s * sin(phi), rn * c), stretch
 
 
 @over(power)

@@ -32,17 +32,17 @@ def any_of(mask: np.ndarray) -> bool:
 
 def rsqrt(a: np.ndarray) -> np.ndarray:
     """1/sqrt(a) of a positive, finite argument; SIMD units have an instruction for it."""
-    found: np.ndarray = 1.0 / np.sqrt(a)
-    return found
+    result: np.ndarray = 1.0 / np.sqrt(a)
+    return result
 
 
 def ratio(a: np.ndarray | float, b: np.ndarray) -> np.ndarray:
     """a/b for a normal, finite b whose inverse is normal, too; GPUs have an instruction for the inverse."""
-    found: np.ndarray = a / b
-    return found
+    result: np.ndarray = a / b
+    return result
 
 
-def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
+def orbit(r2: np.ndarray, alive: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> None:
     """Record a step of an orbit for the palettes of pictures; elsewhere it does nothing.
 
     Parameters
@@ -51,6 +51,8 @@ def orbit(r2: np.ndarray, alive: np.ndarray) -> None:
         |w|^2 after the step.
     alive
         Mask of the points whose orbit is still running.
+    x, y, z
+        w after the step.
     """
 
 

@@ -19,7 +19,6 @@ import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 from typing import Any, BinaryIO
@@ -315,17 +314,19 @@ def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> M
 @lru_cache(maxsize=1)
 def _toolchain() -> str:
     """Key of everything that the machine code depends on besides the module's own text."""
-    words = texts(Path(__file__).parent / "cuda_intrinsics.py")
+    from importlib.metadata import version  # imports an e-mail parser
+
+    source = texts(Path(__file__).parent / "cuda_intrinsics.py")
     versions = (version(name) for name in ("numba-cuda", "numba", "llvmlite"))
-    return key(words, *versions, *_numba_settings())
+    return key(source, *versions, *_numba_settings())
 
 
 def _numba_settings() -> list[str]:
     """Numba's settings: its environment variables and its file in the current folder."""
-    told = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
+    settings = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
     with suppress(OSError):
-        told.append(repr(Path(".numba_config.yaml").read_bytes()))
-    return told
+        settings.append(repr(Path(".numba_config.yaml").read_bytes()))
+    return settings
 
 
 def _imported(name: str, text: str) -> ModuleType:

@@ -44,7 +44,7 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
     KernelError
         If a loop or formula is not in the language.
     """
-    words = [
+    names = [
         *sorted(NAMES),
         CALLED,
         "device",
@@ -55,7 +55,7 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
         "thread",
         "together",
     ]
-    header = f"from {INTRINSICS} import {', '.join(words)}\n"
+    header = f"from {INTRINSICS} import {', '.join(names)}\n"
     trees = [function.tree for function in link_loops(tuple(loops)).values()]
     units = [ast.unparse(tree) for tree in trees if not tree.decorator_list]
     by_hand = [ast.unparse(tree) for tree in trees if tree.decorator_list]

@@ -198,7 +198,7 @@ class Expressions:
             return self.called(name, given)
         if name in _INTRINSICS:
             return _INTRINSICS[name][0](*(self.lanes.vec(self.builder, v) for v in given))
-        found: Value = getattr(self, f"word_{name}")(*given)
+        found: Value = getattr(self, f"intrinsic_{name}")(*given)
         return found
 
     def called(self, name: str, given: Sequence[Value]) -> Value:
@@ -210,12 +210,12 @@ class Expressions:
         return made_of(kind, parts, self.lanes, self.builder)
 
     # --- intrinsics that are not functions of lanes only ---
-    def word_where(self, mask: Value, yes: Value, no: Value) -> Vec:
+    def intrinsic_where(self, mask: Value, yes: Value, no: Value) -> Vec:
         """Emit `where`."""
         yes, no = (self.lanes.vec(self.builder, v) for v in (yes, no))
         return self.lanes.condition(self.builder, mask).choose(yes, no)
 
-    def word_any_of(self, mask: Value) -> Any:
+    def intrinsic_any_of(self, mask: Value) -> Any:
         """Emit `any_of`: one bit test of the joined mask registers."""
         if not isinstance(mask, Vec):
             return truth(self.builder, mask)
@@ -224,15 +224,15 @@ class Expressions:
         bits = reduce(self.builder.or_, [self.builder.bitcast(part, word) for part in parts])
         return self.builder.icmp_unsigned("!=", bits, word(0))
 
-    def word_int(self, value: Value) -> Any:
+    def intrinsic_int(self, value: Value) -> Any:
         """Emit a conversion to an integer."""
         return number(self.builder, value, WHOLE)
 
-    def word_min(self, a: Value, b: Value) -> Any:
+    def intrinsic_min(self, a: Value, b: Value) -> Any:
         """Emit the minimum of two scalars."""
         return self.extreme("min", a, b)
 
-    def word_max(self, a: Value, b: Value) -> Any:
+    def intrinsic_max(self, a: Value, b: Value) -> Any:
         """Emit the maximum of two scalars."""
         return self.extreme("max", a, b)
 
@@ -244,7 +244,7 @@ class Expressions:
         a, b = number(self.builder, a, kind), number(self.builder, b, kind)
         return self.builder.select(compare(self.builder, _EXTREMES[which], b, a), b, a)
 
-    def word_load(self, place: Any, index: Value) -> Vec:
+    def intrinsic_load(self, place: Any, index: Value) -> Vec:
         """Load lanes from memory."""
         align = self.lanes.bits // 8
         return Vec(
@@ -252,7 +252,7 @@ class Expressions:
             tuple(self.builder.load(a, align=align) for a in self.registers(place, index)),
         )
 
-    def word_store(self, place: Any, index: Value, value: Value) -> None:
+    def intrinsic_store(self, place: Any, index: Value, value: Value) -> None:
         """Store lanes to memory."""
         parts = self.lanes.vec(self.builder, value).parts
         for address, part in zip(self.registers(place, index), parts, strict=True):

@@ -85,7 +85,7 @@ def _text(function: Callable[..., Any], _: object) -> str:
     if not isinstance(tree, ast.FunctionDef):
         raise KernelError(place.format(first) + "expected a def")
     found = _Language(function, tree, place, first).visit(tree)
-    return ast.unparse(ast.fix_missing_locations(found))
+    return ast.unparse(found)
 
 
 def intrinsic(value: Any) -> str | None:

@@ -95,7 +95,7 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
     numbers = {name: _plain(scope[name]) for name in outside if functions.is_number(scope.get(name))}
     calls = {name: scope[name] for name in outside if isinstance(scope.get(name), FunctionType)}
     tree = _Substitute(numbers).visit(tree)
-    return Copy(tree.name, ast.unparse(ast.fix_missing_locations(tree)), calls)
+    return Copy(tree.name, ast.unparse(tree), calls)
 
 
 def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str]) -> Copy:

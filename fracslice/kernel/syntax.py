@@ -83,13 +83,18 @@ def point_names(tree: ast.FunctionDef, first: set[str]) -> set[str]:
         These names, and those computed from them.
     """
     found = set(first)
+    assigned = [
+        (target, node.value)
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Assign, ast.AugAssign))
+        for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
+    ]
     while True:
         more = {
             name.id
-            for node in ast.walk(tree)
-            if isinstance(node, (ast.Assign, ast.AugAssign)) and depends_on_points(node.value, found)
-            for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
-            for name in _assigned_points(target, node.value, found)
+            for target, value in assigned
+            if depends_on_points(value, found)
+            for name in _assigned_points(target, value, found)
         }
         if more <= found:
             return found

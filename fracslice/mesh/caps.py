@@ -64,8 +64,8 @@ class Rings:
             Vertex indices.
         """
         once, which = np.unique(rows(points), return_inverse=True)
-        found = np.intersect1d(rows(self.mesh.vertices), once, return_indices=True)[1]
-        return np.asarray(found[which])
+        result = np.intersect1d(rows(self.mesh.vertices), once, return_indices=True)[1]
+        return np.asarray(result[which])
 
     def around(self, vertices: NDArray[np.integer]) -> NDArray[np.int64]:
         """Triangles incident to any of some vertices.
@@ -98,14 +98,14 @@ class Rings:
         ndarray of int64, shape (n,)
             For each point the vertex at which no neighbour is nearer to it.
         """
-        found = np.empty(len(points), np.int64)
+        out = np.empty(len(points), np.int64)
         for k, (best, point) in enumerate(zip(vertices, points, strict=True)):
             last = -1
             while best != last:
                 last, ring = best, self.ring(best)
                 best = ring[np.linalg.norm(self.mesh.vertices[ring] - point, axis=1).argmin()]
-            found[k] = best
-        return found
+            out[k] = best
+        return out
 
     def middles(self, vertices: NDArray[np.integer]) -> NDArray[np.float64]:
         """Centroid of each vertex and its neighbours.
@@ -171,9 +171,9 @@ class Rings:
         while len(seen) <= MOST:
             corners = self.mesh.vertices[self.mesh.triangles[near]]
             normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            ways = tip - corners.mean(axis=1)
-            sizes = np.linalg.norm(normals, axis=1) * np.linalg.norm(ways, axis=1)
-            more = np.union1d(near[(normals * ways).sum(axis=1) > sine * sizes], seen)
+            arms = tip - corners.mean(axis=1)
+            sizes = np.linalg.norm(normals, axis=1) * np.linalg.norm(arms, axis=1)
+            more = np.union1d(near[(normals * arms).sum(axis=1) > sine * sizes], seen)
             if len(more) == len(seen):
                 rim = _rim(self.mesh.triangles[seen])
                 return None if rim is None else Cap(seen, self._fan(rim, tip))
@@ -243,8 +243,8 @@ def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """Smallest height of each triangle, float64 [m]."""
     sides = corners - np.roll(corners, 1, axis=1)
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    found: NDArray[np.float64] = area / np.linalg.norm(sides, axis=2).max(axis=1)
-    return found
+    result: NDArray[np.float64] = area / np.linalg.norm(sides, axis=2).max(axis=1)
+    return result
 
 
 def disjoint(caps: list[Cap], count: int) -> list[Cap]:

@@ -42,7 +42,7 @@ class MeshReport:
     nonmanifold_vertices : int
         Vertices whose triangles form more than one fan.
     misoriented_edges : int
-        Edges whose triangles face opposite ways.
+        Edges whose triangles have opposite orientations.
     misplaced_shells : int
         Shells that are inside out or inside another body.
     components : int
@@ -87,7 +87,7 @@ class MeshReport:
             (self.open_edges, "open edges (a hole in the surface)"),
             (self.nonmanifold_edges, "edges with more than two triangles"),
             (self.nonmanifold_vertices, "vertices where the surface touches itself"),
-            (self.misoriented_edges, "edges between triangles that face opposite ways"),
+            (self.misoriented_edges, "edges between triangles of opposite orientation"),
             (self.misplaced_shells, "shells inside out or inside another body"),
             (self.self_intersections, "triangles that cut or touch others"),
             (self.degenerate_triangles, "triangles without area"),
@@ -202,7 +202,8 @@ def duplicates(triangles: NDArray[np.int32]) -> int:
     int
         Duplicates.
     """
-    return len(triangles) - len(np.unique(np.sort(triangles, axis=1), axis=0))
+    distinct = np.unique(np.sort(triangles, axis=1), axis=0) if len(triangles) else triangles
+    return len(triangles) - len(distinct)
 
 
 def _genus(mesh: Mesh, edges: int, shells: int) -> int:

@@ -18,39 +18,10 @@ from fracslice.mesh.quantisation import (
     Frame,
     placed,
     quantise,
-    used,
     welded,
 )
 
 PASSES = 8
-
-
-def clean(mesh: Mesh) -> Mesh:
-    """Round a closed, oriented manifold to float32 and remove the triangles that this flattens or turns over.
-
-    A triangle with collinear corners gives its middle corner to the neighbour across its longest edge: an
-    edge flip, which does not change the shape. A triangle with two coincident corners, or without a possible
-    flip, is removed by collapsing its shortest edge. Neither is done where it would pinch the surface or turn
-    a neighbour over (the link condition of Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge
-    contraction", 1999). Triangles that cannot be removed stay, and `check_mesh` reports them. Equal positions
-    are welded last.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Closed, oriented manifold, mm.
-
-    Returns
-    -------
-    Mesh
-        Quantised and welded.
-
-    Raises
-    ------
-    MeshError
-        If a coordinate is not finite or an index is out of range.
-    """
-    return cleaned(mesh, used(mesh)).mesh
 
 
 class Cleaned(NamedTuple):
@@ -82,6 +53,13 @@ def cleaned(
     threads: int = 0,
 ) -> Cleaned:
     """Place, clean and quantise a mesh, or a piece of one.
+
+    A triangle with collinear corners gives its middle corner to the neighbour across its longest edge: an
+    edge flip, which does not change the shape. A triangle with two coincident corners, or without a possible
+    flip, is removed by collapsing its shortest edge. Neither is done where it would pinch the surface or turn
+    a neighbour over (the link condition of Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge
+    contraction", 1999). Triangles that cannot be removed stay, and `check_mesh` reports them. Equal positions
+    are welded last.
 
     Parameters
     ----------
@@ -118,15 +96,15 @@ def cleaned(
     displaced, keep = np.zeros(len(keep), bool), keep.copy()
     displaced[mesh.triangles[fresh]], keep[gone] = True, False
     final, displaced, places = quantise(mesh, keep, displaced, edits, planes, frame, threads)
-    suspects = touching(final.triangles, displaced, threads)
-    suspects = np.union1d(suspects, places[places >= 0])
+    suspected = np.zeros(len(final.triangles), bool)
+    suspected[touching(final.triangles, displaced, threads)] = suspected[places[places >= 0]] = True
     # Only displaced vertices can coincide with others.
-    return Cleaned(welded(final) if displaced.any() else final, suspects, edits)
+    return Cleaned(welded(final) if displaced.any() else final, np.flatnonzero(suspected), edits)
 
 
 def _with_edited(edits: Edits, edited: NDArray[np.int64], triangles: NDArray[np.int32]) -> Edits:
     """Edits, and triangles edited before, as they are."""
-    edited = np.setdiff1d(edited, edits[0])
+    edited = np.setdiff1d(edited, edits[0], assume_unique=True)
     rows = np.concatenate([edits[0], edited])
     order = np.argsort(rows)
     return rows[order], np.concatenate([edits[1], triangles[edited]])[order]

@@ -59,13 +59,13 @@ def on_creases(
         move = _nearest(normals, ((points - there[:, None]) * normals).sum(axis=2))
         size = np.linalg.norm(move, axis=1)
         there = there + move * np.minimum(1, length / np.maximum(size, 1e-300))[:, None]
-        ways = points - there[:, None]
-        ways /= np.maximum(np.linalg.norm(ways, axis=2, keepdims=True), 1e-300)
+        directions = points - there[:, None]
+        directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-300)
         spacing = np.clip(2 * size, NEAREST * length, spacing / 2)
-        points = there[:, None] + spacing[:, None, None] * ways
-    found = ((first * normals).sum(axis=2) > SAME).all(axis=1) & (size < NEAREST / 4 * length)
-    found &= np.linalg.norm(there - middles, axis=1) < REACH * length
-    return there, found
+        points = there[:, None] + spacing[:, None, None] * directions
+    result = ((first * normals).sum(axis=2) > SAME).all(axis=1) & (size < NEAREST / 4 * length)
+    result &= np.linalg.norm(there - middles, axis=1) < REACH * length
+    return there, result
 
 
 def _nearest(normals: NDArray[np.float64], off: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -77,5 +77,5 @@ def _nearest(normals: NDArray[np.float64], off: NDArray[np.float64]) -> NDArray[
     sharp = square > ANGLE**2
     share = (off - cosine[:, None] * off[:, ::-1]) / np.where(sharp, square, 1)[:, None]
     share[~sharp] = off[~sharp] / 2
-    found: NDArray[np.float64] = (share[..., None] * normals).sum(axis=1)
-    return found
+    result: NDArray[np.float64] = (share[..., None] * normals).sum(axis=1)
+    return result

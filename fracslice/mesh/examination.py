@@ -52,12 +52,12 @@ class Examination:
         self.bound, self.back = np.zeros(len(mesh.triangles)), np.zeros(len(mesh.triangles))
         self.crossing, self.beyond = np.zeros(len(mesh.triangles), dtype=bool), np.empty((0, 2), np.int32)
 
-    def faults(self, found: Collapsed) -> NDArray[np.bool_]:
+    def faults(self, collapsed: Collapsed) -> NDArray[np.bool_]:
         """Triangles whose last collapse has to be undone.
 
         Parameters
         ----------
-        found : Collapsed
+        collapsed : Collapsed
             Current state.
 
         Returns
@@ -70,19 +70,19 @@ class Examination:
         Cancelled
             If the work is cancelled.
         """
-        left = _Left(self.mesh, found)
-        faulty = self._there(left, found) | self._back(found)
+        left = _Left(self.mesh, collapsed)
+        faulty = self._there(left, collapsed) | self._back(collapsed)
         self.work.check()
-        self.crossing = left.crossing(found.fresh | self.crossing, self.work)
-        faulty |= (self.crossing | left.all(self.shells.turned(left.mesh))) & found.changed
+        self.crossing = left.crossing(collapsed.fresh | self.crossing, self.work)
+        faulty |= (self.crossing | left.all(self.shells.turned(left.mesh))) & collapsed.changed
         return faulty
 
-    def distances(self, found: Collapsed) -> tuple[float, float]:
+    def distances(self, collapsed: Collapsed) -> tuple[float, float]:
         """Greatest distances between the two surfaces.
 
         Parameters
         ----------
-        found : Collapsed
+        collapsed : Collapsed
             Current state.
 
         Returns
@@ -92,33 +92,33 @@ class Examination:
         float
             Greatest sampled distance back, mm.
         """
-        there, back = self.bound[found.changed], self.back[found.changed & ~found.gone]
+        there, back = self.bound[collapsed.changed], self.back[collapsed.changed & ~collapsed.gone]
         return float(there.max(initial=0.0)), float(back.max(initial=0.0))
 
-    def _there(self, left: _Left, found: Collapsed) -> NDArray[np.bool_]:
+    def _there(self, left: _Left, collapsed: Collapsed) -> NDArray[np.bool_]:
         """Faulty triangles by the distance from the original: of the triangles near one that is too far off,
         the one that changed last.
         """
-        lost = found.fresh | found.fresh[found.owner][self.mesh.triangles].any(axis=1)
-        lost[self.beyond[found.fresh[self.beyond[:, 1]], 0]] = True
-        which = np.flatnonzero(lost & found.changed)
+        lost = collapsed.fresh | collapsed.fresh[collapsed.owner][self.mesh.triangles].any(axis=1)
+        lost[self.beyond[collapsed.fresh[self.beyond[:, 1]], 0]] = True
+        which = np.flatnonzero(lost & collapsed.changed)
         these = Mesh(self.mesh.vertices, self.mesh.triangles[which])
-        hints = left.number[found.owner[these.triangles]]
+        hints = left.number[collapsed.owner[these.triangles]]
         self.bound[which], pairs = left.nearest.bounds(these, self.tolerance, self.work, hints)
         beyond = np.column_stack([which[pairs[:, 0]], left.old[pairs[:, 1]]]).astype(np.int32)
         self.beyond = np.concatenate([self.beyond[~lost[self.beyond[:, 0]]], beyond])
-        far = np.flatnonzero(np.isinf(self.bound) & found.changed)
-        suspects = np.column_stack([found.owner[self.mesh.triangles[far]], far])
-        latest = found.step[suspects].argmax(axis=1)
+        far = np.flatnonzero(np.isinf(self.bound) & collapsed.changed)
+        suspects = np.column_stack([collapsed.owner[self.mesh.triangles[far]], far])
+        latest = collapsed.step[suspects].argmax(axis=1)
         faulty = np.zeros(len(lost), dtype=bool)
         faulty[suspects[np.arange(len(suspects)), latest]] = True
         return faulty
 
-    def _back(self, found: Collapsed) -> NDArray[np.bool_]:
+    def _back(self, collapsed: Collapsed) -> NDArray[np.bool_]:
         """Changed triangles with samples too far from the original."""
-        new = found.changed & ~found.gone
-        fresh = new & found.fresh
-        these = Mesh(self.mesh.vertices, found.triangles[fresh])
+        new = collapsed.changed & ~collapsed.gone
+        fresh = new & collapsed.fresh
+        these = Mesh(self.mesh.vertices, collapsed.triangles[fresh])
         self.back[fresh] = self.original.samples(these, self.spacing, self.work, self.tolerance)
         return new & (self.back > self.tolerance)
 
@@ -126,10 +126,10 @@ class Examination:
 class _Left:
     """The remaining triangles as a mesh. `number`, int32 [m], has their indices in it."""
 
-    def __init__(self, mesh: Mesh, found: Collapsed) -> None:
-        self.old = np.flatnonzero(~found.gone)
-        self.number = np.cumsum(~found.gone, dtype=np.int32) - np.int32(1)
-        self.mesh = Mesh(mesh.vertices, found.triangles[self.old])
+    def __init__(self, mesh: Mesh, collapsed: Collapsed) -> None:
+        self.old = np.flatnonzero(~collapsed.gone)
+        self.number = np.cumsum(~collapsed.gone, dtype=np.int32) - np.int32(1)
+        self.mesh = Mesh(mesh.vertices, collapsed.triangles[self.old])
         self.tree = build(self.mesh)
         self.nearest = Nearest(self.mesh, self.tree)
 
@@ -141,9 +141,9 @@ class _Left:
 
     def all(self, marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Marks of the remaining triangles as marks of the original ones."""
-        found = np.zeros(len(self.number), dtype=bool)
-        found[self.old] = marks
-        return found
+        result = np.zeros(len(self.number), dtype=bool)
+        result[self.old] = marks
+        return result
 
 
 class _Shells:
@@ -155,8 +155,10 @@ class _Shells:
 
     def turned(self, mesh: Mesh) -> NDArray[np.bool_]:
         """Triangles of shells that are inside out: crumbs that fewer triangles cannot represent."""
-        found: NDArray[np.bool_] = (self.outside != (self._volumes(mesh) >= 0))[self.of[mesh.triangles[:, 0]]]
-        return found
+        result: NDArray[np.bool_] = (self.outside != (self._volumes(mesh) >= 0))[
+            self.of[mesh.triangles[:, 0]]
+        ]
+        return result
 
     def _volumes(self, mesh: Mesh) -> NDArray[np.float64]:
         """Signed volumes of the shells."""

@@ -13,7 +13,6 @@ from ..formulas.field import Bounds, Device, Precision
 from ..kernel import Kernel
 from ..kernel.arrays import ArrayField
 from ..keys import key
-from ..work import Work
 from .model import Mesh
 from .nearest import Nearest
 
@@ -82,16 +81,13 @@ class _MeshKernel(Kernel):
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """`Kernel.points`."""
-        points = np.stack([np.asarray(a, np.float64).ravel() for a in (x, y, z)], 1)
-        known = np.isfinite(points).all(1)
-        spots = np.arange(np.count_nonzero(known), dtype=np.int32)
-        found = np.full(len(points), np.nan)
-        if len(spots):
-            these = Mesh(points[known], np.stack([spots] * 3, 1))
-            away = self._field.nearest.samples(these, 1.0, Work(1))
-            inside = np.empty(len(spots), np.bool_)
-            _inside(these.vertices, *self._field.columns, inside)
-            found[known] = np.where(inside, -away, away)
+        axes = [np.asarray(a, np.float64).ravel() for a in (x, y, z)]
+        known = np.isfinite(axes[0] + axes[1] + axes[2])
+        these, found = np.stack([a[known] for a in axes], 1), np.full(len(known), np.nan)
+        inside = np.empty(len(these), np.bool_)
+        _inside(these, *self._field.columns, inside)
+        away = self._field.nearest.points(these, threads=1)
+        found[known] = np.where(inside, -away, away)
         return found.reshape(np.shape(x)).astype(self.dtype, copy=False)
 
 
@@ -128,33 +124,49 @@ def _cell(value, frame, side, axis):  # type: ignore[no-untyped-def]
 def _inside(points, corners, frame, side, starts, filled, inside):  # type: ignore[no-untyped-def]
     """True for points around which the mesh winds: a ray upwards adds the orientation of all triangles.
 
+    Consecutive points above each other share the crossings of their line.
+    """
+    height, turn = np.empty(16), np.empty(16, np.int64)
+    count, x, y = 0, np.nan, np.nan
+    for n in range(len(points)):
+        if points[n, 0] != x or points[n, 1] != y:
+            x, y = points[n, 0], points[n, 1]
+            count = _crossings(x, y, corners, frame, side, starts, filled, height, turn)
+            if count > len(height):
+                height, turn = np.empty(2 * count), np.empty(2 * count, np.int64)
+                count = _crossings(x, y, corners, frame, side, starts, filled, height, turn)
+        winding = 0
+        for k in range(count):
+            if height[k] > points[n, 2]:
+                winding += turn[k]
+        inside[n] = winding != 0
+
+
+@compiled
+def _crossings(x, y, corners, frame, side, starts, filled, height, turn):  # type: ignore[no-untyped-def]
+    """Write the heights at which triangles cross the vertical line at x, y, and whether they face up, 1, or
+    down, -1; return their number, which may exceed the length of the arrays.
+
     In projection, edges cross a line along x by one rule for both of their triangles, so that exactly one of
     them contains a point on an edge.
     """
-    for n in range(len(points)):
-        x, y, z = points[n]
-        cell = _cell(x, frame, side, 0) * side[1] + _cell(y, frame, side, 1)
-        winding = 0
-        for entry in range(starts[cell], starts[cell + 1]):
-            t = filled[entry]
-            ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
-            bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
-            cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
-            if max(az, bz, cz) <= z:
+    cell = _cell(x, frame, side, 0) * side[1] + _cell(y, frame, side, 1)
+    count = 0
+    for entry in range(starts[cell], starts[cell + 1]):
+        t = filled[entry]
+        ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
+        bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
+        cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
+        if _crosses(ax, ay, bx, by, x, y) ^ _crosses(bx, by, cx, cy, x, y) ^ _crosses(cx, cy, ax, ay, x, y):
+            up = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+            if up == 0:
                 continue
-            if (
-                _crosses(ax, ay, bx, by, x, y)
-                ^ _crosses(bx, by, cx, cy, x, y)
-                ^ _crosses(cx, cy, ax, ay, x, y)
-            ):
-                up = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-                if up == 0:
-                    continue
+            if count < len(height):
                 b = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / up
                 c = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / up
-                if az + b * (bz - az) + c * (cz - az) > z:
-                    winding += 1 if up > 0 else -1
-        inside[n] = winding != 0
+                height[count], turn[count] = az + b * (bz - az) + c * (cz - az), 1 if up > 0 else -1
+            count += 1
+    return count
 
 
 @compiled

@@ -65,18 +65,18 @@ class Fit:
             Unit gradient, and signed distance to the surface to first order.
         """
 
-        def look(p: NDArray[np.float64], found: NDArray[np.float64]) -> None:
+        def look(p: NDArray[np.float64], out: NDArray[np.float64]) -> None:
             h = STEP * self._voxel
             for axis, step in enumerate(h * np.eye(3)):
                 ends = (self._kernel.points(*(p + sign * step[:, None])) for sign in (1, -1))
-                found[:, axis] = np.subtract(*ends) / (2 * h)
-            slope = np.maximum(np.linalg.norm(found[:, :3], axis=1), 1e-30)
-            found[:, :3] /= slope[:, None]
-            found[:, 3] = self._kernel.points(*p) / slope
+                out[:, axis] = np.subtract(*ends) / (2 * h)
+            slope = np.maximum(np.linalg.norm(out[:, :3], axis=1), 1e-30)
+            out[:, :3] /= slope[:, None]
+            out[:, 3] = self._kernel.points(*p) / slope
 
         return self._each(look, points, 4)
 
-    def distances(self, points: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distances(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances of points from the surface.
 
         A continuous field has a zero between two points of opposite signs. A sign change along the normal
@@ -87,7 +87,7 @@ class Fit:
         ----------
         points : ndarray of float64, shape (n, 3)
             Points, scene units.
-        ways : ndarray of float64, shape (n, 3)
+        normals : ndarray of float64, shape (n, 3)
             Unit normals of the surface.
 
         Returns
@@ -96,22 +96,22 @@ class Fit:
             Distances, scene units.
         """
 
-        def look(rows: NDArray[np.float64], found: NDArray[np.float64]) -> None:
+        def look(rows: NDArray[np.float64], out: NDArray[np.float64]) -> None:
             p, step = rows[:3], self.reach * rows[3:]
             up, down = self._kernel.points(*(p + step)), self._kernel.points(*(p - step))
             passed = (up >= 0) & (down <= 0) & (up > down)
-            found[passed, 0] = self.reach * np.abs(up + down)[passed] / (up - down)[passed]
+            out[passed, 0] = self.reach * np.abs(up + down)[passed] / (up - down)[passed]
             left = np.ascontiguousarray(p[:, ~passed])
             f = self._kernel.points(*left)
             around = np.array([self._kernel.points(*(left + self.reach * way[:, None])) for way in AROUND])
             steep = np.abs(around - f).max(axis=0) / self.reach
             far = np.minimum(np.abs(f) / np.maximum(steep, 1e-30), self._voxel)
             near = np.ptp((around < 0).astype(np.int8), axis=0) > 0
-            found[~passed, 0] = np.where(
+            out[~passed, 0] = np.where(
                 near, np.minimum(far, self.reach), np.maximum(far, BEYOND * self.reach)
             )
 
-        return self._each(look, np.concatenate([points, ways], axis=1), 1)[:, 0]
+        return self._each(look, np.concatenate([points, normals], axis=1), 1)[:, 0]
 
     def triangles(self, corners: NDArray[np.float64]) -> NDArray[np.float64]:
         """Measure the fit of triangles.
@@ -127,11 +127,11 @@ class Fit:
             Unit normal of the field at the centroid (3 columns), its cosine with the triangle's normal,
             greatest distance of the samples on each side (3 columns), and of all samples.
         """
-        ways = self.planes(corners.mean(axis=1))[:, :3]
+        normals = self.planes(corners.mean(axis=1))[:, :3]
         points = (LATTICE @ corners).reshape(-1, 3)
-        found = self.distances(points, np.repeat(ways, len(LATTICE), axis=0)).reshape(-1, len(LATTICE))
-        sides = found[:, :9].reshape(-1, 3, 3).max(axis=2)
-        return np.column_stack([ways, _cosines(corners, ways), sides, found.max(axis=1)])
+        result = self.distances(points, np.repeat(normals, len(LATTICE), axis=0)).reshape(-1, len(LATTICE))
+        sides = result[:, :9].reshape(-1, 3, 3).max(axis=2)
+        return np.column_stack([normals, _cosines(corners, normals), sides, result.max(axis=1)])
 
     def _each(
         self,
@@ -140,13 +140,13 @@ class Fit:
         width: int,
     ) -> NDArray[np.float64]:
         """Apply a function to columns of the rows, in parallel; float64 [n, width]."""
-        found = np.empty((len(rows), width))
+        out = np.empty((len(rows), width))
 
         def task(part: slice) -> None:
-            look(np.ascontiguousarray(rows[part].T), found[part])
+            look(np.ascontiguousarray(rows[part].T), out[part])
 
         self._work.map(task, chunks(len(rows), 1 << 14))
-        return found
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +207,7 @@ class Fitted:
         return Fitted(mesh, self.fit, measured)
 
     @property
-    def ways(self) -> NDArray[np.float64]:
+    def normals(self) -> NDArray[np.float64]:
         """Unit normals of the field at the centroids, float64 [m, 3]."""
         return self.measured[:, :3]
 
@@ -227,11 +227,11 @@ class Fitted:
         return self.measured[:, OFF]
 
 
-def _cosines(corners: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cosines(corners: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Cosine between normals of triangles and unit vectors, [m]; -1 for triangles without area."""
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(across, axis=1)
     cosine: NDArray[np.float64] = np.where(
-        size > 0, (across * ways).sum(axis=1) / np.maximum(size, 1e-300), -1.0
+        size > 0, (across * normals).sum(axis=1) / np.maximum(size, 1e-300), -1.0
     )
     return cosine

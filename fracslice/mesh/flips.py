@@ -137,8 +137,8 @@ def _sine_of_sum(p: NDArray[np.float64], a, b, c, d) -> NDArray[np.float64]:  # 
         size = np.maximum(np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1), 1e-300)
         parts.append(((u * v).sum(axis=1) / size, np.linalg.norm(np.cross(u, v), axis=1) / size))
     (cos_c, sin_c), (cos_d, sin_d) = parts
-    found: NDArray[np.float64] = sin_c * cos_d + cos_c * sin_d
-    return found
+    result: NDArray[np.float64] = sin_c * cos_d + cos_c * sin_d
+    return result
 
 
 def _independent(flips: Flips, worth: NDArray[np.float64], count: int) -> NDArray[np.int64]:

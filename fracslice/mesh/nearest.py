@@ -78,6 +78,23 @@ class Nearest:
             beyond.append(pairs + np.array([part.start, 0], np.int32))
         return found, np.concatenate(beyond)
 
+    def points(self, points: NDArray[np.float64], threads: int = 0) -> NDArray[np.float64]:
+        """Distances of points from this mesh; fast where consecutive points lie close together.
+
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 3)
+            Points.
+        threads : int, optional
+            Threads; 0 for all cores.
+
+        Returns
+        -------
+        ndarray of float64, shape (n,)
+            Distances.
+        """
+        return self._native.points(points, threads)
+
     def samples(self, mesh: Mesh, spacing: float, work: Work, enough: float = 0.0) -> NDArray[np.float64]:
         """Greatest distance of the samples of each triangle from this mesh.
 

@@ -89,20 +89,20 @@ def project(
 
     def brought(which: np.ndarray, f: np.ndarray) -> np.ndarray:
         p, region = np.ascontiguousarray(points[which].T), trust_regions(which, f < 0)
-        ways = np.concatenate([p, guess.lead(_relative(p, region))])
-        t, miss = exact.aimed(ways, guess.found(ways.astype(np.float32)))
+        rays = np.concatenate([p, guess.lead(_relative(p, region))])
+        t, miss = exact.aimed(rays, guess.found(rays.astype(np.float32)))
         left = np.flatnonzero(miss > FOUND)
         if len(left):
             left = exact.padded(left)
-            slow = ways.take(left, 1)
+            slow = rays.take(left, 1)
             t[left], miss[left] = exact.aimed(slow, exact.found(slow))
-        there = np.clip(p + t * ways[3:], region.low, region.high)
+        there = np.clip(p + t * rays[3:], region.low, region.high)
         return np.where(miss * voxel < np.abs(f), there, p)
 
-    found = work.collect(task, chunks(len(points), 1 << 14))
-    if not found:
+    result = work.collect(task, chunks(len(points), 1 << 14))
+    if not result:
         return np.empty(0, np.int64), np.empty((0, 3))
-    numbers, places = zip(*found, strict=True)
+    numbers, places = zip(*result, strict=True)
     return np.concatenate(numbers), np.concatenate(places)
 
 

@@ -110,9 +110,9 @@ def used(mesh: Mesh) -> NDArray[np.bool_]:
     """
     if len(mesh.triangles) and not 0 <= mesh.triangles.min() <= mesh.triangles.max() < len(mesh.vertices):
         raise MeshError("a triangle names a vertex that does not exist")
-    found = np.zeros(len(mesh.vertices), bool)
-    found[mesh.triangles] = True
-    return found
+    result = np.zeros(len(mesh.vertices), bool)
+    result[mesh.triangles] = True
+    return result
 
 
 def quantise(
@@ -181,9 +181,9 @@ def placed(points: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
         Rounded points.
     """
     scale, offset, bed = frame
-    found = points * scale + np.array(offset)
-    found[found[:, 2] < bed, 2] = 0
-    rounded: NDArray[np.float64] = found.astype(np.float32).astype(np.float64) + 0.0
+    result = points * scale + np.array(offset)
+    result[result[:, 2] < bed, 2] = 0
+    rounded: NDArray[np.float64] = result.astype(np.float32).astype(np.float64) + 0.0
     return rounded
 
 

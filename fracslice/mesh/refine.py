@@ -137,8 +137,8 @@ def refine(
 
 def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:
     """Values that occur more than once."""
-    found, counts = np.unique(keys, return_counts=True)
-    return found[counts > 1]
+    result, counts = np.unique(keys, return_counts=True)
+    return result[counts > 1]
 
 
 def _wanted(
@@ -186,7 +186,7 @@ def _creased(
     beyond = middles[:, None] + inwards * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None, None] / 8
     normals = state.fit.planes(near.reshape(-1, 3))[:, :3].reshape(-1, 2, 3)
     across = (normals[:, 0] * normals[:, 1]).sum(axis=1) < CREASED
-    normals = state.ways[beside]
+    normals = state.normals[beside]
     creased = across | ((normals[:, 0] * normals[:, 1]).sum(axis=1) < CREASED)
     starts = np.where(across[:, None, None], near, beyond)
     points = np.empty_like(middles)
@@ -211,10 +211,10 @@ def _split(
         mesh, parents = cut(old, edges.sides, now, there[keep])
         cut_up = np.asarray(now[edges.sides]).any(axis=1)
         fresh = np.take(cut_up, parents)
-        found, flipped = flip(state.become(mesh, parents, fresh), fresh)
-        blamed = _blamed(found, fresh | flipped, len(old.vertices), work)
+        result, flipped = flip(state.become(mesh, parents, fresh), fresh)
+        blamed = _blamed(result, fresh | flipped, len(old.vertices), work)
         if not blamed.any():
-            return found, chosen[~keep]
+            return result, chosen[~keep]
         keep[np.flatnonzero(keep)[blamed]] = False
     return state, chosen
 

@@ -98,8 +98,8 @@ class Roots:
         """Run `find` with a limit of steps."""
         roots = np.empty((1, segments.shape[1]), self.dtype)
         self._runs["find"](self._frame, segments, roots, steps)
-        found: np.ndarray = roots[0]
-        return found
+        result: np.ndarray = roots[0]
+        return result
 
     def native(self, name: str) -> tuple[Any, ...] | Callable[..., None]:
         """Return a loop for native code.
@@ -152,6 +152,6 @@ class Roots:
         ndarray
             Directions, [3, n].
         """
-        ways = np.empty((3, trust_regions.shape[1]), self.dtype)
-        self._runs["lead"](self._frame, trust_regions, ways)
-        return ways
+        rays = np.empty((3, trust_regions.shape[1]), self.dtype)
+        self._runs["lead"](self._frame, trust_regions, rays)
+        return rays

@@ -52,8 +52,8 @@ def self_intersecting_triangles(
         return _self_intersecting_triangles(
             vertices, triangles, *(tree or build(mesh, threads)), threads, among
         )
-    found, near = np.zeros(len(triangles), bool), surroundings(vertices, triangles, among, threads)
+    result, near = np.zeros(len(triangles), bool), surroundings(vertices, triangles, among, threads)
     if len(near):
         part = Mesh(vertices, triangles[near])
-        found[near] = self_intersecting_triangles(part, build(part, threads), threads, among[near])
-    return found
+        result[near] = self_intersecting_triangles(part, build(part, threads), threads, among[near])
+    return result

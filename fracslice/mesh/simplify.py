@@ -90,10 +90,10 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
         if number < PATIENT:
             collapse.run(work)
         work.progress("simplifying", 1 - (1 - FIRST) * 0.6**number)
-        found = collapse.found()
-        faulty = examination.faults(found)
+        result = collapse.found()
+        faulty = examination.faults(result)
         if not faulty.any():
-            done = Simplified(tolerance, len(mesh.triangles), *examination.distances(found))
-            return Mesh(mesh.vertices, found.triangles).selected(~found.gone), done
+            done = Simplified(tolerance, len(mesh.triangles), *examination.distances(result))
+            return Mesh(mesh.vertices, result.triangles).selected(~result.gone), done
         collapse.undo(faulty)
     raise MeshError(f"the mesh cannot be simplified within {tolerance:g} mm without crossing itself")

@@ -36,8 +36,8 @@ class Edges(NamedTuple):
     @property
     def keys(self) -> NDArray[np.int64]:
         """Unique key of each edge, made of its end points, int64 [e]."""
-        found: NDArray[np.int64] = self.ends[:, 0] << 32 | self.ends[:, 1]
-        return found
+        result: NDArray[np.int64] = self.ends[:, 0] << 32 | self.ends[:, 1]
+        return result
 
     @property
     def beside(self) -> NDArray[np.int64]:

@@ -154,7 +154,9 @@ class Survey:
             before = self.pieces.pop()
             _, theirs, mine = np.intersect1d(rows(before.after), rows(piece.points), return_indices=True)
             pairs = before.labels_after[theirs] + np.int32(self.starts[-2]), piece.labels[mine]
-            self.same.append(np.unique(np.stack([pairs[0], pairs[1] + np.int32(start)], axis=1), axis=0))
+            if len(mine):
+                both = np.stack([pairs[0], pairs[1] + np.int32(start)], axis=1)
+                self.same.append(np.unique(both, axis=0))
             self.pieces.append(replace(before, **NO_BORDER))
         self.pieces.append(piece)
         self.starts.append(start + len(piece.volumes))
@@ -269,7 +271,7 @@ class WholeShells:
         Returns
         -------
         Shells
-            Volumes and parents of the shells, without labels of triangles.
+            Volumes and parents of the shells.
         int
             Number of misplaced shells.
 
@@ -279,7 +281,7 @@ class WholeShells:
             For a cavity without a body around it.
         """
         searched = self.searched(bodies)
-        numbers = np.unique(self.piece[searched]).tolist()
+        numbers = sorted(set(self.piece[searched].tolist()))
         rays = (self.rays(n, pieces.mesh(n), pieces.labels(n), searched, threads) for n in numbers)
         return self.nested_by(searched, dict(zip(numbers, rays, strict=True)))
 
@@ -359,7 +361,7 @@ class WholeShells:
             parent[own], winding[own] = one.parent[own], one.winding[own]
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
-        return Shells(np.empty(0, np.int32), self.volumes, parent), int((winding != hollow)[searched].sum())
+        return Shells(self.volumes, parent), int((winding != hollow)[searched].sum())
 
     def thin_walls(self, voxel: float) -> str:
         """Note on walls thinner than a voxel; empty if there are none.

@@ -5,7 +5,7 @@
 
 namespace fracslice {
 
-// Runs without the interpreter's lock, on so many threads (0: all cores).
+// Runs without the interpreter's lock, on a number of threads (0: all cores).
 template <class Do>
 auto unlocked(int threads, const Do& act) {
     nanobind::gil_scoped_release released;

@@ -21,7 +21,7 @@ cannot cross.
 """
 
 
-def nearer(found: Components, these: np.ndarray, others: np.ndarray) -> Samples:
+def nearer(components: Components, these: np.ndarray, others: np.ndarray) -> Samples:
     """A field that is negative nearer to some components than to others.
 
     The value is half the difference of the grid steps to either, so the border lies midway between them. The
@@ -29,7 +29,7 @@ def nearer(found: Components, these: np.ndarray, others: np.ndarray) -> Samples:
 
     Parameters
     ----------
-    found : Components
+    components : Components
         Components of a sampled solid.
     these, others : int64 [k]
         Numbers of the components on the negative and on the positive side.
@@ -39,9 +39,9 @@ def nearer(found: Components, these: np.ndarray, others: np.ndarray) -> Samples:
     Samples
         The field in scene units, at most `REACH` voxels in magnitude, on bricks in and around `these`.
     """
-    solid, (samples, tiles) = found.solid, found.masks(these)
+    solid, (samples, tiles) = components.solid, components.masks(these)
     near, index = _around(solid, np.any(samples, axis=1), tiles)
-    labels, ijk = found.labels[near], solid.ijk[near]
+    labels, ijk = components.labels[near], solid.ijk[near]
     to_these, to_others = (_steps(index, ijk, np.isin(labels, those)) for those in (these, others))
     half = np.clip((to_these.astype(np.float32) - to_others) / 2, -REACH, REACH)
     values = half * np.float32(solid.voxel)

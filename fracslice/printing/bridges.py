@@ -98,11 +98,11 @@ def _cells(
         rows, offsets = np.nonzero(body != NONE)
         place = positions(solid, begin + rows, offsets)
         cell = np.ravel_multi_index(tuple(place.T // times), shape)
-        found, first = np.unique(cell * len(bodies) + body[rows, offsets], return_index=True)
-        keys.append(found)
+        result, first = np.unique(cell * len(bodies) + body[rows, offsets], return_index=True)
+        keys.append(result)
         places.append(place[first])
-    found, first = np.unique(np.concatenate(keys), return_index=True)
-    return *np.divmod(found, len(bodies)), np.concatenate(places)[first]
+    result, first = np.unique(np.concatenate(keys), return_index=True)
+    return *np.divmod(result, len(bodies)), np.concatenate(places)[first]
 
 
 def _sharing(cell: np.ndarray) -> np.ndarray:

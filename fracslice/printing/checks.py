@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from ..formulas import Box
 from ..formulas.box import Triple
 from ..kernel import Field
-from ..volume import Bricks
+from ..volume import Bricks, Drain
 from ..work import Work
 from .components import components_of
 from .connectivity import resolved, shown
@@ -100,6 +101,7 @@ def check_object(
     work: Work | None = None,
     finest: float | None = None,
     origin: Triple | None = None,
+    drains: Sequence[Drain] = (),
 ) -> SolidReport:
     """Check an object given by its field.
 
@@ -119,6 +121,8 @@ def check_object(
         Width in mm below which a mesh or layers may lose walls; the sample spacing if not given.
     origin : three floats, optional
         Point from which places are measured, scene units; by default the middle of the samples' lower face.
+    drains : sequence of Drain, optional
+        Drain holes, whose rims may be sharp.
 
     Returns
     -------
@@ -137,7 +141,7 @@ def check_object(
     wanted = ACROSS * longest * scale / max(min(limits.wall, limits.floor), 1e-6)
     samples = min(max(wanted, COARSE), FINE)
     bricks = shown(root, outer, longest, samples, work)
-    return check_solid(root, bricks, scale, limits, work, finest, origin)
+    return check_solid(root, bricks, scale, limits, work, finest, origin, drains)
 
 
 def check_solid(
@@ -148,6 +152,7 @@ def check_solid(
     work: Work | None = None,
     finest: float | None = None,
     origin: Triple | None = None,
+    drains: Sequence[Drain] = (),
 ) -> SolidReport:
     """Check a sampled solid: bodies, sealed cavities, thin walls and thin floors.
 
@@ -167,6 +172,8 @@ def check_solid(
         Width in mm below which a mesh or layers may lose walls; the sample spacing if not given.
     origin : three floats, optional
         Point from which places are measured, scene units; by default the middle of the samples' lower face.
+    drains : sequence of Drain, optional
+        Drain holes, whose rims may be sharp.
 
     Returns
     -------
@@ -193,14 +200,17 @@ def check_solid(
     thick = thin.beside(seen(), most)
     between = tight.beside(seen(gaps=True), most)
     floors = thin.beside(seen(direction=UP), most, UP)
-    bare, narrow = _under(floors, limits.floor, scale), _under(thick, limits.wall, scale)
+    bare, narrow = (
+        _off_rims(_under(found, limit, scale), drains, 2 * limit / scale)
+        for found, limit in ((floors, limits.floor), (thick, limits.wall))
+    )
     speck = max(limits.speck, SPECK * (bricks.voxel * scale) ** 3) / scale**3
-    found = _volumes(bricks, speck)
+    result = _volumes(bricks, speck)
     missed = thin.walls + tight.walls
-    fine = resolved(root, bricks, limits.thin / scale**2, len(found[0]) > 1, work, missed)
+    fine = resolved(root, bricks, limits.thin / scale**2, len(result[0]) > 1, work, missed)
     if fine is not bricks:
-        found = _volumes(fine, speck)
-    bodies, cavities = ([v * scale**3 for v in volumes] for volumes in found)
+        result = _volumes(fine, speck)
+    bodies, cavities = ([v * scale**3 for v in volumes] for volumes in result)
     middle = np.array(origin or (*Samples(bricks).bounds.box.centre[:2], bricks.origin[2]))
     problems = []
     if len(bodies) > 1:
@@ -230,17 +240,17 @@ def check_solid(
     )
 
 
-def _widths(found: Walls, scale: float) -> Widths | None:
+def _widths(walls: Walls, scale: float) -> Widths | None:
     """Statistics of widths in mm, weighted by their surface."""
-    return widths_of(found.width * scale, found.area * scale**2)
+    return widths_of(walls.width * scale, walls.area * scale**2)
 
 
-def _unseen(found: Walls, finest: float, least: float, scale: float) -> str:
+def _unseen(walls: Walls, finest: float, least: float, scale: float) -> str:
     """Describe the walls thinner than `finest` mm: area, least thickness and its place in the scene.
 
     Empty if their area is below `least` mm2.
     """
-    lost = found.chosen(found.width * scale < finest)
+    lost = walls.chosen(walls.width * scale < finest)
     area = float(lost.area.sum()) * scale**2
     if area < least:
         return ""
@@ -262,9 +272,19 @@ def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
     return bodies, cavities
 
 
-def _under(found: Walls, limit: float, scale: float) -> Walls:
+def _under(walls: Walls, limit: float, scale: float) -> Walls:
     """Walls thinner than `limit` mm by more than a hundredth of it, the rims of wedges excepted."""
-    return found.chosen((found.width * scale < 0.99 * limit) & (found.facing < PARALLEL))
+    return walls.chosen((walls.width * scale < 0.99 * limit) & (walls.facing < PARALLEL))
+
+
+def _off_rims(found: Walls, drains: Sequence[Drain], near: float) -> Walls:
+    """Walls except for the sharp rims of drain holes: those nearer than `near` to the side of a hole."""
+    for drain in drains:
+        start, along = np.array(drain.start), np.array(drain.end) - drain.start
+        share = np.clip((found.middle - start) @ along / (along @ along), 0, 1)
+        away = np.linalg.norm(found.middle - start - share[:, None] * along, axis=1)
+        found = found.chosen(np.abs(away - drain.radius) > near)
+    return found
 
 
 def loose(count: int, **where: Any) -> Problem:

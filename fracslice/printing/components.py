@@ -177,9 +177,9 @@ def thin_share(signs: SignBricks) -> float:
     """
     inside = np.unpackbits(signs.signs, axis=-1, bitorder="little").view(np.int8)
     values = -inside.reshape(-1, 512)
-    found = components_of(Bricks(signs.origin, signs.voxel, signs.ijk, values, signs.index))
-    thin = found.inside & (found.crossings > 3 * found.count)
-    return float(found.count[thin].sum() / found.count[found.inside].sum())
+    components = components_of(Bricks(signs.origin, signs.voxel, signs.ijk, values, signs.index))
+    thin = components.inside & (components.crossings > 3 * components.count)
+    return float(components.count[thin].sum() / components.count[components.inside].sum())
 
 
 def components_of(bricks: Bricks) -> Components:

@@ -120,8 +120,8 @@ def _times(bricks: Bricks, thin: Walls, least: float, most: float) -> float:
     return float(min(2 * voxel / _thinnest(thin), (most / count) ** 0.5))
 
 
-def _thinnest(found: Walls) -> float:
+def _thinnest(walls: Walls) -> float:
     """Width of the thinnest hundredth, by area."""
-    order = np.argsort(found.width, kind="stable")
-    upto = np.cumsum(found.area[order])
-    return float(found.width[order][np.searchsorted(upto, 0.01 * upto[-1])])
+    order = np.argsort(walls.width, kind="stable")
+    upto = np.cumsum(walls.area[order])
+    return float(walls.width[order][np.searchsorted(upto, 0.01 * upto[-1])])

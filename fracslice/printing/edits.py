@@ -78,12 +78,12 @@ class _Composite(Kernel):
         return changed
 
 
-def edited(thing: Field, does: Does, shape: Field) -> Field:
+def edited(root: Field, does: Does, shape: Field) -> Field:
     """Apply an edit to a field.
 
     Parameters
     ----------
-    thing : Field
+    root : Field
         The field to change.
     does : {"cut", "add", "keep"}
         As of `EditedField`.
@@ -95,6 +95,6 @@ def edited(thing: Field, does: Does, shape: Field) -> Field:
     Field
         A formula tree if both are formula trees, an `EditedField` otherwise.
     """
-    if thing.tree and shape.tree:
-        return _FOLDED[does](thing.tree, shape.tree)
-    return EditedField(thing, does, shape)
+    if root.tree and shape.tree:
+        return _FOLDED[does](root.tree, shape.tree)
+    return EditedField(root, does, shape)

@@ -17,7 +17,7 @@ AWAY = 0.5
 """Maximum displacement of a face, voxels."""
 
 
-def projected(root: Field, found: Walls, voxel: float, work: Work) -> Walls:
+def projected(root: Field, walls: Walls, voxel: float, work: Work) -> Walls:
     """Project the faces of walls or gaps to the surface, along the wall.
 
     Walls whose faces do not look away from each other there are dropped: they are artefacts of features
@@ -28,7 +28,7 @@ def projected(root: Field, found: Walls, voxel: float, work: Work) -> Walls:
     ----------
     root : Field
         The object.
-    found : Walls
+    walls : Walls
         Walls or gaps measured on samples.
     voxel : float
         Spacing of those samples, scene units.
@@ -45,11 +45,11 @@ def projected(root: Field, found: Walls, voxel: float, work: Work) -> Walls:
     Cancelled
         When the work is cancelled.
     """
-    if root.bounds.exterior_only or not len(found.width):
-        return found
-    kernel, directions = root.kernel(), ((found.end - found.start) / found.width[:, None]).T
+    if root.bounds.exterior_only or not len(walls.width):
+        return walls
+    kernel, directions = root.kernel(), ((walls.end - walls.start) / walls.width[:, None]).T
     ends, normals = [], []
-    for points in (found.start.T, found.end.T):
+    for points in (walls.start.T, walls.end.T):
         steep, normal = slopes(kernel, points, STEP * voxel, work)
         along = steep * (normal * directions).sum(0)
         shift = -values_at(kernel, points, work) / np.where(np.abs(along) > -OPPOSITE * steep, along, np.inf)
@@ -59,4 +59,4 @@ def projected(root: Field, found: Walls, voxel: float, work: Work) -> Walls:
     facing = (normals[0] * normals[1]).sum(0)
     width = ((ends[1] - ends[0]) * directions).sum(0)
     stays = np.where(across[0] & across[1], facing < OPPOSITE, across[0] | across[1]) & (width > 0)
-    return Walls(ends[0].T, ends[1].T, width, found.area, facing).chosen(stays)
+    return Walls(ends[0].T, ends[1].T, width, walls.area, facing).chosen(stays)

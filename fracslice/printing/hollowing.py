@@ -8,7 +8,7 @@ import numpy as np
 
 from ..formulas import Box, Node, cylinder, transform, union
 from ..kernel import Field
-from ..volume import Bricks
+from ..volume import Bricks, Drain
 from ..volume.grid import from_grid, to_grid
 from .components import components_of
 from .samples import Samples, positions
@@ -17,8 +17,8 @@ POCKET = 0.1
 """Fraction of the largest hollow's volume below which another hollow stays solid instead of being drained."""
 
 
-def hollows(solid: Bricks, wall: float, drain: float, outer: Box) -> list[Field]:
-    """Return what to cut: everything deeper than the wall, and two drain holes for each hollow.
+def hollows(solid: Bricks, wall: float, drain: float, outer: Box) -> tuple[list[Field], tuple[Drain, ...]]:
+    """Hollows to cut, everything deeper than the wall, and two drain holes for each of them.
 
     With drain holes, hollows under `POCKET` of the largest stay solid.
 
@@ -37,23 +37,26 @@ def hollows(solid: Bricks, wall: float, drain: float, outer: Box) -> list[Field]
     -------
     list of Field
         Fields to cut, in order; empty if the walls leave nothing to hollow out.
+    tuple of Drain
+        The drain holes.
     """
     inner = from_grid(to_grid(solid).redistance().offset(-wall))
     components = components_of(inner)
     numbers, count = components.bodies, components.count
     if not len(numbers):
-        return []
+        return [], ()
     if not drain:
-        return [Samples(inner)]
-    large, holes = count[numbers] >= POCKET * count[numbers[0]], list[Node]()
+        return [Samples(inner)], ()
+    large, holes = count[numbers] >= POCKET * count[numbers[0]], list[Drain]()
     for number in numbers[large]:
         at = (components.labels == number) & (inner.values > -inner.voxel)
         points = np.array(inner.origin) + inner.voxel * positions(inner, *np.nonzero(at))
         holes += _drains(points, -inner.values[at], drain / 2, outer)
-    return [Samples(components.without(numbers[~large])), union(*holes)]
+    cuts = [Samples(components.without(numbers[~large])), union(*map(_cylinder, holes))]
+    return cuts, tuple(holes)
 
 
-def _drains(hollow: np.ndarray, depth: np.ndarray, radius: float, outer: Box) -> Iterator[Node]:
+def _drains(hollow: np.ndarray, depth: np.ndarray, radius: float, outer: Box) -> Iterator[Drain]:
     """Drain holes of one hollow: one sideways, one upwards.
 
     The first leads from the lowest point to the nearer side along x, as the plate would close a hole
@@ -64,8 +67,15 @@ def _drains(hollow: np.ndarray, depth: np.ndarray, radius: float, outer: Box) ->
     x, y, z = hollow[lowest].tolist()
     z -= float(depth[lowest])
     to = outer.hi[0] + radius if x - outer.lo[0] > outer.hi[0] - x else outer.lo[0] - radius
-    side = cylinder(radius=radius, height=abs(to - x))
-    yield transform(side, rotate=(0, 1, 0, 90), translate=((x + to) / 2, y, z + radius))
+    yield Drain((x, y, z + radius), (to, y, z + radius), radius)
     x, y, z = hollow[highest].tolist()
-    low, high = z - radius, outer.hi[2] + radius
-    yield transform(cylinder(radius=radius, height=high - low), translate=(x, y, (low + high) / 2))
+    yield Drain((x, y, z - radius), (x, y, outer.hi[2] + radius), radius)
+
+
+def _cylinder(drain: Drain) -> Node:
+    """Cylinder of a drain hole, which runs along x or z."""
+    (x, y, low), (to, _, high) = drain.start, drain.end
+    if to != x:
+        side = cylinder(radius=drain.radius, height=abs(to - x))
+        return transform(side, rotate=(0, 1, 0, 90), translate=((x + to) / 2, y, low))
+    return transform(cylinder(radius=drain.radius, height=high - low), translate=(x, y, (low + high) / 2))

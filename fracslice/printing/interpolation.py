@@ -150,8 +150,8 @@ def gather(grid, row, f):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def mark_beside(grid, found):  # type: ignore[no-untyped-def]
-    """Write `Samples.beside`."""
+def mark_beside(grid, out):  # type: ignore[no-untyped-def]
+    """Mark the samples with the opposite sign among the 26 samples around them; see `Samples.beside`."""
     f = np.empty(SIDE**3, np.float32)
     one, two = np.empty(SIDE**3, np.uint8), np.empty(SIDE**3, np.uint8)
     for row in range(len(grid.ijk)):
@@ -164,12 +164,12 @@ def mark_beside(grid, found):  # type: ignore[no-untyped-def]
             one, two = two, one
         for s in range(512):
             at = ((s >> 6) + 1) * SIDE * SIDE + (((s >> 3) & 7) + 1) * SIDE + (s & 7) + 1
-            found[row, s] = one[at] == 3
+            out[row, s] = one[at] == 3
 
 
 @compiled
 def advance(start, directions, far, grid, beside, out):  # type: ignore[no-untyped-def]
-    """Write `Samples.free`."""
+    """Write the distance along each ray to the first cell with the surface; see `Samples.free`."""
     x0, y0, z0, voxel, _, index, values, bounds = grid
     for n in range(len(far)):
         x, y, z = (start[n, 0] - x0) / voxel, (start[n, 1] - y0) / voxel, (start[n, 2] - z0) / voxel

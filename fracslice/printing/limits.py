@@ -1,4 +1,9 @@
-"""Limits of the printability checks."""
+"""Limits of the printability checks.
+
+Guides of makers of resin printers advise supports for flat cantilevers over 1 mm (Addema, "Recommendations -
+SLA"; EnvisionTEC, "Self-Supporting Features") and keep bridges under 21 mm (Addema): beyond, surfaces
+suffer. Prints fail later; the limit of cantilevers, 5 mm, is ours, as are those of necks, cups and specks.
+"""
 
 from __future__ import annotations
 

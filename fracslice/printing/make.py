@@ -18,6 +18,7 @@ from ..kernel import Field
 from ..meshjob import DUST
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
+from ..volume.sizing import Sizing
 from ..work import Work
 from .edits import edited
 
@@ -36,7 +37,7 @@ THIN = 1.0
 """Area of walls or gaps that samples may miss, from which finer samples are taken, mm^2."""
 
 
-def printable(planned: Plan, size: float, how: Print, work: Work | None = None) -> tuple[Plan, float]:
+def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None) -> tuple[Plan, float]:
     """Make a planned scene printable.
 
     Samples with the voxel of `planned` lie at the same points before and after.
@@ -45,8 +46,8 @@ def printable(planned: Plan, size: float, how: Print, work: Work | None = None) 
     ----------
     planned : Plan
         The scene.
-    size : float
-        Longest side of the bodies that stay, mm, measured on the field before anything is cut off or added.
+    size : Sizing
+        Size of the bodies that stay, measured on the field before anything is cut off or added.
     how : Print
         Changes to make.
     work : Work, optional
@@ -67,8 +68,10 @@ def printable(planned: Plan, size: float, how: Print, work: Work | None = None) 
         When the work is cancelled.
     """
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
-        if (length := getattr(how, name)) > size and (name != "drain" or how.hollow):
-            raise VolumeError(f"{name} {length:g} mm: expected at most the object's size, {size:g} mm")
+        if (length := getattr(how, name)) > size.longest and (name != "drain" or how.hollow):
+            raise VolumeError(
+                f"{name} {length:g} mm: expected at most the object's size, {size.longest:g} mm"
+            )
     job = _Preparation(planned, size, how, work or Work())
     for stage, change in job.changes():
         job.work.check()
@@ -83,7 +86,7 @@ class _Preparation:
     """The object during its edits."""
 
     planned: Plan
-    size: float
+    sizing: Sizing
     how: Print
     work: Work
     scale: float = 1.0
@@ -92,18 +95,23 @@ class _Preparation:
     """Components, once computed."""
 
     @property
-    def thing(self) -> Field:
+    def size(self) -> float:
+        """Approximate longest side, mm."""
+        return self.sizing.longest
+
+    @property
+    def root(self) -> Field:
         """The current field."""
         return self.planned.root
 
-    def put(self, thing: Field) -> None:
+    def put(self, root: Field) -> None:
         """Replace the current field."""
-        self.planned = replace(self.planned, root=thing)
+        self.planned = replace(self.planned, root=root)
 
     def bound(self) -> None:
         """Recompute the extent of the object."""
-        found = extent(self.thing, max(self.planned.box.size) / self.planned.voxel, self.work)
-        self.planned = replace(self.planned, box=found.box, outer=found.outer, tips=found.tips)
+        extents = extent(self.root, max(self.planned.box.size) / self.planned.voxel, self.work)
+        self.planned = replace(self.planned, box=extents.box, outer=extents.outer, tips=extents.tips)
 
     @property
     def grown(self) -> bool:
@@ -116,11 +124,11 @@ class _Preparation:
         if how.cavities == "fill":
             yield "filling cavities", self.filled
         if how.keep == "largest":
-            before = self.thing
+            before = self.root
             yield "keeping the largest", self.largest
-            if self.thing is not before:
+            if self.root is not before:
                 self.bound()
-        self.scale = self.size / max(self.planned.box.size)
+        self.scale = self.sizing.scale(self.planned.box)
         if how.gap:
             yield "closing gaps", self.closed
         if how.thickness:
@@ -144,7 +152,7 @@ class _Preparation:
             raise VolumeError(f"{length:g} mm in {self.size:g} mm: expected at least {least:.3g} mm, or 0")
         from .connectivity import shown
 
-        return shown(self.thing, self.planned.outer, max(self.planned.box.size), samples, self.work)
+        return shown(self.root, self.planned.outer, max(self.planned.box.size), samples, self.work)
 
     def connected(self) -> Components:
         """Components of samples that resolve connectivity; shared by cavities, bodies and bridges."""
@@ -153,10 +161,10 @@ class _Preparation:
 
         if self.known is None:
             coarse = self.sampled()
-            found = components_of(coarse)
+            components = components_of(coarse)
             unit = max(self.planned.box.size) / self.size
-            bricks = resolved(self.thing, coarse, THIN * unit**2, len(_large(found)) > 1, self.work)
-            self.known = found if bricks is coarse else components_of(bricks)
+            bricks = resolved(self.root, coarse, THIN * unit**2, len(_large(components)) > 1, self.work)
+            self.known = components if bricks is coarse else components_of(bricks)
         return self.known
 
     def seen(self, length: float) -> Samples:
@@ -174,18 +182,18 @@ class _Preparation:
         from .border import nearer
 
         if not len(cavities):
-            return self.thing
-        found = self.connected()
-        self.known = found.filled(cavities)
-        return edited(self.thing, "add", nearer(found, cavities, np.array([0])))
+            return self.root
+        components = self.connected()
+        self.known = components.filled(cavities)
+        return edited(self.root, "add", nearer(components, cavities, np.array([0])))
 
     def largest(self) -> Field:
         """Keep only the largest body."""
         from .border import nearer
 
-        found = self.connected()
-        first, others = np.split(found.bodies, [1])
-        return edited(self.thing, "keep", nearer(found, first, others)) if len(others) else self.thing
+        components = self.connected()
+        first, others = np.split(components.bodies, [1])
+        return edited(self.root, "keep", nearer(components, first, others)) if len(others) else self.root
 
     def bridged(self) -> Field:
         """Join bodies by struts of minimum total length, and drop dust."""
@@ -193,23 +201,23 @@ class _Preparation:
         from .bridges import struts
         from .capsules import capsules
 
-        found = self.connected()
-        large = _large(found)
-        dust = np.setdiff1d(found.bodies, large)
-        start, end = struts(found, large)
+        components = self.connected()
+        large = _large(components)
+        dust = np.setdiff1d(components.bodies, large)
+        start, end = struts(components, large)
         if len(dust):
-            self.put(edited(self.thing, "cut", nearer(found, dust, large)))
+            self.put(edited(self.root, "cut", nearer(components, dust, large)))
         if not len(start):
-            return self.thing
+            return self.root
         width = max(self.how.bridge, self.how.thickness) / self.scale
-        return self.with_capsules(capsules(start, end, width / 2, found.solid), width)
+        return self.with_capsules(capsules(start, end, width / 2, components.solid), width)
 
     def unsealed(self) -> Field:
         """Fill cavities that are sealed only at the sample spacing of the mesh."""
         from .components import components_of
 
         fine, self.known = self.known, components_of(sample_scene(self.planned, self.work))
-        return self.without(self.known.sealed(fine)) if fine else self.thing
+        return self.without(self.known.sealed(fine)) if fine else self.root
 
     def closed(self) -> Field:
         """Fill gaps from face to face."""
@@ -217,12 +225,12 @@ class _Preparation:
         from .thin_features import all_walls
 
         solid = self.seen(self.how.gap)
-        found = all_walls(self.thing, solid, self.how.gap / self.scale, self.work, gaps=True)
-        one = _spaced(found.middle, solid.bricks.voxel)
+        gaps = all_walls(self.root, solid, self.how.gap / self.scale, self.work, gaps=True)
+        one = _spaced(gaps.middle, solid.bricks.voxel)
         if not len(one):
-            return self.thing
+            return self.root
         radius = solid.bricks.voxel
-        made = capsules(found.start[one], found.end[one], radius, solid.bricks)
+        made = capsules(gaps.start[one], gaps.end[one], radius, solid.bricks)
         return self.with_capsules(made, 2 * radius)
 
     def thickened(self) -> Field:
@@ -237,10 +245,10 @@ class _Preparation:
         from .thin_features import all_walls
 
         solid, least = self.seen(self.how.thickness), self.how.thickness / self.scale
-        middle = all_walls(self.thing, solid, least, self.work).middle
+        middle = all_walls(self.root, solid, least, self.work).middle
         middle = middle[_spaced(middle, solid.bricks.voxel)]
         if not len(middle):
-            return self.thing
+            return self.root
         balls = capsules(middle, middle, least / 2, solid.bricks)
         self.put(self.with_capsules(balls, least))
         before = components_of(solid.bricks)
@@ -251,19 +259,20 @@ class _Preparation:
         """Add capsules of a width in scene units. They may connect components, which are forgotten."""
         self.known = None
         self.planned = replace(self.planned, outer=self.planned.outer.grown(width))
-        return edited(self.thing, "add", made)
+        return edited(self.root, "add", made)
 
     def hollowed(self) -> Field:
         """Remove everything deeper than the wall thickness, and drill drain holes."""
         from .hollowing import hollows
 
-        samples, how, thing = self.sampled(self.how.hollow), self.how, self.thing
-        cuts = hollows(samples, how.hollow / self.scale, how.drain / self.scale, self.planned.outer)
+        samples, how, root = self.sampled(self.how.hollow), self.how, self.root
+        cuts, drains = hollows(samples, how.hollow / self.scale, how.drain / self.scale, self.planned.outer)
         if not cuts:
             raise VolumeError(f"walls of {how.hollow:g} mm leave nothing to hollow out")
+        self.planned = replace(self.planned, drains=drains)
         for cut in cuts:
-            thing = edited(thing, "cut", cut)
-        return thing
+            root = edited(root, "cut", cut)
+        return root
 
 
 def _spaced(points: np.ndarray, voxel: float) -> np.ndarray:
@@ -287,8 +296,8 @@ def _standing(made: Plan, how: Print, scale: float) -> Plan:
 
     The raft extends a tenth of the longest side beyond the object, and half its height into it.
     """
-    thing, found, outer = made.root, made.box, made.outer
-    (x0, y0, z0), (x1, y1, z1) = found.lo, found.hi
+    root, extents, outer = made.root, made.box, made.outer
+    (x0, y0, z0), (x1, y1, z1) = extents.lo, extents.hi
     base, raft = how.base / scale, how.raft / scale
     if 0 < raft < made.voxel:
         raise VolumeError(
@@ -298,11 +307,11 @@ def _standing(made: Plan, how: Print, scale: float) -> Plan:
         z0 += base
         if z0 >= z1:
             raise VolumeError(f"a base of {base * scale:g} mm leaves nothing of the object")
-        thing = edited(thing, "keep", plane(normal=(0, 0, -1), offset=-z0))
-        found = Box((x0, y0, z0), (x1, y1, z1))
+        root = edited(root, "keep", plane(normal=(0, 0, -1), offset=-z0))
+        extents = Box((x0, y0, z0), (x1, y1, z1))
     if raft:
-        rim = max(found.size) / 10
+        rim = max(extents.size) / 10
         lying = Box((x0 - rim, y0 - rim, z0 - raft / 2), (x1 + rim, y1 + rim, z0 + raft / 2))
-        thing = edited(thing, "add", transform(box(size=lying.size), translate=lying.centre))
-        found, outer = found | lying, (outer | lying).about(outer.centre)
-    return replace(made, root=thing, box=found, outer=outer)
+        root = edited(root, "add", transform(box(size=lying.size), translate=lying.centre))
+        extents, outer = extents | lying, (outer | lying).about(outer.centre)
+    return replace(made, root=root, box=extents, outer=outer)

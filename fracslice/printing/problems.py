@@ -79,11 +79,11 @@ def mended(problems: Sequence[Problem]) -> dict[str, str]:
     dict
         Values by the name of the setting; the largest one where several ask for the same length.
     """
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for name, value in (setting for problem in problems for setting in problem.mend):
-        if name not in found or _mm(value) > _mm(found[name]):
-            found[name] = value
-    return found
+        if name not in result or _mm(value) > _mm(result[name]):
+            result[name] = value
+    return result
 
 
 def _mm(value: str) -> float:

@@ -57,9 +57,9 @@ class Samples(ArrayField):
     @cached_property
     def beside(self) -> np.ndarray:
         """True for samples with the opposite sign among the 26 samples around them, bool [n, 512]."""
-        found = np.empty(self.bricks.values.shape, np.bool_)
-        mark_beside(self.grid, found)
-        return found
+        out = np.empty(self.bricks.values.shape, np.bool_)
+        mark_beside(self.grid, out)
+        return out
 
     def free(self, start: np.ndarray, directions: np.ndarray, far: np.ndarray) -> np.ndarray:
         """Distance along rays to the first grid cell that contains the surface.

@@ -83,7 +83,7 @@ def thin_features(root: Field, seen: Samples, work: Work) -> tuple[ThinFeatures,
     """Find the thin walls and gaps of an object, including those that its samples miss.
 
     The values of escape-time fractals are far from distances: their samples are more accurate, and only
-    features that the samples miss are searched for. A gap between thin walls is found behind them.
+    features that the samples miss are searched for. A gap between thin walls is reached through them.
 
     Parameters
     ----------
@@ -127,9 +127,9 @@ class _Look:
     def voxel(self) -> float:
         return self.seen.bricks.voxel
 
-    def features(self, found: Walls) -> ThinFeatures:
+    def features(self, thin: Walls) -> ThinFeatures:
         """Walls or gaps with the width below which they replace sampled ones."""
-        return ThinFeatures(found, 0.0 if self.root.bounds.exterior_only else self.most)
+        return ThinFeatures(thin, 0.0 if self.root.bounds.exterior_only else self.most)
 
     @cached_property
     def inwards(self) -> Rays:
@@ -141,23 +141,23 @@ class _Look:
         return self.facing(self.inwards)
 
     def gaps(self) -> Walls:
-        """Thin gaps, found from within thick walls and behind thin ones.
+        """Thin gaps, searched from within thick walls and behind thin ones.
 
         Behind a thin wall the search goes on through the next gap and wall while the gaps are too narrow for
         a ray to start in them.
         """
-        found, rays = self.from_within(), self.inwards
+        result, rays = self.from_within(), self.inwards
         while len(rays.start):
             gap = self.stretch(rays, rays.leave, 1.0)
             gap = self.missed(gap, gap.enter)
             gap = self.missed(gap, gap.leave)
-            found = found + self.facing(gap)
+            result = result + self.facing(gap)
             near = gap.chosen(gap.leave - gap.enter < 2 * NEAR * self.voxel)
             rays = self.stretch(near, near.leave, -1.0)
-        return found
+        return result
 
     def from_within(self) -> Walls:
-        """Thin gaps found from within thick walls."""
+        """Thin gaps between thick walls, searched from within them."""
         try:
             rays = self.rays(-1.0)
         except VolumeError:  # all walls are thin
@@ -245,8 +245,8 @@ class _Look:
             some = rays.chosen(part)
             ends = [some.points(s) for s in (some.enter, some.leave)]
             facing = (self.normals(ends[0]) * self.normals(ends[1])).sum(0)
-            found = Walls(ends[0].T, ends[1].T, some.leave - some.enter, some.area, facing)
-            return found.chosen(facing < OPPOSITE)
+            result = Walls(ends[0].T, ends[1].T, some.leave - some.enter, some.area, facing)
+            return result.chosen(facing < OPPOSITE)
 
         return gathered(look, len(rays.start), RAYS, self.work)
 
@@ -285,7 +285,7 @@ def all_walls(root: Field, seen: Samples, limit: float, work: Work, *, gaps: boo
     """
     exterior_only, most = root.bounds.exterior_only, THIN * seen.bricks.voxel
     look = _Look(root, seen, most if exterior_only else max(most, limit), work)
-    found = look.gaps() if gaps else look.walls()
+    result = look.gaps() if gaps else look.walls()
     if exterior_only:
-        found = walls(seen, limit, work, gaps=gaps) + found
-    return found.chosen(found.width < limit)
+        result = walls(seen, limit, work, gaps=gaps) + result
+    return result.chosen(result.width < limit)

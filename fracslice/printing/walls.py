@@ -170,8 +170,8 @@ def gathered(look: Callable[[slice], R], count: int, size: int, work: Work) -> R
     Cancelled
         When the work is cancelled.
     """
-    found = work.collect(look, chunks(count, size) or [slice(0, 0)])
-    return type(found[0]).joined(found)
+    result = work.collect(look, chunks(count, size) or [slice(0, 0)])
+    return type(result[0]).joined(result)
 
 
 @compiled

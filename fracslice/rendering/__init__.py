@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from .accumulator import Accumulator, HostAccumulator
-from .film import develop
-from .progressive import Pass, Renderer
+from .accumulator import Accumulator
+from .film import develop, picture
+from .host_accumulator import HostAccumulator
+from .passes import Pass
+from .progressive import Renderer
 
-__all__ = ["Accumulator", "HostAccumulator", "Pass", "Renderer", "develop"]
+__all__ = ["Accumulator", "HostAccumulator", "Pass", "Renderer", "develop", "picture"]

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..formulas.material import material
+from ..formulas.material import material, stops
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
-from .tracing import TraceDialect
+from .tracing import TraceDialect, traps
 from .units import shade
-
-
-def linear(colour: Sequence[float]) -> tuple[float, ...]:
-    """Convert an sRGB colour to linear light (IEC 61966-2-1).
-
-    Parameters
-    ----------
-    colour : sequence of float
-        sRGB components in [0, 1].
-
-    Returns
-    -------
-    tuple of float
-        Linear components.
-    """
-    return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
+from .units.pixel import linear
 
 
 def opaque_part(node: Node) -> Node | None:
@@ -65,10 +49,13 @@ class Look:
         Linker of the kernel.
     root : Node
         Root of the formula tree.
+    paths : bool
+        True if rays also continue where a surface scatters light.
     """
 
     linker: Linker
     root: Node
+    paths: bool = False
 
     def __post_init__(self) -> None:
         self.nodes = [n for n in self.root.walk() if n.formula.name == material.name]
@@ -76,10 +63,11 @@ class Look:
         plain = material(self.root)
         self.all = self.nodes if covered else [plain, *self.nodes]
         self.paints = {id(n): self.all.index(n) if covered else k + 1 for k, n in enumerate(self.nodes)}
-        self.palettes = any(len(n["colour"]) > 3 for n in self.all)
+        self.palettes = any(len(stops(n)) > 3 for n in self.all)
         self.glows = any(n["glow"] for n in self.all)
         self.inside = any(n["clear"] for n in self.all)
-        self.bounces = self.inside or any(n["reflect"] for n in self.all)
+        self.glossy = self.paths or any(n["roughness"] or n["metallic"] for n in self.all)
+        self.bounces = self.inside or self.glossy or any(n["reflect"] for n in self.all)
 
     def lines(self) -> list[str]:
         """Return the lines that set cr, cg, cb, specular, shininess and the other properties in use.
@@ -91,11 +79,16 @@ class Look:
         """
         lines = []
         if len(self.all) > 1 or self.palettes:
-            trace = link_tree(self.linker, self.root, TraceDialect(self.linker, materials=self.paints))
+            trace = link_tree(
+                self.linker,
+                self.root,
+                TraceDialect(self.linker, materials=self.paints, traps=traps(self.root)),
+            )
             lines.append(f"_, paint, tone = {trace}")
         lines += self.chosen([self.colour(k, n) for k, n in enumerate(self.all)], ("cr", "cg", "cb"))
         names = ["specular", "shininess"]
         names += ["glow"] * self.glows + ["reflect"] * self.bounces + ["clear", "index"] * self.inside
+        names += ["roughness", "metallic"] * self.glossy
         for name in names:
             values = [[self.linker.argument(n[name])] for n in self.all]
             lines += self.chosen([([], v) for v in values], (name,))
@@ -121,7 +114,7 @@ class Look:
         values : list of str
             Expressions of red, green and blue.
         """
-        colours = linear(node["colour"])
+        colours = linear(stops(node))
         if len(colours) == 3:
             return [], [self.linker.argument(c) for c in colours]
         self.linker.bind(f"palette{k}", shade.palette, {"stops": colours, "count": Fixed(len(colours) // 3)})

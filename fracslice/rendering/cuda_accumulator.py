@@ -11,9 +11,13 @@ import numpy as np
 from ..formulas.field import Precision
 from ..kernel.cuda import launched, load_loops, require
 from ..kernel.linker import Linked
-from ..scene.view import Film
-from .accumulator import FEW, NEARLY, TRUSTED, HostAccumulator, Plan, ordered
+from ..scene.view import View
+from .accumulator import COARSE, FEW, NEARLY, TRUSTED, Plan
 from .cuda_accumulator_loops import LOOPS
+from .film import shows_background
+from .host_accumulator import HostAccumulator
+from .tiles import ordered
+from .units.pixel import linear
 
 PARTS = 8192
 """Threads that sum over a picture, each over every 8192nd pixel, so that sums are deterministic."""
@@ -39,7 +43,7 @@ class CudaAccumulator:
     def __init__(self, start: HostAccumulator) -> None:
         cuda = self._cuda = require()
         self.width, self.height = start.width, start.height
-        self.passes, self.coarse = start.passes, start.coarse
+        self.passes = start.passes
         self.dtype, pixels = start.sums.dtype, start.width * start.height
         precision: Precision = "float32" if self.dtype == np.float32 else "float64"
         self._loops = load_loops(Linked("", np.zeros(1)), precision, LOOPS)
@@ -49,13 +53,8 @@ class CudaAccumulator:
         self._parts = cuda.device_array((min(PARTS, pixels), 3), self.dtype)
         self._shown = cuda.device_array((pixels, 3), np.uint8)
 
-    def anew(self, coarse: int) -> CudaAccumulator:
+    def anew(self) -> CudaAccumulator:
         """Return an empty accumulator in the same memory; this one becomes invalid.
-
-        Parameters
-        ----------
-        coarse : int
-            Grid spacing of the first pass, pixels.
 
         Returns
         -------
@@ -63,13 +62,13 @@ class CudaAccumulator:
             The empty accumulator.
         """
         fresh = copy(self)
-        fresh.passes, fresh.coarse, self.passes = 0, coarse, GONE
+        fresh.passes, self.passes = 0, GONE
         launched(self._loops.clear, self.sums.size, self.sums)
         return fresh
 
     def host(self) -> HostAccumulator:
         """Return a copy in host memory; see `Accumulator.host`."""
-        return HostAccumulator(self.width, self.height, self.sums.copy_to_host(), self.passes, self.coarse)
+        return HostAccumulator(self.width, self.height, self.sums.copy_to_host(), self.passes)
 
     def _summed(self, loop: Any, *arguments: Any) -> np.ndarray:
         """Run a kernel over the partial sums and return them, float64 [threads, 3]."""
@@ -85,7 +84,7 @@ class CudaAccumulator:
     def plan(self, most: int, tolerance: float) -> Plan:
         """Set the goals of the next pass; see `Accumulator.plan`."""
         if self.passes < 2:
-            step = self.coarse if self.passes == 0 else 1
+            step = COARSE if self.passes == 0 else 1
             plan = self._plan(self._loops.grid, self.sums, self._parts, self.width, step)
             if plan.samples:
                 return plan
@@ -102,13 +101,22 @@ class CudaAccumulator:
         left, last, _ = self._summed(loop, *arguments).T
         return Plan(self._order, int(left.sum()), int(last.max()))
 
-    def shown(self, film: Film, mode: str) -> np.ndarray:
-        """Develop the picture, on the host if it has bloom; see `Accumulator.shown`."""
-        if film.bloom and mode == "light":
-            return self.host().shown(film, mode)
-        lit = mode == "light"
-        tone, exposure = TONES[film.tone] if lit else -1, 2.0**film.exposure if lit else 1.0
-        coarse = self.coarse if self.passes == 1 else 1
-        given = (self.width, coarse, self.dtype.type(exposure), tone)
-        launched(self._loops.show, len(self._shown), self.sums, self._shown, *given)
+    def shown(self, view: View) -> np.ndarray:
+        """Develop the picture, on the host if it has bloom or no light; see `Accumulator.shown`."""
+        film = view.film
+        if film.bloom or film.transparent or view.shading.mode != "light":
+            return self.host().shown(view)
+        coarse = COARSE if self.passes == 1 else 1
+        behind = linear(film.background) if shows_background(view) else (0, 0, 0)
+        given = (2.0**film.exposure, *behind)
+        launched(
+            self._loops.show,
+            len(self._shown),
+            self.sums,
+            self._shown,
+            self.width,
+            coarse,
+            *map(self.dtype.type, given),
+            TONES[film.tone],
+        )
         return np.asarray(self._shown.copy_to_host().reshape(self.height, self.width, 3))

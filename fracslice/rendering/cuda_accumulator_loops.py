@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ..formulas.vocabulary import maximum, minimum
 from ..kernel.cuda_stubs import device, divide, kernel, real, thread, whole
-from .accumulator import CHANNELS, COUNT, GOAL
+from .accumulator import CHANNELS, COUNT, COVER, GOAL
 from .units.pixel import UNKNOWN, encoded, filmic, reinhard, squared_error
 
 
@@ -177,7 +177,7 @@ def choose(A, G, T, most, least):
 
 
 @kernel
-def show(A, out, width, coarse, exposure, tone):
+def show(A, out, width, coarse, exposure, red, green, blue, tone):
     """Develop the picture as `film.develop` does, without bloom.
 
     Parameters
@@ -192,26 +192,29 @@ def show(A, out, width, coarse, exposure, tone):
         Grid spacing of the sampled pixels; each is repeated over its cell.
     exposure : real
         Factor on the light.
+    red, green, blue : real
+        Display colour behind the picture, linear.
     tone : int
-        Tone curve: 0 none, 1 filmic, 2 Reinhard; below 0, no sRGB encoding.
+        Tone curve: 0 none, 1 filmic, 2 Reinhard.
     """
     k = thread()
     if k < out.shape[0]:
         row = k // width
         column = k - row * width
         a = CHANNELS * ((row - row % coarse) * width + column - column % coarse)
-        scale = divide(exposure, maximum(A[a + COUNT], real(1)))
-        r, g, b = A[a] * scale, A[a + 1] * scale, A[a + 2] * scale
+        n = maximum(A[a + COUNT], real(1))
+        clear = real(1) - divide(A[a + COVER], n)
+        r = exposure * maximum(divide(A[a], n) - clear * red, real(0))
+        g = exposure * maximum(divide(A[a + 1], n) - clear * green, real(0))
+        b = exposure * maximum(divide(A[a + 2], n) - clear * blue, real(0))
         if tone == 2:
             dim = reinhard(r, g, b)
             r, g, b = r * dim, g * dim, b * dim
         if tone == 1:
             r, g, b = filmic(r), filmic(g), filmic(b)
-        if tone >= 0:
-            r, g, b = encoded(r), encoded(g), encoded(b)
-        out[k, 0] = level(r)
-        out[k, 1] = level(g)
-        out[k, 2] = level(b)
+        out[k, 0] = level(encoded(r + clear * red))
+        out[k, 1] = level(encoded(g + clear * green))
+        out[k, 2] = level(encoded(b + clear * blue))
 
 
 @device

@@ -8,7 +8,7 @@ from __future__ import annotations
 from ..formulas.vocabulary import maximum
 from ..kernel.cuda_stubs import device, kernel, real, thread, together, whole
 from ..kernel.loops import Loop
-from .accumulator import CHANNELS, COUNT, GOAL
+from .accumulator import CHANNELS, COUNT, COVER, GOAL
 from .linking import Frame
 from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
 from .units.pixel import brightness, clamped
@@ -70,12 +70,12 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
             if frame.sharp
             else (sample(whole(Q[q, 2]), pixel, 2), sample(whole(Q[q, 3]), pixel, 3))
         )
-        ox, oy, oz, dx, dy, dz = camera_ray(px, py, u, v, P)
+        ox, oy, oz, dx, dy, dz = camera_ray(px + P[frame.far + 1], py + P[frame.far + 2], u, v, P)
         start, end = span_box(ox, oy, oz, dx, dy, dz, P)
         start = maximum(start, S[(row >> frame.shift) * blocks + (column >> frame.shift)])
         r, g, b = real(0.0), real(0.0), real(0.0)
         tr, tg, tb = real(1.0), real(1.0), real(1.0)
-        path, side = real(0.0), real(1.0)
+        path, side, covered = real(0.0), real(1.0), real(0.0)
         for bounce in range(frame.bounces + 1):
             t, steps, before, stride = start, real(0.0), real(0.0), real(0.0)
             missed = start >= end
@@ -88,7 +88,11 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
                 if steps >= limit:
                     break
             together()
+            if bounce == 0:
+                covered = real(0.0) if missed else real(1.0)
             if missed:
+                if frame.transparent and bounce == 0:
+                    break
                 hr, hg, hb = background(dx, dy, dz, P)
                 r, g, b = r + tr * hr, g + tg * hg, b + tb * hb
                 break
@@ -108,7 +112,7 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
             start, end = span_box(ox, oy, oz, dx, dy, dz, P)
             if not tr + tg + tb > real(0.002):
                 start = real(1e30)
-        gather(A, a, r, g, b)
+        gather(A, a, r, g, b, covered, frame)
 
 
 @kernel
@@ -132,6 +136,7 @@ def cones(P, S, blocks, limit, frame):
     if k < S.size:
         px = (real(k % blocks) + real(0.5)) * real(frame.block)
         py = (real(k // blocks) + real(0.5)) * real(frame.block)
+        px, py = px + P[frame.far + 1], py + P[frame.far + 2]
         ox, oy, oz, dx, dy, dz = camera_ray(px, py, real(0.0), real(0.0), P)
         t, steps, before, stride, gap = real(0.0), real(0.0), real(0.0), real(0.0), real(1.0)
         while not t > P[frame.far]:
@@ -145,7 +150,7 @@ def cones(P, S, blocks, limit, frame):
 
 
 @device
-def gather(A, a, r, g, b):
+def gather(A, a, r, g, b, covered, frame):
     """Add one sample to a pixel. NaN, infinite and negative light is removed.
 
     Parameters
@@ -156,14 +161,20 @@ def gather(A, a, r, g, b):
         Index of the pixel's first sum.
     r, g, b : real
         Linear light.
+    covered : real
+        1 if the camera ray hit.
+    frame : Frame
+        Linked frame.
     """
-    r = clamped(r)
-    g = clamped(g)
-    b = clamped(b)
-    bright = brightness(r, g, b)
+    bright = brightness(clamped(r), clamped(g), clamped(b))
+    if frame.lit:
+        r = clamped(r)
+        g = clamped(g)
+        b = clamped(b)
     A[a] += r
     A[a + 1] += g
     A[a + 2] += b
     A[a + 3] += bright
     A[a + 4] += bright * bright
     A[a + COUNT] += real(1.0)
+    A[a + COVER] += covered

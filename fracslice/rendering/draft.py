@@ -9,7 +9,7 @@ from ..formulas.registry import Node
 from ..scene.view import Camera, View
 from ..work import Work
 from .progressive import Renderer
-from .setup import SKY, SUN, clearance
+from .setup import clearance, default_lights
 
 NEARER = 2.0
 """Ratio of surface distances, in either direction, at which depth and precision are chosen again."""
@@ -17,11 +17,13 @@ VISIBLE = 0.7
 """Fraction of the sky that is visible from an average point of a fractal."""
 
 
-def drafted(view: View) -> View:
+def drafted(root: Node, view: View) -> View:
     """Return a view whose pictures are free of noise after one sample: hard shadows and a sharp lens.
 
     Parameters
     ----------
+    root : Node
+        Root of the formula tree.
     view : View
         The view.
 
@@ -34,10 +36,10 @@ def drafted(view: View) -> View:
         replace(light, shadows="no", strength=light.strength * VISIBLE)
         if light.kind == "sky"
         else replace(light, size=0.0)
-        for light in view.lights or (SUN, SKY)
+        for light in view.lights or default_lights(root)
     )
     camera = view.camera and replace(view.camera, aperture=0.0)
-    return replace(view, camera=camera, lights=lights, shading=replace(view.shading, bounces=0))
+    return replace(view, camera=camera, lights=lights, shading=replace(view.shading, bounces=0, paths="no"))
 
 
 class Follower:

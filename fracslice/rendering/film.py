@@ -4,51 +4,151 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..scene.view import Film
+from ..scene.view import Film, View
 from ..work import Work, chunks
-from .units.pixel import encoded, filmic, reinhard
+from .units.pixel import encoded, filmic, linear, reinhard
 
 BRIGHT = 1.0
 """Bloom threshold, linear light."""
 BAND = 32
 """Rows of a picture per task."""
+NOWHERE = 1e10
+"""Depth and distance where no ray hits, as in Blender."""
+LEAST = np.float32(1e-6)
+"""Smallest divisor."""
 
 
-def develop(image: np.ndarray, film: Film, mode: str = "light", work: Work | None = None) -> np.ndarray:
-    """Convert linear light to display values.
+def picture(mean: np.ndarray, mode: str = "light") -> np.ndarray:
+    """Return linear light, or in another mode the mean value of what is visible.
 
     Parameters
     ----------
-    image : ndarray of float32, shape (height, width, 3)
-        Linear light.
-    film : Film
-        Exposure, bloom and tone curve.
+    mean : ndarray of float32, shape (height, width, 4)
+        Mean of the samples, and the fraction of them whose camera ray hit.
     mode : str
-        `Shading.mode`. Values of modes other than "light" are only clipped to [0, 1].
+        `Shading.mode`.
+
+    Returns
+    -------
+    ndarray of float32, shape (height, width, 3)
+        Where no ray hit, depth and distance are `NOWHERE` and other values are 0.
+    """
+    values, alpha = mean[..., :3], mean[..., 3:]
+    if mode == "light":
+        return np.ascontiguousarray(values)
+    empty = NOWHERE if mode in ("depth", "distance") else 0.0
+    return np.where(alpha > 0, values / np.maximum(alpha, LEAST), np.float32(empty))
+
+
+def develop(mean: np.ndarray, view: View, work: Work | None = None) -> np.ndarray:
+    """Convert the mean of the samples to display values.
+
+    The film's background is a display colour: neither exposure nor the tone curve changes it.
+
+    Parameters
+    ----------
+    mean : ndarray of float32, shape (height, width, 4)
+        Mean of the samples, and the fraction of them whose camera ray hit.
+    view : View
+        The view, with its lights.
     work : Work, optional
         Threads; one by default.
 
     Returns
     -------
     ndarray of float32, shape (height, width, 3)
-        sRGB in [0, 1].
+        sRGB in [0, 1]; (height, width, 4) with unassociated alpha for a transparent film.
     """
+    film, mode, work = view.film, view.shading.mode, work or Work(1)
+    alpha, light = mean[..., 3:], mean[..., :3]
     if mode != "light":
-        return np.asarray(np.clip(image, 0, 1), np.float32)
-    light, work = np.maximum(image, 0) * np.float32(2.0**film.exposure), work or Work(1)
+        return layered(displayed(picture(mean, mode), mode), alpha, film)
+    behind = np.array(linear(film.background if shows_background(view) else (0, 0, 0)), np.float32)
+    if film.transparent:
+        light = light / np.maximum(alpha, LEAST)
+    light = np.maximum(light - (1 - alpha) * behind, 0) * np.float32(2.0**film.exposure)
     if film.bloom:
         light = bloomed(light, film.bloom, work)
 
-    def displayed(rows: slice) -> None:
+    def toned(rows: slice) -> None:
         part = light[rows]
         if film.tone == "filmic":
             part = filmic(part)
         elif film.tone == "reinhard":
             part = part * reinhard(*np.moveaxis(part, -1, 0))[..., None]
-        light[rows] = encoded(part)
+        light[rows] = encoded(part + (1 - alpha[rows]) * behind)
 
-    work.map(displayed, chunks(len(light), BAND))
-    return np.asarray(light, np.float32)
+    work.map(toned, chunks(len(light), BAND))
+    return np.concatenate([light, alpha], 2) if film.transparent else np.asarray(light, np.float32)
+
+
+def shows_background(view: View) -> bool:
+    """Return whether rays that miss show the film's background.
+
+    Parameters
+    ----------
+    view : View
+        The view, with its lights.
+
+    Returns
+    -------
+    bool
+        False if they show a sky or fog, or if the film is transparent.
+    """
+    lit = view.shading.mode == "light"
+    return not (view.film.transparent or (lit and (view.fog or any(x.kind == "sky" for x in view.lights))))
+
+
+def displayed(values: np.ndarray, mode: str) -> np.ndarray:
+    """Map the values of a mode other than "light" to display values.
+
+    Parameters
+    ----------
+    values : ndarray of float32, shape (height, width, 3)
+        Result of `picture`.
+    mode : str
+        `Shading.mode`.
+
+    Returns
+    -------
+    ndarray of float32, shape (height, width, 3)
+        sRGB in [0, 1]. Depth and distance: the picture's smallest value, divided by the value. Position: the
+        range of each coordinate. Steps: the more, the darker.
+    """
+    if mode in ("depth", "distance"):
+        values = values.min() / np.maximum(values, LEAST)
+    elif mode == "normal":
+        values = 0.5 + 0.5 * values
+    elif mode == "steps":
+        values = np.exp(-0.02 * values)
+    elif mode == "position":
+        low, high = values.min((0, 1)), values.max((0, 1))
+        values = (values - low) / np.maximum(high - low, LEAST)
+    else:
+        values = encoded(values)
+    return np.asarray(np.clip(values, 0, 1), np.float32)
+
+
+def layered(shown: np.ndarray, alpha: np.ndarray, film: Film) -> np.ndarray:
+    """Place display values on the film's background.
+
+    Parameters
+    ----------
+    shown : ndarray of float32, shape (height, width, 3)
+        sRGB in [0, 1].
+    alpha : ndarray of float32, shape (height, width, 1)
+        Fraction of each pixel that is covered.
+    film : Film
+        The film.
+
+    Returns
+    -------
+    ndarray of float32, shape (height, width, 3)
+        sRGB in [0, 1]; (height, width, 4) with unassociated alpha for a transparent film.
+    """
+    if film.transparent:
+        return np.concatenate([shown, alpha], 2)
+    return np.asarray(shown * alpha + (1 - alpha) * np.array(film.background, np.float32), np.float32)
 
 
 def levels(shown: np.ndarray) -> np.ndarray:

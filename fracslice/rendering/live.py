@@ -16,7 +16,8 @@ from ..scene.reader import read
 from ..scene.view import Camera
 from ..work import Work
 from .draft import Follower, drafted
-from .progressive import Pass, Renderer
+from .passes import Pass
+from .progressive import Renderer
 from .steering import CameraInput
 
 WITHIN = 0.05
@@ -252,7 +253,7 @@ class Live:
                 yield done
             self.shown = replace(self.shown, pixels=done.shown)
         for done in self._made(self._finals, self.camera, self._drawn).passes():
-            if done.samples >= min(READABLE, done.film.samples):
+            if done.samples >= min(READABLE, done.view.film.samples):
                 self.shown = replace(self.shown, pixels=done.shown, samples=done.samples)
             yield done
 
@@ -266,7 +267,7 @@ class Live:
 
     def _load(self, scene: Scene, camera: Camera | None) -> None:
         """Show a scene from a camera, or from its own; if that fails, the former scene stays."""
-        hard, device = drafted(scene.view), self._device
+        hard, device = drafted(scene.root, scene.view), self._device
         drafts = Follower(scene.root, hard, self._drafting, device)
         self._problem = ""
         self._draft(drafts, camera or scene.view.camera, self._size)

@@ -24,12 +24,15 @@ class Optics:
         parallel rays.
     far : float
         Distance beyond which the scene is empty, scene units.
+    origin : tuple of int
+        Upper left pixel of the part of the film that is rendered.
     """
 
     size: tuple[int, int]
     cone: float
     least: float
     far: float
+    origin: tuple[int, int] = (0, 0)
 
 
 def footprint(camera: Camera, size: tuple[int, int]) -> tuple[float, float]:

@@ -8,38 +8,18 @@ Conventions:
   ``W[Row.t * m + i]``.
 - L holds the packet under way: one row per quantity in `Lane`, WIDTH numbers each. `rays` holds the ray of
   each lane, -1 for none.
-
-Packets are refilled: a lane whose ray is done takes the next ray at once, so no lane idles while rays are
-left.
 """
 
 from __future__ import annotations
 
-from enum import IntEnum
-
-from ..formulas.vocabulary import any_of, where
 from ..kernel.intrinsics import WIDTH, load, store
 from ..kernel.loops import Loop, loop
 from .accumulator import CHANNELS, COUNT, GOAL
+from .lanes import Row, follow, store_vector
 from .linking import Frame
-from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
-from .units.pixel import brightness, clamped
+from .packet_light import clear, cover, gather, shade
+from .units.intrinsics import camera_ray, span_box, step_cone, step_ray
 from .units.random import centred, sample
-
-Row = IntEnum("Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb px py", start=0)
-"""State of a ray.
-
-- ox, oy, oz, dx, dy, dz: origin and unit direction.
-- start, end: interval of t to march.
-- side: -1 inside the solid.
-- path: length of the path before this ray.
-- status: 1 hit, 2 missed, 3 out of steps.
-- r, g, b: light gathered.
-- tr, tg, tb: throughput, the factor on light still to come.
-- px, py: film position, the first two random numbers. The other random numbers are in the rows after them.
-"""
-Lane = IntEnum("Lane", "ox oy oz dx dy dz start end side path t steps done before stride", start=0)
-"""State of a ray in a packet. The first ten entries are those of `Row`."""
 
 
 def loops(frame: Frame) -> tuple[Loop, ...]:
@@ -112,8 +92,12 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, blocks, frame):
             W[Row.start * m + k] = max(W[Row.start * m + k], early)
         for bounce in range(frame.bounces + 1):
             follow(W, L, rays, left, m, limit, P, step_ray)
+            if bounce == 0:
+                cover(W, m)
             shade(W, m, Row.px + frame.camera_samples + bounce * frame.bounce_samples, P, frame)
-        gather(W, pixels, A, left, m, width)
+            if frame.transparent and bounce == 0:
+                clear(W, m)
+        gather(W, pixels, A, left, m, width, frame)
         left = unfinished(pixels, A, left, width)
 
 
@@ -178,49 +162,6 @@ def cones(P, S, ids, W, L, rays, n, m, blocks, limit, frame):
         S[ids[k]] = W[Row.t * m + k] if W[Row.status * m + k] != 2.0 else 1e30
 
 
-def load_vector(W, row, m, i):
-    """Load three consecutive rows of rays.
-
-    Parameters
-    ----------
-    W : pointer to float
-        Workspace or lanes.
-    row : int
-        First row.
-    m : int
-        Numbers per row.
-    i : int
-        First ray.
-
-    Returns
-    -------
-    tuple of lanes
-        WIDTH numbers of each row.
-    """
-    return load(W, row * m + i), load(W, (row + 1) * m + i), load(W, (row + 2) * m + i)
-
-
-def store_vector(W, row, m, i, a, b, c):
-    """Store three consecutive rows of rays.
-
-    Parameters
-    ----------
-    W : pointer to float
-        Workspace, written.
-    row : int
-        First row.
-    m : int
-        Numbers per row.
-    i : int
-        First ray.
-    a, b, c : lanes
-        WIDTH numbers of each row.
-    """
-    store(W, row * m + i, a)
-    store(W, (row + 1) * m + i, b)
-    store(W, (row + 2) * m + i, c)
-
-
 def draw(W, Q, pixels, A, n, m, width, frame):
     """Draw all random numbers of the next sample of n pixels. Columns beyond n repeat the last pixel.
 
@@ -262,7 +203,8 @@ def begin(W, m, P, frame):
     """
     for i in range(0, m, WIDTH):
         u, v = (0.0, 0.0) if frame.sharp else (load(W, (Row.px + 2) * m + i), load(W, (Row.px + 3) * m + i))
-        px, py = load(W, Row.px * m + i), load(W, Row.py * m + i)
+        px = load(W, Row.px * m + i) + P[frame.far + 1]
+        py = load(W, Row.py * m + i) + P[frame.far + 2]
         ox, oy, oz, dx, dy, dz = camera_ray(px, py, u, v, P)
         enter, leave = span_box(ox, oy, oz, dx, dy, dz, P)
         zero = 0.0 * dx
@@ -274,257 +216,3 @@ def begin(W, m, P, frame):
         store_vector(W, Row.r, m, i, zero, zero, zero)
         store(W, Row.side * m + i, zero + 1.0)
         store_vector(W, Row.tr, m, i, zero + 1.0, zero + 1.0, zero + 1.0)
-
-
-def follow(W, L, rays, n, m, limit, P, step):
-    """March n rays until each has hit, missed or run out of steps.
-
-    A ray has missed once its free distance exceeds its end; an over-relaxed step beyond the end does not
-    count.
-
-    Parameters
-    ----------
-    W, L, rays : pointer
-        Workspace, lanes, ray of each lane.
-    n, m : int
-        Rays, and numbers per row of W.
-    limit : int
-        Steps per ray.
-    P : pointer to float
-        Scene parameters.
-    step : callable
-        `step_ray` or `step_cone`.
-    """
-    for lane in range(WIDTH):
-        rays[lane] = -1
-        L[Lane.done * WIDTH + lane] = 1.0
-    under_way = 0
-    following = 0
-    while True:
-        for lane in range(WIDTH):
-            if L[Lane.done * WIDTH + lane] > 0.0:
-                under_way -= finish(W, L, rays, m, lane)
-                following = skip_missed(W, m, n, following)
-                L[Lane.before * WIDTH + lane] = 0.0
-                L[Lane.stride * WIDTH + lane] = 0.0
-                L[Lane.steps * WIDTH + lane] = 0.0
-                if following < n:
-                    take(W, L, rays, m, lane, following)
-                    following += 1
-                    under_way += 1
-                else:
-                    idle(L, rays, lane)
-        if under_way == 0:
-            break
-        march(L, limit, P, step)
-
-
-def finish(W, L, rays, m, lane):
-    """Write the result of a lane's ray.
-
-    Parameters
-    ----------
-    W, L, rays : pointer
-        Workspace, lanes, ray of each lane.
-    m, lane : int
-        Numbers per row of W, and the lane.
-
-    Returns
-    -------
-    int
-        1 if the lane held a ray, else 0.
-    """
-    i = rays[lane]
-    if i < 0:
-        return 0
-    W[Row.t * m + i] = L[Lane.t * WIDTH + lane]
-    W[Row.steps * m + i] = L[Lane.steps * WIDTH + lane]
-    W[Row.status * m + i] = L[Lane.done * WIDTH + lane]
-    return 1
-
-
-def skip_missed(W, m, n, i):
-    """Mark rays with an empty interval as missed, from ray i on.
-
-    Parameters
-    ----------
-    W : pointer to float
-        Workspace.
-    m, n, i : int
-        Numbers per row of W, rays, first ray.
-
-    Returns
-    -------
-    int
-        Index of the first ray to march, or n.
-    """
-    while i < n and W[Row.start * m + i] >= W[Row.end * m + i]:
-        W[Row.status * m + i] = 2.0
-        W[Row.steps * m + i] = 0.0
-        W[Row.t * m + i] = 0.0
-        i += 1
-    return i
-
-
-def take(W, L, rays, m, lane, i):
-    """Load a ray into a lane.
-
-    Parameters
-    ----------
-    W, L, rays : pointer
-        Workspace, lanes, ray of each lane.
-    m, lane, i : int
-        Numbers per row of W, the lane, the ray.
-    """
-    for k in range(Row.path + 1):
-        L[k * WIDTH + lane] = W[k * m + i]
-    L[Lane.t * WIDTH + lane] = W[Row.start * m + i]
-    rays[lane] = i
-
-
-def idle(L, rays, lane):
-    """Park a lane without a ray far from the scene.
-
-    Parameters
-    ----------
-    L, rays : pointer
-        Lanes, ray of each lane.
-    lane : int
-        The lane.
-    """
-    for k in range(Lane.dz + 1):
-        L[k * WIDTH + lane] = 1e4
-    L[Lane.end * WIDTH + lane] = 1e30
-    L[Lane.side * WIDTH + lane] = 1.0
-    L[Lane.path * WIDTH + lane] = 0.0
-    L[Lane.t * WIDTH + lane] = 1.0
-    rays[lane] = -1
-
-
-def march(L, limit, P, step):
-    """Step all lanes until at least one is done.
-
-    Parameters
-    ----------
-    L : pointer to float
-        Lanes.
-    limit : int
-        Steps per ray.
-    P : pointer to float
-        Scene parameters.
-    step : callable
-        `step_ray` or `step_cone`.
-    """
-    ox, oy, oz = load_vector(L, Lane.ox, WIDTH, 0)
-    dx, dy, dz = load_vector(L, Lane.dx, WIDTH, 0)
-    end = load(L, Lane.end * WIDTH)
-    side = load(L, Lane.side * WIDTH)
-    path = load(L, Lane.path * WIDTH)
-    t = load(L, Lane.t * WIDTH)
-    steps = load(L, Lane.steps * WIDTH)
-    before = load(L, Lane.before * WIDTH)
-    stride = load(L, Lane.stride * WIDTH)
-    while True:
-        t, before, stride, gap = step(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P)
-        steps = steps + 1.0
-        free = where(stride > 0.0, t - stride + before, t)
-        done = where(gap < 0.0, 1.0, where(free > end, 2.0, where(steps < limit, 0.0 * steps, 3.0)))
-        if any_of(done > 0.0):
-            break
-    store(L, Lane.t * WIDTH, t)
-    store(L, Lane.steps * WIDTH, steps)
-    store(L, Lane.before * WIDTH, before)
-    store(L, Lane.stride * WIDTH, stride)
-    store(L, Lane.done * WIDTH, done)
-
-
-def shade(W, m, first, P, frame):
-    """Add the light of every ray, and replace each ray by its continuation.
-
-    Parameters
-    ----------
-    W : pointer to float
-        Workspace.
-    m : int
-        Numbers per row of W.
-    first : int
-        Row of the bounce's first random number.
-    P : pointer to float
-        Scene parameters.
-    frame : Frame
-        Linked frame.
-    """
-    for i in range(0, m, WIDTH):
-        status = load(W, Row.status * m + i)
-        dx, dy, dz = load_vector(W, Row.dx, m, i)
-        tr, tg, tb = load_vector(W, Row.tr, m, i)
-        missed = (status > 1.5) & (status < 2.5)
-        hit = (status < 1.5) | (status > 2.5)
-        r = 0.0 * dx
-        g = r
-        b = r
-        if any_of(missed):
-            r, g, b = background(dx, dy, dz, P)
-        more = 0.0 * dx
-        if any_of(hit):
-            t = load(W, Row.t * m + i)
-            path = load(W, Row.path * m + i)
-            x = load(W, Row.ox * m + i) + t * dx
-            y = load(W, Row.oy * m + i) + t * dy
-            z = load(W, Row.oz * m + i) + t * dz
-            steps, side = load(W, Row.steps * m + i), load(W, Row.side * m + i)
-            u = tuple(load(W, (first + k) * m + i) for k in range(frame.bounce_samples))
-            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, u, P)
-            hr, hg, hb = light
-            r = where(hit, hr, r)
-            g = where(hit, hg, g)
-            b = where(hit, hb, b)
-            if frame.bounces:
-                er, eg, eb, ox, oy, oz, ex, ey, ez, es = onward
-                er = where(hit, tr * er, 0.0)
-                eg = where(hit, tg * eg, 0.0)
-                eb = where(hit, tb * eb, 0.0)
-                more = er + eg + eb
-                store_vector(W, Row.tr, m, i, er, eg, eb)
-                store(W, Row.path * m + i, path + t)
-                store_vector(W, Row.ox, m, i, ox, oy, oz)
-                store_vector(W, Row.dx, m, i, ex, ey, ez)
-                store(W, Row.side * m + i, es)
-                enter, leave = span_box(ox, oy, oz, ex, ey, ez, P)
-                store(W, Row.start * m + i, enter)
-                store(W, Row.end * m + i, where(more > 0.002, leave, 0.0))
-        elif frame.bounces:
-            store_vector(W, Row.tr, m, i, more, more, more)
-        if frame.bounces:  # start beyond end: terminated rays, whose values may be NaN, are not marched
-            store(W, Row.start * m + i, where(more > 0.002, load(W, Row.start * m + i), 1e30))
-        sr, sg, sb = load_vector(W, Row.r, m, i)
-        store_vector(W, Row.r, m, i, sr + tr * r, sg + tg * g, sb + tb * b)
-
-
-def gather(W, pixels, A, n, m, width):
-    """Add one sample to each of n pixels. NaN, infinite and negative light is removed.
-
-    Parameters
-    ----------
-    W, pixels : pointer
-        Workspace and pixels.
-    A : pointer to float
-        Sums of the picture, changed in place.
-    n, m, width : int
-        Pixels, numbers per row of W, picture width.
-    """
-    for i in range(0, m, WIDTH):
-        r, g, b = load_vector(W, Row.r, m, i)
-        r, g, b = clamped(r), clamped(g), clamped(b)
-        store_vector(W, Row.r, m, i, r, g, b)
-        store(W, Row.t * m + i, brightness(r, g, b))
-    for k in range(n):
-        pixel = pixels[k]
-        a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
-        bright = W[Row.t * m + k]
-        A[a] += W[Row.r * m + k]
-        A[a + 1] += W[Row.g * m + k]
-        A[a + 2] += W[Row.b * m + k]
-        A[a + 3] += bright
-        A[a + 4] += bright * bright
-        A[a + COUNT] += 1.0

@@ -40,6 +40,12 @@ class PartTask:
     ----------
     scene : str
         XML of the scene.
+    film : tuple of int
+        Width and height of the film, pixels.
+    crop : tuple of int or None
+        Part of the film that is rendered.
+    samples : Samples
+        Part of the sample sequence.
     size : tuple of int
         Width and height of the picture, pixels.
     dtype : str
@@ -61,6 +67,9 @@ class PartTask:
     """
 
     scene: str
+    film: tuple[int, int]
+    crop: tuple[int, int, int, int] | None
+    samples: Samples
     size: tuple[int, int]
     dtype: str
     pieces: Pieces
@@ -80,7 +89,7 @@ class PartTask:
 
     def make(self, work: Work) -> bytes:
         """Sums of the pixels after the pass; see `Task.make`."""
-        of = _renderer(self.scene, self.size)
+        of = _renderer(self.scene, self.film, self.crop, self.samples)
         of.prepare(self.ahead)
         if of.dtype.name != self.dtype or frame_key(of.tracer.frame) != self.frame:
             raise ClusterError("the frame linked here is another than that of the job")
@@ -123,10 +132,22 @@ class PoolTracer:
         View of the picture.
     tracer : CpuTracer
         Tracer of the same frame, which the sums are for.
+    film : tuple of int
+        Width and height of the film, pixels.
+    crop : tuple of int or None
+        Part of the film that is rendered.
     """
 
-    def __init__(self, root: Node, view: View, tracer: CpuTracer) -> None:
+    def __init__(
+        self,
+        root: Node,
+        view: View,
+        tracer: CpuTracer,
+        film: tuple[int, int],
+        crop: tuple[int, int, int, int] | None,
+    ) -> None:
         self.scene, self.tracer = to_xml(Scene(root, 1.0, view=view)), tracer
+        self._part = film, crop
         self._passes, self._ahead = 0, False
 
     @property
@@ -177,8 +198,8 @@ class PoolTracer:
         state, places = sums.reshape(-1, CHANNELS), _places(plan.pixels, size)
         frame, count = frame_key(self.frame), len(plan.pixels)
         known = np.ascontiguousarray(plan.pixels), state[places]
-        job = key(frame, size, self._ahead, *known)
-        of = self.scene, size, sums.dtype.name, pool.pieces, job, frame
+        job = key(frame, size, self.samples, self._ahead, *known)
+        of = self.scene, *self._part, self.samples, size, sums.dtype.name, pool.pieces, job, frame
         about = *of, self._passes, self._ahead, plan.last
         tasks = [
             PartTask(*about, start, min(start + PIXELS, count), count) for start in range(0, count, PIXELS)
@@ -199,13 +220,16 @@ def _places(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 _OWN = threading.local()
 
 
-def _renderer(scene: str, size: tuple[int, int]) -> Renderer:
+def _renderer(
+    scene: str, film: tuple[int, int], crop: tuple[int, int, int, int] | None, samples: Samples
+) -> Renderer:
     """Renderer of a frame, the last one of this thread."""
     from .progressive import Renderer
 
-    if getattr(_OWN, "of", None) != (scene, size):
+    of = scene, film, crop, samples
+    if getattr(_OWN, "of", None) != of:
         read = reads(scene)
-        _OWN.renderer = Renderer(read.root, read.view, size, Work(threads=1), "cpu")
-        _OWN.of = scene, size
+        _OWN.renderer = Renderer(read.root, read.view, film, Work(threads=1), "cpu", samples, crop)
+        _OWN.of = of
     renderer: Renderer = _OWN.renderer
     return renderer

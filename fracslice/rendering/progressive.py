@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -16,114 +15,28 @@ from ..formulas.parameters import Number, Vector, validated
 from ..formulas.registry import Node
 from ..kernel.devices import chosen
 from ..keys import key, program
+from ..memory import available_bytes
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import COARSE, Accumulator, HostAccumulator, Plan
+from .accumulator import CHANNELS, Accumulator, Plan
 from .cpu import BLOCK, CpuTracer
+from .host_accumulator import HostAccumulator
 from .linking import Frame, link_frame
 from .optics import optics
 from .parts import PoolTracer
+from .passes import Pass
 from .sequence import Samples
 from .setup import prepare
 from .state import load_state, save_state
 
-PREVIEWS = (1, 2, 4, 8)
-"""Allowed grid spacings, in pixels, of the first pass after a camera move."""
 TOLERANCE = 0.002
 """Standard error of displayed brightness at which a pixel has converged: half a level of 256."""
 
 
+BYTES = 4 * (CHANNELS + 4 + 3)
+"""Memory of a pixel: its sums, their mean and the developed picture."""
+CROP = Vector(None, "left, top, width and height, pixels", sizes=(4,), least=0, most=32768, whole=True)
 SIZE = Vector(None, "pixels across and down", sizes=(2,), least=1, most=32768, whole=True)
-
-
-@dataclass(frozen=True, eq=False)
-class Pass:
-    """The picture after a pass.
-
-    Attributes
-    ----------
-    number : int
-        Number of the pass, from 1.
-    samples : float
-        Mean samples per pixel.
-    error : float
-        Root mean square of the pixels' standard errors, in displayed brightness.
-    active : float
-        Samples of this pass per pixel of the picture.
-    rate : float
-        Samples per second.
-    film : Film
-        Film that develops the picture.
-    mode : str
-        `Shading.mode` of the picture.
-    source : Accumulator
-        Accumulator that holds the samples.
-    """
-
-    number: int
-    samples: float
-    error: float
-    active: float
-    rate: float
-    film: Film = field(repr=False)
-    mode: str = field(repr=False)
-    source: Accumulator = field(repr=False)
-
-    @cached_property
-    def image(self) -> np.ndarray:
-        """Linear light.
-
-        Returns
-        -------
-        ndarray of float32, shape (height, width, 3)
-            Mean of the samples.
-
-        Raises
-        ------
-        RenderError
-            If a later pass has replaced this picture.
-        """
-        return self._current().host().mean()
-
-    @cached_property
-    def shown(self) -> np.ndarray:
-        """Developed picture.
-
-        Returns
-        -------
-        ndarray of uint8, shape (height, width, 3)
-            sRGB.
-
-        Raises
-        ------
-        RenderError
-            If a later pass has replaced this picture.
-        """
-        return self._current().shown(self.film, self.mode)
-
-    @cached_property
-    def developed(self) -> np.ndarray:
-        """Developed picture in floats.
-
-        Returns
-        -------
-        ndarray of float32, shape (height, width, 3)
-            sRGB in [0, 1].
-
-        Raises
-        ------
-        RenderError
-            If a later pass has replaced this picture.
-        """
-        return self._current().host().developed(self.film, self.mode)
-
-    def _current(self) -> Accumulator:
-        """The accumulator, if it still holds this pass."""
-        if self.source.passes != self.number:
-            raise RenderError(
-                f"pass {self.number}: its picture was replaced by that of pass {self.source.passes}"
-            )
-        return self.source
 
 
 def _backend(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator], Accumulator]]:
@@ -134,6 +47,26 @@ def _backend(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator
     from .cuda_accumulator import CudaAccumulator
 
     return CudaTracer, CudaAccumulator
+
+
+def _cropped(film: tuple[int, int], crop: tuple[int, int, int, int] | None) -> tuple[int, int, int, int]:
+    """Left and upper pixel, width and height of the picture."""
+    if crop is None:
+        return 0, 0, *film
+    x, y, width, height = validated("crop", crop, CROP, RenderError)
+    if width < 1 or height < 1 or x + width > film[0] or y + height > film[1]:
+        raise RenderError(f"crop={x},{y},{width},{height}: expected a part of {film[0]} x {film[1]} pixels")
+    return x, y, width, height
+
+
+def _check_memory(pixels: int) -> None:
+    """Raise `RenderError` if a picture is larger than the memory."""
+    needed, free = BYTES * pixels, available_bytes()
+    if needed > free:
+        raise RenderError(
+            f"size: {pixels / 1e6:,.0f} million pixels need {needed / 1e9:,.0f} GB of memory, "
+            f"{free / 1e9:,.0f} GB are free; expected fewer pixels"
+        )
 
 
 class Renderer:
@@ -155,6 +88,8 @@ class Renderer:
         Device that traces the rays.
     samples : Samples, optional
         Part of the sample sequence; its begin, without a shift, by default.
+    crop : tuple of int, optional
+        Part of the picture to render: left and upper pixel, width and height; all of it by default.
 
     Raises
     ------
@@ -172,22 +107,25 @@ class Renderer:
         work: Work | None = None,
         device: str = "auto",
         samples: Samples | None = None,
+        crop: tuple[int, int, int, int] | None = None,
     ) -> None:
         pixels = (view.film.width, view.film.height) if size is None else size
-        self.width, self.height = validated("size", pixels, SIZE, RenderError)
+        film = validated("size", pixels, SIZE, RenderError)
+        x, y, self.width, self.height = _cropped(film, crop)
+        _check_memory(self.width * self.height)
         self.work = work or Work()
         self.device = chosen(device if self.work.cluster is None else "cpu")
-        self.setup = prepare(root, view, (self.width, self.height))
+        setup = prepare(root, view, film)
+        self.setup = replace(setup, optics=replace(setup.optics, origin=(x, y)))
         self.dtype = np.dtype(self.setup.precision)
         tracer, self._placed = _backend(self.device)
         self._frame = self._linked()
         self.tracer = tracer(self._frame, self.dtype, self.width, self.height)
         self.tracer.samples = samples or self.tracer.samples
         if self.work.cluster is not None:
-            self.tracer = PoolTracer(root, view, self.tracer)
+            self.tracer = PoolTracer(root, view, self.tracer, film, crop)
         self.accumulator = self._placed(self._empty)
         self._prepared = False
-        self._rate = 0.0
 
     @property
     def _empty(self) -> HostAccumulator:
@@ -208,7 +146,7 @@ class Renderer:
         about = self.width, self.height, self.setup.precision, samples
         return key(program(), *about, linked.source, linked.parameters)
 
-    def look(self, camera: Camera, within: float | None = None) -> None:
+    def look(self, camera: Camera) -> None:
         """Restart the picture from another camera; depths and precision are kept.
 
         Suitable for moves that leave the level of detail unchanged; otherwise create a new renderer, which
@@ -218,23 +156,14 @@ class Renderer:
         ----------
         camera : Camera
             The new camera.
-        within : float, optional
-            Time budget of the first pass, seconds. Its grid is the finest that fits, judged by the rate of
-            earlier passes.
         """
         setup = self.setup
-        seen = optics(camera, (self.width, self.height), setup.root, setup.optics.least)
+        seen = optics(camera, setup.optics.size, setup.root, setup.optics.least)
+        seen = replace(seen, origin=setup.optics.origin)
         self.setup = replace(setup, camera=camera, optics=seen)
         self._frame, self._prepared = self._linked(), False
         self.tracer.aim(self._frame)
-        self.accumulator = self.accumulator.anew(COARSE if within is None else self._affordable(within))
-
-    def _affordable(self, within: float) -> int:
-        """The finest grid spacing of a first pass that fits the time budget."""
-        for coarse in PREVIEWS:
-            if self.width * self.height <= coarse * coarse * self._rate * within:
-                return coarse
-        return PREVIEWS[-1]
+        self.accumulator = self.accumulator.anew()
 
     def save(self, file: BinaryIO) -> None:
         """Write the accumulated samples for `resume`.
@@ -296,12 +225,11 @@ class Renderer:
 
     def _pass(self, plan: Plan) -> Pass:
         start = time.perf_counter()
-        self.prepare(self.accumulator.passes > 0 or self.accumulator.coarse < BLOCK)
+        self.prepare(self.accumulator.passes > 0)
         self.tracer.add(self.accumulator.sums, plan, self.work)
         self.accumulator.passes += 1
         samples, error = self.accumulator.statistics()
-        self._rate = plan.samples / (time.perf_counter() - start)
-        return self._seen(samples, error, plan.samples, self._rate)
+        return self._seen(samples, error, plan.samples, plan.samples / (time.perf_counter() - start))
 
     def prepare(self, ahead: bool) -> None:
         """Load the frame into the tracer.
@@ -334,4 +262,4 @@ class Renderer:
     def _seen(self, samples: float, error: float, traced: int, rate: float) -> Pass:
         view, source = self.setup.view, self.accumulator
         active = traced / (self.width * self.height)
-        return Pass(source.passes, samples, error, active, rate, view.film, view.shading.mode, source)
+        return Pass(source.passes, samples, error, active, rate, view, source)

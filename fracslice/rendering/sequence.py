@@ -88,11 +88,11 @@ def points(count: int, dimensions: int, first: int = 0) -> np.ndarray:
         Bit patterns of 32-bit fractions with their bits REVERSED.
     """
     index = np.arange(first, first + count, dtype=np.uint32)[:, None]
-    found = np.zeros((count, DIMENSIONS), np.uint32)
+    result = np.zeros((count, DIMENSIONS), np.uint32)
     for bit in range(max(first + count - 1, 0).bit_length()):
         columns = np.array([_columns(d)[bit] for d in range(DIMENSIONS)], np.uint32)
-        found ^= (index >> np.uint32(bit) & np.uint32(1)) * columns
-    return np.ascontiguousarray(found[:, np.arange(dimensions) % DIMENSIONS]).view(np.int32)
+        result ^= (index >> np.uint32(bit) & np.uint32(1)) * columns
+    return np.ascontiguousarray(result[:, np.arange(dimensions) % DIMENSIONS]).view(np.int32)
 
 
 @lru_cache(maxsize=DIMENSIONS)
@@ -117,9 +117,9 @@ def _columns(dimension: int) -> list[int]:
 
 def _product(a: int, b: int) -> int:
     """Product in GF(16), modulo x^4 + x + 1."""
-    found = 0
+    result = 0
     for bit in range(4):
-        found ^= (a << bit) * (b >> bit & 1)
+        result ^= (a << bit) * (b >> bit & 1)
     for bit in (6, 5, 4):
-        found ^= (0b10011 << bit - 4) * (found >> bit & 1)
-    return found
+        result ^= (0b10011 << bit - 4) * (result >> bit & 1)
+    return result

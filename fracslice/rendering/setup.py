@@ -18,6 +18,7 @@ SUN = Light(kind="sun", position=(-0.6, -1.0, 1.4), colour=(1.0, 0.95, 0.86), st
 SKY = Light(
     kind="sky", colour=(0.42, 0.58, 0.85), horizon=(0.82, 0.86, 0.92), ground=(0.35, 0.33, 0.31), strength=0.8
 )
+AT_CAMERA = Light(kind="camera")
 CELLS = 1 << 13
 """Maximum cells in the search for the object's extent."""
 
@@ -83,7 +84,7 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
         camera.
     """
     camera = view.camera or _whole(root, size[0] / size[1])
-    lights = view.lights or (SUN, SKY)
+    lights = view.lights or default_lights(root)
     if sum(light.kind == "sky" for light in lights) > 1:
         raise lights[-1].fail("kind: expected at most one sky")
     growth, base = footprint(camera, size)
@@ -93,6 +94,23 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     resolved, _ = _around_eye(root, camera, DETAIL * pixel)
     seen = optics(camera, size, root, ROUNDING[precision] * scale)
     return RenderSetup(resolved, replace(view, lights=lights), camera, seen, precision)
+
+
+def default_lights(root: Node) -> tuple[Light, ...]:
+    """Return the lights of a view without any.
+
+    Parameters
+    ----------
+    root : Node
+        Root of the formula tree.
+
+    Returns
+    -------
+    tuple of Light
+        A sun and a sky; a light at the camera if the scene has no end on any side, since it shadows both.
+    """
+    box = root.bounds.box
+    return (SUN, SKY) if any(map(math.isfinite, box.lo + box.hi)) else (AT_CAMERA,)
 
 
 def surroundings(root: Node, camera: Camera, pixel: float) -> float:

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.lib.npyio import NpzFile
 
 from ..errors import RenderError
-from .accumulator import COUNT, GOAL, HostAccumulator
+from .accumulator import COUNT, COVER, GOAL
+from .host_accumulator import HostAccumulator
 
-COARSEST, MOST_PASSES, MOST_SAMPLES = 64, 1 << 24, 1 << 20
-"""Limits of a saved picture's grid spacing, passes and samples per pixel."""
+MOST_PASSES, MOST_SAMPLES = 1 << 24, 1 << 20
+"""Limits of a saved picture's passes and samples per pixel."""
 HEADER = 1 << 12
 """Maximum header size of an array in a file, bytes."""
 INVALID = "expected a picture in progress, complete, as it was saved"
@@ -32,7 +33,7 @@ def save_state(file: BinaryIO, key: str, picture: HostAccumulator) -> None:
     picture : HostAccumulator
         The picture.
     """
-    shape = np.array([picture.width, picture.height, picture.passes, picture.coarse])
+    shape = np.array([picture.width, picture.height, picture.passes])
     np.savez(file, sums=picture.sums, shape=shape, key=np.array(key))
 
 
@@ -62,27 +63,27 @@ def load_state(path: str | Path, key: str, like: HostAccumulator) -> HostAccumul
         with open(path, "rb") as file, NpzFile(file) as stored:
             if str(_array(stored, "key")) != key:
                 raise RenderError(f"{path}: is of another scene, view, size or version")
-            width, height, passes, coarse = map(int, _array(stored, "shape"))
+            width, height, passes = map(int, _array(stored, "shape"))
             sums = _array(stored, "sums", like.sums.nbytes)
     except OSError as error:
         raise RenderError(f"{path}: {error.strerror or error}") from None
     except (ValueError, KeyError, EOFError, BadZipFile, NotImplementedError, zlib.error):
         raise RenderError(f"{path}: {INVALID}") from None
-    found = HostAccumulator(width, height, sums, passes, coarse, like.work)
-    if not _fits(found, like):
+    saved = HostAccumulator(width, height, sums, passes, like.work)
+    if not _fits(saved, like):
         raise RenderError(f"{path}: {INVALID}")
-    return found
+    return saved
 
 
-def _fits(found: HostAccumulator, like: HostAccumulator) -> bool:
+def _fits(saved: HostAccumulator, like: HostAccumulator) -> bool:
     """True if a picture is consistent and has the size and float type of another."""
     return (
-        (found.width, found.height) == (like.width, like.height)
-        and (found.sums.shape, found.sums.dtype) == (like.sums.shape, like.sums.dtype)
-        and 0 <= found.passes < MOST_PASSES
-        and 1 <= found.coarse <= COARSEST
-        and all(_counts(found.channels[..., channel]) for channel in (COUNT, GOAL))
-        and bool((found.counts <= found.channels[..., GOAL]).all())
+        (saved.width, saved.height) == (like.width, like.height)
+        and (saved.sums.shape, saved.sums.dtype) == (like.sums.shape, like.sums.dtype)
+        and 0 <= saved.passes < MOST_PASSES
+        and all(_counts(saved.channels[..., channel]) for channel in (COUNT, GOAL, COVER))
+        and bool((saved.counts <= saved.channels[..., GOAL]).all())
+        and bool((saved.channels[..., COVER] <= saved.counts).all())
     )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..formulas.material import material
@@ -20,6 +20,43 @@ from ..kernel.dialects import OF_FORMULAS, FieldDialect, folded, function, leadi
 from ..kernel.parsing import parse
 from ..kernel.structure import Run, Subroutine
 
+TRAP, NEAREST = "trap", "point"
+
+_SMALLEST = "sqrt(minimum(nearest, 1.0))"
+_TRAPS = {
+    "point": ("1e30", "minimum(nearest, {r2})", _SMALLEST),
+    "axes": (
+        "1e30",
+        "minimum(nearest, minimum({x} * {x} + minimum({y} * {y}, {z} * {z}), {y} * {y} + {z} * {z}))",
+        _SMALLEST,
+    ),
+    "planes": ("1e30", "minimum(nearest, minimum({x} * {x}, minimum({y} * {y}, {z} * {z})))", _SMALLEST),
+    "sphere": ("1e30", "minimum(nearest, absolute({r2} - 1.0))", "minimum(nearest, 1.0)"),
+    "steps": ("0.0", "nearest + 0.0625", "nearest"),
+    "direction": ("0.5", "0.5 + 0.15915494309189535 * atan2({y}, {x})", "nearest"),
+}
+"""Start and update of each trap's running value, and its position in the palette."""
+
+
+def traps(root: Node, trap: str = NEAREST) -> dict[int, str]:
+    """Return the orbit traps of the shapes of a tree.
+
+    Parameters
+    ----------
+    root : Node
+        Root of the formula tree.
+    trap : str
+        Trap of the shapes that are in no material.
+
+    Returns
+    -------
+    dict of int to str
+        Traps of the innermost materials, by the `id` of the shapes.
+    """
+    trap = root["trap"] if root.formula.name == material.name else trap
+    below = (item for child in root.children for item in traps(child, trap).items())
+    return dict(below) if root.children else {id(root): trap}
+
 
 @dataclass
 class TraceDialect(FieldDialect):
@@ -29,11 +66,14 @@ class TraceDialect(FieldDialect):
     ----------
     materials : dict of int to int
         Paint number of each material node, by the node's `id`.
+    traps : dict of int to str
+        Orbit trap of each shape, by the node's `id`; see `traps`.
     prefix : str
         Prefix of the function names.
     """
 
     materials: dict[int, int] = field(default_factory=dict)
+    traps: dict[int, str] = field(default_factory=dict)
     prefix: str = "T"
 
     def kept(self, node: Node) -> Node:
@@ -67,7 +107,9 @@ class TraceDialect(FieldDialect):
             The node's function and arguments.
         """
         if node.formula.name != material.name:
-            return arguments(node, leading(node))
+            given = arguments(node, leading(node))
+            trap = self.traps.get(id(node), NEAREST)
+            return given if trap == NEAREST else replace(given, fixed=(*given.fixed, (TRAP, trap)))
         paint: list[float] = []
         passed = read(float(self.materials[id(node)]), paint, "P0")
         return Arguments(node.function, (), (passed,), tuple(paint))
@@ -152,15 +194,17 @@ class TraceDialect(FieldDialect):
         str
             Source text.
         """
-        tree = _KeepsNearest().visit(source.specialised(given.function, dict(given.fixed)))
-        tree.body.insert(0, parse("nearest = 0.0 * x + 1e30").body[0])
+        fixed = dict(given.fixed)
+        start, update, tone = _TRAPS[fixed.pop(TRAP, NEAREST)]
+        tree = _KeepsNearest(update).visit(source.specialised(given.function, fixed))
+        tree.body.insert(0, parse(f"nearest = 0.0 * x + {start}").body[0])
         called = f"{name}_of"
         self.linker.functions[called] = self.linker.named(called, tree, given.function)
         return function(
             name,
             [
                 f"f, nearest = {called}({', '.join(['x', 'y', 'z', *given.passed])})",
-                "return f, 0.0 * x, sqrt(minimum(nearest, 1.0))",
+                f"return f, 0.0 * x, {tone}",
             ],
         )
 
@@ -223,14 +267,18 @@ class TraceDialect(FieldDialect):
 
 
 class _KeepsNearest(ast.NodeTransformer):
-    """Replace orbit marks by a running minimum of r2, and return the minimum beside the value."""
+    """Replace orbit marks by the update of a running value, and return it beside the field's."""
+
+    def __init__(self, update: str) -> None:
+        self.update = update
 
     def visit_Expr(self, node: ast.Expr) -> Any:
         if not source.is_mark(node):
             return node
         assert isinstance(node.value, ast.Call)
-        r2, alive = map(ast.unparse, node.value.args)
-        return parse(f"nearest = where({alive}, minimum(nearest, {r2}), nearest)").body[0]
+        r2, alive, x, y, z = (f"({ast.unparse(argument)})" for argument in node.value.args)
+        value = self.update.format(r2=r2, x=x, y=y, z=z)
+        return parse(f"nearest = where({alive}, {value}, nearest)").body[0]
 
     def visit_Return(self, node: ast.Return) -> Any:
         assert node.value is not None

@@ -58,7 +58,12 @@ SCENE = TopElement(
 SOLID = TopElement(
     "solid",
     "The object to make. Several elements inside it are a union.",
-    MappingProxyType({"size": Length(REQUIRED, "the longest side of the finished object")}),
+    MappingProxyType(
+        {
+            "size": Length(None, "the longest side of the finished object"),
+            "unit": Length(None, "or the length of a scene unit"),
+        }
+    ),
     (1, None),
 )
 
@@ -74,6 +79,11 @@ FILM = [_section(part) for part in (Animation, Track)]
 SECTIONS = {section.name: section for section in (SOLID, PRINT, *PICTURE, *FILM)}
 
 
+def registered() -> dict[str, Formula]:
+    """Return every registered formula by name, without a look at installed packages."""
+    return {name: get(name) for name in names()}
+
+
 def formulas() -> list[Formula]:
     """Return every registered formula, those of installed packages too.
 
@@ -83,4 +93,4 @@ def formulas() -> list[Formula]:
         Sorted by name.
     """
     load_installed()
-    return [get(name) for name in names()]
+    return list(registered().values())

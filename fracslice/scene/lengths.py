@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +16,9 @@ SMALLEST, LARGEST = 1e-6, 1e6
 EXPECTS = "a length above zero such as 80mm, 8cm, 3.1in or 250um, from 0.001um to 1000m"
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _LENGTH = re.compile(rf"\s*({NUMBER})\s*({'|'.join(MILLIMETRES)})?\s*")
+LEAST, MOST = 0.5, 2.0
+"""Limits of scale factors."""
+_PERCENT = re.compile(rf"\s*({NUMBER})\s*%\s*")
 
 
 def parse_length(value: str | float, what: str = "length") -> float:
@@ -171,3 +175,60 @@ class Pair(Length):
         if len(pair) != 2:
             raise ValueError(self.expects)
         return super().check(pair[0]), super().check(pair[1])
+
+
+@dataclass(frozen=True)
+class Percent(Parameter):
+    """Parameter kind of scale factors along x, y and z: percentages, or numbers in Python."""
+
+    @property
+    def expects(self) -> str:
+        """Description of the accepted values."""
+        return f"a percentage such as 102%, or three, from {LEAST:.0%} to {MOST:.0%}"
+
+    def read(self, text: str) -> tuple[float, ...]:
+        """Parse one percentage, or three separated by commas.
+
+        Parameters
+        ----------
+        text : str
+            The text.
+
+        Returns
+        -------
+        tuple of float
+            Three factors.
+
+        Raises
+        ------
+        ValueError
+            With `expects`, for any other text.
+        """
+        matches = [_PERCENT.fullmatch(part) for part in text.split(",")]
+        return self.check(tuple(float(match[1]) / 100 if match else math.nan for match in matches))
+
+    def check(self, value: Any) -> tuple[float, ...]:
+        """Validate text, one factor for all axes, or three.
+
+        Parameters
+        ----------
+        value : str, float, tuple or list
+            The value.
+
+        Returns
+        -------
+        tuple of float
+            Three factors.
+
+        Raises
+        ------
+        ValueError
+            With `expects`, for any other value.
+        """
+        if isinstance(value, str):
+            return self.read(value)
+        given = [finite(v) for v in (value if isinstance(value, (tuple, list)) else (value,))]
+        factors = tuple(v for v in given if v is not None and LEAST <= v <= MOST)
+        if len(factors) != len(given) or len(given) not in (1, 3):
+            raise ValueError(self.expects)
+        return factors if len(factors) == 3 else factors * 3

@@ -47,8 +47,8 @@ def _page() -> Iterator[str]:
 
 def _call(formula: Formula) -> str:
     """Python call of a formula, with its defaults."""
-    found = inspect.signature(formula).parameters.values()
-    return f"{formula.name}({', '.join(str(p.replace(annotation=p.empty)) for p in found)})"
+    result = inspect.signature(formula).parameters.values()
+    return f"{formula.name}({', '.join(str(p.replace(annotation=p.empty)) for p in result)})"
 
 
 def _described(element: Element, call: str | None = None) -> Iterator[str]:

@@ -26,8 +26,8 @@ class Scene:
     ----------
     root : Node
         Root of the formula tree.
-    size_mm : float
-        Longest side of the finished object, mm; text with a unit is accepted.
+    size_mm : float or None
+        Longest side of the finished object, mm; text with a unit is accepted. None if `unit_mm` is given.
     name : str
         Label; not compared and not written.
     view : View
@@ -38,23 +38,31 @@ class Scene:
         Length and frames of the film.
     tracks : tuple of Track
         Attributes that the film moves.
+    unit_mm : float or None
+        Length of a scene unit, mm; excludes `size_mm`.
 
     Raises
     ------
     SceneError
-        If the tree is invalid as a whole, such as a twist of an unbounded solid.
+        Unless one of `size_mm` and `unit_mm` is given, or if the tree is invalid as a whole, such as a twist
+        of an unbounded solid.
     """
 
     root: Node
-    size_mm: float
+    size_mm: float | None
     name: str = field(default="scene", compare=False)
     view: View = field(default_factory=View)
     printing: Print = field(default_factory=Print)
     animation: Animation | None = None
     tracks: tuple[Track, ...] = ()
+    unit_mm: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "size_mm", parse_length(self.size_mm, "size"))
+        if (self.size_mm is None) == (self.unit_mm is None):
+            raise SceneError("size and unit: expected one of them")
+        for name in ("size", "unit"):
+            if (value := getattr(self, f"{name}_mm")) is not None:
+                object.__setattr__(self, f"{name}_mm", parse_length(value, name))
         _refuse_impossible(self.root)
         if self.tracks and self.animation is None:
             raise self.tracks[0].fail("needs an <animation> in the scene")
@@ -95,7 +103,8 @@ class Scene:
 
 def scene(
     *elements: Node,
-    size: str | float,
+    size: str | float | None = None,
+    unit: str | float | None = None,
     name: str = "scene",
     view: View | None = None,
     printing: Print | None = None,
@@ -106,8 +115,10 @@ def scene(
     ----------
     *elements : Node
         One or more elements; several form a union.
-    size : str or float
+    size : str or float, optional
         Longest side of the finished object: text with a unit, or mm.
+    unit : str or float, optional
+        Length of a scene unit, instead of a size.
     name : str
         Label.
     view : View, optional
@@ -135,7 +146,8 @@ def scene(
     if not elements:
         raise SceneError("a scene needs at least one element")
     root = elements[0] if len(elements) == 1 else get("union")(*elements)
-    return Scene(root, parse_length(size, "size"), name, view or View(), printing or Print())
+    parts = view or View(), printing or Print()
+    return Scene(root, size, name, *parts, unit_mm=unit)  # type: ignore[arg-type]
 
 
 def _refuse_impossible(root: Node) -> None:

@@ -20,7 +20,7 @@ from ..formulas.registry import DEEPEST, TOO_DEEP
 from ..nearest import hint
 from .animation import Animation, Track
 from .element import Part
-from .layout import SCENE, SECTIONS, SOLID, Element, TopElement, formulas
+from .layout import SCENE, SECTIONS, SOLID, Element, TopElement, formulas, registered
 from .model import Scene, computing, scene
 from .printing import Print
 from .view import View
@@ -92,7 +92,9 @@ def _scene(data: bytes, source: str, name: str) -> Scene:
     others = (Print, Animation, Track)
     printing = next((part for part in builder.parts if isinstance(part, Print)), Print())
     view = View.of(part for part in builder.parts if not isinstance(part, others))
-    made = scene(*solid.children, size=solid.values["size"], name=name, view=view, printing=printing)
+    if len(solid.values) != 1:
+        raise solid.fail('expected size="...", the longest side, or unit="...", the length of a scene unit')
+    made = scene(*solid.children, **solid.values, name=name, view=view, printing=printing)
     animation = next((part for part in builder.parts if isinstance(part, Animation)), None)
     return replace(
         made, animation=animation, tracks=tuple(part for part in builder.parts if isinstance(part, Track))
@@ -121,7 +123,7 @@ class _Builder:
         self.open: list[_Open] = []
         self.done: dict[str, _Open] = {}
         self.parts: list[Part] = []
-        self.formulas = {formula.name: formula for formula in formulas()}
+        self.formulas: Mapping[str, Element] = registered()
         self.parser = expat.ParserCreate()
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self.doctype
@@ -168,16 +170,22 @@ class _Builder:
         elif self.open[-1].element is SCENE:
             allowed = SECTIONS
         else:
-            allowed = self.formulas
+            allowed = self.formulas if name in self.formulas else self.all_formulas()
             if self.open[-1].element.children[1] == 0:
                 raise self.open[-1].fail(f"takes no elements inside it, found <{name}>")
         if name not in allowed:
-            known = {SCENE.name, *SECTIONS, *self.formulas}
+            known = {SCENE.name, *SECTIONS, *self.all_formulas()}
             wrong = "cannot stand here" if name in known else "is not a known element"
             raise SceneError(f"{self.place}: <{name}> {wrong}; {hint(name, allowed, '<{}>')}")
         if name in self.done:
             raise SceneError(f"{self.place}: <{name}> may only stand once in a scene")
         return allowed[name]
+
+    def all_formulas(self) -> Mapping[str, Element]:
+        """Formulas by name, those of installed packages too, which take long to find."""
+        formulas()
+        self.formulas = registered()
+        return self.formulas
 
     def end(self, name: str) -> None:
         """Handle an end tag: build the node."""

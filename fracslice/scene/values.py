@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import SceneError
 from ..formulas import Node
 from ..nearest import hint
+from .element import Part
 from .layout import PICTURE, PRINT, SECTIONS, SOLID, Element
 from .model import Scene
 from .view import View
@@ -156,7 +157,8 @@ def _parsed(source: str) -> Override:
 
 def _changed(scene: Scene, override: Override) -> Scene:
     if override.element == SOLID.name:
-        return replace(scene, size_mm=override.value(SOLID))
+        sizes = {"size_mm": None, "unit_mm": None, f"{override.attribute}_mm": override.value(SOLID)}
+        return replace(scene, **sizes)
     if override.element == PRINT.name:
         return replace(scene, printing=replace(scene.printing, **{override.attribute: override.value(PRINT)}))
     if override.element in (section.name for section in PICTURE):
@@ -171,9 +173,12 @@ def _changed(scene: Scene, override: Override) -> Scene:
 
 
 def _relit(view: View, override: Override) -> View:
-    """The view with one value changed; film and shading can be changed even if they are not in the file."""
+    """The view with one value changed; an element that may stand once need not be in the file."""
     section = SECTIONS[override.element]
-    always = [part for part in (view.film, view.shading) if part not in view.parts]
+    always: list[Part] = [part for part in (view.film, view.shading) if part not in view.parts]
+    missing = all(part.element != section.name for part in (*view.parts, *always))
+    if section.part and missing and not section.many:
+        always.append(section.part())
     found, counted = [], 0
     for part in (*view.parts, *always):
         counted += part.element == section.name

@@ -29,17 +29,27 @@ class Film(Part):
         Number(0.0, "the part of bright light that spreads in the lens", least=0, most=1)
     )
     background: Triple = described(
-        Vector((0.08, 0.08, 0.12), "colour where nothing is, without a sky", least=0, most=1)
+        Vector((0.08, 0.08, 0.12), "displayed colour behind the object, without a sky", least=0, most=1)
     )
+    alpha: str = described(
+        Choice("no", "whether the background and the sky are transparent, by an alpha channel", ("no", "yes"))
+    )
+
+    @property
+    def transparent(self) -> bool:
+        """True if the picture has an alpha channel."""
+        return self.alpha == "yes"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Light(Part):
-    """Light source, repeatable; without any, the scene has a sun and a sky."""
+    """Light source, repeatable; by default a sun and a sky, in a scene without end a light at the camera."""
 
     element = "light"
     many = True
-    kind: str = described(Choice("sun", "far away, near, or all around", ("sun", "lamp", "sky")))
+    kind: str = described(
+        Choice("sun", "far away, near, all around, or at the camera", ("sun", "lamp", "sky", "camera"))
+    )
     position: Triple = described(
         Vector((-1.0, -2.0, 3.0), "where a lamp is, or the direction in which the sun stands", nonzero=True)
     )
@@ -47,7 +57,12 @@ class Light(Part):
     horizon: Triple = described(Vector(WHITE, "of a sky, its colour at the horizon", least=0, most=1))
     ground: Triple = described(Vector((0.3, 0.28, 0.26), "of a sky, its colour from below", least=0, most=1))
     strength: float = described(
-        Number(1.0, "multiplies the colour; of a lamp, at distance 1", least=0, most=1e6)
+        Number(
+            1.0,
+            "multiplies the colour; of a lamp at distance 1, of a light at the camera at its target",
+            least=0,
+            most=1e6,
+        )
     )
     size: float = described(
         Number(
@@ -62,10 +77,12 @@ class Light(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Fog(Part):
-    """Haze that hides distant surfaces."""
+    """Haze that hides distant surfaces; it does not cover the sky."""
 
     element = "fog"
-    colour: Triple = described(Vector((0.7, 0.75, 0.8), "red, green and blue", least=0, most=1))
+    colour: Triple | None = described(
+        Vector(None, "red, green and blue; without it, those of the sky behind", least=0, most=1)
+    )
     density: float = described(
         Number(0.1, "of light, exp(-density distance) comes through", least=0, most=1e6)
     )
@@ -79,14 +96,18 @@ class Shading(Part):
     mode: str = described(
         Choice(
             "light",
-            "light: lit by the lights; normal: its direction; depth: how far along the view; "
-            "distance: how far from the eye; steps: how many steps the ray took, the more the darker",
-            ("light", "normal", "depth", "distance", "steps"),
+            "light: lit by the lights; normal: unit normal; position: coordinates; albedo: colour "
+            "without light; depth: distance along the view, and distance: from the eye, both in "
+            "scene units; steps: steps of the ray",
+            ("light", "normal", "position", "albedo", "depth", "distance", "steps"),
         )
     )
     ambient: float = described(Number(0.0, "light that is everywhere", least=0, most=100))
     occlusion: float = described(Number(0.0, "how much occlusion darkens ambient light", least=0, most=4))
     reach: float = described(Number(0.2, "distance at which surfaces occlude, in scene units", above=0))
+    paths: str = described(
+        Choice("no", "whether surfaces light each other, and glowing ones the others", ("no", "yes"))
+    )
     bounces: int = described(Count(4, "maximum number of reflections and refractions of a ray", most=16))
 
 

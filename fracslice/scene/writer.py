@@ -49,7 +49,7 @@ def part_to_xml(part: Part | Print) -> str:
 
 def _lines(scene: Scene) -> Iterator[str]:
     yield f"<{SCENE.name}{_attributes(SCENE, {'version': VERSION})}>"
-    yield f"  <{SOLID.name}{_attributes(SOLID, {'size': scene.size_mm})}>"
+    yield f"  <{SOLID.name}{_attributes(SOLID, {'size': scene.size_mm, 'unit': scene.unit_mm})}>"
     yield from _element(scene.root, "    ")
     yield f"  </{SOLID.name}>"
     printing = () if scene.printing == Print() else (scene.printing,)

@@ -112,13 +112,13 @@ def bends(
     )
     sides = replace(sides, low=np.minimum(sides.low, where), high=np.maximum(sides.high, where + 1))
     sides = sides.chosen(free(pixels[sides.after], where, taken))
-    found = Vertices(sides.tops, sides.after, sides.share)
+    result = Vertices(sides.tops, sides.after, sides.share)
     for level in range(2, LEVELS + 1):
         sides = _settled(sides.halved(0.5**level).bent, section).bent
         between = (sides.tops > sides.low) & (sides.tops < sides.high)
         sides = sides.chosen(np.all(between, axis=1))
-        found += Vertices(sides.tops, sides.after, sides.share)
-    return found
+        result += Vertices(sides.tops, sides.after, sides.share)
+    return result
 
 
 def _guessed(points: np.ndarray, following: np.ndarray, pixels: np.ndarray) -> _Sides:
@@ -159,7 +159,7 @@ def _square(span: np.ndarray) -> np.ndarray:
 def _settled(sides: _Sides, section: CrossSection) -> _Sides:
     """Sides with their heights on the field, by the secant method; those without a solution are dropped."""
     height, before, last = sides.height.copy(), np.zeros(len(sides.height)), section(sides.middles)
-    found, todo = np.zeros(len(height), bool), np.arange(len(height))
+    result, todo = np.zeros(len(height), bool), np.arange(len(height))
     for _ in range(ROUNDS):
         if not len(todo):
             break
@@ -168,6 +168,6 @@ def _settled(sides: _Sides, section: CrossSection) -> _Sides:
         step = -f * (height[todo] - before[todo]) / change
         before[todo], last[todo] = height[todo], f
         height[todo] += step
-        found[todo] = np.abs(step) < SAGITTA / 2
-        todo = todo[~found[todo] & np.isfinite(height[todo])]
-    return replace(sides, height=height).chosen(found)
+        result[todo] = np.abs(step) < SAGITTA / 2
+        todo = todo[~result[todo] & np.isfinite(height[todo])]
+    return replace(sides, height=height).chosen(result)

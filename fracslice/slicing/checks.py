@@ -15,7 +15,7 @@ from ..printing.limits import Limits
 from ..printing.problems import Problem
 from ..printing.widths import Widths, widths_of
 from ..work import Work
-from .graph import Found, Graph
+from .graph import Feature, Graph
 from .layers import Layer, Slicer
 from .necks import Neck, weakest
 from .overhangs import Overhang, farthest, unsupported
@@ -48,13 +48,13 @@ class PrintReport:
         True if the object fits the printer; None without a printer.
     volume, weight_g : float
         Volume of the solid, and weight in grams.
-    bodies, islands : list of Found
+    bodies, islands : list of Feature
         Connected components, and components with nothing below them, without specks.
     specks : int
         Number of islands and bodies below the limit.
     overhang_area, largest_overhang : float
         Total over all layers, and maximum in a layer.
-    cups, traps, cavities : list of Found
+    cups, traps, cavities : list of Feature
         Suction cups, resin traps and sealed cavities.
     walls, gaps : Widths or None
         Widths in layers.
@@ -76,14 +76,14 @@ class PrintReport:
     fits: bool | None
     volume: float
     weight_g: float
-    bodies: list[Found]
-    islands: list[Found]
+    bodies: list[Feature]
+    islands: list[Feature]
     specks: int
     overhang_area: float
     largest_overhang: float
-    cups: list[Found]
-    traps: list[Found]
-    cavities: list[Found]
+    cups: list[Feature]
+    traps: list[Feature]
+    cavities: list[Feature]
     walls: Widths | None
     gaps: Widths | None
     overhang: Overhang | None
@@ -153,7 +153,7 @@ def check_layers(
 
     limits, work = limits or Limits(), work or Work()
     finest, origin = max(stack.pixel), stack.origin
-    solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin)
+    solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin, stack.drains)
     return _Collector(stack, limits, printer, solid).report(Slicer(stack, work).map(make))
 
 
@@ -219,21 +219,21 @@ class _Collector:
         report.problems.extend([*([unfit] if unfit else []), *problems_of(report, stack, self.limits)])
         return report
 
-    def found(self, graph: Graph, chosen: np.ndarray) -> list[Found]:
+    def found(self, graph: Graph, chosen: np.ndarray) -> list[Feature]:
         """Chosen nodes as connected groups."""
         return graph.groups(chosen, self.stack.heights, self.stack.pixel, self.stack.shape)
 
-    def shut(self, hollows: Graph, backwards: bool) -> list[Found]:
+    def shut(self, hollows: Graph, backwards: bool) -> list[Feature]:
         """Large groups of shut nodes, see `Graph.shut`."""
         return [p for p in self.found(hollows, hollows.shut(backwards)) if p.area >= self.limits.cup]
 
-    def height(self, part: Found) -> float:
+    def height(self, part: Feature) -> float:
         """Height of a group, mm."""
         first, last = part.layers
         return float(self.stack.heights[first : last + 1].sum())
 
 
-def _worst(overhang: np.ndarray, islands: list[Found], far: list[Overhang]) -> list[int]:
+def _worst(overhang: np.ndarray, islands: list[Feature], far: list[Overhang]) -> list[int]:
     """Layers in which the largest islands begin, then those with the farthest and the most overhang."""
     first = [i.layers[0] for i in sorted(islands, key=lambda i: -i.area)[: WORST // 2]]
     most = [int(k) for k in np.argsort(-overhang, kind="stable")[:WORST] if overhang[k] > 0]

@@ -19,7 +19,7 @@ from .runs import LayerComponents, Nodes, overlaps
 
 
 @dataclass(frozen=True)
-class Found:
+class Feature:
     """A feature found by a check.
 
     Attributes
@@ -139,7 +139,7 @@ class Graph:
 
     def groups(
         self, chosen: np.ndarray, heights: np.ndarray, pixel: tuple[float, float], shape: tuple[int, int]
-    ) -> list[Found]:
+    ) -> list[Feature]:
         """Group chosen nodes into connected components.
 
         Parameters
@@ -155,7 +155,7 @@ class Graph:
 
         Returns
         -------
-        list of Found
+        list of Feature
             The groups, by descending volume.
         """
         number, _ = grouped(self.count, *self.edges[chosen[self.edges].all(1)].T)
@@ -170,7 +170,7 @@ class Graph:
         at = (self.nodes.middle[nodes[lowest]] - np.array(shape[::-1]) / 2) * pixel
         order = np.argsort(-volume, kind="stable")
         return [
-            Found(
+            Feature(
                 (int(first[i]), int(last[i])),
                 float(area[i]),
                 float(volume[i]),

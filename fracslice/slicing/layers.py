@@ -215,13 +215,13 @@ class Slicer:
         def slab(group: list[int]) -> list[T]:
             self.work.check()
             first = group[0] // SLAB * SLAB
-            found, made = sampler.slab(self.stack.z[first : first + SLAB]), []
+            result, made = sampler.slab(self.stack.z[first : first + SLAB]), []
             for index in group:
                 self.work.check()
-                before = found.evaluations
-                sampler.sample(found, index - first)
-                spent = found.evaluations - before
-                layer = Layer(self.stack, index, spent, found, index - first, exact)
+                before = result.evaluations
+                sampler.sample(result, index - first)
+                spent = result.evaluations - before
+                layer = Layer(self.stack, index, spent, result, index - first, exact)
                 made.append(make(layer))
                 if layer.is_painted:
                     self.areas[index] = layer.area

@@ -97,7 +97,7 @@ def _weakest(area, firm, edges, starts, least):  # type: ignore[no-untyped-def]
     """
     parent, largest = np.arange(len(area)), area.copy()
     contact, widest = np.zeros(len(area), np.int64), np.full(len(area), -1)
-    ratio, found = 0.0, (0, 0, 0, -1)
+    ratio, result = 0.0, (0, 0, 0, -1)
     for cut in range(len(starts) - 2, -1, -1):
         cut_edges, seen = edges[starts[cut] : starts[cut + 1]], {(-1, -1)}
         for node, above in cut_edges:
@@ -111,7 +111,7 @@ def _weakest(area, firm, edges, starts, least):  # type: ignore[no-untyped-def]
             root = find(parent, above)
             if contact[root] and largest[root] >= least and largest[root] > ratio * contact[root]:
                 ratio = largest[root] / contact[root]
-                found = (contact[root], largest[root], cut, widest[root])
+                result = (contact[root], largest[root], cut, widest[root])
         for _, above in cut_edges:
             contact[find(parent, above)], widest[find(parent, above)] = 0, -1
         for node, above in cut_edges:
@@ -119,4 +119,4 @@ def _weakest(area, firm, edges, starts, least):  # type: ignore[no-untyped-def]
             low, high = min(a, b), max(a, b)
             largest[low] = max(largest[low], largest[high])
             parent[high] = low
-    return found
+    return result

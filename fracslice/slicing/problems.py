@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..printing.checks import BRIDGE, FILL, loose
 from ..printing.problems import Problem, counted
-from .graph import Found
+from .graph import Feature
 from .printers import PRINTERS, Printer
 from .stack import Stack
 
@@ -66,9 +66,9 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
         The problems.
     """
 
-    def where(found: Found) -> dict[str, Any]:
-        layer = found.layers[0]
-        return {"layer": layer, "at": (*found.at, _bottom(stack, layer))}
+    def where(feature: Feature) -> dict[str, Any]:
+        layer = feature.layers[0]
+        return {"layer": layer, "at": (*feature.at, _bottom(stack, layer))}
 
     problems = []
     if len(report.bodies) > 1:
@@ -91,10 +91,10 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
         text = f"{sealed} with {sum(c.volume for c in report.cavities):.3g} mm3 of resin"
         problems.append(Problem("cavities", text, mend=FILL, **where(report.cavities[0])))
     for kind, noun, hollows in (("cups", "suction cup", report.cups), ("traps", "resin trap", report.traps)):
-        found = [hollow for hollow in hollows if hollow not in report.cavities]
-        if found:
-            largest = max(found, key=lambda h: h.area)
-            text = f"{counted(found, noun)} with {sum(h.volume for h in found):.3g} mm3 of resin"
+        remaining = [hollow for hollow in hollows if hollow not in report.cavities]
+        if remaining:
+            largest = max(remaining, key=lambda h: h.area)
+            text = f"{counted(remaining, noun)} with {sum(h.volume for h in remaining):.3g} mm3 of resin"
             text += f", the largest {largest.area:.3g} mm2"
             problems.append(Problem(kind, text, advice="--up, or a drain hole", **where(largest)))
     return [*problems, *report.solid.thin]

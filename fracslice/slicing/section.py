@@ -88,8 +88,8 @@ def keys(pixels: np.ndarray) -> np.ndarray:
     int64 [n]
         The numbers.
     """
-    found: np.ndarray = (pixels[:, 0] << 32) + pixels[:, 1]
-    return found
+    result: np.ndarray = (pixels[:, 0] << 32) + pixels[:, 1]
+    return result
 
 
 def alone(pixels: np.ndarray) -> np.ndarray:
@@ -128,5 +128,5 @@ def free(pixels: np.ndarray, beside: np.ndarray, taken: np.ndarray) -> np.ndarra
         vertex.
     """
     away = np.abs(beside - pixels).sum(1)
-    found: np.ndarray = (away == 0) | ((away == 1) & alone(beside) & ~np.isin(keys(beside), keys(taken)))
-    return found
+    result: np.ndarray = (away == 0) | ((away == 1) & alone(beside) & ~np.isin(keys(beside), keys(taken)))
+    return result

@@ -8,15 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import SceneError, SliceError
-from ..formulas import transform
-from ..formulas.algebra import length
-from ..formulas.box import Box
+from ..formulas.box import Box, Triple
 from ..formulas.parameters import REQUIRED, Vector, validate
 from ..kernel import Field
 from ..printing import printable
 from ..scene import Print
-from ..scene.lengths import Length, Pair
-from ..volume import plan, with_depths
+from ..scene.lengths import Length, Pair, Percent
+from ..volume import Drain, plan
+from ..volume.sizing import SAME, UP, Sizing, oriented
 from ..work import Work
 
 MOST_LAYERS = 100_000
@@ -30,7 +29,7 @@ class SliceJob:
     Attributes
     ----------
     size : float
-        Longest side of the object, before anything is cut off or added.
+        Longest side of the object, before anything is cut off or added; approximate if `unit` is given.
     layer : float
         Layer height.
     pixel : tuple of float
@@ -39,6 +38,10 @@ class SliceJob:
         Direction of the scene that is up in the print.
     printing : Print
         Changes that make the object printable.
+    scale : tuple of float
+        Compensation of shrinkage along x, y and z; one factor or percentage for all, or three.
+    unit : float, optional
+        Length of a scene unit, mm, which then determines the size.
 
     Raises
     ------
@@ -51,8 +54,10 @@ class SliceJob:
     size: float
     layer: float = 0.05
     pixel: tuple[float, float] = (0.05, 0.05)
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    up: Triple = UP
     printing: Print = field(default_factory=Print)
+    scale: Triple = SAME
+    unit: float | None = None
 
     def __post_init__(self) -> None:
         validate(self, _KINDS, SceneError)
@@ -61,12 +66,19 @@ class SliceJob:
         if max(self.pixel) >= self.size:
             raise SliceError(f"a pixel of {max(self.pixel):g} mm is as large as the object: {self.size:g} mm")
 
+    @property
+    def sizing(self) -> Sizing:
+        """Size of the object."""
+        return Sizing(self.size, self.unit, self.scale)
+
 
 _KINDS = {
     "size": Length(REQUIRED, "the longest side"),
     "layer": Length(0.05, "the layer height"),
     "pixel": Pair((0.05, 0.05), "width and height"),
-    "up": Vector((0.0, 0.0, 1.0), "a direction", nonzero=True),
+    "up": Vector(UP, "a direction", nonzero=True),
+    "scale": Percent(SAME, "compensation of shrinkage"),
+    "unit": Length(None, "a scene unit"),
 }
 
 
@@ -96,6 +108,8 @@ class Stack:
         Conservative bounds of the object, scene units.
     notes : tuple of str
         What a pixel or a layer is too large for.
+    drains : tuple of Drain
+        Drain holes.
     """
 
     root: Field
@@ -108,6 +122,7 @@ class Stack:
     size: tuple[float, float, float]
     outer: Box
     notes: tuple[str, ...] = ()
+    drains: tuple[Drain, ...] = ()
 
     @property
     def heights(self) -> np.ndarray:
@@ -154,8 +169,9 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     Cancelled
         When the work is cancelled.
     """
-    planned = plan(turned(root, job.up, work), job.size / min(job.pixel), work)
-    planned, scale = printable(planned, job.size, job.printing, work)
+    upright = oriented(root, job.up, job.sizing.stretch, work)
+    planned = plan(upright, job.sizing.longest / min(job.pixel), work)
+    planned, scale = printable(planned, job.sizing, job.printing, work)
     found, outer = planned.box, planned.outer
     mm = tuple(s * scale for s in found.size)
     shape, corner = [0, 0], [0.0, 0.0]
@@ -169,7 +185,7 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     z = found.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
     pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounded(mm[2], float(tops[-1])))
-    return Stack(planned.root, scale, at, job.pixel, pixels, z, tops, size, outer, notes)
+    return Stack(planned.root, scale, at, job.pixel, pixels, z, tops, size, outer, notes, planned.drains)
 
 
 def _tops(height: float, layer: float) -> np.ndarray:
@@ -185,37 +201,3 @@ def _rounded(height: float, made: float) -> tuple[str, ...]:
     if abs(made - height) <= height / 100:
         return ()
     return (f"whole layers are {made:.4g} mm high, the object {height:.4g} mm; expected lower layers",)
-
-
-def turned(root: Field, up: tuple[float, float, float], work: Work | None) -> Field:
-    """Rotate a scene by the shortest way so that a direction points along z.
-
-    Parameters
-    ----------
-    root : Field
-        The scene.
-    up : three numbers
-        Direction.
-    work : Work, optional
-        Threads and cancellation.
-
-    Returns
-    -------
-    Field
-        The rotated scene, with the depths of the unrotated one.
-
-    Raises
-    ------
-    SliceError
-        If a field without a scene tree must be rotated.
-    """
-    direction = np.asarray(up, float) / length(np.asarray(up, float))
-    axis = np.cross(direction, (0.0, 0.0, 1.0))
-    angle = math.degrees(math.atan2(length(axis), float(direction[2])))
-    if angle == 0:
-        return root
-    if root.tree is None:
-        raise SliceError("up: expected a scene of formulas")
-    if not length(axis) > 0:
-        axis = np.array([1.0, 0.0, 0.0])
-    return transform(with_depths(root.tree, work), rotate=(*axis.tolist(), angle))

@@ -64,7 +64,7 @@ def _measured(solid: Runs, count: np.ndarray, times: int, pixel: Pair, gaps: boo
         _narrow(solid.rows, solid.begin, solid.end, solid.width, gaps, times, longest, narrow)
     width, middle = _across((2 * np.pad(count, 2) >= times**2) != gaps, coarse)
     far = width[2:-2, 2:-2][middle[2:-2, 2:-2] & ~narrow]
-    found = [np.column_stack([far, np.full(len(far), times)])]
+    result = [np.column_stack([far, np.full(len(far), times)])]
     halo = int(np.ceil(WIDE / 2 / min(pixel))) + AROUND
     for rows, columns in _windows(narrow, max(WINDOW // times, 1)):
         chosen = narrow[rows, columns].repeat(times, 0).repeat(times, 1)
@@ -73,8 +73,8 @@ def _measured(solid: Runs, count: np.ndarray, times: int, pixel: Pair, gaps: boo
         _paint(solid.rows, solid.begin, solid.end, top, left, image)
         width, middle = _across(image != gaps, pixel)
         near = width[halo:-halo, halo:-halo][middle[halo:-halo, halo:-halo] & chosen]
-        found.append(np.column_stack([near, np.ones(len(near))]))
-    return np.concatenate(found)
+        result.append(np.column_stack([near, np.ones(len(near))]))
+    return np.concatenate(result)
 
 
 def _windows(chosen: np.ndarray, side: int) -> Iterator[Window]:

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..formulas.box import Box
+from ..formulas.box import Box, Triple
 from ..formulas.field import Bounds
 from ..formulas.registry import Node
 from ..kernel import Field, Kernel
@@ -23,6 +23,7 @@ from .sampler import sample, sample_signs
 
 __all__ = [
     "Bricks",
+    "Drain",
     "Extent",
     "Lattice",
     "Plan",
@@ -47,6 +48,23 @@ which depths follow.
 """
 
 
+@dataclass(frozen=True)
+class Drain:
+    """Drain hole of a hollow, scene units.
+
+    Attributes
+    ----------
+    start, end
+        Ends of its axis, in the hollow and outside.
+    radius
+        Radius.
+    """
+
+    start: Triple
+    end: Triple
+    radius: float
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """Scene with resolved depths, its bounds and its voxel size.
@@ -67,6 +85,8 @@ class Plan:
         Details that the voxel is too large to resolve, as text.
     depths
         Automatic depths, such as "mandelbulb 5".
+    drains
+        Drain holes.
     """
 
     root: Field
@@ -76,6 +96,7 @@ class Plan:
     voxel: float
     notes: tuple[str, ...] = ()
     depths: tuple[str, ...] = ()
+    drains: tuple[Drain, ...] = ()
 
     @property
     def lattice(self) -> Lattice:
@@ -109,9 +130,9 @@ def plan(root: Field, resolution: float, work: Work | None = None) -> Plan:
     """
     tree = root.tree
     known = with_depths(tree, work) if tree else None
-    found = extent(known or root, resolution, work)
-    voxel = max(found.box.size) / resolution
-    planned = Plan(known or root, found.box, found.outer, found.tips, voxel)
+    extents = extent(known or root, resolution, work)
+    voxel = max(extents.box.size) / resolution
+    planned = Plan(known or root, extents.box, extents.outer, extents.tips, voxel)
     if tree is None or known is None:
         return planned
     shown, notes = visible(known, voxel)

@@ -74,8 +74,8 @@ def surface_points(root: Field, box: Box, voxel: float, count: int, work: Work |
         step = -f * gradient / np.where(square > 0, square, np.inf)
         move = np.where(square > 0, np.linalg.norm(step, axis=0), np.inf)
         p = p + step
-    found: np.ndarray = p[:, move < NEAR * voxel][:, :count].T
-    return found
+    result: np.ndarray = p[:, move < NEAR * voxel][:, :count].T
+    return result
 
 
 def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | None = None) -> np.ndarray:
@@ -117,8 +117,8 @@ def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | No
 
         def slopes(which: np.ndarray | slice, way: np.ndarray) -> np.ndarray:
             there = kernel.points(*(p[:, which] + (h / length(way) * way)[:, None]))
-            found: np.ndarray = np.abs(there - f[which]) / h
-            return found
+            result: np.ndarray = np.abs(there - f[which]) / h
+            return result
 
         ups = np.stack([slopes(slice(None), axis) for axis in np.eye(3)])
         steep = np.linalg.norm(ups, axis=0)

@@ -12,7 +12,7 @@ from ..formulas.algebra import length
 from ..formulas.field import Bounds
 from ..kernel import Field, Kernel
 from ..kernel.cells import possible_cells
-from ..work import Work
+from ..work import Work, chunks
 from .values import values_at
 
 POINTS = 1 << 18
@@ -23,6 +23,9 @@ CELLS = 1 << 16
 
 MOST_EACH = 64
 """Largest number of random points per cell."""
+
+AT_ONCE = 1 << 14
+"""Approximate number of random points evaluated together."""
 
 TOLERANCE = 0.01
 """Tolerated volume error of the samples, as a fraction of the object's volume."""
@@ -123,12 +126,22 @@ def _part(
     full = (values < -bounds.lipschitz * length(step) / 2) & (not bounds.exterior_only)
     cells, whole = cells[:, ~full], int(full.sum())
     each = min(max(POINTS // boxes // max(cells.shape[1], 1), 2), MOST_EACH)
-    rng = np.random.default_rng(0)
-    points = cells[:, :, None] + step[:, None, None] * rng.uniform(-0.5, 0.5, (*cells.shape, each))
-    inside = (values_at(kernel, points.reshape(3, -1), work) < 0).reshape(-1, each)
-    share, cell = inside.mean(axis=1), float(step.prod())
+    count, cell = cells.shape[1], float(step.prod())
+    share = np.empty(count)
+
+    def task(part: slice) -> np.ndarray:
+        points = np.empty((3, part.stop - part.start, each))
+        for axis, row in enumerate(points):  # numbers of one sequence, for any division of the cells
+            numbers = np.random.Generator(np.random.PCG64(0).advance((axis * count + part.start) * each))
+            row[:] = cells[axis, part, None] + step[axis] * numbers.uniform(-0.5, 0.5, row.shape)
+        inside = kernel.points(*points) < 0
+        share[part] = inside.mean(axis=1)
+        return points[:, inside]
+
+    found = work.collect(task, chunks(count, max(AT_ONCE // each, 1)))
     error = math.sqrt(float((share * (1 - share)).sum()) / (each - 1))
-    return VolumeEstimate(cell * (whole + float(share.sum())), cell * error, points[:, inside])
+    inside = np.concatenate([np.empty((3, 0)), *found], axis=1)
+    return VolumeEstimate(cell * (whole + float(share.sum())), cell * error, inside)
 
 
 def finer(

@@ -39,14 +39,14 @@ class SignFaces:
     @cached_property
     def either(self) -> np.ndarray:
         """Bits set in any slab, uint64 [n]."""
-        found: np.ndarray = np.bitwise_or.reduce(self.slabs)
-        return found
+        result: np.ndarray = np.bitwise_or.reduce(self.slabs)
+        return result
 
     @cached_property
     def both(self) -> np.ndarray:
         """Bits set in all slabs, uint64 [n]."""
-        found: np.ndarray = np.bitwise_and.reduce(self.slabs)
-        return found
+        result: np.ndarray = np.bitwise_and.reduce(self.slabs)
+        return result
 
     @property
     def anywhere(self) -> tuple[np.ndarray, np.ndarray]:

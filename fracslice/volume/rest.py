@@ -32,7 +32,7 @@ def box_of_the_rest(planned: Plan, whole: np.ndarray, rest: np.ndarray, tips: np
     """
     if (rest == whole).all():
         return planned.box
-    found = reached(planned.root, tips.T, planned.voxel, work)
+    result = reached(planned.root, tips.T, planned.voxel, work)
     own = np.array([planned.box.lo, planned.box.hi])
-    lo, hi = np.where(rest == whole, own, [found.lo, found.hi]).tolist()
+    lo, hi = np.where(rest == whole, own, [result.lo, result.hi]).tolist()
     return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))

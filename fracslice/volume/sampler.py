@@ -221,8 +221,8 @@ class _Sampling:
             known, left = sum(map(len, self.numbers)), int(np.count_nonzero(flat == CANDIDATE))
             self.work.progress("sampling", known / max(known + left, 1))
             near = np.concatenate([bare + states.step(*face) for face in FACES])
-            found = self.neighbours(states, front, signs)
-            front = states.distinct(np.concatenate([found, near[flat[near] == CANDIDATE]]))
+            result = self.neighbours(states, front, signs)
+            front = states.distinct(np.concatenate([result, near[flat[near] == CANDIDATE]]))
 
     def emptied(self, places: np.ndarray) -> np.ndarray:
         """Mask of the bricks proven empty by their eight subcells: 8 evaluations to save 512."""
@@ -259,7 +259,7 @@ class _Sampling:
 
     def neighbours(self, states: States, bricks: np.ndarray, signs: np.ndarray) -> np.ndarray:
         """Bricks that must be sampled because of the signs on the faces of these bricks."""
-        found, faces = [], SignFaces(signs)
+        result, faces = [], SignFaces(signs)
         for axis, step in FACES:
             inside, outside = faces.shown(axis, step)
             near = bricks + states.step(axis, step)
@@ -267,9 +267,9 @@ class _Sampling:
             if (inside & (there == BORDER)).any():
                 raise VolumeError("the solid reaches the border of what is sampled; give it finite <bounds>")
             lost = (there == EMPTY) & inside | (there == FULL) & outside
-            found.append(near[lost | (there == CANDIDATE) & outside])
+            result.append(near[lost | (there == CANDIDATE) & outside])
             self.repaired += int(np.count_nonzero(lost))
-        return np.concatenate(found)
+        return np.concatenate(result)
 
     def audit(self, states: States, turn: int) -> np.ndarray:
         """Unsampled bricks where a random grid point has not the assumed sign; the points are the same in

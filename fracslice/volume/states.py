@@ -102,12 +102,12 @@ class States:
         ndarray
             Mask, bool, like `flat`; undefined at the border.
         """
-        found = np.zeros_like(those)
+        result = np.zeros_like(those)
         for axis in range(3):
             step = self.step(axis, 1)
-            found[step:] |= those[:-step]
-            found[:-step] |= those[step:]
-        return found
+            result[step:] |= those[:-step]
+            result[:-step] |= those[step:]
+        return result
 
     def inner(self, flat: np.ndarray) -> np.ndarray:
         """Remove the border of an array like `flat`.

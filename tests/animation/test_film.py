@@ -107,7 +107,7 @@ def test_an_open_shutter_averages_the_times_and_divides_the_samples() -> None:
     for k in range(4):
         at = timeline.at((2 + (k + 0.5) / 4) / 8)
         *_, done = Renderer(at.root, at.view, (40, 24), Work(1), "cpu").passes(64)
-        parts.append(done.image)
+        parts.append(done.mean)
     expected = np.mean(parts, 0)
     closed = job(scene(tracks=turning), 16).light(2, Work(1))
     assert abs(open_shutter - expected).mean() < 0.3 * abs(closed - expected).mean()
@@ -160,7 +160,7 @@ def test_shipped_films_are_what_their_scenes_show(name: str) -> None:
     film = Timeline(read(FILMS / f"{name}.xml"))
     assert film.animation.frames == 60
     small = FilmJob(film, (80, 45), 16, film.animation.fps, device="cpu")
-    shown = develop(small.light(8, Work()), film.scene.view.film)
+    shown = develop(small.light(8, Work()), film.scene.view)
     frames = imageio_ffmpeg.read_frames(str(FILMS / f"{name}.mp4"))
     size = next(frames)["size"]
     data = [np.frombuffer(frame, np.uint8) for frame in frames]

@@ -50,10 +50,9 @@ def test_a_shape_without_a_size_is_in_millimetres() -> None:
     assert make_mesh(box() | box() + (6, 0, 0), resolution=28).size.tolist() == [7, 1, 1]
 
 
-def test_a_body_that_stays_alone_needs_a_size() -> None:
+def test_a_body_that_stays_alone_keeps_the_unit_of_the_shape() -> None:
     two = box() | box((0.5, 0.5, 0.5)) + (3, 0, 0)
-    with pytest.raises(SceneError, match="keep='largest': expected a size"):
-        make_mesh(two, keep="largest", resolution=16)
+    assert make_mesh(two, keep="largest", resolution=16).size[0] == pytest.approx(1, rel=1e-6)
     assert make_mesh(two, keep="largest", resolution=16, size=5).size[0] == pytest.approx(5, rel=1e-6)
 
 

@@ -46,9 +46,9 @@ def test_the_scene_and_the_keywords_say_how() -> None:
 
 
 def test_progress_is_told_and_work_is_cancelled() -> None:
-    told: list[tuple[str, float]] = []
-    render(SHAPE, size=(16, 16), samples=2, progress=lambda stage, share: told.append((stage, share)))
-    assert told[-1] == ("rendering", 1.0)
+    reported: list[tuple[str, float]] = []
+    render(SHAPE, size=(16, 16), samples=2, progress=lambda stage, share: reported.append((stage, share)))
+    assert reported[-1] == ("rendering", 1.0)
     stop = threading.Event()
     stop.set()
     with pytest.raises(Cancelled):

@@ -112,7 +112,7 @@ def test_values_that_cannot_be_are_named(options: dict, error: type, message: st
 
 
 def test_progress_is_told() -> None:
-    told: list[tuple[str, float]] = []
-    slices = slice_layers(box(), layer=0.1, progress=lambda stage, share: told.append((stage, share)))
+    reported: list[tuple[str, float]] = []
+    slices = slice_layers(box(), layer=0.1, progress=lambda stage, share: reported.append((stage, share)))
     list(slices)
-    assert told[-1] == ("slicing", 1.0)
+    assert reported[-1] == ("slicing", 1.0)

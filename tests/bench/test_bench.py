@@ -58,8 +58,8 @@ def test_the_command_writes_page_numbers_and_plots(tmp_path, peer, capfd):
     folder = tmp_path / "out"
     options = ["--workload", "sphere", "--resolution", "32", "--repeat", "1", "--peer", peer]
     assert run(["bench", "-o", str(folder), *options]) == 0
-    told = json.loads((folder / "numbers.json").read_text())["measurements"]
-    by_method = {one["method"]: one["numbers"] for one in told}
+    reported = json.loads((folder / "numbers.json").read_text())["measurements"]
+    by_method = {one["method"]: one["numbers"] for one in reported}
     assert (by_method["ready"]["wall_s"], by_method["ready"]["cpu_s"]) == (7.5, 8)
     assert by_method["ready"]["error_voxels"] == pytest.approx(0.01 / (2.4 / 32), rel=0.05)
     assert abs(by_method["exact"]["volume"]) < abs(by_method["ready"]["volume"])

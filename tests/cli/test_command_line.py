@@ -27,10 +27,10 @@ def fracslice(*arguments: object) -> int:
 def test_mesh_writes_the_model_and_its_report(ball, tmp_path, capfd):
     model, report = tmp_path / "ball.stl", tmp_path / "ball.json"
     assert fracslice("mesh", ball, "-o", model, "--resolution", 32, "--report", report) == 0
-    told = json.loads(report.read_text())
-    assert told["watertight"]
-    assert told["bbox_mm"][1][2] == pytest.approx(20, rel=2e-3)
-    assert model.stat().st_size == 84 + 50 * told["triangles"]
+    reported = json.loads(report.read_text())
+    assert reported["watertight"]
+    assert reported["bbox_mm"][1][2] == pytest.approx(20, rel=2e-3)
+    assert model.stat().st_size == 84 + 50 * reported["triangles"]
     out, err = capfd.readouterr()
     assert "watertight, manifold" in out
     assert err == "", "no progress where nobody looks"
@@ -40,10 +40,10 @@ def test_a_mesh_larger_than_memory_goes_to_stl(ball, tmp_path, capfd, monkeypatc
     model, report = tmp_path / "ball.stl", tmp_path / "ball.json"
     monkeypatch.setattr("fracslice.surfaces.available_bytes", lambda: 1 << 20)
     assert fracslice("mesh", ball, "-o", model, "--resolution", 400, "--report", report) == 0
-    told = json.loads(report.read_text())
-    assert (told["printable"], told["components"], told["genus"]) == (True, 1, 0)
-    assert model.stat().st_size == 84 + 50 * told["triangles"]
-    assert told["volume_mm3"] == pytest.approx(4000 / 3 * np.pi, rel=1e-4)
+    reported = json.loads(report.read_text())
+    assert (reported["printable"], reported["components"], reported["genus"]) == (True, 1, 0)
+    assert model.stat().st_size == 84 + 50 * reported["triangles"]
+    assert reported["volume_mm3"] == pytest.approx(4000 / 3 * np.pi, rel=1e-4)
     assert {path.name for path in tmp_path.iterdir()} == {"ball.xml", "ball.stl", "ball.json"}
 
 
@@ -57,8 +57,8 @@ def test_size_set_and_base_change_what_is_made(ball, tmp_path, capfd):
     options = ("--size", "3cm", "--voxel", "1mm", "--set", "sphere.radius=2", "--base", "3mm")
     assert fracslice("mesh", ball, "-o", model, *options) == 0
     assert fracslice("check", model, "--json") == 0
-    told = json.loads(capfd.readouterr().out.partition("\n{")[2].join(["{", ""]))
-    low, high = told["bbox_mm"]
+    reported = json.loads(capfd.readouterr().out.partition("\n{")[2].join(["{", ""]))
+    low, high = reported["bbox_mm"]
     assert high[0] - low[0] == pytest.approx(30, rel=2e-3)
     assert high[2] == pytest.approx(27, abs=0.2)
 
@@ -67,11 +67,11 @@ def test_simplify_writes_fewer_triangles_and_says_how_near(ball, tmp_path, capfd
     model, report = tmp_path / "b.stl", tmp_path / "b.json"
     options = ("--resolution", 48, "--simplify", "0.1mm", "--report", report)
     assert fracslice("mesh", ball, "-o", model, *options) == 0
-    told = json.loads(report.read_text())
-    assert told["triangles"] < told["simplified"]["from_triangles"] / 3
-    assert max(told["simplified"]["bound_mm"], told["simplified"]["back_mm"]) <= 0.1
-    assert told["printable"] and told["surface_error_mm"]["max"] < 1e-4
-    assert model.stat().st_size == 84 + 50 * told["triangles"]
+    reported = json.loads(report.read_text())
+    assert reported["triangles"] < reported["simplified"]["from_triangles"] / 3
+    assert max(reported["simplified"]["bound_mm"], reported["simplified"]["back_mm"]) <= 0.1
+    assert reported["printable"] and reported["surface_error_mm"]["max"] < 1e-4
+    assert model.stat().st_size == 84 + 50 * reported["triangles"]
     assert "simplified from " in capfd.readouterr().out
 
 
@@ -106,8 +106,8 @@ def test_a_file_of_that_name_goes_before_a_shipped_scene(ball, tmp_path, monkeyp
 
 def test_check_says_whether_a_scene_would_print(ball, capfd):
     assert fracslice("check", ball, "--resolution", 16, "--json") == 0
-    told = json.loads(capfd.readouterr().out)
-    assert (told["printable"], told["components"], told["genus"]) == (True, 1, 0)
+    reported = json.loads(capfd.readouterr().out)
+    assert (reported["printable"], reported["components"], reported["genus"]) == (True, 1, 0)
 
 
 def test_check_exits_1_for_a_model_with_a_hole(ball, tmp_path, capfd):

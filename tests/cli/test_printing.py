@@ -70,13 +70,13 @@ def test_check_ends_with_a_verdict(pair: str, tmp_path: Path, capfd: pytest.Capt
         return capfd.readouterr().out.splitlines()
 
     assert lines(pair, "--resolution", "32")[-1].startswith("would print; --layer")
-    said = lines(pair, "--resolution", "32", "--wall", "3mm")
-    assert said[-2] == "would not print:" and " of walls are thinner than 3 mm: at " in said[-1]
-    said = lines(
+    reported = lines(pair, "--resolution", "32", "--wall", "3mm")
+    assert reported[-2] == "would not print:" and " of walls are thinner than 3 mm: at " in reported[-1]
+    reported = lines(
         pair, "--layer", "0.5mm", "--pixel", "0.2mm", "--bridge", "0", "--set", "transform.rotate=0 1 0 45"
     )
-    assert said[0].endswith(", would not print:")
-    assert any(line.startswith("  1 island in the air, the first from layer ") for line in said)
+    assert reported[0].endswith(", would not print:")
+    assert any(line.startswith("  1 island in the air, the first from layer ") for line in reported)
 
 
 @pytest.mark.parametrize("flags", [["--bridge", "2mm"], ["--bridge", "0", "--keep", "largest"]])
@@ -97,12 +97,12 @@ def test_what_does_not_fit_is_said_before_any_layer(
     monkeypatch.setattr(Slicer, "map", None)
     layers = ["--layer", "1mm", "--printer", "sl1s", "--size", "300mm", "--bridge", "0", "-q"]
     assert run(["check", pair, *layers]) == 1
-    said = capfd.readouterr().out.splitlines()
-    assert len(said) == 1
-    assert "would not print: does not fit the Original Prusa SL1S Speed: 300 x " in said[0]
+    reported = capfd.readouterr().out.splitlines()
+    assert len(reported) == 1
+    assert "would not print: does not fit the Original Prusa SL1S Speed: 300 x " in reported[0]
     assert run(["check", pair, *layers, "--json"]) == 1
-    told = json.loads(capfd.readouterr().out)
-    assert told["fits"] is False and len(told["problems"]) == 1
+    reported = json.loads(capfd.readouterr().out)
+    assert reported["fits"] is False and len(reported["problems"]) == 1
 
 
 def test_check_says_what_a_voxel_or_a_pixel_may_lose(
@@ -114,14 +114,14 @@ def test_check_says_what_a_voxel_or_a_pixel_may_lose(
         <transform translate="1 0 0"><box size="1.0 0.8 0.015"/></transform></union></solid></scene>"""
     )
 
-    def told(*how: str) -> list[str]:
+    def reported(*how: str) -> list[str]:
         run(["check", str(tmp_path / "plate.xml"), "-q", *how])
         lines = capfd.readouterr().out.splitlines()
         return [line for line in lines if "may be lost" in line]
 
-    (line,) = told("--layer", "1mm", "--pixel", "0.3mm")
+    (line,) = reported("--layer", "1mm", "--pixel", "0.3mm")
     assert "thinner than 0.3 mm" in line and "the thinnest, 0.15 mm" in line
     x, _, z = map(float, line.split(" at ")[1].split()[:3])
     assert 0.5 < x < 1.5 and abs(z) < 0.05
-    assert len(told("--resolution", "48")) == 1
-    assert told("--layer", "1mm", "--pixel", "0.1mm") == []
+    assert len(reported("--resolution", "48")) == 1
+    assert reported("--layer", "1mm", "--pixel", "0.1mm") == []

@@ -44,6 +44,47 @@ def test_a_picture_with_what_it_is_of(
     assert corner[2] > corner[0], "and the background is not"
 
 
+def test_layers_have_the_names_and_units_of_compositors(scene: Path, tmp_path: Path) -> None:
+    import OpenEXR
+
+    common = ["render", str(scene), "-q", "--device", "cpu", "--samples", "1"]
+    assert run([*common, "-o", str(tmp_path / "a.exr"), "--layers"]) == 0
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        held = {name: channel.pixels for name, channel in file.channels().items()}
+    expected = {"R", "G", "B", "Z", "Samples.X", "Albedo.R", "Albedo.G", "Albedo.B"}
+    assert set(held) == expected | {f"{layer}.{axis}" for layer in ("Normal", "Position") for axis in "XYZ"}
+    place, normal = (np.stack([held[f"{n}.{axis}"] for axis in "XYZ"], -1) for n in ("Position", "Normal"))
+    hit = held["Z"] < 1e9
+    assert 0.1 < hit.mean() < 0.9 and (held["Z"][~hit] == 1e10).all()
+    forward = -np.array((3, -2, 1)) / np.sqrt(14)
+    assert np.allclose((place[hit] - (3, -2, 1)) @ forward, held["Z"][hit], atol=1e-3)
+    assert ((place * normal).sum(2)[hit] > 0.9).mean() > 0.9, "on a ball, the normal is the position"
+    assert np.allclose(held["Albedo.R"][hit], ((0.9 + 0.055) / 1.055) ** 2.4)
+    assert (held["Samples.X"] == 1).all()
+    assert run([*common, "-o", str(tmp_path / "a.png"), "--layers"]) == 2
+
+
+def test_a_part_of_a_picture_is_that_part(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["render", str(scene), "-q", "--device", "cpu", "--samples", "1"]
+    assert run([*common, "-o", str(tmp_path / "a.png")]) == 0
+    assert run([*common, "-o", str(tmp_path / "b.png"), "--crop", "13,6,16,9"]) == 0
+    whole, cut = (np.asarray(Image.open(tmp_path / f"{name}.png")) for name in "ab")
+    assert (cut == whole[6:15, 13:29]).all()
+    assert run([*common, "-o", str(tmp_path / "b.png"), "--crop", "30,6,16,9"]) == 2
+    assert "crop=30,6,16,9: expected a part of 40 x 24 pixels" in capsys.readouterr().err
+
+
+def test_a_seed_changes_the_noise_alone(scene: Path, tmp_path: Path) -> None:
+    pictures = []
+    for seed in ("0", "0", "5"):
+        assert run(["render", str(scene), "-q", "-o", str(tmp_path / "a.png"), "--seed", seed]) == 0
+        pictures.append(np.asarray(Image.open(tmp_path / "a.png")).astype(int))
+    assert (pictures[0] == pictures[1]).all() and (pictures[0] != pictures[2]).any()
+    assert abs(pictures[0].mean() - pictures[2].mean()) < 2
+
+
 def test_pass_images_and_going_on_from_a_state(scene: Path, tmp_path: Path) -> None:
     common = ["render", str(scene), "-q", "--device", "cpu"]
     state = ["--state", str(tmp_path / "s.npz")]

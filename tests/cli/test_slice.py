@@ -33,7 +33,7 @@ def test_printers_are_listed_without_a_scene(command: str, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "reported"),
     [
         (["--layer", "0.4mm..0.2mm"], "expected a range from the lowest to the highest"),
         (["--layer", "0.2mm..thick"], "'thick'"),
@@ -43,29 +43,29 @@ def test_printers_are_listed_without_a_scene(command: str, capsys: pytest.Captur
     ],
 )
 def test_bad_input_is_one_line(
-    options: list[str], said: str, ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    options: list[str], reported: str, ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert sliced(ball, "-o", tmp_path / "out.cli", *options) == 2
     error = capfd.readouterr().err
     assert error.startswith("fracslice: ")
     assert error.count("\n") == 1
-    assert said in error
+    assert reported in error
     assert [path.name for path in tmp_path.iterdir()] == ["ball.xml"]
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "reported"),
     [
         (["--layer", "0.2mm..0.6mm", "--printer", "sl1s"], "has layers of one height"),
         (["--layer", "0.2mm"], "needs --printer, such as sl1s"),
     ],
 )
 def test_what_an_archive_cannot_say_is_refused_before_the_object_is_changed(
-    options: list[str], said: str, ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    options: list[str], reported: str, ball: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     wrong = ["--hollow", "15mm"]
     assert run(["slice", str(ball), "-o", str(tmp_path / "out.sl1"), *options, *wrong]) == 2
-    assert said in capfd.readouterr().err
+    assert reported in capfd.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["ball.xml"]
 
 
@@ -101,8 +101,12 @@ def test_an_edited_scene_begins_afresh_and_says_so(
     scene.write_text(text.format(0.1))
     capfd.readouterr()
     assert run(["slice", str(scene), *map(str, options)]) == 0
-    said = capfd.readouterr().err
-    assert said.startswith(f"fracslice: {target}: ") and "begun afresh" in said and said.count("\n") == 1
+    reported = capfd.readouterr().err
+    assert (
+        reported.startswith(f"fracslice: {target}: ")
+        and "begun afresh" in reported
+        and reported.count("\n") == 1
+    )
     edited = target.read_bytes()
     target.unlink()
     assert run(["slice", str(scene), *map(str, options)]) == 0

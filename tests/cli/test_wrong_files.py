@@ -7,9 +7,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from fracslice.cli import inputs
 from fracslice.cli.main import run
 
 from fracslice.export import FORMATS, write
+from fracslice.mesh.reading import READERS
 from tests.mesh import shapes
 
 BALL = '<scene version="1"><solid size="20mm"><sphere/></solid></scene>'
@@ -189,4 +191,4 @@ def test_an_empty_name(option: str, wrong: Path, capfd, monkeypatch) -> None:
 
 
 def test_every_kind_of_model_is_tried() -> None:
-    assert {f".{ending}" for ending in ENDINGS} == set(FORMATS)
+    assert {f".{ending}" for ending in ENDINGS} == set(FORMATS) == set(READERS) == inputs.MODELS

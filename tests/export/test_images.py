@@ -38,6 +38,32 @@ def test_png_of_16_bits_reads_back(tmp_path: Path) -> None:
     assert (found.reshape(SHOWN.shape)[::-1] == np.round(SHOWN * np.float64(65535))).all()
 
 
+@pytest.mark.parametrize("ending", ["jpg", "jpeg", "webp"])
+def test_pictures_for_the_web_read_back(tmp_path: Path, ending: str) -> None:
+    write_image(tmp_path / f"a.{ending}", SMOOTH, SMOOTH, text={"scene_hash": "abc"})
+    with Image.open(tmp_path / f"a.{ending}") as image:
+        assert abs(np.asarray(image).astype(float) - SMOOTH * 255).mean() < 2
+        assert "scene_hash: abc" in image.getexif()[0x010E]
+
+
+@pytest.mark.parametrize("ending", ["png", "webp", "exr", "tif"])
+def test_alpha_reads_back(tmp_path: Path, ending: str) -> None:
+    import OpenEXR
+
+    clear = np.dstack([SMOOTH, np.linspace(0, 1, 48 * 64, dtype=np.float32).reshape(48, 64)])
+    write_image(path := tmp_path / f"a.{ending}", clear, clear)
+    if ending == "exr":
+        with OpenEXR.File(str(path)) as file:
+            assert (file.channels()["RGBA"].pixels == clear).all()
+    elif ending == "tif":
+        tifffile = pytest.importorskip("tifffile")
+        assert (tifffile.imread(path) == clear).all()
+    else:
+        with Image.open(path) as image:
+            assert image.mode == "RGBA"
+            assert abs(np.asarray(image)[..., 3].astype(float) - clear[..., 3] * 255).max() <= 0.5
+
+
 def test_tiff_holds_the_light_as_floats(tmp_path: Path) -> None:
     tifffile = pytest.importorskip("tifffile")
     light = SHOWN * 1000
@@ -68,4 +94,4 @@ def test_smooth_pictures_make_small_files() -> None:
 
 def test_unknown_endings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ExportError, match=r"known are \.png"):
-        write_image(tmp_path / "a.jpg", SHOWN, SHOWN)
+        write_image(tmp_path / "a.bmp", SHOWN, SHOWN)

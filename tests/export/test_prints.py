@@ -57,9 +57,9 @@ def run(version: int = 1, most: float | None = None, compensation: float = 0.0) 
 
 
 @cache
-def picture(width: int, height: int) -> np.ndarray:
+def picture() -> np.ndarray:
     """A rendered preview, once for all files."""
-    return StackModel(scene(ROOT, size=12), JOB, Work()).picture(width, height)
+    return StackModel(scene(ROOT, size=12), JOB, Work()).picture()
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -47,16 +47,18 @@ def test_cli_by_colain(run: SliceRun, layers: np.ndarray, tmp_path: Path) -> Non
     if built.returncode:
         pytest.skip("the crate cannot be had here")
     path = write_slices(run, tmp_path / "part.cli", "cli-binary")
-    said = subprocess.run([crate / "target/release/layers", path], check=True, capture_output=True, text=True)
-    found = np.array([line.split() for line in said.stdout.splitlines()], float) * (1, 1e-6)
+    reported = subprocess.run(
+        [crate / "target/release/layers", path], check=True, capture_output=True, text=True
+    )
+    found = np.array([line.split() for line in reported.stdout.splitlines()], float) * (1, 1e-6)
     np.testing.assert_allclose(found, layers, rtol=1e-5)
 
 
 def drawn(data: bytes, background: str) -> np.ndarray:
     """A picture, 0 for the background's opposite, by librsvg."""
     command = ["rsvg-convert", "--width", "1024", "--background-color", background]
-    said = subprocess.run(command, input=data, check=True, capture_output=True)
-    with Image.open(io.BytesIO(said.stdout)) as image:
+    reported = subprocess.run(command, input=data, check=True, capture_output=True)
+    with Image.open(io.BytesIO(reported.stdout)) as image:
         return np.asarray(image.convert("L")) / 255
 
 

@@ -93,12 +93,12 @@ def test_sl1(tmp_path: Path) -> None:
 
 def test_folder_and_manifest(tmp_path: Path) -> None:
     folder = write_slices(run(), tmp_path / "layers")
-    said = json.loads((folder / "manifest.json").read_text())
-    names = [layer["file"] for layer in said["layers"]]
+    reported = json.loads((folder / "manifest.json").read_text())
+    names = [layer["file"] for layer in reported["layers"]]
     assert sorted(p.name for p in folder.iterdir()) == [*names, "manifest.json"]
-    assert said["layers"][-1]["top_mm"] == 12.0
-    assert said["pixels"] == [80, 96]
-    assert said["pixel_mm"] == [0.25, 0.25]
+    assert reported["layers"][-1]["top_mm"] == 12.0
+    assert reported["pixels"] == [80, 96]
+    assert reported["pixel_mm"] == [0.25, 0.25]
 
 
 def test_3mf_by_lib3mf(tmp_path: Path, areas: np.ndarray) -> None:
@@ -215,10 +215,10 @@ def test_cli_in_binary(tmp_path: Path, areas: np.ndarray) -> None:
 
 
 def test_json(tmp_path: Path, areas: np.ndarray) -> None:
-    said = json.loads(write_slices(run(), tmp_path / "part.json").read_text())
-    assert said["unit"] == "mm"
-    assert said["metadata"] == {"Title": "test"}
-    for layer, area in zip(said["layers"], areas, strict=True):
+    reported = json.loads(write_slices(run(), tmp_path / "part.json").read_text())
+    assert reported["unit"] == "mm"
+    assert reported["metadata"] == {"Title": "test"}
+    for layer, area in zip(reported["layers"], areas, strict=True):
         assert sum(shoelace(np.array(c["points"])) for c in layer["contours"]) == pytest.approx(
             area, rel=1e-4
         )
@@ -345,11 +345,11 @@ def test_a_job_is_known_by_all_that_its_layers_follow_from(monkeypatch: pytest.M
 
 @pytest.mark.parametrize("spoil", ["forged", "linked", "lent"])
 def test_a_remainder_that_somebody_else_can_have_written_is_not_used(spoil: str, tmp_path: Path) -> None:
-    target, part, said = (tmp_path / name for name in ("part.cli", ".part.cli.part", ".part.cli.job"))
+    target, part, reported = (tmp_path / name for name in ("part.cli", ".part.cli.part", ".part.cli.job"))
     with pytest.raises(Cancelled):
         write_slices(run(cancelled_after(8)), target)
     if spoil == "forged":
-        said.write_text(json.dumps({"application": "fracslice", "job": run().key("cli")}))
+        reported.write_text(json.dumps({"application": "fracslice", "job": run().key("cli")}))
     elif spoil == "linked":
         part.rename(tmp_path / "mine")
         part.symlink_to(tmp_path / "mine")

@@ -10,33 +10,66 @@ import numpy as np
 import pytest
 
 from fracslice import make_mesh
+from fracslice.errors import SceneError
 from fracslice.formulas import (
     Node,
+    apollonian,
     bristorbrot,
     cells,
+    cosine_bulb,
     flake,
+    frd,
+    gear,
     get,
+    gyroid,
+    hilbert,
+    honeycomb,
     iwp,
+    jerusalem,
+    koch,
     mandelbox,
     menger,
     names,
     neovius,
+    noise,
     prism,
     quaternion_mandelbrot,
+    quaternion_power,
+    sphere,
+    struts,
     superquadric,
+    tetrabrot,
+    thread,
+    tree,
+    voronoi,
 )
+from fracslice.formulas.inversions import MIDDLE, mirrors
 from fracslice.kernel import compile_scene
 from tests.examples import EXAMPLES
 
 RNG = np.random.default_rng(7)
+BEFORE = {
+    "menger",
+    "mandelbulb",
+    "sphere",
+    "box",
+    "torus",
+    "cylinder",
+    "capsule",
+    "cone",
+    "plane",
+    "octahedron",
+}
+"""Shapes that have suites of their own."""
+
 FAMILIES = {
     name: root
     for name, root in EXAMPLES.items()
-    if {"flake", "cells", "prism", "superquadric"} & {root.formula.name}
-    or name.endswith(" wall")
+    if not {node.formula.name for node in root.walk() if node.formula.kind == "shape"} & BEFORE
     or "julia" in root.values
+    or root.formula.name == "noise"
 }
-"""Examples of all families; the Mandelbulb's, which have suites of their own, too."""
+"""Examples of all families."""
 
 each_family = pytest.mark.parametrize("name", FAMILIES)
 
@@ -84,7 +117,7 @@ def test_the_box_holds_the_inside(name: str) -> None:
 
 @each_family
 def test_its_mesh_is_closed(name: str) -> None:
-    mesh = make_mesh(FAMILIES[name], resolution=96)
+    mesh = make_mesh(FAMILIES[name], resolution=48)
     assert mesh.is_watertight and mesh.volume > 0
     assert mesh.report.mesh.printable
 
@@ -93,7 +126,9 @@ SYMMETRIES = {
     "turn": lambda x, y, z: (y, z, x),
     "swap": lambda x, y, z: (y, x, z),
     "flip": lambda x, y, z: (-x, y, z),
+    "flip y": lambda x, y, z: (x, -y, z),
     "flip z": lambda x, y, z: (x, y, -z),
+    "inverse": lambda x, y, z: (-x, -y, -z),
     "half turn": lambda x, y, z: (-x, -y, z),
 }
 SYMMETRIC: list[tuple[Node, str]] = [
@@ -105,8 +140,28 @@ SYMMETRIC: list[tuple[Node, str]] = [
     (quaternion_mandelbrot(iterations=8), "flip z"),
     (prism(sides=4), "swap"),
     *[(superquadric(), s) for s in ("turn", "swap", "flip")],
-    *[(f(), s) for f in (neovius, iwp) for s in ("turn", "swap", "flip")],
-    *[(get(n)(), "turn") for n in ("gyroid", "lidinoid", "schwarz_d", "schwarz_p")],
+    *[(f(), s) for f in (neovius, iwp, frd) for s in ("turn", "swap", "flip")],
+    *[
+        (get(n)(), "turn")
+        for n in ("gyroid", "lidinoid", "schwarz_d", "schwarz_p", "fischer_koch_s", "split_p")
+    ],
+    *[
+        (struts(kind=k), s)
+        for k in ("cubic", "bcc", "fcc", "octet", "kelvin")
+        for s in ("turn", "swap", "flip")
+    ],
+    *[(jerusalem(level=2), s) for s in ("turn", "swap", "flip")],
+    *[(honeycomb(kind=k), s) for k in ("534", "353") for s in ("flip", "inverse")],
+    *[(honeycomb(kind="435"), s) for s in ("turn", "swap", "flip")],
+    *[(gear(teeth=12), s) for s in ("swap", "flip", "flip z")],
+    *[(tree(branches=4), s) for s in ("swap", "flip")],
+    (koch(), "flip y"),
+    (tetrabrot(iterations=8), "flip z"),
+    *[(quaternion_power(power=n, iterations=6), "flip z") for n in (3, 4)],
+    (quaternion_power(power=3, iterations=6), "flip"),
+    *[(cosine_bulb(iterations=3), s) for s in ("half turn", "flip z")],
+    *[(get(n)(iterations=5), "swap") for n in ("kifs_tetrahedron", "kifs_octahedron")],
+    *[(get(n)(iterations=4), s) for n in ("kifs_dodecahedron", "kifs_icosahedron") for s in ("turn", "flip")],
 ]
 
 
@@ -117,7 +172,10 @@ def test_symmetries(root: Node, symmetry: str) -> None:
     np.testing.assert_allclose(values(*SYMMETRIES[symmetry](*p)), values(*p), atol=1e-9)
 
 
-GOLDEN = (1 + sqrt(5)) / 2
+GOLDEN, CUBE = (1 + sqrt(5)) / 2, (sqrt(2) - 1) ** 3
+CORE = 0.5 - 5 / 16 * sqrt(3) * 0.3
+FLANK = (0.25 + 0.5 * CORE + CORE**2) / 3
+"""Radius of the thread's roots, and mean square of the radius along a flank."""
 VOLUMES: list[tuple[Node, float]] = [
     (flake(solid="tetrahedron", level=2), 8 / (9 * sqrt(3)) / 4),
     (flake(solid="octahedron", level=2), 4 / 3 * (3 / 4) ** 2),
@@ -129,6 +187,10 @@ VOLUMES: list[tuple[Node, float]] = [
     ],
     (prism(sides=5, radius=1, height=0.5), 2.5 * np.sin(2 * pi / 5) * 0.5),
     (superquadric(size=(1, 2, 0.5), exponent=2), pi / 6),
+    (koch(level=3, height=0.5), 0.5 * 3 * sqrt(3) / 4 * (1 + 0.6 * (1 - (4 / 9) ** 3))),
+    (jerusalem(level=1), 8 * (8 * CUBE + 12 * CUBE**2)),
+    (jerusalem(level=2), 8 * (8 * CUBE * (8 * CUBE + 12 * CUBE**2) + 12 * CUBE**2)),
+    (thread(radius=0.5, pitch=0.3, height=0.9), 0.9 * pi * (0.125 * 0.25 + 0.25 * CORE**2 + 0.625 * FLANK)),
 ]
 
 
@@ -160,3 +222,90 @@ def test_the_bristorbrot_is_bounded_where_the_usual_derivative_is_not() -> None:
     inside, near = p[:, f < 0], np.flatnonzero((f > 0) & (f < 0.1))[:300]
     gap = np.sqrt(((p[:, near, None] - inside[:, None, :]) ** 2).sum(axis=0).min(axis=1))
     assert (gap > f[near] / 2).all()
+
+
+def test_the_packings_middle_ball_is_soddys() -> None:
+    """Four balls in the unit ball leave room for one of radius 5 - 2 sqrt(6) between them."""
+    root = apollonian(level=1, swell=1.0)
+    assert pytest.approx(5 - 2 * sqrt(6)) == MIDDLE
+    zero = np.zeros(2)
+    f = field(root)(np.array([MIDDLE * 0.999, MIDDLE * 1.001]), zero, zero)
+    assert f[0] < 0 < f[1]
+
+
+@pytest.mark.parametrize("symbol", [(5, 3, 4), (3, 5, 3)])
+def test_mirrors_of_a_honeycomb_meet_at_its_angles(symbol: tuple[int, int, int]) -> None:
+    normals = np.array(mirrors(*symbol))
+    products = normals @ np.diag([1, 1, 1, -1]) @ normals.T
+    assert np.diag(products) == pytest.approx(1)
+    assert np.diag(products, 1) == pytest.approx([-np.cos(pi / n) for n in symbol])
+    assert np.diag(products, 2) == pytest.approx(0, abs=1e-12) and products[0, 3] == pytest.approx(
+        0, abs=1e-12
+    )
+
+
+def test_the_tetrabrot_is_two_mandelbrot_sets() -> None:
+    x, y, z = RNG.uniform(-2, 2, (3, 4000))
+    inside = np.ones(4000, bool)
+    for c in (x + 1j * (y - z), x + 1j * (y + z)):
+        w = c
+        for _ in range(9):
+            w = np.where(abs(w) < 1e6, w * w + c, w)
+        inside &= abs(w) <= 2
+    assert inside.sum() > 20
+    assert ((field(tetrabrot(iterations=9))(x, y, z) < 0) == inside).all()
+
+
+def test_the_square_of_a_quaternion_is_its_second_power() -> None:
+    p = RNG.uniform(-1.5, 1.5, (3, 4000))
+    a, b = (
+        field(root)(*p)
+        for root in (quaternion_power(power=2, iterations=8), quaternion_mandelbrot(iterations=8))
+    )
+    np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12)
+
+
+def test_a_hilbert_curve_is_one_tube_through_all_cells() -> None:
+    root = hilbert(level=2, thickness=0.5)
+    centres = (np.indices((4, 4, 4)).reshape(3, -1) - 1.5) / 2
+    assert field(root)(*centres) == pytest.approx(-0.125)
+    mesh = make_mesh(hilbert(level=1), resolution=32)
+    assert mesh.report.mesh.components == 1
+
+
+@pytest.mark.parametrize("kind", ["walls", "struts"])
+def test_a_foam_is_that_of_its_cells_centres(kind: str) -> None:
+    """A regular foam is that of a cubic lattice: walls are planes, struts are where three cells meet."""
+    f = field(voronoi(kind=kind, irregularity=0.0, thickness=0.1))
+    t = np.linspace(-0.3, 0.3, 7)
+    on_face = f(0 * t + 1.0, t + 0.5, 0 * t + 0.5)
+    assert (on_face < 0).all() if kind == "walls" else (on_face > 0).all()
+    assert (f(0 * t + 1.0, 0 * t + 2.0, t + 0.5) < 0).all() and f(*np.full((3, 1), 0.5)) > 0.1
+
+
+def test_noise_displaces_by_its_amplitudes_at_most() -> None:
+    p = RNG.uniform(-1.6, 1.6, (3, 20000))
+    for kind in ("perlin", "simplex"):
+        moved = field(noise(sphere(), kind=kind, amplitude=0.1, period=0.4, octaves=3))(*p)
+        far = np.abs(moved - field(sphere())(*p))
+        box = np.abs(p).max(axis=0) < 1
+        assert 0.05 < far[box].max() <= 0.175 + 1e-12
+
+
+def test_a_graded_wall_grows_thicker() -> None:
+    p = RNG.uniform(-2, 2, (3, 100))
+    plain, graded = field(gyroid(thickness=0.2))(*p), field(gyroid(thickness=0.2, grade=(0.1, 0, 0.2)))(*p)
+    np.testing.assert_allclose(plain - graded, 0.05 * p[0] + 0.1 * p[2], atol=1e-12)
+
+
+def test_noise_refuses_escape_time_fractals() -> None:
+    with pytest.raises(SceneError, match="cannot displace an escape-time fractal"):
+        noise(mandelbox(iterations=3))
+
+
+def test_steps_near_both_poles_are_precise() -> None:
+    """Angles counted from one pole only lose all digits of the stretch near the other."""
+    z = np.linspace(-1.2, 1.2, 13)
+    for root in (cosine_bulb(iterations=3), get("lambda_bulb")(iterations=4)):
+        on_axis, beside = (field(root)(np.full(13, e), 0 * z, z) for e in (1e-12, 1e-9))
+        np.testing.assert_allclose(on_axis, beside, rtol=1e-5, atol=1e-8)

@@ -102,7 +102,10 @@ class _Entry:
 def test_installed_packages_are_loaded(files: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     from fracslice.scene import read
 
-    monkeypatch.setattr(plugins, "entry_points", lambda group: [_Entry(files[0])] * (group == plugins.GROUP))
+    entries = [_Entry(files[0])]
+    monkeypatch.setattr(
+        "importlib.metadata.entry_points", lambda group: entries if group == plugins.GROUP else []
+    )
     plugins.load_installed.cache_clear()
     try:
         assert read(files[1]).root.formula.name == "own_box"

@@ -71,7 +71,7 @@ def test_an_automatic_depth_is_the_objects_own_whatever_it_is_made_for(root):
     stacks = [plan_stack(root, replace(job, up=up)).root for up in ((0, 0, 1), (1, 1, 1))]
     assert all(depths(plan(root, n).root) == known for n in (9, 48, 512))
     assert all(depths(stack) == known for stack in stacks)
-    assert [int(told.split()[1]) for told in plan(root, 48).depths] == known
+    assert [int(reported.split()[1]) for reported in plan(root, 48).depths] == known
     assert known > depths(resolve_depths(root, 0.05))
 
 

@@ -92,7 +92,7 @@ GOOD: dict[str, Callable[[], Mesh]] = {
 
 BAD: dict[str, tuple[Callable[[], Mesh], str]] = {
     "hole": (lambda: without(sphere(), 400), "open edges"),
-    "flipped triangle": (lambda: with_flipped(sphere(), 400), "opposite ways"),
+    "flipped triangle": (lambda: with_flipped(sphere(), 400), "opposite orientation"),
     "inside out": (lambda: inverted(sphere()), "inside out"),
     "overlapping": (lambda: joined([sphere(), sphere(at=(8, 0, 0))]), "cut or touch"),
     "spike through": (lambda: with_moved(sphere(), 0, (0, 0, -30)), "cut or touch"),

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fracslice._native import side_of_line, side_of_plane
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.nesting import nesting
-from fracslice.mesh.predicates import side_of_line, side_of_plane
 from fracslice.mesh.reading import joined
 from fracslice.mesh.self_intersections import self_intersecting_triangles
 from fracslice.mesh.topology import component_sizes, connected_components, edge_topology

@@ -10,11 +10,11 @@ import pytest
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
-from fracslice.mesh.components import Removed, select, shells
+from fracslice.mesh.components import Removed, Shells, choose
 from fracslice.mesh.extract import Piece
 from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.reading import joined
-from fracslice.mesh.survey import survey
+from fracslice.mesh.survey import WholeShells, survey
 
 from .shapes import cube, inverted, sphere
 
@@ -33,10 +33,29 @@ def hollow_and_dust() -> Mesh:
     )
 
 
+def surveyed(mesh: Mesh) -> tuple[Pieces, WholeShells]:
+    """A mesh in one piece, and its shells."""
+    pieces = Pieces()
+    pieces.add(Piece(mesh, np.inf))
+    return pieces, survey(pieces, 1.0)
+
+
+def shells(mesh: Mesh) -> Shells:
+    pieces, whole = surveyed(mesh)
+    return whole.nested(pieces)[0]
+
+
+def select(mesh: Mesh, **how: str | float) -> tuple[Mesh, Removed]:
+    """The shells that are chosen."""
+    pieces, whole = surveyed(mesh)
+    stays, removed = choose(whole.nested(pieces)[0], **how)  # type: ignore[arg-type]
+    return mesh.selected(stays[whole.of_label][pieces.labels(0)][mesh.triangles[:, 0]]), removed
+
+
 def test_everything_stays_by_default() -> None:
     mesh = hollow_and_dust()
     kept, removed = select(mesh)
-    assert kept is mesh
+    assert np.array_equal(kept.triangles, mesh.triangles)
     assert removed == Removed()
 
 
@@ -105,7 +124,7 @@ def test_bodies_thinner_than_a_voxel_are_pieces_unless_they_are_dust() -> None:
     """The wall of a cube is a third of its side, by volume and area."""
     thick, thin = cube(10), [cube(1, at=(20 + 2 * k, 0, 0)) for k in range(60)]
     assert thin_walls(joined([thick, *thin]), 0.33) == ""
-    told = thin_walls(joined([thick, *thin]), 0.34)
-    assert told == "walls thinner than a voxel fell to pieces: 60 of 61 bodies, 6% of the material"
+    reported = thin_walls(joined([thick, *thin]), 0.34)
+    assert reported == "walls thinner than a voxel fell to pieces: 60 of 61 bodies, 6% of the material"
     assert thin_walls(joined([thick, *thin[:40]]), 0.34) == ""
     assert thin_walls(thin[0], 0.34) == "walls thinner than a voxel have holes, 100% of the material"

@@ -43,3 +43,23 @@ def test_a_mesh_is_planned_like_a_formula_and_its_key_is_its_triangles() -> None
     assert found.box.size == pytest.approx(exact.box.size, abs=1e-5)
     assert field.key != field_of(trimesh.creation.icosphere(3, 1.0)).key
     assert np.isnan(field.kernel().points(np.array([np.nan]), np.zeros(1), np.zeros(1))).all()
+
+
+def test_runs_of_points_far_near_and_scattered_have_the_distances_of_single_points() -> None:
+    field = field_of(trimesh.creation.icosphere(3, 5.0), trimesh.creation.box((3, 4, 14)))
+    line = np.linspace(-9, 9, 70)
+    spread = np.random.default_rng(0).uniform(-9, 9, (3, 200))
+    points = np.ascontiguousarray(np.concatenate([np.stack([line, line / 3, 0 * line + 1], 1), spread.T]))
+    found = field.nearest.points(points)
+    alone = np.array([field.nearest.points(p[None])[0] for p in points])
+    exact = trimesh.proximity.closest_point_naive(field.mesh.to_trimesh(), points)[1]
+    assert found == pytest.approx(alone, abs=1e-12) and found == pytest.approx(exact, abs=1e-9)
+
+
+def test_points_above_each_other_share_the_crossings_of_their_line() -> None:
+    plates = [trimesh.creation.box((10, 10, 1)) for _ in range(20)]
+    for k, plate in enumerate(plates):
+        plate.apply_translation((0, 0, 2 * k))
+    z = np.linspace(-1, 39, 410)
+    values = field_of(*plates).kernel().points(0 * z + 0.3, 0 * z + 0.2, z)
+    assert ((values < 0) == (np.abs((z + 1) % 2 - 1) < 0.5)).all()

@@ -177,13 +177,13 @@ def test_the_result_is_the_same_for_any_number_of_threads():
 
 
 def test_the_result_is_the_same_at_every_scale_and_progress_goes_on():
-    said = []
+    reported = []
     bulb = fine(mandelbulb(iterations=4), 24)
-    few, done = simplify(bulb, 0.2, Work(progress=lambda stage, share: said.append(share)))
-    assert said == sorted(said) and 0 <= said[0] < said[-1] <= 1
-    tiny, told = simplify(bulb.scaled(2.0**-20), 0.2 * 2.0**-20)
+    few, done = simplify(bulb, 0.2, Work(progress=lambda stage, share: reported.append(share)))
+    assert reported == sorted(reported) and 0 <= reported[0] < reported[-1] <= 1
+    tiny, reported = simplify(bulb.scaled(2.0**-20), 0.2 * 2.0**-20)
     assert np.array_equal(few.triangles, tiny.triangles)
-    assert (told.bound_mm, told.back_mm) == (done.bound_mm * 2.0**-20, done.back_mm * 2.0**-20)
+    assert (reported.bound_mm, reported.back_mm) == (done.bound_mm * 2.0**-20, done.back_mm * 2.0**-20)
 
 
 @pytest.mark.parametrize("tolerance", [0, -1, float("nan"), float("inf")])

@@ -17,6 +17,7 @@ from fracslice.printing.make import COARSE
 from fracslice.printing.thin_features import thin_features
 from fracslice.scene import Print, scene
 from fracslice.volume import Lattice, Plan, plan, sample, sample_scene_signs
+from fracslice.volume.sizing import Sizing
 from fracslice.work import Work
 
 SIZE = 20.0
@@ -25,7 +26,7 @@ VOXEL = 2 / COARSE
 
 
 def made(root: Node, **printing: float | str) -> Plan:
-    return printable(plan(root, COARSE), SIZE, Print(**printing))[0]  # type: ignore[arg-type]
+    return printable(plan(root, COARSE), Sizing(SIZE), Print(**printing))[0]  # type: ignore[arg-type]
 
 
 def at(node: Node, x: float, y: float, z: float) -> Node:

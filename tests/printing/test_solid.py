@@ -20,6 +20,7 @@ from fracslice.formulas import (
     bend,
     bounds,
     box,
+    cone,
     cylinder,
     difference,
     julia,
@@ -42,8 +43,9 @@ from fracslice.printing.widths import Widths
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layers import Slicer
-from fracslice.volume import Plan, plan, sample_scene
+from fracslice.volume import Drain, Plan, plan, sample_scene
 from fracslice.volume.grid import from_grid, to_grid
+from fracslice.volume.sizing import Sizing
 from fracslice.work import Work
 
 SIZE = 20.0
@@ -59,7 +61,7 @@ def distances(planned: Plan) -> Samples:
 
 def made(root: Node, **printing: float | str) -> tuple[Samples, float]:
     """The distances of a printable object of 20 mm on 0.2 mm samples, and its scale."""
-    thing, scale = printable(plan(root, 100), SIZE, Print(**printing))  # type: ignore[arg-type]
+    thing, scale = printable(plan(root, 100), Sizing(SIZE), Print(**printing))  # type: ignore[arg-type]
     return distances(thing), scale
 
 
@@ -105,7 +107,7 @@ def test_thin_walls_become_as_thick_as_asked() -> None:
 
 def test_what_is_thick_enough_stays_as_it_is() -> None:
     planned = plan(box(), 100)
-    thing, scale = printable(planned, SIZE, Print(thickness=2))
+    thing, scale = printable(planned, Sizing(SIZE), Print(thickness=2))
     assert (thing.root, scale) == (planned.root, pytest.approx(20))
 
 
@@ -129,7 +131,7 @@ def test_loose_bodies_are_joined_by_struts_across_the_middle() -> None:
 def test_dust_is_dropped_where_one_body_is_asked_for() -> None:
     """From layers too: none of their tools drops what it finds."""
     dusty = union(TWO, at(sphere(radius=0.0115), 0, 0, 0.8))
-    thing, _ = printable(plan(dusty, 100), SIZE, Print(bridge=1.5))
+    thing, _ = printable(plan(dusty, 100), Sizing(SIZE), Print(bridge=1.5))
     before, after = (
         components_of(sample_scene(plan(dusty, 200))),
         components_of(sample_scene(replace(thing, voxel=0.005))),
@@ -152,7 +154,7 @@ def test_cavities_are_filled_and_bodies_dropped() -> None:
 
 def test_lengths_that_cannot_be_measured() -> None:
     with pytest.raises(VolumeError, match=r"0.01 mm in 20 mm: expected at least 0.0625 mm"):
-        printable(plan(box(), 100), SIZE, Print(thickness=0.01))
+        printable(plan(box(), 100), Sizing(SIZE), Print(thickness=0.01))
 
 
 def test_mesh_and_slices_agree() -> None:
@@ -273,7 +275,7 @@ def test_walls_of_many_samples_are_thickened_alike() -> None:
 def test_gaps_thinner_than_the_samples_are_closed() -> None:
     """A gap of 0.1 mm where samples are 0.2 mm apart."""
     apart = union(at(box(size=(1, 1, 0.995)), 0, 0, 0.5025), at(box(size=(1, 1, 0.995)), 0, 0, -0.5025))
-    thing, _ = printable(plan(apart, 96), SIZE, Print(gap=0.5))
+    thing, _ = printable(plan(apart, 96), Sizing(SIZE), Print(gap=0.5))
     middle = thing.root.kernel("cpu", "float64").points(
         *np.array([[0.0, 0.2, -0.4], [0, 0.3, 0.1], [0, 0, 0]])
     )
@@ -295,7 +297,7 @@ def test_gaps_of_fractals_are_closed() -> None:
     points = np.random.default_rng(0).uniform(-1.2, 1.2, (3, 400_000))
     before, after = (
         root.kernel(precision="float64").points(*points) < 0
-        for root in (planned.root, printable(planned, 40, Print(gap=1))[0].root)
+        for root in (planned.root, printable(planned, Sizing(40), Print(gap=1))[0].root)
     )
     assert after[before].all()
     assert 1.002 < after.sum() / before.sum() < 1.1
@@ -342,7 +344,7 @@ def test_a_millimetre_is_a_millimetre(root: Node) -> None:
 
 def holes(root: Node) -> tuple[Callable[..., bool], float]:
     """Hollowed to 2 mm, with holes of 3 mm: whether a point is solid; a millimetre."""
-    thing, scale = printable(plan(root, 100), SIZE, Print(hollow=2, drain=3))
+    thing, scale = printable(plan(root, 100), Sizing(SIZE), Print(hollow=2, drain=3))
     kernel = thing.root.kernel("cpu", "float64")
     return lambda *at: bool(kernel.points(*np.array(at)[:, None])[0] < 0), 1 / scale
 
@@ -387,4 +389,13 @@ print("numba" in sys.modules)"""
 
 def test_a_raft_that_no_voxel_holds_is_refused() -> None:
     with pytest.raises(VolumeError, match=r"a raft of 0.2 mm: expected at least a voxel, 0.3125 mm"):
-        printable(plan(box(), 64), SIZE, Print(raft=0.2))
+        printable(plan(box(), 64), Sizing(SIZE), Print(raft=0.2))
+
+
+def test_the_sharp_rim_of_a_drain_hole_is_no_thin_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fracslice.printing.checks.resolved", lambda root, bricks, *others: bricks)
+    hole = transform(cylinder(radius=1, height=22), translate=(0, 0, 5))
+    thing = plan(difference(cone(radius=6, height=22), hole), 100)
+    drain = Drain((0, 0, -6), (0, 0, 12), 1.0)
+    rims, none = (check_object(thing.root, thing.outer, 1, drains=drains) for drains in ((), (drain,)))
+    assert [p.kind for p in rims.problems] == ["walls"] and none.problems == []

@@ -12,6 +12,7 @@ from fracslice.printing.samples import Samples, together
 from fracslice.printing.walls import walls
 from fracslice.scene import Print
 from fracslice.volume import Plan, plan, sample_scene
+from fracslice.volume.sizing import Sizing
 from fracslice.work import Work
 
 SIZE = 20.0
@@ -23,7 +24,7 @@ def at(node: Node, x: float, y: float, z: float) -> Node:
 
 def made(root: Node, **printing: float | str) -> Plan:
     """Of 20 mm, on 0.2 mm samples."""
-    return printable(plan(root, 100), SIZE, Print(**printing))[0]  # type: ignore[arg-type]
+    return printable(plan(root, 100), Sizing(SIZE), Print(**printing))[0]  # type: ignore[arg-type]
 
 
 def connected(planned: Plan) -> Components:
@@ -71,7 +72,7 @@ def test_pores_that_only_a_coarse_mesh_seals_are_filled() -> None:
     planned = plan(POROUS, 24)
     thick = union(planned.root, at(box(size=(0.05, 0.4, 0.4)), 1, 0, 0))
     coarse = plan(thick, 24)
-    after, _ = printable(coarse, SIZE, Print(thickness=0.6))
+    after, _ = printable(coarse, Sizing(SIZE), Print(thickness=0.6))
     assert len(connected(after).cavities) == 1
 
 
@@ -87,7 +88,7 @@ def test_thin_walls_of_a_fractal_are_found_by_coarse_samples_as_by_fine_ones() -
 
 def test_walls_of_a_fractal_become_as_thick_as_asked() -> None:
     root = shell(julia(iterations=6), thickness=0.03)
-    after, scale = printable(plan(root, 100), SIZE, Print(thickness=1.2))
+    after, scale = printable(plan(root, 100), Sizing(SIZE), Print(thickness=1.2))
     found = walls(Samples(sample_scene(after)), 3 / scale, Work())
     order = np.argsort(found.width)
     share = np.cumsum(found.area[order]) / found.area.sum()

@@ -6,7 +6,7 @@ from fracslice.formulas import Node, box, get, mandelbulb, menger, plane, sphere
 from fracslice.rendering.cpu import BLOCK
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.optics import optics
-from fracslice.scene.view import Camera, Fog, Light, Shading, View
+from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 
 WIDTH, HEIGHT = 17, 12
 SUN = Light(kind="sun", position=(1.0, -2.0, 3.0))
@@ -32,6 +32,14 @@ CASES: dict[str, tuple[Node, View]] = {
     ),
     "depth of field": (torus(), View(camera=Camera(aperture=0.05), lights=(SKY,))),
     "glass and mirrors": (_glass(), View(lights=(SKY, SUN), shading=Shading(bounces=4))),
+    "transparent film, light at the camera": (
+        torus(),
+        View(film=Film(alpha="yes"), lights=(Light(kind="camera"), SKY), fog=Fog(density=0.2)),
+    ),
+    "rough metal and glass, paths": (
+        union(get("material")(torus(), metallic=0.7, roughness=0.4), _glass()),
+        View(lights=SOFT, shading=Shading(paths="yes", bounces=2)),
+    ),
     "normals": (torus(), View(shading=Shading(mode="normal"))),
     "fisheye": (torus(), View(camera=Camera(kind="fisheye", fov=200.0, eye=(0.0, -1.0, 0.6)), lights=(SUN,))),
     "all around": (

@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from fracslice.kernel.cuda import require
-from fracslice.rendering.accumulator import CHANNELS, HostAccumulator, Plan, ordered
+from fracslice.rendering.accumulator import CHANNELS, Plan
 from fracslice.rendering.cpu import CpuTracer
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.cuda_accumulator import CudaAccumulator
-from fracslice.scene.view import Film
+from fracslice.rendering.host_accumulator import HostAccumulator
+from fracslice.rendering.tiles import ordered
+from fracslice.scene.view import Film, Light, Shading, View
 from fracslice.work import Work
 from tests.rendering.cuda_cases import CASES, HEIGHT, WIDTH, frame
 
@@ -23,7 +25,7 @@ def kernels() -> None:
     for name in CASES:
         pictures = [HostAccumulator.empty(WIDTH, HEIGHT, SINGLE) for _ in range(2)]
         for picture in pictures:
-            picture.channels[..., 5:] = SAMPLE, SAMPLE + 1
+            picture.channels[..., 5:7] = SAMPLE, SAMPLE + 1
         cpu, gpu = (kind(frame(name), SINGLE, WIDTH, HEIGHT) for kind in (CpuTracer, CudaTracer))
         cpu.look_ahead(Work(1)), gpu.look_ahead(Work(1))
         plan = Plan(ordered(WIDTH, HEIGHT), WIDTH * HEIGHT, SAMPLE + 1)
@@ -47,7 +49,7 @@ def accumulators() -> None:
     np.testing.assert_array_equal(gpu.host().sums, host.sums)
     n = 2.0 ** rng.integers(3, 6, WIDTH * HEIGHT)
     bright = rng.beta(0.3, 0.5, n.size)
-    state = [*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n, n]
+    state = [*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n, n, n // 2]
     host.channels[:] = np.stack(state, 1).reshape(host.channels.shape)
     host.passes = 70
     gpu = CudaAccumulator(host)
@@ -58,16 +60,17 @@ def accumulators() -> None:
         assert 0 < mine.samples < n.sum()
         assert (mine.samples, mine.last) == (theirs.samples, theirs.last)
         np.testing.assert_array_equal(gpu.host().sums, host.sums)
-    for film, mode in (
-        *((Film(tone=tone, exposure=0.7), "light") for tone in ("filmic", "reinhard", "none")),
-        (Film(bloom=0.5), "light"),
-        (Film(), "normal"),
+    for view in (
+        *(View(film=Film(tone=tone, exposure=0.7)) for tone in ("filmic", "reinhard", "none")),
+        View(film=Film(bloom=0.5)),
+        View(film=Film(background=(1, 0.5, 0)), lights=(Light(kind="sky"),)),
+        View(shading=Shading(mode="normal")),
     ):
-        assert abs(gpu.shown(film, mode).astype(int) - host.shown(film, mode)).max() <= 1
+        assert abs(gpu.shown(view).astype(int) - host.shown(view)).max() <= 1
     host.passes = gpu.passes = 1
     host.channels[..., 6] = 0
-    assert abs(gpu.shown(Film(), "light").astype(int) - host.shown(Film(), "light")).max() <= 1
-    again, fresh = gpu.anew(2), host.anew(2)
+    assert abs(gpu.shown(View()).astype(int) - host.shown(View())).max() <= 1
+    again, fresh = gpu.anew(), host.anew()
     assert not again.host().sums.any() and gpu.passes != again.passes == 0
     for number in (0, 1):
         again.passes = fresh.passes = number

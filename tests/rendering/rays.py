@@ -20,12 +20,7 @@ def distances(root: Node, camera: Camera, size: tuple[int, int]) -> np.ndarray:
     view = View(camera=camera, lights=LIGHT, shading=Shading(mode="distance"))
     renderer = Renderer(root, view, size, Work(threads=1))
     *_, last = renderer.passes(samples=1)
-    seen = renderer.setup.optics
-    scale = 2.0 / (np.linalg.norm(np.subtract(camera.eye, camera.target)) + seen.far)
-    background = 0.08 / 12.92 if 0.08 <= 0.04045 else ((0.08 + 0.055) / 1.055) ** 2.4
-    red, blue = last.image[..., 0].astype(np.float64), last.image[..., 2]
-    missed = (abs(red - background) < 1e-6) & (red != blue)
-    return np.where(missed, np.nan, -np.log(np.maximum(red, 1e-300)) / scale)
+    return np.where(last.alpha > 0, last.image[..., 0].astype(np.float64), np.nan)
 
 
 def directions(camera: Camera, size: tuple[int, int]) -> np.ndarray:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, HostAccumulator, around, ordered
-from fracslice.scene.view import Film
+from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL
+from fracslice.rendering.host_accumulator import HostAccumulator, around
+from fracslice.rendering.tiles import ordered
+from fracslice.scene.view import View
 from fracslice.work import Work
 
 WIDTH, HEIGHT = 37, 23
@@ -17,7 +19,7 @@ def begun(threads: int = 1) -> HostAccumulator:
     rng = np.random.default_rng(3)
     n = 2.0 ** rng.integers(3, 6, WIDTH * HEIGHT)
     bright = rng.beta(0.3, 0.5, n.size)
-    sums = np.stack([*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n, n], 1)
+    sums = np.stack([*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n, n, n], 1)
     return HostAccumulator(WIDTH, HEIGHT, sums.astype(np.float32).ravel(), 70, work=Work(threads))
 
 
@@ -53,12 +55,12 @@ def test_an_interrupted_second_pass_shows_its_samples_and_the_grid_elsewhere() -
     picture.plan(4, 0.0)
     picture.channels[::4, ::4, :6] = (2, 2, 2, 0, 0, 1)
     picture.passes = 1
-    assert (picture.mean() == 2).all()
+    assert (picture.mean()[..., :3] == 2).all()
     picture.plan(4, 0.0)
     picture.channels[0, 1, :6] = (5, 5, 5, 0, 0, 1)
     assert picture.mean()[0, 1, 0] == 5
     assert (np.delete(picture.mean()[..., 0].ravel(), 1) == 2).all()
-    assert picture.shown(Film(), "light").shape == (8, 8, 3)
+    assert picture.shown(View()).shape == (8, 8, 3)
 
 
 def test_a_picture_of_one_pixel_gets_all_its_samples() -> None:

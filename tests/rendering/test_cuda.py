@@ -32,7 +32,7 @@ def test_float32_kernels_hold_no_float64(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "arguments"),
-    [("measure", "RRM"), ("judge", "RRRMnrrr"), ("choose", "RRMrr"), ("show", "RUnnrn")],
+    [("measure", "RRM"), ("judge", "RRRMnrrr"), ("choose", "RRMrr"), ("show", "RUnnrrrrn")],
 )
 def test_what_keeps_the_picture_holds_no_float64(name: str, arguments: str, tmp_path: Path) -> None:
     ptx = compiled(Linked("", np.zeros(1)), 32, cuda_accumulator.LOOPS, name, arguments, tmp_path)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,7 +73,7 @@ def test_every_pixel_is_a_number(name: str) -> None:
     *_, last = Renderer(root, view, (24, 18), Work(threads=1), "cpu").passes(samples=3)
     assert np.isfinite(last.image).all()
     assert (last.image >= 0).all()
-    shown = develop(last.image, Film(bloom=1, exposure=20))
+    shown = develop(last.mean, replace(view, film=Film(bloom=1, exposure=20)))
     assert np.isfinite(shown).all()
     assert shown.min() >= 0
     assert shown.max() <= 1
@@ -99,7 +101,7 @@ def test_views_that_show_nothing_are_refused(root: Node, view: dict, message: st
         (Film, {"samples": 0}, "expected a whole number from 1"),
         (Light, {"position": (float("nan"), 0, 1)}, "expected 3 numbers"),
         (Light, {"strength": float("nan")}, "expected a number"),
-        (Light, {"kind": "laser"}, "expected sun, lamp or sky"),
+        (Light, {"kind": "laser"}, "expected sun, lamp, sky or camera"),
         (Shading, {"mode": "cel"}, "expected light, normal"),
     ],
 )

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from fracslice import render
 from fracslice.formulas import mandelbulb, material, sphere, union
+from fracslice.formulas.material import TRAPS
 from fracslice.formulas.registry import Node
 from fracslice.kernel.linker import link
 from fracslice.rendering.linking import Frame, link_frame
@@ -33,8 +35,13 @@ EFFECTS = {
     "def lens(": {"camera": Camera(eye=(2, -2, 1), aperture=0.1)},
     "def palette_count_2(": {"root": material(BULB, colour=(1, 0, 0, 0, 1, 0))},
     "nearest": {"root": material(BULB, colour=(1, 0, 0, 0, 1, 0))},
+    "def palette_count_8(": {"root": material(BULB, palette="magma")},
+    "nearest + 0.0625": {"root": material(BULB, palette="magma", trap="steps")},
+    "0.15915494309189535 * atan2(": {"root": material(BULB, palette="magma", trap="direction")},
     "def reflects(": {"root": material(BULB, reflect=0.2)},
     "def goes_on(": {"root": material(BULB, clear=0.9)},
+    "def glossy(": {"root": material(BULB, roughness=0.5, reflect=0.1)},
+    "def upward(nx": {"shading": Shading(paths="yes")},
     "glow": {"root": material(BULB, glow=1)},
     "paint": {"root": union(material(BULB), sphere(radius=0.3))},
 }
@@ -46,7 +53,7 @@ def test_an_effect_is_in_the_kernel_of_a_scene_that_uses_it_and_in_no_other(line
     assert line not in frame().linked.source
 
 
-@pytest.mark.parametrize("mode", ["normal", "depth", "distance", "steps"])
+@pytest.mark.parametrize("mode", ["normal", "position", "depth", "distance", "steps"])
 def test_modes_that_show_a_number_light_nothing(mode: str) -> None:
     source = frame(shading=Shading(mode=mode), lights=(Light(),)).linked.source
     assert "phong" not in source
@@ -67,3 +74,13 @@ def test_random_numbers_are_drawn_for_what_needs_them() -> None:
 
 def test_materials_change_no_field() -> None:
     assert link(material(BULB, colour=(1, 0, 0, 0, 1, 0), clear=0.5)).source == link(BULB).source
+
+
+@pytest.mark.parametrize("trap", TRAPS)
+def test_traps_colour_pictures_differently_and_leave_the_shape(trap: str) -> None:
+    """One trap per material: a deeper one takes precedence. The field's code does not know of it."""
+    plain, seen = material(BULB, palette="viridis"), material(BULB, palette="viridis", trap=trap)
+    pictures = [render(root, size=(24, 24), samples=1) for root in (plain, seen, material(seen, trap="axes"))]
+    assert (pictures[0] == pictures[1]).all() == (trap == "point")
+    assert (pictures[1] == pictures[2]).all()
+    assert link(plain).source == link(seen).source

@@ -13,7 +13,7 @@ import pytest
 from fracslice.errors import Cancelled, RenderError
 from fracslice.formulas import material, menger, sphere, union
 from fracslice.rendering import Renderer, cpu, progressive
-from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL
+from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL
 from fracslice.scene.view import Camera, Film, Light, View
 from fracslice.work import Work
 
@@ -95,15 +95,15 @@ def test_a_state_that_was_cut_off_is_refused(tmp_path: Path, left: int) -> None:
 FORGED: dict[str, Callable[[dict[str, np.ndarray]], object]] = {
     "of another type": lambda s: s.update(sums=s["sums"].astype(np.float16)),
     "of fewer pixels": lambda s: s.update(sums=s["sums"][:-CHANNELS]),
-    "smaller": lambda s: s.update(sums=s["sums"][: 8 * 8 * CHANNELS], shape=np.array([8, 8, 1, 4])),
+    "smaller": lambda s: s.update(sums=s["sums"][: 8 * 8 * CHANNELS], shape=np.array([8, 8, 1])),
     "with too many samples": lambda s: s["sums"].__setitem__([COUNT, GOAL], 1e9),
     "with more samples than its goal": lambda s: s["sums"].__setitem__(COUNT, 8),
     "with half a sample": lambda s: s["sums"].__setitem__([COUNT, GOAL], 0.5),
     "with less than none": lambda s: s["sums"].__setitem__(COUNT, -1),
     "with no number of them": lambda s: s["sums"].__setitem__(GOAL, np.nan),
-    "without a grid": lambda s: s.update(shape=np.array([*s["shape"][:3], 0])),
+    "with more hits than samples": lambda s: s["sums"].__setitem__(COVER, 1),
     "without a shape": lambda s: s.pop("shape"),
-    "with code": lambda s: s.update(shape=np.array([print] * 4, dtype=object)),
+    "with code": lambda s: s.update(shape=np.array([print] * 3, dtype=object)),
     "too large": lambda s: s.update(sums=np.zeros(len(s["sums"]) + 10000, s["sums"].dtype)),
 }
 
@@ -155,17 +155,6 @@ def test_most_samples_go_where_they_take_most_error_away() -> None:
     assert n.min() >= 8
     assert n.max() >= 4 * n.min()
     assert (n == 2 ** np.round(np.log2(n))).all(), "every net of samples is complete"
-
-
-@pytest.mark.parametrize(("within", "coarse"), [(1e-9, 8), (1e9, 1)])
-def test_the_first_pass_from_a_moved_camera_is_as_fine_as_there_is_time(within: float, coarse: int) -> None:
-    of = renderer()
-    finished(of)
-    of.look(VIEW.camera.moved(right=0.1), within)  # type: ignore[union-attr]
-    first = next(of.passes())
-    assert first.active == -(-SIZE[0] // coarse) * -(-SIZE[1] // coarse) / (SIZE[0] * SIZE[1])
-    assert (first.image.sum(2) > 0).mean() > 0.9
-    assert [done.samples for done in of.passes(3)][-2:] == [2, 3]
 
 
 def test_a_cancelled_pass_keeps_its_samples_and_continues_to_the_same_picture(

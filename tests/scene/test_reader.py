@@ -85,7 +85,10 @@ def refused(text: str | bytes) -> str:
         ("<box>\n<sphere/></box>", "f.xml:3: <box> takes no elements inside it, found <sphere>"),
         ("<box/>\nmore", "f.xml:2: <solid> holds the text 'more': expected elements only"),
         ("", "f.xml:2: <solid> expected at least one element inside it"),
-        ("<solid size='1mm'><box/></solid>", "f.xml:3: <solid> cannot stand here; expected <abox>, <bend>"),
+        (
+            "<solid size='1mm'><box/></solid>",
+            "f.xml:3: <solid> cannot stand here; expected <abox>, <amazing_surf>",
+        ),
         ("<box>", "f.xml:4: not well-formed XML: mismatched tag"),
         ("<box size='1 1 1' size='1 1 1'/>", "f.xml:3: not well-formed XML: duplicate attribute"),
         ("<box", "f.xml:4: not well-formed XML"),
@@ -127,7 +130,11 @@ def test_wrong_sizes(size):
         ),
         (
             "<scene version='1'><solid><box/></solid></scene>",
-            'f.xml:1: <solid> needs the attribute size="..."',
+            'f.xml:1: <solid> expected size="...", the longest side, or unit="..."',
+        ),
+        (
+            "<scene version='1'><solid size='4cm' unit='1mm'><box/></solid></scene>",
+            'f.xml:1: <solid> expected size="...", the longest side, or unit="..."',
         ),
         (
             around(BALL).replace("</scene>", "<solid size='1'><box/></solid></scene>"),

@@ -30,6 +30,13 @@ def test_the_size_and_several_settings_at_once():
     assert [n["size"] for n in changed.root.walk() if n.formula.name == "box"] == [(3, 2, 1)] * 2
 
 
+def test_an_element_of_the_view_need_not_be_in_the_file():
+    view = SCENE.with_values(["camera.eye=3 -2 1", "fog.density=0.5", "film.samples=4"]).view
+    assert view.camera and view.camera.eye == (3, -2, 1) and view.fog and view.fog.density == 0.5
+    with pytest.raises(SceneError, match="the scene has no <light>"):
+        SCENE.with_values(["light.strength=2"])
+
+
 def test_no_setting_changes_nothing_and_the_original_stays():
     before = SCENE.hash
     assert SCENE.with_values([]) == SCENE

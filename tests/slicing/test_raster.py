@@ -180,12 +180,12 @@ def test_unknown_printers() -> None:
 
 def test_pixels_of_the_printers_are_what_makers_say() -> None:
     """Micrometres, to a tenth."""
-    said = {"sl1": (47.25, 47.25), "sl1s": (50, 50), "mars-5-ultra": (18, 18), "saturn-4-ultra": (19, 24)}
-    said |= {
+    reported = {"sl1": (47.25, 47.25), "sl1s": (50, 50), "mars-5-ultra": (18, 18), "saturn-4-ultra": (19, 24)}
+    reported |= {
         "saturn-4-ultra-16k": (14, 19),
         "photon-mono-m7-pro": (16.8, 24.8),
         "halot-mage-pro": (29.7, 29.7),
     }
-    said |= {"sonic-mini-8k-s": (22, 22), "photon-mono-4": (17, 17), "photon-mono-4k": (35, 35)}
-    for name, pixel in said.items():
+    reported |= {"sonic-mini-8k-s": (22, 22), "photon-mono-4": (17, 17), "photon-mono-4k": (35, 35)}
+    for name, pixel in reported.items():
         assert np.array(printer(name).pixel) * 1000 == pytest.approx(pixel, abs=0.05)

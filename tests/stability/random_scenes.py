@@ -26,13 +26,18 @@ DEEPEST = {"iterations": 20, "level": 4}
 SHALLOW = 6
 """For a first look, where a depth is automatic."""
 
-FAMILIES = {"flake", "cells", "prism", "superquadric", *WALLS, *STEPS}
+FAMILIES = {
+    *("flake", "cells", "prism", "superquadric", "jerusalem", "koch", "hilbert", "tree", "gear", "thread"),
+    *("apollonian", "honeycomb", "pseudo_kleinian", "tetrabrot", "noise"),
+    *WALLS,
+    *STEPS,
+}
 """Families with a suite of their own, `tests.formulas.test_families`."""
 
 LOOKED = 4000
 TREES, TRIES = 100, 10
 LEAVES = [f for f in formulas() if f.kind == "shape" and f.name not in FAMILIES]
-OTHERS = [f for f in formulas() if f.kind != "shape" and f.name != "material"]
+OTHERS = [f for f in formulas() if f.kind != "shape" and f.name not in FAMILIES | {"material"}]
 Draw = Callable[[np.random.Generator, float], Any]
 
 

@@ -6,7 +6,10 @@ from collections.abc import Callable
 
 from fracslice.formulas import Node, transform
 
-WALLS = ("gyroid", "iwp", "lidinoid", "neovius", "schwarz_d", "schwarz_p")
+WALLS = (
+    *("gyroid", "iwp", "lidinoid", "neovius", "schwarz_d", "schwarz_p", "frd", "fischer_koch_s", "split_p"),
+    *("struts", "voronoi"),
+)
 LENGTHS: dict[str, tuple[str, ...]] = {
     "sphere": ("radius",),
     "box": ("size", "round"),
@@ -18,12 +21,16 @@ LENGTHS: dict[str, tuple[str, ...]] = {
     "octahedron": ("radius",),
     "prism": ("radius", "height"),
     "superquadric": ("size",),
+    "koch": ("radius", "height"),
+    "gear": ("radius", "height", "bore"),
+    "thread": ("radius", "pitch", "height"),
     **dict.fromkeys(WALLS, ("period", "thickness")),
     "union": ("smooth",),
     "intersection": ("smooth",),
     "difference": ("smooth",),
     "shell": ("thickness",),
     "offset": ("distance",),
+    "noise": ("amplitude", "period"),
     "bounds": ("min", "max"),
     "repeat": ("period",),
     "mirror": (),

@@ -15,7 +15,7 @@ from fracslice.work import Work
 @dataclass(frozen=True)
 class Outcome:
     """faults: why the mesh is not a printable solid. repaired: violations of bounds that the audit or the
-    closure rule found. refused: the one line that said why there is no mesh.
+    closure rule found. refused: the one line that reported why there is no mesh.
     """
 
     faults: tuple[str, ...] = ()

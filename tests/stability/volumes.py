@@ -30,7 +30,7 @@ class Volumes:
     """
 
     faults: tuple[str, ...] = ()
-    told: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
     off: float = 0.0
     layers: float = 0.0
 
@@ -52,7 +52,7 @@ def volumes(root: Node, resolution: float) -> Volumes:
     try:
         made = make_mesh(scene(root, size=SIZE), MeshJob(resolution=resolution), work)
     except VolumeError as error:
-        return Volumes(told=(str(error),))
+        return Volumes(reported=(str(error),))
     report, unit, grid = made.report, made.place.scale**3, made.bricks
     faults = [n for n in ("watertight", "manifold", "oriented") if not getattr(report.mesh, n)]
     hi = np.array(grid.origin) + grid.voxel * 8 * np.array(grid.index.shape)
@@ -70,10 +70,10 @@ def volumes(root: Node, resolution: float) -> Volumes:
         faults.append(f"the mesh is of {made.root}, the layers are of {stack.root}")
     quantised = tuple(line for line in stack.notes if line.startswith("whole layers"))
     lacks = bool(of_stack.off or quantised)
-    for name, is_, told in (("mesh", of_mesh, amount.off), ("layers", of_layers, lacks)):
-        if abs(is_ - volume) > max(TOLERANCE * volume, 5 * error) and not told:
+    for name, is_, reported in (("mesh", of_mesh, amount.off), ("layers", of_layers, lacks)):
+        if abs(is_ - volume) > max(TOLERANCE * volume, 5 * error) and not reported:
             faults.append(f"the volume of the {name} is {is_:.4g}, not {volume:.4g} +- {error:.2g}")
-    told = tuple(line for line in (*report.notes, *note) if line not in stack.notes) + quantised
-    if abs(of_layers / of_mesh - 1) > BETWEEN and not told:
+    reported = tuple(line for line in (*report.notes, *note) if line not in stack.notes) + quantised
+    if abs(of_layers / of_mesh - 1) > BETWEEN and not reported:
         faults.append(f"the volume of the layers is {of_layers:.4g}, of the mesh {of_mesh:.4g}")
-    return Volumes(tuple(faults), told, of_mesh / volume - 1, of_layers / volume - 1)
+    return Volumes(tuple(faults), reported, of_mesh / volume - 1, of_layers / volume - 1)

@@ -181,6 +181,6 @@ def test_cancelled() -> None:
 
 
 def test_progress_is_told() -> None:
-    told: list[tuple[str, float]] = []
-    sample_scene(plan(sphere(), 64), Work(progress=lambda stage, done: told.append((stage, done))))
-    assert told and all(0 <= done <= 1 for _, done in told) and told[-1][1] == 1.0
+    reported: list[tuple[str, float]] = []
+    sample_scene(plan(sphere(), 64), Work(progress=lambda stage, done: reported.append((stage, done))))
+    assert reported and all(0 <= done <= 1 for _, done in reported) and reported[-1][1] == 1.0

@@ -48,37 +48,37 @@ std::span<const bool> marks_of(const Vector<bool>& marks, size_t count) {
 }
 
 nb::tuple bind_links(const Rows<int32_t>& triangles, const Vector<bool>& counted, int threads) {
-    EdgeCounts found = unlocked(threads, [&] { return edge_counts(triangles_of(triangles, counted.size()), counted.data()); });
-    return nb::make_tuple(found.edges, found.open, found.non_manifold, found.misoriented, found.extra_fans);
+    EdgeCounts result = unlocked(threads, [&] { return edge_counts(triangles_of(triangles, counted.size()), counted.data()); });
+    return nb::make_tuple(result.edges, result.open, result.non_manifold, result.misoriented, result.extra_fans);
 }
 
 nb::tuple bind_corners(const Rows<int32_t>& triangles, size_t vertices, int threads) {
-    CornersByVertex found = unlocked(threads, [&] { return corners_by_vertex(triangles_of(triangles, vertices)); });
-    return nb::make_tuple(to_numpy(std::move(found.start), {vertices + 1}),
-                          to_numpy(std::move(found.corner), {triangles.size()}));
+    CornersByVertex result = unlocked(threads, [&] { return corners_by_vertex(triangles_of(triangles, vertices)); });
+    return nb::make_tuple(to_numpy(std::move(result.start), {vertices + 1}),
+                          to_numpy(std::move(result.corner), {triangles.size()}));
 }
 
 nb::tuple bind_components(const Rows<int32_t>& triangles, size_t vertices, int threads) {
-    Components found = unlocked(threads, [&] { return connected_components(triangles_of(triangles, vertices)); });
-    return nb::make_tuple(to_numpy(std::move(found.labels), {vertices}), found.count);
+    Components result = unlocked(threads, [&] { return connected_components(triangles_of(triangles, vertices)); });
+    return nb::make_tuple(to_numpy(std::move(result.labels), {vertices}), result.count);
 }
 
 nb::tuple bind_sizes(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int32_t>& labels, size_t count,
                      int threads) {
-    Sizes found = unlocked(threads, [&] {
+    Sizes result = unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
         require_labels(mesh, labels, count);
         return component_sizes(mesh, span_of(labels), count);
     });
-    return nb::make_tuple(to_numpy(std::move(found.volumes), {count}), to_numpy(std::move(found.areas), {count}),
-                          to_numpy(std::move(found.vectors), {count, 3}), to_numpy(std::move(found.outermost), {count, 6}),
-                          to_numpy(std::move(found.flat), {count}));
+    return nb::make_tuple(to_numpy(std::move(result.volumes), {count}), to_numpy(std::move(result.areas), {count}),
+                          to_numpy(std::move(result.vectors), {count, 3}), to_numpy(std::move(result.outermost), {count, 6}),
+                          to_numpy(std::move(result.flat), {count}));
 }
 
-nb::object numbers(const std::vector<int64_t>& found) {
-    Array<int64_t> rows(found.size(), 1);
-    std::copy(found.begin(), found.end(), rows.data.get());
-    return to_numpy(std::move(rows), {found.size()});
+nb::object numbers(const std::vector<int64_t>& result) {
+    Array<int64_t> rows(result.size(), 1);
+    std::copy(result.begin(), result.end(), rows.data.get());
+    return to_numpy(std::move(rows), {result.size()});
 }
 
 nb::object bind_turned(const Rows<double>& vertices, const Rows<int32_t>& triangles, const FrameTuple& frame, int threads) {
@@ -91,14 +91,14 @@ nb::object bind_pointed(const Rows<double>& vertices, const Rows<int32_t>& trian
 
 nb::tuple bind_bounds(const Rows<double>& points, int threads) {
     if (!points.shape(0)) throw nb::value_error("no points");
-    Bounds found = unlocked(threads, [&] { return bounds(points.data(), points.shape(0)); });
-    return nb::make_tuple(found.low, found.high);
+    Bounds result = unlocked(threads, [&] { return bounds(points.data(), points.shape(0)); });
+    return nb::make_tuple(result.low, result.high);
 }
 
 nb::tuple bind_quantise(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<bool>& keep,
                         const Vector<bool>& displaced, const Vector<int64_t>& rows, const Rows<int32_t>& corners,
                         const Rows<double>& planes, const FrameTuple& frame, int threads) {
-    Quantised found = unlocked(threads, [&] {
+    Quantised result = unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
         if (rows.size() != corners.shape(0)) throw std::invalid_argument("rows and corners differ in length");
         require_below(rows.data(), rows.size(), mesh.count, "an edit names a triangle that does not exist");
@@ -107,20 +107,20 @@ nb::tuple bind_quantise(const Rows<double>& vertices, const Rows<int32_t>& trian
         return quantise(mesh, marks_of(keep, mesh.vertices), marks_of(displaced, mesh.vertices), edits,
                         {planes.data(), planes.shape(0)}, frame_of(frame));
     });
-    if (!found.finite) throw nb::value_error("the mesh has a coordinate that is not a finite number");
-    size_t n = found.points.rows, m = found.triangles.rows;
-    return nb::make_tuple(to_numpy(std::move(found.points), {n, 3}), to_numpy(std::move(found.triangles), {m, 3}),
-                          to_numpy(std::move(found.displaced), {n}), numbers(found.places));
+    if (!result.finite) throw nb::value_error("the mesh has a coordinate that is not a finite number");
+    size_t n = result.points.rows, m = result.triangles.rows;
+    return nb::make_tuple(to_numpy(std::move(result.points), {n, 3}), to_numpy(std::move(result.triangles), {m, 3}),
+                          to_numpy(std::move(result.displaced), {n}), numbers(result.places));
 }
 
 nb::object bind_selected(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<bool>& keep, int threads) {
-    Selection found = unlocked(threads, [&] {
+    Selection result = unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
         return selected(mesh, marks_of(keep, mesh.count));
     });
-    size_t n = found.vertices.rows, m = found.triangles.rows;
+    size_t n = result.vertices.rows, m = result.triangles.rows;
     if (n == vertices.shape(0) && m == triangles.shape(0)) return nb::none();
-    return nb::make_tuple(to_numpy(std::move(found.vertices), {n, 3}), to_numpy(std::move(found.triangles), {m, 3}));
+    return nb::make_tuple(to_numpy(std::move(result.vertices), {n, 3}), to_numpy(std::move(result.triangles), {m, 3}));
 }
 
 nb::object bind_touching(const Rows<int32_t>& triangles, const Vector<bool>& vertices, int threads) {
@@ -147,9 +147,9 @@ nb::object bind_stl(const Rows<double>& vertices, const Rows<int32_t>& triangles
 
 nb::tuple bind_weld(const Rows<float>& points) {
     size_t count = points.shape(0);
-    Welded found = unlocked(1, [&] { return weld(reinterpret_cast<const uint32_t*>(points.data()), count); });
-    size_t sets = found.first.rows;
-    return nb::make_tuple(to_numpy(std::move(found.first), {sets}), to_numpy(std::move(found.labels), {count}));
+    Welded result = unlocked(1, [&] { return weld(reinterpret_cast<const uint32_t*>(points.data()), count); });
+    size_t sets = result.first.rows;
+    return nb::make_tuple(to_numpy(std::move(result.first), {sets}), to_numpy(std::move(result.labels), {count}));
 }
 
 nb::tuple bind_tree(const Rows<double>& vertices, const Rows<int32_t>& triangles, int threads) {
@@ -173,14 +173,14 @@ nb::object bind_crossings(const Rows<double>& vertices, const Rows<int32_t>& tri
 nb::tuple bind_nesting(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int32_t>& labels,
                        const Vector<double>& sizes, const Vector<int64_t>& first, int threads) {
     size_t shells = sizes.size();
-    Nesting found = unlocked(threads, [&] {
+    Nesting result = unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
         require_labels(mesh, labels, shells);
         if (first.size() != shells) throw std::invalid_argument("sizes and first differ in length");
         require_below(first.data(), shells, mesh.vertices, "first names a vertex that does not exist", int64_t(-1));
         return nesting(mesh, span_of(labels), span_of(sizes), span_of(first));
     });
-    return nb::make_tuple(to_numpy(std::move(found.winding), {shells}), to_numpy(std::move(found.parent), {shells}));
+    return nb::make_tuple(to_numpy(std::move(result.winding), {shells}), to_numpy(std::move(result.parent), {shells}));
 }
 
 int bind_side_of_plane(const Point& a, const Point& b, const Point& c, const Point& d) {

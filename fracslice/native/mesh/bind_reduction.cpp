@@ -63,6 +63,12 @@ class BoundNearest {
         return nb::make_tuple(to_numpy(std::move(found), {count}), to_numpy<int32_t>(beyond));
     }
 
+    nb::object points(const Rows<double>& points, int threads) const {
+        Array<double> found(points.shape(0), 1);
+        unlocked(threads, [&] { nearest_.points(points.data(), points.shape(0), found.data.get()); });
+        return to_numpy(std::move(found), {points.shape(0)});
+    }
+
     nb::object samples(const Rows<double>& vertices, const Rows<int32_t>& triangles, double spacing, double enough,
                        int threads) const {
         Array<double> found(triangles.shape(0), 1);
@@ -92,6 +98,7 @@ void bind_reduction(nb::module_& module) {
                       bool>(),
              "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a, "closed"_a = false)
         .def("bounds", &BoundNearest::bounds, "vertices"_a, "triangles"_a, "hints"_a, "tolerance"_a, "threads"_a = 0)
+        .def("points", &BoundNearest::points, "points"_a, "threads"_a = 0)
         .def("samples", &BoundNearest::samples, "vertices"_a, "triangles"_a, "spacing"_a, "enough"_a, "threads"_a = 0);
 }
 

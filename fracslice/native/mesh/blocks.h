@@ -1,5 +1,5 @@
-// Work in blocks of equal size: what is found in each is put together in order, so that results are the same for any number
-// of threads.
+// Work in blocks of equal size: the results of the blocks are joined in order, so that they are the same for any number of
+// threads.
 #pragma once
 #include <tbb/parallel_for.h>
 
@@ -41,11 +41,11 @@ std::vector<T> joined(const std::vector<std::vector<T>>& parts) {
 template <class Do>
 std::vector<int64_t> chosen(size_t count, const Do& choose) {
     return joined(in_blocks<std::vector<int64_t>>(count, [&](size_t first, size_t last) {
-        std::vector<int64_t> found;
+        std::vector<int64_t> result;
         for (size_t i = first; i < last; ++i) {
-            if (choose(i)) found.push_back(int64_t(i));
+            if (choose(i)) result.push_back(int64_t(i));
         }
-        return found;
+        return result;
     }));
 }
 
@@ -53,9 +53,9 @@ std::vector<int64_t> chosen(size_t count, const Do& choose) {
 template <class Do>
 std::vector<size_t> counted(size_t count, const Do& holds) {
     std::vector<size_t> before = in_blocks<size_t>(count, [&](size_t first, size_t last) {
-        size_t found = 0;
-        for (size_t i = first; i < last; ++i) found += holds(i);
-        return found;
+        size_t result = 0;
+        for (size_t i = first; i < last; ++i) result += holds(i);
+        return result;
     });
     size_t total = 0;
     for (size_t& number : before) total += std::exchange(number, total);

@@ -51,7 +51,7 @@ struct LeafBoxes {
 
     // A bit for each box that meets another.
     unsigned meeting(const Box& box) const {
-        unsigned found = 0;
+        unsigned result = 0;
 #if defined(__SSE2__)
         for (size_t lane = 0; lane < kLeaf; lane += 4) {
             __m128 meets = _mm_castsi128_ps(_mm_set1_epi32(-1));
@@ -59,16 +59,16 @@ struct LeafBoxes {
                 meets = _mm_and_ps(meets, _mm_cmple_ps(_mm_loadu_ps(low[k] + lane), _mm_set1_ps(box.high[k])));
                 meets = _mm_and_ps(meets, _mm_cmpge_ps(_mm_loadu_ps(high[k] + lane), _mm_set1_ps(box.low[k])));
             }
-            found |= unsigned(_mm_movemask_ps(meets)) << lane;
+            result |= unsigned(_mm_movemask_ps(meets)) << lane;
         }
 #else
         for (size_t lane = 0; lane < kLeaf; ++lane) {
             bool meets = true;
             for (int k = 0; k < 3; ++k) meets &= low[k][lane] <= box.high[k] && high[k][lane] >= box.low[k];
-            found |= unsigned(meets) << lane;
+            result |= unsigned(meets) << lane;
         }
 #endif
-        return found;
+        return result;
     }
 };
 

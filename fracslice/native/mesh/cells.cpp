@@ -11,18 +11,18 @@ namespace {
 constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
 
 // Finds a brick's crossings and returns their number.
-size_t find_crossings(const std::array<CornerPlanes, kSide + 1>& corners, BrickCrossings& found) {
+size_t find_crossings(const std::array<CornerPlanes, kSide + 1>& corners, BrickCrossings& result) {
     for (int x = 0; x < kSide; ++x) {
         const CornerPlanes& own = corners[x];
-        found.bits[0][x] = own[0] ^ corners[x + 1][0];
-        found.bits[1][x] = own[0] ^ own[1];
-        found.bits[2][x] = own[0] ^ own[2];
+        result.bits[0][x] = own[0] ^ corners[x + 1][0];
+        result.bits[1][x] = own[0] ^ own[1];
+        result.bits[2][x] = own[0] ^ own[2];
     }
     size_t total = 0;
     for (int axis = 0; axis < 3; ++axis) {
         for (int x = 0; x < kSide; ++x) {
-            found.rank[axis][x] = uint16_t(total);
-            total += size_t(std::popcount(found.bits[axis][x]));
+            result.rank[axis][x] = uint16_t(total);
+            total += size_t(std::popcount(result.bits[axis][x]));
         }
     }
     return total;
@@ -30,7 +30,7 @@ size_t find_crossings(const std::array<CornerPlanes, kSide + 1>& corners, BrickC
 
 // The ghosts' places, in order.
 std::vector<BrickPlace> ghosts(const Layout& layout, const std::vector<Signs>& signs) {
-    std::vector<BrickPlace> found;
+    std::vector<BrickPlace> result;
     for (size_t row = 0; row < layout.count; ++row) {
         const int32_t* p = layout.ijk + 3 * row;
         for (int k : {3, 5, 6, 7}) {
@@ -39,12 +39,12 @@ std::vector<BrickPlace> ghosts(const Layout& layout, const std::vector<Signs>& s
             if (at >= 0) continue;
             BitPlane seen = (k & 2 ? kFirstY : ~BitPlane(0)) & (k & 4 ? kFirstZ : ~BitPlane(0)), differ = 0;
             for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) differ |= (signs[row][x] ^ constant(at)) & seen;
-            if (differ) found.push_back(q);
+            if (differ) result.push_back(q);
         }
     }
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    return found;
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
 }
 
 }  // namespace
@@ -133,8 +133,8 @@ size_t CellGrid::crossings_before(int layer) const {
 int64_t CellGrid::find(const BrickPlace& place) const {
     int32_t row = layout_.at(place[0], place[1], place[2]);
     if (row >= 0) return row;
-    auto first = places_.begin() + int64_t(sampled()), found = std::lower_bound(first, places_.end(), place);
-    return found != places_.end() && *found == place ? found - places_.begin() : -1;
+    auto first = places_.begin() + int64_t(sampled()), result = std::lower_bound(first, places_.end(), place);
+    return result != places_.end() && *result == place ? result - places_.begin() : -1;
 }
 
 }  // namespace fracslice::mesh

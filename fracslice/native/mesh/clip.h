@@ -16,8 +16,8 @@ struct Plane {
     double above(const Point& p) const { return normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] - offset; }
 };
 
-// Cuts a convex polygon at a plane (Sutherland and Hodgman 1974, "Reentrant polygon clipping"): what is above it; the
-// polygon becomes what is left.
+// Cuts a convex polygon at a plane (Sutherland and Hodgman 1974, "Reentrant polygon clipping"). Returns the part above it;
+// the polygon becomes the part below.
 inline Polygon taken_above(const Plane& plane, Polygon& polygon) {
     Polygon above, below;
     for (size_t i = 0; i < polygon.size(); ++i) {

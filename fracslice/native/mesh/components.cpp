@@ -67,18 +67,18 @@ struct Reach {
 std::vector<Reach> reaches(const MeshView& mesh, std::span<const int32_t> labels, size_t count) {
     std::vector<Reach> all(count);
     for (const auto& part : in_blocks<std::vector<Reach>>(mesh.vertices, [&](size_t first, size_t last) {
-             std::vector<Reach> found;
+             std::vector<Reach> result;
              for (size_t v = first; v < last; ++v) {
                  if (labels[v] < 0) continue;
-                 if (found.empty() || found.back().label != labels[v]) found.push_back({labels[v]});
+                 if (result.empty() || result.back().label != labels[v]) result.push_back({labels[v]});
                  const double* p = mesh.point(int32_t(v));
-                 for (size_t k = 0; k < 3; ++k) found.back().add(k, p[k], int32_t(v), p[k], int32_t(v));
+                 for (size_t k = 0; k < 3; ++k) result.back().add(k, p[k], int32_t(v), p[k], int32_t(v));
              }
-             return found;
+             return result;
          })) {
-        for (const Reach& found : part) {
-            Reach& to = all[size_t(found.label)];
-            for (size_t k = 0; k < 3; ++k) to.add(k, found.low[k], found.vertex[k], found.high[k], found.vertex[k + 3]);
+        for (const Reach& result : part) {
+            Reach& to = all[size_t(result.label)];
+            for (size_t k = 0; k < 3; ++k) to.add(k, result.low[k], result.vertex[k], result.high[k], result.vertex[k + 3]);
         }
     }
     return all;
@@ -103,8 +103,8 @@ Components connected_components(const Triangles& triangles) {
     });
     auto is_root = [&](size_t v) { return used[v].load(std::memory_order_relaxed); };
     std::vector<size_t> before = counted(triangles.vertices, is_root);
-    Components found{{triangles.vertices, 1}, int32_t(before.back())};
-    int32_t* labels = found.labels.data.get();
+    Components result{{triangles.vertices, 1}, int32_t(before.back())};
+    int32_t* labels = result.labels.data.get();
     for_each_block(triangles.vertices, [&](size_t block, size_t first, size_t last) {
         for (size_t v = first, next = before[block]; v < last; ++v) labels[v] = is_root(v) ? int32_t(next++) : -1;
     });
@@ -113,7 +113,7 @@ Components connected_components(const Triangles& triangles) {
             if (!is_root(v)) labels[v] = labels[forest.root(int32_t(v))];
         }
     });
-    return found;
+    return result;
 }
 
 Sizes component_sizes(const MeshView& mesh, std::span<const int32_t> labels, size_t count) {

@@ -1,4 +1,4 @@
-// Layer by layer, so that what is known of features is used while it is near: the features of the next layer are found and
+// Layer by layer, so that features are used while they are in the cache: the features of the next layer are computed and
 // its corners numbered, then a layer's tips, vertices and triangles, each brick by itself, at the places that the sums of the
 // counts give.
 #include "contour.h"
@@ -150,7 +150,7 @@ void Contouring::write_vertices(size_t i, const Hermite& data) {
     });
     const Features& own = features_.of(i);
     for (size_t axis = 0; axis < 3; ++axis) {
-        for (size_t k = 0; k < own.counts[axis]; ++k) put(own.corner_base[axis] + k, own.found[axis][k]);
+        for (size_t k = 0; k < own.counts[axis]; ++k) put(own.corner_base[axis] + k, own.result[axis][k]);
     }
 }
 
@@ -161,7 +161,7 @@ void Contouring::write_triangles(size_t i) {
     cells_.for_each_near(near.octant,
                          [&](size_t at, uint32_t vertex) { near.numbers[at] = uint32_t(vertex - first_vertex_); });
     Around around(features_, i);
-    const Feature* feature = own.found[3];
+    const Feature* feature = own.result[3];
     size_t tip = own.tip_base;
     auto write = [&](const Cell& cell) {
         const Case& type = kCases[cell.number];

@@ -43,13 +43,13 @@ CornerTable::CornerTable(const Triangles& triangles)
     for (size_t c = triangles_.size(); c-- > 0;) corner_[size_t(triangles_[c])] = int32_t(c);
 }
 
-bool CornerTable::star(size_t v, Star& found) const {
+bool CornerTable::star(size_t v, Star& result) const {
     int32_t begin = corner_[v], c = begin;
-    found.count = 0;
+    result.count = 0;
     do {
-        if (found.count == kDegree) return false;
-        found.corner[found.count] = c;
-        found.ring[found.count++] = at(after(c));
+        if (result.count == kDegree) return false;
+        result.corner[result.count] = c;
+        result.ring[result.count++] = at(after(c));
         c = after(across(after(c)));
     } while (c != begin);
     return true;
@@ -95,10 +95,10 @@ int32_t CornerTable::changed_by(size_t t) const {
     int32_t step = last_[t];
     while (step) {
         const Step& s = steps_[size_t(step) - 1];
-        auto found = std::find_if(touched(s), touched(s) + s.count, [&](int32_t c) { return size_t(c / 3) == t; });
-        if (found < touched(s) + s.count) return step;
-        found = std::find_if(found, found + 2, [&](int32_t c) { return size_t(c / 3) == t; });
-        step = before_[size_t(found - touched_.begin())];
+        auto result = std::find_if(touched(s), touched(s) + s.count, [&](int32_t c) { return size_t(c / 3) == t; });
+        if (result < touched(s) + s.count) return step;
+        result = std::find_if(result, result + 2, [&](int32_t c) { return size_t(c / 3) == t; });
+        step = before_[size_t(result - touched_.begin())];
     }
     return 0;
 }

@@ -41,7 +41,7 @@ class CornerTable {
     bool stands(int32_t step) const { return steps_[size_t(step) - 1].stands; }
 
     // False if there are more than kDegree triangles.
-    bool star(size_t v, Star& found) const;
+    bool star(size_t v, Star& result) const;
     // Whether the vertex of a star may move to ring[i] and leave a manifold of the same topology: the two have two common
     // neighbours and no common triangle (the link condition; Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge
     // contraction", 1999).

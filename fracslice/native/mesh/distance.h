@@ -53,25 +53,25 @@ class TriangleDistance {
     }
     // The plane that it lies in, its normal a unit vector; and those through its sides, their normals outwards.
     std::array<Plane, 4> planes() const {
-        std::array<Plane, 4> found;
+        std::array<Plane, 4> result;
         double w[3] = {v_[0] - u_[0], v_[1] - u_[1], v_[2] - u_[2]};
         const double *along[3] = {u_, w, v_};
         Point n;
         normal(n.data());
         double size = std::sqrt(dot(n.data(), n.data()));
         for (double& x : n) x /= size;
-        found[0] = {n, dot(n.data(), a_)};
+        result[0] = {n, dot(n.data(), a_)};
         for (size_t side = 0; side < 3; ++side) {
             double from[3];
             for (size_t k = 0; k < 3; ++k) {
                 size_t i = (k + 1) % 3, j = (k + 2) % 3;
                 double across = along[side][i] * n[j] - along[side][j] * n[i];
-                found[side + 1].normal[k] = side == 2 ? -across : across;
+                result[side + 1].normal[k] = side == 2 ? -across : across;
                 from[k] = a_[k] + (side == 1 ? u_[k] : 0);
             }
-            found[side + 1].offset = dot(found[side + 1].normal.data(), from);
+            result[side + 1].offset = dot(result[side + 1].normal.data(), from);
         }
-        return found;
+        return result;
     }
     double square_area() const { return uu_ * vv_ - uv_ * uv_; }
     double square_sides() const { return 2 * (uu_ + vv_ - uv_); }

@@ -10,7 +10,7 @@
 namespace fracslice::mesh {
 namespace {
 
-// Joins two sets of a forest of lowest indices, halving paths (Tarjan and van Leeuwen 1984); whether they were apart.
+// Joins two sets of a forest of lowest indices, halving paths (Tarjan and van Leeuwen 1984); returns true if they were disjoint.
 bool unite(std::vector<int32_t>& parent, int32_t a, int32_t b) {
     while (parent[a] != a) a = parent[a] = parent[parent[a]];
     while (parent[b] != b) b = parent[b] = parent[parent[b]];
@@ -101,8 +101,8 @@ EdgeCounts operator+(const EdgeCounts& a, const EdgeCounts& b) {
 }  // namespace
 
 CornersByVertex corners_by_vertex(const Triangles& triangles) {
-    CornersByVertex found{{triangles.vertices + 1, 1}, {3 * triangles.count, 1}};
-    int64_t *start = found.start.data.get(), *corner = found.corner.data.get();
+    CornersByVertex result{{triangles.vertices + 1, 1}, {3 * triangles.count, 1}};
+    int64_t *start = result.start.data.get(), *corner = result.corner.data.get();
     Stars stars(triangles);
     tbb::parallel_for(size_t(0), stars.blocks(), [&](size_t block) {
         size_t next = stars.corners_before(block);
@@ -113,7 +113,7 @@ CornersByVertex corners_by_vertex(const Triangles& triangles) {
         });
     });
     start[triangles.vertices] = int64_t(3 * triangles.count);
-    return found;
+    return result;
 }
 
 EdgeCounts edge_counts(const Triangles& triangles, const bool* counted) {

@@ -14,7 +14,7 @@ struct CornersByVertex {
 CornersByVertex corners_by_vertex(const Triangles& triangles);
 
 // Sums over vertices. An edge is counted at both ends; non_manifold: of more than two triangles; misoriented: of triangles that
-// do not run in opposite ways.
+// traverse it in the same direction.
 struct EdgeCounts {
     int64_t edges = 0, open = 0, non_manifold = 0, misoriented = 0, extra_fans = 0;
 };

@@ -55,11 +55,11 @@ class Fan {
     // The triangle nearest to a point before the move.
     int nearest(const double* p) const {
         double least = kInfinity;
-        int found = 0;
+        int result = 0;
         for (int i = 0; i < count; ++i) {
-            if (double d = before_[i].square(p); d < least) least = d, found = i;
+            if (double d = before_[i].square(p); d < least) least = d, result = i;
         }
-        return found;
+        return result;
     }
 
     // Whether the middles of new edges are within a distance, given by its square, of the old triangles: no hole without points

@@ -11,9 +11,9 @@ struct Symmetric {
 
     Vec3 row(int k) const {
         int u = (k + 1) % 3, v = (k + 2) % 3;
-        Vec3 found;
-        found[k] = diagonal[k], found[u] = other[v], found[v] = other[u];
-        return found;
+        Vec3 result;
+        result[k] = diagonal[k], result[u] = other[v], result[v] = other[u];
+        return result;
     }
 };
 
@@ -31,15 +31,15 @@ double least_eigenvalue(double trace, double minors, double determinant) {
         double further = p / (minors - (2 * trace - 3 * value) * value);
         if (!(further > 0)) break;
         value += further;
-        if (further < 1e-3 * trace) break;  // What is left is of the order of its square.
+        if (further < 1e-3 * trace) break;  // The error is of the order of its square.
     }
     return value;
 }
 
 Vec3 product(const std::array<Vec3, 3>& rows, const Vec3& b) { return {dot(rows[0], b), dot(rows[1], b), dot(rows[2], b)}; }
 
-// The unit vector that the matrix takes to `value` times itself, for an eigenvalue apart from the others: the adjugate of what
-// is left when it is taken off is that vector times itself.
+// The unit eigenvector of a simple eigenvalue `value` of A: the adjugate of A - value I is the outer product of that vector
+// with itself, times a factor.
 Vec3 eigenvector(const Symmetric& a, std::array<Vec3, 3> adjugate, double trace, double value) {
     int longest = 0;
     for (int k = 0; k < 3; ++k) {

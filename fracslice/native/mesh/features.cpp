@@ -17,20 +17,20 @@ BitPlane from_z(BitPlane plane, BitPlane before) { return (plane << 1 & ~kFirstZ
 // Keeps the corners between two cells with features. below: the brick's neighbours on the lower sides.
 void keep_corners(Features& own, const std::array<const Features*, 3>& below) {
     for (size_t axis = 0; axis < 3; ++axis) {
-        const Feature* from = own.found[axis];
-        Feature* to = own.found[axis];
+        const Feature* from = own.result[axis];
+        Feature* to = own.result[axis];
         Signs none{}, before = below[axis] ? below[axis]->cells : none;
         for (size_t x = 0; x < kSide; ++x) {
             BitPlane cells = own.cells[x], other = axis == 0   ? (x ? own.cells[x - 1] : before[kSide - 1])
                                                : axis == 1 ? from_y(cells, before[x])
                                                            : from_z(cells, before[x]);
-            own.rank[axis][x] = uint16_t(to - own.found[axis]);
+            own.rank[axis][x] = uint16_t(to - own.result[axis]);
             for (BitPlane bits = own.corners[axis][x]; bits; bits &= bits - 1, ++from) {
                 if (bits & -bits & other) *to++ = *from;
             }
             own.corners[axis][x] &= other;
         }
-        own.counts[axis] = uint32_t(to - own.found[axis]);
+        own.counts[axis] = uint32_t(to - own.result[axis]);
     }
 }
 
@@ -111,7 +111,7 @@ void FeatureGrid::straighten(int layer) {
         own.triangles = own.loops;
         if (!own.counts[3]) return;
         Around around(*this, i);
-        const Feature* features = own.found[3];
+        const Feature* features = own.result[3];
         for (int x = 0; x < kSide; ++x) {
             for (int face = 0; face < 6; ++face) own.triangles += size_t(std::popcount(around.at(x, face)));
             own.straight[x] = straight_cells(own, around, x, features);

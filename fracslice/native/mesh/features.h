@@ -50,7 +50,7 @@ struct Features {
     Signs lined{};     // cells that lie in two planes, so that two corners say all that a tip would
     Signs straight{};  // cells whose two corners do say it
     std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that plane
-    std::array<Feature*, 4> found{};  // in lower faces along each axis, then one a cell, in order
+    std::array<Feature*, 4> result{};  // in lower faces along each axis, then one a cell, in order
     std::array<uint32_t, 4> counts{};
     uint32_t tip_count = 0;
     uint32_t loops = 0;  // triangles that these cells would have without corners
@@ -58,7 +58,7 @@ struct Features {
     size_t tip_base = 0, triangles = 0;
 
     // Puts one in a cell, or in its lower face along axis 0, 1 or 2.
-    void add(size_t kind, const Feature& feature) { found[kind][counts[kind]++] = feature; }
+    void add(size_t kind, const Feature& feature) { result[kind][counts[kind]++] = feature; }
 };
 
 // Where a thread finds features and keeps them, until nobody needs them.
@@ -66,7 +66,7 @@ class FeatureStore {
   public:
     // Makes space for the features of a brick.
     void open(Features& of) {
-        for (size_t kind = 0; kind < 4; ++kind) of.found[kind] = rows_[kind].space();
+        for (size_t kind = 0; kind < 4; ++kind) of.result[kind] = rows_[kind].space();
     }
 
     // Keeps those that were put there.
@@ -147,7 +147,7 @@ class Around {
         const Features* owner;
         size_t axis, index;
 
-        const Vec3& point() const { return owner->found[axis][index].point; }
+        const Vec3& point() const { return owner->result[axis][index].point; }
         size_t vertex() const { return owner->corner_base[axis] + index; }
     };
 

@@ -23,26 +23,26 @@ struct Seen {
     }
 };
 
-// What is known of a crossing; a brick's are laid side by side, for its cells look at each up to four times.
+// Root and normal of a crossing; those of a brick are contiguous, as its cells read each up to four times.
 struct Datum {
     double t;
     Normal normal;
 };
 
 // An edge of the unit cell.
-struct Way {
+struct UnitEdge {
     Vec3 start{}, along{};
 };
 
-constexpr std::array<Way, 12> make_ways() {
-    std::array<Way, 12> ways{};
+constexpr std::array<UnitEdge, 12> make_unit_edges() {
+    std::array<UnitEdge, 12> edges{};
     for (int e = 0; e < 12; ++e) {
-        ways[e].start = {double(kEdges[e].dx), double(kEdges[e].dy), double(kEdges[e].dz)};
-        ways[e].along[kEdges[e].axis] = 1;
+        edges[e].start = {double(kEdges[e].dx), double(kEdges[e].dy), double(kEdges[e].dz)};
+        edges[e].along[kEdges[e].axis] = 1;
     }
-    return ways;
+    return edges;
 }
-constexpr std::array<Way, 12> kWays = make_ways();
+constexpr std::array<UnitEdge, 12> kUnitEdges = make_unit_edges();
 
 // The features of one brick.
 class Finder {
@@ -74,7 +74,7 @@ class Finder {
     }
 
   private:
-    // What is known of a crossing of a cell's loop.
+    // Datum of a crossing of a cell's loop.
     const Datum& datum(const Cell& cell, int k) const { return data_[cell.at(kCases[cell.number].loop[k])]; }
 
     // Whether two normals of a cell's loop of crossings make a feature.
@@ -84,11 +84,11 @@ class Finder {
         float least = 1;
         for (int k = 1; k < length; ++k) least = std::min(least, dot(first, datum(cell, k).normal));
         if (least > kHalfSharp) return false;
-        bool found = least < kSharp;
-        for (int a = 2; a < length && !found; ++a) {
-            for (int b = 1; b < a; ++b) found |= dot(datum(cell, a).normal, datum(cell, b).normal) < kSharp;
+        bool result = least < kSharp;
+        for (int a = 2; a < length && !result; ++a) {
+            for (int b = 1; b < a; ++b) result |= dot(datum(cell, a).normal, datum(cell, b).normal) < kSharp;
         }
-        return found;
+        return result;
     }
 
     // Where the planes of a cell's crossings meet, if they do.
@@ -97,7 +97,7 @@ class Finder {
         length_ = type.loop_length;
         for (int k = 0; k < length_; ++k) {
             const Datum& from = datum(cell, k);
-            const Way& way = kWays[type.loop[k]];
+            const UnitEdge& way = kUnitEdges[type.loop[k]];
             loop_[k].point = way.start + from.t * way.along;
             for (int j = 0; j < 3; ++j) loop_[k].normal[j] = from.normal[j];
         }
@@ -169,7 +169,7 @@ constexpr std::array<Planes, 256> make_planes() {
 }
 constexpr std::array<Planes, 256> kPlanes = make_planes();
 
-// How far roots may be apart that are one plane's, in voxels.
+// Maximum distance of roots in one plane, voxels.
 constexpr double kSame = 1e-9;
 
 // The same where every plane is across its crossing's edge: each says one coordinate, and which is a matter of the case.

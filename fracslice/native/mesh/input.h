@@ -15,13 +15,13 @@ using Rows = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cp
 
 template <class T>
 void require_below(const T* values, size_t count, size_t end, const char* what, T least = 0) {
-    std::atomic<bool> found = false;
+    std::atomic<bool> result = false;
     for_each_block(count, [&](size_t, size_t first, size_t last) {
         bool beyond = false;
         for (size_t i = first; i < last; ++i) beyond |= values[i] < least || (values[i] >= 0 && size_t(values[i]) >= end);
-        if (beyond) found.store(true, std::memory_order_relaxed);
+        if (beyond) result.store(true, std::memory_order_relaxed);
     });
-    if (found) throw std::invalid_argument(what);
+    if (result) throw std::invalid_argument(what);
 }
 
 inline Triangles triangles_of(const Rows<int32_t>& triangles, size_t vertices) {

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations, permutations, product
+from textwrap import wrap
 
 import numpy as np
 
@@ -179,13 +180,15 @@ def header() -> str:
         "};",
         "constexpr Case kCases[256] = {",
     ]
+    rows = []
     for case, triangles in enumerate(cases):
-        found = loops(case)
-        loop = found[0] if len(found) == 1 else ()
+        rings = loops(case)
+        loop = rings[0] if len(rings) == 1 else ()
         flat = [e for triangle in triangles for e in triangle]
         crossed = sum(1 << e for e in set(flat))
-        ring = f"{len(loop)}, {{{', '.join(map(str, loop)) or 0}}}"
-        lines.append(f"    {{{len(triangles)}, {crossed}, {{{', '.join(map(str, flat)) or 0}}}, {ring}}},")
+        ring = f"{len(loop)},{{{','.join(map(str, loop)) or 0}}}"
+        rows.append(f"{{{len(triangles)},{crossed},{{{','.join(map(str, flat)) or 0}}},{ring}}},")
+    lines += wrap(" ".join(rows), 125, initial_indent="    ", subsequent_indent="    ")
     return "\n".join([*lines, "};", "}  // namespace fracslice::mesh"])
 
 

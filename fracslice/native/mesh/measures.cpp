@@ -38,8 +38,8 @@ std::vector<int64_t> pointed(const MeshView& mesh, double sine, size_t most) {
     if (mesh.count > kRough) {  // a rough surface shows in some of its triangles
         MeshView some = mesh;
         some.corners += 3 * ((mesh.count - kRough / 2) / 2), some.count = kRough / 2;
-        std::vector<int64_t> found = pointed(some, sine, most);
-        if (found.size() > most) return found;
+        std::vector<int64_t> result = pointed(some, sine, most);
+        if (result.size() > most) return result;
     }
     auto falls_off = [&](size_t v, std::span<const int64_t> corners) {
         Vec3 up{0, 0, 0};
@@ -60,13 +60,13 @@ std::vector<int64_t> pointed(const MeshView& mesh, double sine, size_t most) {
         return !corners.empty();
     };
     Stars stars(mesh);
-    std::vector<std::vector<int64_t>> found(stars.blocks());
+    std::vector<std::vector<int64_t>> result(stars.blocks());
     tbb::parallel_for(size_t(0), stars.blocks(), [&](size_t block) {
         stars.for_each(block, [&](size_t v, std::span<const int64_t> corners) {
-            if (falls_off(v, corners)) found[block].push_back(int64_t(v));
+            if (falls_off(v, corners)) result[block].push_back(int64_t(v));
         });
     });
-    return joined(found);
+    return joined(result);
 }
 
 Bounds bounds(const double* points, size_t count) {
@@ -75,9 +75,9 @@ Bounds bounds(const double* points, size_t count) {
     };
     Bounds all;
     for (const Bounds& part : in_blocks<Bounds>(count, [&](size_t first, size_t last) {
-             Bounds found;
-             for (size_t i = first; i < last; ++i) spread(found, at(points + 3 * i), at(points + 3 * i));
-             return found;
+             Bounds result;
+             for (size_t i = first; i < last; ++i) spread(result, at(points + 3 * i), at(points + 3 * i));
+             return result;
          })) {
         spread(all, part.low, part.high);
     }

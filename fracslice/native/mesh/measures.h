@@ -1,4 +1,4 @@
-// What of a mesh rounding turns over, what is pointed, and its box.
+// Triangles of a mesh that rounding turns over, pointed vertices, and the bounding box.
 #pragma once
 #include <limits>
 #include <vector>

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <cmath>
+#include <limits>
 
 #include "corner_table.h"
 
@@ -11,6 +12,8 @@ namespace {
 
 // Triangles that one thread looks at in turn, each beginning where the one before was: always the same ones.
 constexpr size_t kTurn = 256;
+// Points that share a search, and the most triangles that it may find.
+constexpr size_t kRun = 64, kMost = 48;
 // The longest way over neighbouring triangles.
 constexpr int kSteps = 32;
 
@@ -88,6 +91,55 @@ std::vector<Nearest::Pair> Nearest::bounds(const MeshView& triangles, const int3
     std::vector<Pair> pairs;
     for (const auto& turn : beyond) pairs.insert(pairs.end(), turn.begin(), turn.end());
     return pairs;
+}
+
+void Nearest::points(const double* points, size_t count, double* found) const {
+    in_turns(count, [&](size_t first, size_t last) {
+        size_t guess = 0;
+        for (size_t i = first; i < last; i += kRun) run(points + 3 * i, std::min(kRun, last - i), guess, found + i);
+    });
+}
+
+// What is nearest to a point of a ball is at most the ball's diameter farther from its centre than what is nearest to that.
+void Nearest::run(const double* points, size_t count, size_t& guess, double* found) const {
+    double centre[3], radius = 0;
+    for (size_t x = 0; x < 3; ++x) {
+        double low = points[x], high = points[x];
+        for (size_t i = 1; i < count; ++i) low = std::min(low, points[3 * i + x]), high = std::max(high, points[3 * i + x]);
+        centre[x] = (low + high) / 2, radius += (high - low) * (high - low) / 4;
+    }
+    Found nearest = (*this)(centre, guess);
+    guess = nearest.triangle;
+    TriangleDistance near[kMost + 1];
+    size_t known = around(centre, (std::sqrt(nearest.square) + 2 * std::sqrt(radius)) * (1 + 1e-9), near);
+    for (size_t i = 0; i < count; ++i) {
+        const double* p = points + 3 * i;
+        double best = std::numeric_limits<double>::infinity();
+        if (known > kMost) {
+            Found one = (*this)(p, guess);
+            guess = one.triangle, best = one.square;
+        }
+        for (size_t t = 0; known <= kMost && t < known; ++t) best = std::min(best, near[t].square(p));
+        found[i] = std::sqrt(best);
+    }
+}
+
+size_t Nearest::around(const double* p, double reach, TriangleDistance* triangles) const {
+    size_t open[128] = {1}, count = 0;
+    for (int height = 1; height > 0 && count <= kMost;) {
+        size_t node = open[--height];
+        if (to_box(p, node) > reach * reach) continue;
+        if (node < tree_.leaves) {
+            open[height++] = 2 * node, open[height++] = 2 * node + 1;
+            continue;
+        }
+        size_t leaf = node - tree_.leaves;
+        for (size_t i = tree_.first(leaf); i < tree_.last(leaf) && count <= kMost; ++i) {
+            triangles[count] = distance(size_t(tree_.order[i]));
+            count += triangles[count].square(p) <= reach * reach;
+        }
+    }
+    return count;
 }
 
 void Nearest::samples(const MeshView& triangles, double spacing, double enough, double* found) const {

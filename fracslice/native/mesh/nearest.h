@@ -22,12 +22,17 @@ class Nearest {
     // besides: a triangle, and one here.
     using Pair = std::array<int32_t, 2>;
     std::vector<Pair> bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* found) const;
+    // The distance of each point. Runs of points that lie close together are fast.
+    void points(const double* points, size_t count, double* found) const;
     // For each triangle how far its samples are at most: exactly, but for distances below `enough`. Samples are at most `spacing`
     // apart along its edges.
     void samples(const MeshView& triangles, double spacing, double enough, double* found) const;
 
   private:
     double to_box(const double* p, size_t node) const;
+    // The triangles at most `reach` from a point, up to kMost.
+    size_t around(const double* p, double reach, TriangleDistance* triangles) const;
+    void run(const double* points, size_t count, size_t& guess, double* found) const;
     double sampled(const MeshView& triangles, size_t t, double spacing, double limit, size_t& guess) const;
 
     MeshView mesh_;

@@ -101,16 +101,16 @@ struct Hit {
 
 std::vector<Hit> hits(const MeshView& mesh, std::span<const int32_t> labels, const Starts& starts) {
     return joined(in_blocks<std::vector<Hit>>(mesh.count, [&](size_t begin, size_t end) {
-        std::vector<Hit> found;
+        std::vector<Hit> result;
         for (size_t t = begin; t < end; ++t) {
             starts.for_each_at(t, [&](const Start& start) {
                 int32_t label = labels[size_t(mesh[t][0])];
                 if (size_t(label) == start.shell || !below(mesh, t, start.at)) return;
                 int winding = winding_of(mesh, t, start.at);
-                if (winding != 0) found.push_back({start.shell, label, winding});
+                if (winding != 0) result.push_back({start.shell, label, winding});
             });
         }
-        return found;
+        return result;
     }));
 }
 
@@ -122,16 +122,16 @@ Nesting nesting(const MeshView& mesh, std::span<const int32_t> labels, std::span
     Nesting nested{{first.size(), 1}, {first.size(), 1}};
     int64_t *winding = nested.winding.data.get(), *parent = nested.parent.data.get();
     std::fill_n(winding, first.size(), 0), std::fill_n(parent, first.size(), -1);
-    std::vector<Hit> found = hits(mesh, labels, Starts(mesh, first));
+    std::vector<Hit> result = hits(mesh, labels, Starts(mesh, first));
     auto before = [](const Hit& a, const Hit& b) { return a.shell != b.shell ? a.shell < b.shell : a.other < b.other; };
-    std::sort(found.begin(), found.end(), before);
-    for (size_t i = 0, j; i < found.size(); i = j) {  // one shell and one other after the other
+    std::sort(result.begin(), result.end(), before);
+    for (size_t i = 0, j; i < result.size(); i = j) {  // one shell and one other after the other
         int64_t around = 0;
-        for (j = i; j < found.size() && !before(found[i], found[j]); ++j) around += found[j].winding;
+        for (j = i; j < result.size() && !before(result[i], result[j]); ++j) around += result[j].winding;
         if (around == 0) continue;
-        size_t shell = found[i].shell;
+        size_t shell = result[i].shell;
         winding[shell] += around;
-        if (parent[shell] < 0 || sizes[size_t(found[i].other)] < sizes[size_t(parent[shell])]) parent[shell] = found[i].other;
+        if (parent[shell] < 0 || sizes[size_t(result[i].other)] < sizes[size_t(parent[shell])]) parent[shell] = result[i].other;
     }
     return nested;
 }

@@ -1,5 +1,5 @@
-// Most pairs of a mesh are neighbours in a fan, and a line through their shared vertex separates them as they are seen along
-// one axis: that is asked first, with the fewest multiplications. What separates what is seen separates the triangles.
+// Most pairs of a mesh are neighbours in a fan, and a line through their shared vertex separates them in the projection
+// along an axis: that is tested first, with the fewest multiplications. A line that separates projections separates triangles.
 #include "overlap.h"
 
 #include <cmath>

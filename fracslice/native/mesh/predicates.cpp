@@ -11,7 +11,7 @@ static_assert(FLT_EVAL_METHOD == 0, "each operation must round to its own type")
 
 using Vec3 = std::array<double, 3>;
 
-// What the rounded product lacks: a * b - product, exactly (Dekker, Veltkamp).
+// Rounding error of a product: a * b - product, exactly (Dekker, Veltkamp).
 double error_of_product(double a, double b, double product) {
     constexpr double splitter = 0x1p27 + 1;
     double t = splitter * a, a_high = t - (t - a), a_low = a - a_high;

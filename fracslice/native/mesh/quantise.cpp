@@ -57,7 +57,7 @@ Quantised quantise(const MeshView& mesh, std::span<const bool> keep, std::span<c
     });
     size_t total = 0;
     for (size_t& number : triangles) total += std::exchange(number, total);
-    Quantised found{{vertices.back(), 3}, {vertices.back(), 1}, {total, 3}, std::vector<int64_t>(edits.rows.size(), -1)};
+    Quantised result{{vertices.back(), 3}, {vertices.back(), 1}, {total, 3}, std::vector<int64_t>(edits.rows.size(), -1)};
     Array<int32_t> number(mesh.vertices, 1);
     bool known = distinct(planes);
     std::atomic<bool> finite = true;
@@ -68,8 +68,8 @@ Quantised quantise(const MeshView& mesh, std::span<const bool> keep, std::span<c
             number.data[v] = int32_t(next);
             if (!keep[v]) continue;
             Vec3 p = frame(mesh.point(int32_t(v)));
-            for (size_t k = 0; k < 3; ++k) all &= std::isfinite(found.points.data[3 * next + k] = rounded(p[k]));
-            found.displaced.data[next++] = displaced[v] || !known;
+            for (size_t k = 0; k < 3; ++k) all &= std::isfinite(result.points.data[3 * next + k] = rounded(p[k]));
+            result.displaced.data[next++] = displaced[v] || !known;
         }
         if (!all) finite.store(false, std::memory_order_relaxed);
         for (size_t k = 0; known && all && k < 3; ++k) {
@@ -77,21 +77,21 @@ Quantised quantise(const MeshView& mesh, std::span<const bool> keep, std::span<c
             for (size_t v = first, to = vertices[block]; v < last; ++v) {
                 if (!keep[v]) continue;
                 double x = mesh.point(int32_t(v))[k] * frame.scale + frame.offset[k];
-                found.displaced.data[to] |= !axis.keeps(x, found.points.data[3 * to + k]);
+                result.displaced.data[to] |= !axis.keeps(x, result.points.data[3 * to + k]);
                 ++to;
             }
         }
     });
-    found.finite = finite;
+    result.finite = finite;
     for_each_block(mesh.count, [&](size_t block, size_t first, size_t last) {
         size_t next = triangles[block];
         edits.for_each(mesh, keep, first, last, [&](const int32_t* corners, int64_t edit) {
-            if (edit >= 0) found.places[size_t(edit)] = int64_t(next);
-            for (size_t k = 0; k < 3; ++k) found.triangles.data[3 * next + k] = number.data[corners[k]];
+            if (edit >= 0) result.places[size_t(edit)] = int64_t(next);
+            for (size_t k = 0; k < 3; ++k) result.triangles.data[3 * next + k] = number.data[corners[k]];
             ++next;
         });
     });
-    return found;
+    return result;
 }
 
 }  // namespace fracslice::mesh

@@ -9,7 +9,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kShape = 0.05;
 // The least height of a triangle, in errors allowed.
 constexpr double kThin = 1e-3;
-// What is left of the tolerance for a vertex that has come back.
+// Fraction of the tolerance for a vertex whose collapse was undone.
 constexpr float kDistrust = 0.25f;
 
 }  // namespace

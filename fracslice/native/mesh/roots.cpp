@@ -1,5 +1,5 @@
-// Batch by batch, in memory that is used again. What is left after a few steps, or after the polish, is brought together and
-// goes on by itself.
+// Batch by batch, in memory that is used again. Segments without a root after a few steps, or after the polish, are gathered
+// and iterated by themselves.
 #include "roots.h"
 
 #include <tbb/blocked_range.h>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t kRows = 6;  // of a segment
 
-// Some segments and what is found on them; one thread's.
+// Some segments and their results; one per thread.
 template <class Real>
 struct Segments {
     std::vector<Real> rows, out;
@@ -40,8 +40,8 @@ struct Segments {
             Real* to = &rows[k * whole];
             for (uint32_t edge : which) *to++ = edges.starts[k][edge];
         }
-        Real* ways = std::fill_n(&rows[3 * whole], 3 * whole, Real(0)) - 3 * whole;
-        for (size_t i = 0; i < count; ++i) ways[edges.axis(which[i]) * whole + i] = length;
+        Real* directions = std::fill_n(&rows[3 * whole], 3 * whole, Real(0)) - 3 * whole;
+        for (size_t i = 0; i < count; ++i) directions[edges.axis(which[i]) * whole + i] = length;
         pad();
     }
 
@@ -78,7 +78,7 @@ struct Segments {
     }
 };
 
-// What is found of crossings: roots, and rows of normals.
+// Roots of crossings, and rows of normals.
 struct RootRows {
     double* t;
     float* normals;
@@ -127,12 +127,12 @@ class Search {
     Search(const CellGrid& cells, const RootLoops& loops, const std::array<double, 3>& origin, double voxel)
         : cells_(cells), loops_(loops), origin_(origin), voxel_(voxel) {}
 
-    void run(size_t begin, size_t end, const RootRows& found) {
+    void run(size_t begin, size_t end, const RootRows& result) {
         cells_.lay(begin, end, origin_, voxel_, edges_);
         choose();
-        each(found);
-        follow(found);
-        if (!which_.empty()) each(found);
+        each(result);
+        follow(result);
+        if (!which_.empty()) each(result);
     }
 
   private:
@@ -152,9 +152,9 @@ class Search {
         }
     }
 
-    // Takes what leaders in planes across their edges have found for those that they lead; `which_` is the rest of these.
-    void follow(const RootRows& found) {
-        look(found);
+    // Copies results of leaders in planes across their edges to the edges that they lead; `which_` is the rest of these.
+    void follow(const RootRows& result) {
+        look(result);
         which_.clear();
         auto curved = [&](const FlatBrick& brick) {
             uint32_t count = 0;
@@ -164,7 +164,7 @@ class Search {
             return true;
         };
         flat_.erase(std::remove_if(flat_.begin(), flat_.end(), curved), flat_.end());
-        if (!flat_.empty()) compare(found);
+        if (!flat_.empty()) compare(result);
     }
 
     // Adds an edge to `which_` that is no leader.
@@ -173,19 +173,19 @@ class Search {
     }
 
     // What the leaders of bricks that look flat have found.
-    void look(const RootRows& found) {
+    void look(const RootRows& result) {
         leads_.resize(edges_.leaders.size());
         for (const FlatBrick& brick : flat_) {
             for (uint32_t k = brick.leader; k < brick.leader_end; ++k) {
                 auto [edge, axis] = edges_.leaders[k];
-                leads_[k] = {edge, found.along(axis, edge), found.t[edge], found.normal(edge), voxel_ * kBeside, 0};
-                leads_[k].shift[axis] += voxel_ * found.t[edge];
+                leads_[k] = {edge, result.along(axis, edge), result.t[edge], result.normal(edge), voxel_ * kBeside, 0};
+                leads_[k].shift[axis] += voxel_ * result.t[edge];
             }
         }
     }
 
     // The same in bricks that are flat.
-    void compare(const RootRows& found) {
+    void compare(const RootRows& result) {
         evaluate();
         const double* value = values_.data();
         for (const FlatBrick& brick : flat_) {
@@ -194,7 +194,7 @@ class Search {
                 if (lead.edge == edge) lead.value = *value;
                 bool same = std::abs(std::abs(*value) - std::abs(lead.value)) <= kSame * voxel_;
                 if (lead.across && same) {
-                    found.put(edge, lead.t, (*value < 0) == (lead.value < 0) ? lead.normal : -lead.normal);
+                    result.put(edge, lead.t, (*value < 0) == (lead.value < 0) ? lead.normal : -lead.normal);
                 } else {
                     add_led(edge);
                 }
@@ -222,7 +222,7 @@ class Search {
     }
 
     // Looks for each of `which_` by itself.
-    void each(const RootRows& found) {
+    void each(const RootRows& result) {
         exact_.take(edges_, which_, voxel_, loops_.lanes);
         fast_.convert(exact_, loops_.lanes);
         fast_.find(loops_.guess, loops_, fast_left_, slow_ones_);
@@ -230,13 +230,13 @@ class Search {
         loops_.polish(exact_.rows.data(), exact_.out.data(), exact_.whole);
         unsure_.clear();
         for (size_t i = 0; i < exact_.count; ++i) {
-            found.put(which_[i], exact_.out[i], normal(exact_, i));
+            result.put(which_[i], exact_.out[i], normal(exact_, i));
             if (!(exact_.moved(i) <= loops_.sure)) unsure_.push_back(uint32_t(i));
         }
-        if (!unsure_.empty()) again(found);
+        if (!unsure_.empty()) again(result);
     }
 
-    void again(const RootRows& found) {
+    void again(const RootRows& result) {
         slow_.take(exact_, unsure_, loops_.lanes);
         slow_.find(loops_.find, loops_, left_, slow_ones_);
         roots_.assign(slow_.out.begin(), slow_.out.begin() + ptrdiff_t(slow_.count));
@@ -244,7 +244,7 @@ class Search {
         loops_.polish(slow_.rows.data(), slow_.out.data(), slow_.whole);
         for (size_t i = 0; i < slow_.count; ++i) {
             double root = slow_.moved(i) <= loops_.sure ? slow_.out[i] : roots_[i];
-            found.put(which_[unsure_[i]], root, normal(slow_, i));
+            result.put(which_[unsure_[i]], root, normal(slow_, i));
         }
     }
 

@@ -67,23 +67,23 @@ Selection selected(const MeshView& mesh, std::span<const bool> keep) {
     auto is_used = [&](size_t v) { return used[v].load(std::memory_order_relaxed); };
     std::vector<size_t> vertices = counted(mesh.vertices, is_used);
     std::vector<size_t> triangles = counted(mesh.count, [&](size_t t) { return keep[t]; });
-    Selection found{{vertices.back(), 3}, {triangles.back(), 3}};
-    if (vertices.back() == mesh.vertices && triangles.back() == mesh.count) return found;
+    Selection result{{vertices.back(), 3}, {triangles.back(), 3}};
+    if (vertices.back() == mesh.vertices && triangles.back() == mesh.count) return result;
     Array<int32_t> number(mesh.vertices, 1);
     for_each_block(mesh.vertices, [&](size_t block, size_t first, size_t last) {
         size_t next = vertices[block];
         for (size_t v = first; v < last; ++v) {
             number.data[v] = int32_t(next);
-            if (is_used(v)) std::copy_n(mesh.point(int32_t(v)), 3, &found.vertices.data[3 * next++]);
+            if (is_used(v)) std::copy_n(mesh.point(int32_t(v)), 3, &result.vertices.data[3 * next++]);
         }
     });
     for_each_block(mesh.count, [&](size_t block, size_t first, size_t last) {
-        int32_t* out = found.triangles.data.get() + 3 * triangles[block];
+        int32_t* out = result.triangles.data.get() + 3 * triangles[block];
         for (size_t t = first; t < last; ++t) {
             for (int k = 0; keep[t] && k < 3; ++k) *out++ = number.data[mesh[t][k]];
         }
     });
-    return found;
+    return result;
 }
 
 std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> vertices) {

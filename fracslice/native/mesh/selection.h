@@ -1,4 +1,4 @@
-// Parts of a mesh: some of its triangles by themselves, or what is near some of them.
+// Submeshes: some triangles of a mesh, or those near some of them.
 #pragma once
 #include <span>
 #include <vector>

@@ -25,23 +25,23 @@ Welded weld(const uint32_t* bits, size_t count) {
     size_t slots = 16;
     while (slots <= 2 * count) slots *= 2;
     std::vector<int32_t> table(slots, -1);  // of sets, with open addressing
-    Welded found{{count, 1}, {count, 1}};
+    Welded result{{count, 1}, {count, 1}};
     int32_t sets = 0;
     for (size_t i = 0; i < count; ++i) {
         const uint32_t* point = bits + 3 * i;
         if (i + kAhead < count) prefetch(&table[mixed(point + 3 * kAhead) & (slots - 1)]);
         size_t slot = mixed(point) & (slots - 1);
-        while (table[slot] >= 0 && !std::equal(point, point + 3, bits + 3 * found.first.data[table[slot]])) {
+        while (table[slot] >= 0 && !std::equal(point, point + 3, bits + 3 * result.first.data[table[slot]])) {
             slot = (slot + 1) & (slots - 1);
         }
         if (table[slot] < 0) {
             table[slot] = sets;
-            found.first.data[sets++] = int64_t(i);
+            result.first.data[sets++] = int64_t(i);
         }
-        found.labels.data[i] = table[slot];
+        result.labels.data[i] = table[slot];
     }
-    found.first.rows = size_t(sets);
-    return found;
+    result.first.rows = size_t(sets);
+    return result;
 }
 
 }  // namespace fracslice::mesh

@@ -10,7 +10,7 @@
 
 namespace fracslice::slices {
 
-// Whether this machine has it, unless the environment says otherwise, so that tests see both ways.
+// True if this machine has AVX-512; an environment variable turns it off, so that tests run both paths.
 bool has_wide();
 inline const bool kWide = has_wide();
 

@@ -101,7 +101,7 @@ class Band {
     // From row to row of the levels.
     ptrdiff_t stride() const { return kTile * capacity_; }
     const uint8_t* levels(int row) const { return &levels_[size_t(row * stride())]; }
-    // Tiles as rows, in which zeros are what is not on the picture.
+    // Tiles as rows; zeros beyond the picture.
     void lay_out() {
         for (int i = n_; i < n_ + 8; ++i) cut_[i] = 0;
         orientation_(cut_.data(), n_ + 1, cut_rows_.data());

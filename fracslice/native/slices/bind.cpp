@@ -84,14 +84,14 @@ nb::tuple bind_paint(const Slab& slab, int layer, const Bytes& image) {
 
 nb::tuple bind_runs(const Slab& slab, int layer, std::array<int, 2> shape) {
     held(slab, layer);
-    SolidRuns found;
+    SolidRuns result;
     {
         nb::gil_scoped_release released;
-        found = solid_runs(slab, shape[0], shape[1]);
+        result = solid_runs(slab, shape[0], shape[1]);
     }
-    const size_t rows = found.rows.size(), n = found.runs.size();
-    return nb::make_tuple(owned<int32_t>(std::move(found.rows), {rows}), owned<int32_t>(std::move(found.runs), {n, 2}),
-                          found.painted.area, found.painted.partly);
+    const size_t rows = result.rows.size(), n = result.runs.size();
+    return nb::make_tuple(owned<int32_t>(std::move(result.rows), {rows}), owned<int32_t>(std::move(result.runs), {n, 2}),
+                          result.painted.area, result.painted.partly);
 }
 
 nb::bytes bytes(const Rows<uint8_t>& data) { return nb::bytes(data.data(), data.size()); }
@@ -122,13 +122,13 @@ nb::bytes bind_encoded(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device:
 
 nb::tuple bind_crossings(const Slab& slab, int layer) {
     held(slab, layer);
-    Crossings found;
+    Crossings result;
     {
         nb::gil_scoped_release released;
-        found = crossings(slab);
+        result = crossings(slab);
     }
-    size_t n = found.edges.size();
-    return nb::make_tuple(owned<int32_t>(std::move(found.edges), {n, 4}), owned<double>(std::move(found.ends), {n, 2}));
+    size_t n = result.edges.size();
+    return nb::make_tuple(owned<int32_t>(std::move(result.edges), {n, 4}), owned<double>(std::move(result.ends), {n, 2}));
 }
 
 nb::tuple bind_signs(const Slab& slab) {

@@ -16,14 +16,14 @@ int32_t Slab::add(int y, int x) {
     return *here;
 }
 
-// Tiles said to be full beside ones said to be empty, where a bound is wrong; the same in all layers of a group.
+// Opens tiles taken to be full beside tiles taken to be empty, where a bound is wrong; the same in all layers of a group.
 void Slab::mend() {
     if (!torn_) torn_ = torn();
     for (const Place& p : *torn_) add(p.y, p.x);
 }
 
 std::vector<Place> Slab::torn() const {
-    std::vector<Place> found;
+    std::vector<Place> result;
     for (int y = 1; y < ty_ - 1; ++y) {
         const int32_t *row = spot(y, 0), *below = row - tx_, *above = row + tx_;
         auto torn = [&](int x) {
@@ -33,9 +33,9 @@ std::vector<Place> Slab::torn() const {
         int32_t any = 0;
         for (int x = 1; x < tx_ - 1; ++x) any |= -int32_t(torn(x));
         for (int x = 1; any && x < tx_ - 1; ++x)
-            if (torn(x)) found.push_back({y, x, kFull});
+            if (torn(x)) result.push_back({y, x, kFull});
     }
-    return found;
+    return result;
 }
 
 // The samples of a tile that differ from those to their right, left, above and below; and the tiles there.
@@ -66,8 +66,8 @@ void Slab::close() {
         ask(active, again);
         turned.resize(asks_.size());
         size_t turns = 0;
-        evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) {
-            const uint64_t other = (inside[ask.tile] ^ found.negative) & ask.samples;
+        evaluate(asks_, nullptr, [&](const Ask& ask, const Signs& result) {
+            const uint64_t other = (inside[ask.tile] ^ result.negative) & ask.samples;
             known[ask.tile] |= ask.samples, inside[ask.tile] ^= other;
             turned[turns] = {ask.tile, other};
             turns += other != 0;

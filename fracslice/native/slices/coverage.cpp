@@ -82,7 +82,7 @@ void by_values(const Slab& slab, const Quad& tiles, float scale, Parts& parts) {
     for (int r = 0; r < kTile; ++r) parts.up[r][kTile] = column[r];
 }
 
-// Where they were found to be crossed.
+// At the evaluated crossings.
 void by_crossings(const Slab& slab, const Quad& tiles, const Corners& corners, Parts& parts) {
     const uint16_t *own = slab.tiles().cross[tiles.own].data(), *right = slab.tiles().cross[tiles.right].data();
     auto part = [](float share, bool first, bool second) {

@@ -160,7 +160,7 @@ Counts counts_of(const uint16_t* symbols, const uint16_t* end) {
     return counts;
 }
 
-// What is written for each symbol.
+// The code of each symbol.
 using Emissions = std::array<Code, Runs::kSymbols>;
 Emissions emissions_of(const std::array<Code, kCodes>& codes) {
     Emissions emissions{};

@@ -25,7 +25,7 @@ struct Batch {
         size_t padded = (n + 63) / 64 * 64;
         std::fill(x + n, x + padded, x[0]), std::fill(y + n, y + padded, y[0]), std::fill(z + n, z + padded, z[0]);
         field.values(x, y, z, f, padded);
-        // What is not a number counts as outside.
+        // NaN counts as outside.
         for (size_t i = 0; i < n; ++i) f[i] = f[i] == f[i] ? f[i] : 1;
     }
 };
@@ -47,7 +47,7 @@ void Slab::evaluate(size_t n, const Where& where, const Take& take) {
 template <class Take>
 void Slab::evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take) {
     Batch batch;
-    std::array<Found, kBatch> found;
+    std::array<Signs, kBatch> result;
     std::fill(batch.z, batch.z + kBatch, float(z_[layer_]));
     for (size_t begin = 0, end = 0; begin < asks.size(); begin = end) {
         size_t n = 0;
@@ -56,8 +56,8 @@ void Slab::evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take) {
         gather(some, *this, x_.data(), y_.data(), batch.x, batch.y);
         batch.values(*field_, n);
         evaluations_ += int64_t(n);
-        scatter(some, batch.f, rim, *this, found.data());
-        for (size_t i = begin; i < end; ++i) take(asks[i], found[i - begin]);
+        scatter(some, batch.f, rim, *this, result.data());
+        for (size_t i = begin; i < end; ++i) take(asks[i], result[i - begin]);
     }
 }
 

@@ -8,32 +8,32 @@ namespace {
 
 constexpr size_t kFew = 128;
 constexpr float kSmallest = 1e6f;  // inside values that large bailouts make
-constexpr int32_t kOften = 8, kSeldom = 40, kEnough = 96;  // every so many tiles are looked at, and as many are enough
+constexpr int32_t kOften = 8, kSeldom = 40, kEnough = 96;  // strides of the tiles looked at, and how many are enough
 
 }  // namespace
 
 // Crossed edges of the layer.
 std::vector<Slab::Edge> Slab::edges() const {
-    std::vector<Edge> found;
+    std::vector<Edge> result;
     for (int32_t t = kTiles; t < int32_t(count()); ++t)
-        crossed(t, kAll, [&](int number, float first, float second) { found.push_back({t, number, first, second}); });
-    return found;
+        crossed(t, kAll, [&](int number, float first, float second) { result.push_back({t, number, first, second}); });
+    return result;
 }
 
 // Those of one tile in `step`.
 Slab::Middles Slab::middles(int32_t step) const {
-    Middles found;
-    for (auto* list : {&found.x, &found.y, &found.quotients}) list->reserve(count() - kTiles);
+    Middles result;
+    for (auto* list : {&result.x, &result.y, &result.quotients}) list->reserve(count() - kTiles);
     const float half[2] = {float(frame_.dx / 2), float(frame_.dy / 2)};
     for (int32_t t = kTiles; t < int32_t(count()); t += step) {
         const float *x = &x_[kTile * (place[t].x - 1)], *y = &y_[kTile * (place[t].y - 1)];
         crossed(t, kAll, [&](int number, float first, float second) {
             const bool up = number >> 6;
-            found.x.push_back(x[number & 7] + (up ? 0 : half[0])), found.y.push_back(y[number >> 3 & 7] + (up ? half[1] : 0));
-            found.quotients.push_back(std::max(first, second) / -std::min(first, second));
+            result.x.push_back(x[number & 7] + (up ? 0 : half[0])), result.y.push_back(y[number >> 3 & 7] + (up ? half[1] : 0));
+            result.quotients.push_back(std::max(first, second) / -std::min(first, second));
         });
     }
-    return found;
+    return result;
 }
 
 // How many times smaller inside values are than outside ones: the factor with which as many crossings lie before the middle

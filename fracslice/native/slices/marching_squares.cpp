@@ -77,7 +77,7 @@ Painted paint(const Slab& slab, const Canvas& canvas) {
 }
 
 Crossings crossings(const Slab& slab) {
-    Crossings found;
+    Crossings result;
     const int32_t first = kTiles, end = int32_t(slab.tiles().count());
     std::unique_ptr<int32_t[]> ids(new int32_t[size_t(end - first) * 128]);
     auto id = [&](int32_t t, int number) -> int32_t& { return ids[128 * size_t(t - first) + number]; };
@@ -89,10 +89,10 @@ Crossings crossings(const Slab& slab) {
             uint64_t words[2] = {of ^ rights(of, slab.word(y, x + 1)), of ^ uppers(of, slab.word(y + 1, x))};
             for (uint64_t w = words[0] | words[1]; w; w &= w - 1)
                 slab.crossed(t, w & -w, [&, t = t](int number, float a, float b) {
-                    id(t, number) = int32_t(found.edges.size());
-                    found.edges.push_back({kTile * (x - 1) + (number & 7), kTile * (y - 1) + (number >> 3 & 7), number >> 6, -1});
-                    found.ends.push_back(a);
-                    found.ends.push_back(b);
+                    id(t, number) = int32_t(result.edges.size());
+                    result.edges.push_back({kTile * (x - 1) + (number & 7), kTile * (y - 1) + (number >> 3 & 7), number >> 6, -1});
+                    result.ends.push_back(a);
+                    result.ends.push_back(b);
                 });
         }
     for (int y = 1; y < slab.rows() - 1; ++y)
@@ -108,10 +108,10 @@ Crossings crossings(const Slab& slab) {
                 int32_t upper = bit >> 3 == 7 ? std::max(slab.at(y + 1, x), first) : t;
                 const int32_t e[4] = {id(t, bit), id(right, 64 + (bit & 56) + ((bit + 1) & 7)), id(upper, (bit + 8) & 63),
                                       id(t, 64 + bit)};
-                link(cells.sides(bit), corners.signs(bit), e, found.edges);
+                link(cells.sides(bit), corners.signs(bit), e, result.edges);
             }
         }
-    return found;
+    return result;
 }
 
 }  // namespace fracslice::slices

@@ -29,7 +29,7 @@ double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y; }
 double det(Vector a, Vector b) { return a.x * b.y - a.y * b.x; }
 Vector unit(Vector a) { return 1 / std::sqrt(dot(a, a)) * a; }
 bool is_short(Vector a) { return dot(a, a) < kShort * kShort; }
-// Of the circle through three points, the ways between them given.
+// Curvature of the circle through three points, from the vectors between them.
 double curvature(Vector u, Vector v) { return 2 * det(u, v) / std::sqrt(dot(u, u) * dot(v, v) * dot(u + v, u + v)); }
 
 // The crossings of a layer in order: their places, and those before them.
@@ -132,7 +132,7 @@ void Slab::project(const std::vector<Edge>& edges) {
     std::vector<int32_t> todo;
     for (size_t i = 0; i < edges.size(); ++i) {
         const Edge& e = edges[i];
-        // No crossing is nearer to an end than its value over the bound; nothing is left to be found where both leave no room.
+        // A crossing is at least |f| over the bound from each end; edges where both distances leave no interval are done.
         const double reach = bounds_.proven * (e.number >> 6 ? frame_.dy : frame_.dx);
         const double low = std::fabs(e.first) / reach, high = 1 - std::fabs(e.second) / reach;
         if (high - low > kTight)

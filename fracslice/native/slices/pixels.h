@@ -70,10 +70,10 @@ class Cells {
         const Sides s = sides(bit);
         // The inside parts of the sides at one of the inside corners, and at the other one.
         const float a = s[0], b = s[3], c = 1 - s[1], d = 1 - s[2];
-        // Half of these corners' areas, or of the other corners' areas; what is inside between them, or outside.
+        // Half of the areas at these corners, or at the other corners: the inside, or the outside, between them is the rest.
         const float halves[] = {(a * b + c * d) / 2, ((1 - a) * (1 - c) + (1 - b) * (1 - d)) / 2};
         const bool first = signs == 5, whole = joined(s, first ? 0 : 1);
-        const float apart = halves[first == whole], areas[] = {apart, 1 - apart};
+        const float corners = halves[first == whole], areas[] = {corners, 1 - corners};
         return areas[whole];
     }
 

@@ -40,14 +40,14 @@ void Slab::list(const Chunk& chunk, uint64_t among) {
     asks_.resize(n);
 }
 
-// Evaluates those of the samples `among` that are not decided, each in a block of `size`, and decides what is within their
-// reach.
+// Evaluates those of the samples `among` that are not decided, each in a block of `size`, and decides the samples within
+// their reach.
 void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
     list(chunk, among);
     const float inside_reach = factor(bounds_.inside, frame_);
     const int back = size / 2 * kBack;
     const uint64_t own = uint64_t(1) << back;
-    evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) {
+    evaluate(asks_, nullptr, [&](const Ask& ask, const Signs& result) {
         const float *kept = values[ask.tile].data(), outside_reach = open_.reach[ask.tile];
         uint64_t reached = 0, within = 0;
         each(ask.samples, [&](int bit) {
@@ -56,11 +56,11 @@ void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
             within = v < 0 ? within | near : within & ~near;
             reached |= near;
         });
-        set(ask, found.negative, reached, within);
+        set(ask, result.negative, reached, within);
     });
 }
 
-// What is evaluated is so; what is known stays.
+// Sets evaluated samples, and implied ones unless their sign is known.
 void Slab::set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t within) {
     uint64_t kept = known[ask.tile], implied = reached & ~(kept | ask.samples);
     uint64_t& now = inside[ask.tile];
@@ -75,9 +75,9 @@ void Slab::twos() {
     list({kTiles, int32_t(count())}, kTwos);
     enough_.resize(count());
     const Rim rim{factor(bounds_.inside, frame_), open_.reach.data(), float(diagonal_), float(diagonal_) * kCalm * kCalm};
-    evaluate(asks_, &rim, [&](const Ask& ask, const Found& found) {
-        enough_[ask.tile] = blocks(found.calm);
-        set(ask, found.negative, blocks(found.beyond), blocks(found.beyond & found.negative));
+    evaluate(asks_, &rim, [&](const Ask& ask, const Signs& result) {
+        enough_[ask.tile] = blocks(result.calm);
+        set(ask, result.negative, blocks(result.beyond), blocks(result.beyond & result.negative));
     });
 }
 
@@ -108,7 +108,7 @@ void Slab::calm() {
 
 void Slab::rest() {
     list({kTiles, int32_t(count())}, kAll);
-    evaluate(asks_, nullptr, [&](const Ask& ask, const Found& found) { set(ask, found.negative, 0, 0); });
+    evaluate(asks_, nullptr, [&](const Ask& ask, const Signs& result) { set(ask, result.negative, 0, 0); });
 }
 
 }  // namespace fracslice::slices

@@ -23,12 +23,12 @@ class Turns {
         within_ = ((solid & kLastColumn) >> 7) * 0xFF;
     }
     // After the last tile: the runs of the first `rows` rows.
-    void end(int column, int rows, SolidRuns& found) {
+    void end(int column, int rows, SolidRuns& result) {
         add(column, 0);
         for (int row = 0; row < kTile; ++row) {
             auto& turns = columns_[row];
-            for (size_t i = 0; row < rows && i < turns.size(); i += 2) found.runs.push_back({turns[i], turns[i + 1]});
-            if (row < rows) found.rows.push_back(int32_t(found.runs.size()));
+            for (size_t i = 0; row < rows && i < turns.size(); i += 2) result.runs.push_back({turns[i], turns[i + 1]});
+            if (row < rows) result.rows.push_back(int32_t(result.runs.size()));
             turns.clear();
         }
     }
@@ -41,7 +41,7 @@ class Turns {
 }  // namespace
 
 SolidRuns solid_runs(const Slab& slab, int rows, int columns) {
-    SolidRuns found{{0}, {}, {0, 0}};
+    SolidRuns result{{0}, {}, {0, 0}};
     Coverage coverage(slab);
     Levels levels;
     Turns turns;
@@ -57,16 +57,16 @@ SolidRuns solid_runs(const Slab& slab, int rows, int columns) {
             full += whole;
             if (cut) {
                 coverage(tiles, corners, levels);
-                found.painted.partly += std::popcount(cut);
+                result.painted.partly += std::popcount(cut);
                 each(cut | corners.whole(), [&](int bit) { solid |= uint64_t(levels[bit] >= kSolid) << bit; });
             }
             const int left = columns - kTile * (x - 1);
             turns.add(kTile * (x - 1), left < kTile ? solid & kAll / 255 * (0xFF >> (kTile - left)) : solid);
         }
-        turns.end(columns, std::min(rows - kTile * (y - 1), kTile), found);
+        turns.end(columns, std::min(rows - kTile * (y - 1), kTile), result);
     }
-    found.painted.area = coverage.area() + kTile * kTile * double(full);
-    return found;
+    result.painted.area = coverage.area() + kTile * kTile * double(full);
+    return result;
 }
 
 }  // namespace fracslice::slices

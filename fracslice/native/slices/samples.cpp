@@ -16,10 +16,10 @@ void gather_each(std::span<const Ask> asks, const Tiles& tiles, const float* x, 
     }
 }
 
-void scatter_each(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
+void scatter_each(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Signs* result) {
     for (size_t i = 0; i < asks.size(); ++i) {
         float* kept = tiles.values[asks[i].tile].data();
-        Found all{};
+        Signs all{};
         const float factors[] = {rim ? rim->outside[asks[i].tile] : 0, rim ? rim->inside : 0};
         each(asks[i].samples, [&](int bit) {
             const float v = *f++;
@@ -31,7 +31,7 @@ void scatter_each(std::span<const Ask> asks, const float* f, const Rim* rim, Til
             all.beyond |= uint64_t(scaled > rim->least) << bit;
             all.calm |= uint64_t(negative | (scaled > rim->calm)) << bit;
         });
-        found[i] = all;
+        result[i] = all;
     }
 }
 
@@ -60,7 +60,7 @@ FRACSLICE_WIDE void gather_wide(std::span<const Ask> asks, const Tiles& tiles, c
 FRACSLICE_WIDE inline int64_t before(uint64_t word, int q) { return _mm_popcnt_u64(word & ((uint64_t(1) << 16 * q) - 1)); }
 
 template <bool kBeyond>
-FRACSLICE_WIDE void scatter_wide(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
+FRACSLICE_WIDE void scatter_wide(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Signs* result) {
     const __m512 inside = _mm512_set1_ps(kBeyond ? rim->inside : 0);
     const __m512 least = _mm512_set1_ps(kBeyond ? rim->least : 0), calm = _mm512_set1_ps(kBeyond ? rim->calm : 0);
     for (size_t i = 0; i < asks.size(); ++i) {
@@ -83,7 +83,7 @@ FRACSLICE_WIDE void scatter_wide(std::span<const Ask> asks, const float* f, cons
             beyond |= uint64_t(_mm512_cmp_ps_mask(scaled, least, _CMP_GT_OQ)) << at;
             enough |= uint64_t(__mmask16(below | _mm512_cmp_ps_mask(scaled, calm, _CMP_GT_OQ))) << at;
         }
-        found[i] = {_pdep_u64(negative, samples), _pdep_u64(beyond, samples), _pdep_u64(enough, samples)};
+        result[i] = {_pdep_u64(negative, samples), _pdep_u64(beyond, samples), _pdep_u64(enough, samples)};
         f += count;
     }
 }
@@ -109,11 +109,11 @@ void gather(std::span<const Ask> asks, const Tiles& tiles, const float* x, const
     gather_each(asks, tiles, x, y, to_x, to_y);
 }
 
-void scatter(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Found* found) {
+void scatter(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Signs* result) {
 #if defined(FRACSLICE_WIDE)
-    if (kWide) return (rim ? scatter_wide<true> : scatter_wide<false>)(asks, f, rim, tiles, found);
+    if (kWide) return (rim ? scatter_wide<true> : scatter_wide<false>)(asks, f, rim, tiles, result);
 #endif
-    scatter_each(asks, f, rim, tiles, found);
+    scatter_each(asks, f, rim, tiles, result);
 }
 
 }  // namespace fracslice::slices

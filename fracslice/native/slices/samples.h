@@ -1,4 +1,4 @@
-// Samples of tiles as a list, and what was found there back in the tiles.
+// Samples of tiles as a list, and their signs back in the tiles.
 #pragma once
 #include <cstddef>
 #include <span>
@@ -14,7 +14,7 @@ struct Ask {
 };
 
 // Those whose values are negative, those whose values are beyond a rim, and those that are so where it is calm.
-struct Found {
+struct Signs {
     uint64_t negative, beyond, calm;
 };
 
@@ -32,6 +32,6 @@ constexpr size_t kSlack = 64;  // numbers that `gather` may write and `scatter` 
 void gather(std::span<const Ask> asks, const Tiles& tiles, const float* x, const float* y, float* to_x, float* to_y);
 
 // The values `f` of the same samples, into the tiles. rim: null if none is beyond.
-void scatter(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Found* found);
+void scatter(std::span<const Ask> asks, const float* f, const Rim* rim, Tiles& tiles, Signs* result);
 
 }  // namespace fracslice::slices

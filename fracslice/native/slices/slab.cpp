@@ -109,12 +109,12 @@ void Slab::sample(int layer) {
 }
 
 std::vector<float> Slab::values_at(const std::vector<Spot>& spots) {
-    std::vector<float> found(spots.size());
+    std::vector<float> result(spots.size());
     auto where = [&](size_t i, float& x, float& y, float& z) {
         x = float(frame_.x0 + frame_.dx * spots[i].column), y = float(frame_.y0 + frame_.dy * spots[i].row), z = float(z_[layer_]);
     };
-    evaluate(spots.size(), where, [&](size_t i, float f) { found[i] = f; });
-    return found;
+    evaluate(spots.size(), where, [&](size_t i, float f) { result[i] = f; });
+    return result;
 }
 
 // --- top down ------------------------------------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ void Slab::fill(const Block& block) {
     for (int y = block.y; y < last; ++y) slices::fill(&where[size_t(y) * tx_ + block.x], n);
 }
 
-// The places whose middle, halfway between two layers, leaves open what is around it in them and between.
+// The places whose middle, halfway between two layers, does not decide the signs around it in and between these layers.
 void Slab::columns(int first, int last) {
     double height = (z_[last] - z_[first]) / 2;
     const double margin = bounds_.escape_time_only ? kAside : 1;
@@ -194,10 +194,10 @@ void Slab::quarter(double height) {
 }
 
 // The tiles of a pair of layers that are `height` from the middles of quarters; none where all of these say that it is empty,
-// unless one beside it is said to be full.
+// unless a tile beside it is taken to be full.
 void Slab::open(double height) {
     const float aside = float(square(height)) * factor(1, frame_), least = aside + float(2.25 * diagonal_ * square(bounds_.escape_time_only ? kBeside : 1));
-    // What is farther than its rim decides its quarter.
+    // A value beyond its rim decides its quarter.
     const float inside_reach = factor(bounds_.inside, frame_);
     grow(columns_.size());
     open_.decided.resize(count()), open_.reach.resize(count());

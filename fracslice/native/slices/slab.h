@@ -18,7 +18,7 @@ constexpr float kWhole = 32768;
 
 inline uint16_t share_of(float share) { return uint16_t(share * kWhole + 0.5f); }
 
-// What is sampled; may be called from many threads.
+// The field to sample; called from many threads.
 class Field {
  public:
     virtual ~Field() = default;
@@ -31,7 +31,7 @@ struct Frame {
     double x0, y0, dx, dy;
 };
 
-// How far a value reaches: what is nearer than |f| over a bound has its sign.
+// Lipschitz bounds of values: points nearer than |f| over a bound have the sign of f.
 struct ProbeBounds {
     double proven;           // for blocks of 16 pixels and more, and of 8 if nothing better is known
     double outside, inside;  // for smaller ones, by the value's sign
@@ -43,7 +43,7 @@ struct Spot {
     double column, row;
 };
 
-// The samples of a layer, tile by tile; neighbouring layers share what is found out first.
+// The samples of a layer, tile by tile. Neighbouring layers share the coarse probes.
 //
 // Top down, blocks of 64, 32 and 16 pixels over all layers, of 8 over groups of some and of 4 over pairs, then samples: one
 // of each block of 2, and the others. A value decides all samples within its reach; in an escape-time field it is calm where all
@@ -176,7 +176,7 @@ class Slab : private Tiles {
     std::optional<std::vector<Place>> torn_;  // of that group, once they are known
     int group_ = -1, pair_ = -1, layer_ = -1;  // their first layers; the layer
     std::vector<float> middles_;   // values in the middles of places, NaN between uses
-    std::vector<uint64_t> decided_;  // of opened tiles: what a value that reaches there implies, or what is known
+    std::vector<uint64_t> decided_;  // of opened tiles: samples that are evaluated or implied by a value in reach
     Rows<Ask> asks_;  // for use within a step
     // Of tiles in an escape-time field: the signs of blocks of 2, and of those in their rows; the blocks whose value is enough where
     // it is calm.

@@ -54,7 +54,7 @@ struct Tiles {
 
     size_t count() const { return place.size(); }
     void push(const Place& at, uint64_t signs);
-    void grow(size_t n);  // by so many tiles with no place yet, nothing known of them
+    void grow(size_t n);  // by n tiles without a place and without known samples
     void clear(size_t places);  // all of them empty
     void drop(size_t first, int columns);  // the tiles from there on; columns: of places
     void cut(size_t n);         // to the first n
@@ -64,7 +64,7 @@ struct Tiles {
 class Memory {
  public:
     Tiles take(size_t places);
-    // What was taken; there is room for it.
+    // Returns tiles that were taken; never allocates.
     void give(Tiles&& tiles) noexcept;
 
  private:

@@ -36,20 +36,20 @@ nb::tuple to_bricks(const Grid& grid) {
 }
 
 nb::tuple mesh(const Grid& grid, double adaptivity) {
-    GridMesh found;
+    GridMesh result;
     {
         nb::gil_scoped_release released;
-        found = mesh_of(*grid.vdb, adaptivity);
+        result = mesh_of(*grid.vdb, adaptivity);
     }
-    return nb::make_tuple(to_numpy<float>(found.points), to_numpy<uint32_t>(found.triangles),
-                          to_numpy<uint32_t>(found.quads));
+    return nb::make_tuple(to_numpy<float>(result.points), to_numpy<uint32_t>(result.triangles),
+                          to_numpy<uint32_t>(result.quads));
 }
 
 std::vector<Grid> parts(const Grid& grid) {
     nb::gil_scoped_release released;
-    std::vector<Grid> found;
-    for (auto& part : surfaces(*grid.vdb)) found.push_back({part});
-    return found;
+    std::vector<Grid> result;
+    for (auto& part : surfaces(*grid.vdb)) result.push_back({part});
+    return result;
 }
 
 }  // namespace

@@ -8,10 +8,10 @@ namespace {
 
 nb::object signs(const ValuesArray& values, int threads) {
     Bricks bricks{{nullptr, values.shape(0), nullptr, {}}, values.data()};
-    std::vector<Signs> found = unlocked(threads, [&] { return signs_of(bricks); });
-    Array<uint8_t> bytes(found.size(), sizeof(Signs));
-    std::copy_n(reinterpret_cast<const uint8_t*>(found.data()), found.size() * sizeof(Signs), bytes.data.get());
-    return to_numpy(std::move(bytes), {found.size(), kSide, kSide});
+    std::vector<Signs> result = unlocked(threads, [&] { return signs_of(bricks); });
+    Array<uint8_t> bytes(result.size(), sizeof(Signs));
+    std::copy_n(reinterpret_cast<const uint8_t*>(result.data()), result.size() * sizeof(Signs), bytes.data.get());
+    return to_numpy(std::move(bytes), {result.size(), kSide, kSide});
 }
 
 int64_t count_open_edges(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index) {

@@ -147,9 +147,9 @@ FloatGrid::Ptr read_grid(const std::string& path, const std::string& name) {
     try {
         openvdb::io::File file(path);
         file.open(false);  // no delayed loading: nothing may depend on the file once this returns
-        for (auto found = file.beginName(); found != file.endName(); ++found) {
-            if (!name.empty() && found.gridName() != name) continue;
-            auto grid = openvdb::gridPtrCast<FloatGrid>(file.readGrid(found.gridName()));
+        for (auto result = file.beginName(); result != file.endName(); ++result) {
+            if (!name.empty() && result.gridName() != name) continue;
+            auto grid = openvdb::gridPtrCast<FloatGrid>(file.readGrid(result.gridName()));
             if (grid) return grid;
         }
     } catch (const std::exception& error) {

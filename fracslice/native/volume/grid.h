@@ -25,7 +25,7 @@ struct BrickArrays {
     Array<float> values;
     Array<int32_t> index;
     std::array<size_t, 3> size;
-    std::array<int32_t, 3> shift;  // grid index of what is now point (0, 0, 0): the arrays start at zero
+    std::array<int32_t, 3> shift;  // grid index of point (0, 0, 0) of the arrays
 };
 
 struct GridMesh {
@@ -41,7 +41,7 @@ BrickArrays bricks_from_grid(const FloatGrid& grid);
 // Origin and spacing of the grid's points. Throws std::invalid_argument unless the voxels are axis-aligned cubes.
 std::pair<std::array<double, 3>, double> placement_of(const FloatGrid& grid);
 
-// Both throw std::runtime_error, naming the path; what OpenVDB would leave unsaid about a full disk is found out.
+// Both throw std::runtime_error with the path, also for a full disk, which OpenVDB does not report.
 void write_grid(const FloatGrid::Ptr& grid, const std::string& path, const Metadata& metadata);
 FloatGrid::Ptr read_grid(const std::string& path, const std::string& name);
 

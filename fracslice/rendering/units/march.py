@@ -55,8 +55,8 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     sign over less than two pixels, or within an empty ball, where only rounding causes it. The root is that
     of the secant.
 
-    Inside the solid (side -1), the field of a fractal is no useful bound: a hit is any change of sign, and
-    steps are at least two pixels.
+    Inside the solid (side -1), the field of a fractal is no useful bound: steps are at least two pixels, and
+    a step that leaves the solid by more is repeated up to the secant's root.
 
     Parameters
     ----------
@@ -96,9 +96,15 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     step = where(ahead < 0.5 * near, maximum(step, 2.0 * ahead), step)
     if glass:
         inside = side < 0.0
-        kept = kept | inside
-        hit = (inside & (radius < 0.0)) | (hit & (side > 0.0))
+        beyond = inside & (radius < 0.0)
+        near_exit = beyond & (stride <= 4.0 * near)
+        kept = (kept | inside) & ((radius >= 0.0) | (side > 0.0) | near_exit)
+        hit = near_exit | (hit & (side > 0.0))
         step = where(inside, maximum(step, 4.0 * near), step)
+        back = where(beyond, maximum(stride + ahead - 2.0 * near, 0.5 * (stride + ahead)), before)
+        after = where(kept, t + step, t - stride + back)
+        after = where(hit, t + where(radius < 0.0, ahead, 0.0), after)
+        return after, where(kept, radius, before), where(kept, step, back), where(hit, -1.0, 1.0)
     after = where(kept, t + step, t - stride + before)
     after = where(hit, t + where(radius < 0.0, ahead, 0.0), after)
     return after, where(kept, radius, before), where(kept, step, before), where(hit, -1.0, 1.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ...formulas.vocabulary import exp, log, maximum, minimum, where
 
 UNKNOWN = 1e30
@@ -111,3 +113,19 @@ def encoded(c):
     a = minimum(maximum(c, 0.0), 1.0)
     power = exp(log(maximum(a, 1e-6)) * 0.4166666666666667)
     return where(a > 0.0031308, 1.055 * power - 0.055, a * 12.92)
+
+
+def linear(colour: Sequence[float]) -> tuple[float, ...]:
+    """Convert an sRGB colour to linear light (IEC 61966-2-1).
+
+    Parameters
+    ----------
+    colour : sequence of float
+        sRGB components in [0, 1].
+
+    Returns
+    -------
+    tuple of float
+        Linear components.
+    """
+    return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)

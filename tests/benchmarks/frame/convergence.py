@@ -16,7 +16,8 @@ import numpy as np
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
 from fracslice.kernel.loop_linker import link_loops
 from fracslice.rendering import Renderer, packets
-from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, Plan, ordered
+from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, Plan
+from fracslice.rendering.tiles import ordered
 from fracslice.rendering.units.random import hashed
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work

@@ -46,7 +46,7 @@ def rows(
         timeline = Timeline(replace(scene, animation=Animation(duration=1.0, noise=noise)))
         job = FilmJob(timeline, (width, height), count, 24.0, device="cpu")
         work = Work(run.threads[0])
-        return np.array([255 * develop(job.light(k, work), scene.view.film) for k in range(number)])
+        return np.array([255 * develop(job.light(k, work), scene.view) for k in range(number)])
 
     (exact,) = levels("fixed", truth, 1)
     for noise in ("moving", "fixed"):

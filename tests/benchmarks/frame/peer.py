@@ -11,10 +11,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice.formulas import mandelbulb
-from fracslice.rendering.accumulator import GOAL, HostAccumulator, Plan, ordered
+from fracslice.rendering.accumulator import GOAL, Plan
 from fracslice.rendering.cpu import BLOCK, CpuTracer
+from fracslice.rendering.host_accumulator import HostAccumulator
 from fracslice.rendering.linking import link_frame
 from fracslice.rendering.optics import optics
+from fracslice.rendering.tiles import ordered
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 

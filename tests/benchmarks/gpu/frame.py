@@ -13,11 +13,12 @@ import numpy as np
 
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
-from fracslice.rendering.accumulator import CHANNELS, GOAL, Plan, ordered
+from fracslice.rendering.accumulator import CHANNELS, GOAL, Plan
 from fracslice.rendering.cpu import BLOCK, CpuTracer
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.optics import optics
+from fracslice.rendering.tiles import ordered
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 

@@ -13,7 +13,8 @@ import numpy as np
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
 from fracslice.rendering import Renderer
-from fracslice.rendering.accumulator import CHANNELS, GOAL, Plan, ordered
+from fracslice.rendering.accumulator import CHANNELS, GOAL, Plan
+from fracslice.rendering.tiles import ordered
 from fracslice.scene.view import Camera, Film, Light, View
 
 from ..runner import Row, Run, Spread

@@ -1,0 +1,65 @@
+"""Options of layers, which `slice` and `check` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .options import length
+
+if TYPE_CHECKING:
+    from fracslice.slicing import Stack
+    from fracslice.slicing.printers import Printer
+    from fracslice.work import Work
+
+LAYER, PIXEL_MM = "0.05mm", 0.05
+
+
+def shift(_: click.Context, __: click.Parameter, text: str) -> float:
+    """Parse a length, zero or negative ones included, into mm."""
+    from fracslice.scene.lengths import Shift
+
+    try:
+        return Shift(0.0, "").read(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: expected {error}") from None
+
+
+def heights(
+    context: click.Context, option: click.Parameter, text: str | None
+) -> tuple[float, float | None] | None:
+    """Parse a layer height into mm, or the minimum and maximum of adaptive layers."""
+    if text is None:
+        return None
+    low, _, high = text.partition("..")
+    least = length(context, option, low)
+    assert least is not None
+    return least, length(context, option, high) if ".." in text else None
+
+
+def printer(context: click.Context, _: click.Parameter, name: str | None) -> Printer | None:
+    """Look up a printer by name; "list" prints all printers and ends the command."""
+    from fracslice.slicing import printers
+
+    if name != "list":
+        return None if name is None else printers.printer(name)
+    for p in printers.PRINTERS.values():
+        volume = " x ".join(f"{r:g}" for r in p.build_volume)
+        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {volume} mm, .{p.file}")
+    context.exit()
+
+
+def printer_option(text: str) -> Callable[..., Any]:
+    """Decorator that adds --printer, parsed before missing options are reported. text: its help."""
+    names = "--printer", "machine"
+    return click.option(*names, callback=printer, is_eager=True, metavar="NAME|FILE", help=text)
+
+
+def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:
+    """Adaptive layers if a range of heights is given; otherwise the stack itself."""
+    from fracslice.slicing import adapted
+
+    most = options["layer"][1]
+    return stack if most is None else adapted(stack, most, work)

@@ -1,0 +1,64 @@
+"""Kaleidoscopic fractals: folded into the part of space nearest to a corner of a Platonic solid, turned and
+enlarged about the corner, again and again (Knighty 2010, "Kaleidoscopic (escape time) IFS",
+fractalforums.com). Without the turn they are the flakes of `flakes`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .flakes import CORNERS, MIRRORS, folded
+from .orbits import orbit
+from .parameters import Number
+from .verbs import mirror, turn
+
+
+def turned(scale: float) -> dict[str, Any]:
+    """Parameters of a kaleidoscopic fractal."""
+    return {
+        "scale": Number(scale, "how much each step enlarges", least=1.1, most=10),
+        "angle": Number(0.0, "rotation about the corner's axis in each step, degrees"),
+    }
+
+
+TETRAHEDRON, OCTAHEDRON = MIRRORS["tetrahedron"], MIRRORS["octahedron"]
+ICOSAHEDRON = DODECAHEDRON = MIRRORS["icosahedron"]
+CORNER = {solid: folded(solid, point) for solid, point in CORNERS.items()}
+LENGTH = {solid: math.hypot(*point) for solid, point in CORNER.items()}
+TETRAHEDRON_AXIS, OCTAHEDRON_AXIS, DODECAHEDRON_AXIS, ICOSAHEDRON_AXIS = (
+    (x / LENGTH[solid], y / LENGTH[solid], z / LENGTH[solid]) for solid, (x, y, z) in CORNER.items()
+)
+"""Directions of the corners, which are on the unit sphere."""
+
+
+@orbit(**turned(2.0))
+def kifs_tetrahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
+    """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 2 is measured."""
+    for a, b, d in TETRAHEDRON:
+        w = mirror(w, (a, b, d))
+    return scale * turn(w, TETRAHEDRON_AXIS, angle) - (scale - 1.0) * TETRAHEDRON_AXIS
+
+
+@orbit(**turned(2.0))
+def kifs_octahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
+    """The octahedron in a kaleidoscope (Knighty 2010). L = 2 is measured."""
+    for a, b, d in OCTAHEDRON:
+        w = mirror(w, (a, b, d))
+    return scale * turn(w, OCTAHEDRON_AXIS, angle) - (scale - 1.0) * OCTAHEDRON_AXIS
+
+
+@orbit(**turned(2.0))
+def kifs_dodecahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
+    """The dodecahedron in a kaleidoscope (Knighty 2010). L = 2 is measured."""
+    for a, b, d in DODECAHEDRON:
+        w = mirror(w, (a, b, d))
+    return scale * turn(w, DODECAHEDRON_AXIS, angle) - (scale - 1.0) * DODECAHEDRON_AXIS
+
+
+@orbit(**turned(2.0))
+def kifs_icosahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
+    """The icosahedron in a kaleidoscope (Knighty 2010). L = 2 is measured."""
+    for a, b, d in ICOSAHEDRON:
+        w = mirror(w, (a, b, d))
+    return scale * turn(w, ICOSAHEDRON_AXIS, angle) - (scale - 1.0) * ICOSAHEDRON_AXIS

@@ -1,0 +1,120 @@
+"""Continuation of rays at surfaces, in a render kernel."""
+
+from __future__ import annotations
+
+from ..kernel.linker import Linker
+from .colours import Look
+from .drawn import Drawn
+from .units import glossy, lights, shade
+
+CHANNELS = "rgb"
+
+
+def divided(linker: Linker) -> list[str]:
+    """Return the lines that divide a colour into what the surface reflects and what it scatters.
+
+    Parameters
+    ----------
+    linker : Linker
+        Linker of the kernel.
+
+    Returns
+    -------
+    list of str
+        Kernel source lines for the reflectance k at normal incidence, the emitted colour e and the scattered
+        colour c.
+    """
+    for function in (shade.fresnel, glossy.tinted):
+        linker.share(function)
+    lines = ["facing = -(dx * nx + dy * ny + dz * nz)", *(f"e{c} = c{c}" for c in CHANNELS)]
+    lines += [f"k{c} = reflect + metallic * (c{c} - reflect)" for c in CHANNELS]
+    return lines + [f"c{c} = c{c} * (1.0 - metallic) * (1.0 - tinted(facing, k{c}))" for c in CHANNELS]
+
+
+def onward(linker: Linker, drawn: Drawn, look: Look) -> list[str]:
+    """Return the lines for the ray that continues.
+
+    Parameters
+    ----------
+    linker : Linker
+        Linker of the kernel.
+    drawn : Drawn
+        Random numbers of a bounce.
+    look : Look
+        Materials.
+
+    Returns
+    -------
+    list of str
+        Kernel source lines for the throughput t, the origin o, the direction e and the side es.
+    """
+    for function in (shade.mirrored, shade.fresnel, shade.bent, shade.goes_on, shade.reflects):
+        linker.share(function)
+    (u,) = drawn.names(1) if look.inside else ("t",)
+    lines, out = [], ""
+    if look.glossy:
+        lines += _reflected(linker, drawn)
+    elif not look.inside:
+        lines.append("tr, ex, ey, ez = reflects(dx, dy, dz, nx, ny, nz, reflect)")
+        lines += ["tg, tb, es = tr, tr, side", *(f"{c} = {c} * (1.0 - t{c})" for c in CHANNELS)]
+    if look.paths:
+        lines += _scattered(linker, drawn)
+    if look.inside:
+        out = "out * "
+        lines += _refracted(u, look.glossy)
+    return [*lines, *(f"o{a} = {a} + 3.0 * h * {out}n{a}" for a in "xyz")]
+
+
+def _reflected(linker: Linker, drawn: Drawn) -> list[str]:
+    """Lines for reflection by microfacets."""
+    for function in (glossy.width, glossy.hidden, lights.frame, glossy.glossy):
+        linker.share(function)
+    u, v = drawn.names(2)
+    lines = [f"ex, ey, ez, weight, half = glossy(dx, dy, dz, nx, ny, nz, roughness, {u}, {v})", "es = side"]
+    return lines + [f"t{c} = weight * tinted(half, k{c})" for c in CHANNELS]
+
+
+def _scattered(linker: Linker, drawn: Drawn) -> list[str]:
+    """Lines that choose between the reflected ray and a scattered one, and end some rays.
+
+    One sample of both (Veach 1997), and Russian roulette with the probability of the throughput (Arvo and
+    Kirk 1990).
+    """
+    for function in (lights.disc, lights.upward):
+        linker.share(function)
+    u, v, choice, life = drawn.names(4)
+    lines = [
+        f"wx, wy, wz = upward(nx, ny, nz, {u}, {v})",
+        "mirrors = tinted(facing, maximum(maximum(kr, kg), kb))",
+        "scatters = maximum(maximum(cr, cg), cb)",
+        "share = mirrors / maximum(mirrors + scatters, 1e-6)",
+        f"chosen = {choice} < share",
+        *(f"e{a} = where(chosen, e{a}, w{a})" for a in "xyz"),
+        *(
+            f"t{c} = where(chosen, t{c} / maximum(share, 1e-6), c{c} / maximum(1.0 - share, 1e-6))"
+            for c in CHANNELS
+        ),
+        "alive = minimum(maximum(maximum(tr, tg), tb), 1.0)",
+    ]
+    return lines + [f"t{c} = where({life} < alive, t{c} / maximum(alive, 1e-6), 0.0)" for c in CHANNELS]
+
+
+def _refracted(u: str, opaque: bool) -> list[str]:
+    """Lines for transparent materials; opaque ones keep their ray if they have one."""
+    ray = f"goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, {u})"
+    if not opaque:
+        return [
+            f"share, ex, ey, ez, out = {ray}",
+            "es = side * out",
+            *(f"t{c} = share * where(side < 0.0, exp(-absorb{c} * t), 1.0 + 0.0 * t)" for c in CHANNELS),
+            *(f"{c} = {c} * where(side < 0.0, 0.0, 1.0 - share)" for c in CHANNELS),
+        ]
+    return [
+        f"part, gx, gy, gz, out = {ray}",
+        "pane = (clear > 0.0) | (side < 0.0)",
+        "out = where(pane, out, 1.0)",
+        "es = side * out",
+        *(f"e{a} = where(pane, g{a}, e{a})" for a in "xyz"),
+        *(f"t{c} = where(pane, part * where(side < 0.0, exp(-absorb{c} * t), 1.0), t{c})" for c in CHANNELS),
+        *(f"{c} = {c} * where(pane, where(side < 0.0, 0.0, 1.0 - part), 1.0)" for c in CHANNELS),
+    ]

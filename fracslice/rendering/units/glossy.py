@@ -1,0 +1,145 @@
+"""Reflection of rough surfaces by microfacets.
+
+Trowbridge and Reitz 1975 (GGX of Walter et al. 2007), with Smith's height-correlated shadowing and masking.
+"""
+
+from __future__ import annotations
+
+from ...formulas.vocabulary import cos, maximum, rsqrt, sin, sqrt, where
+from .lights import TURN, frame
+from .normal import normalised
+from .shade import fresnel, mirrored
+
+SMOOTHEST = 1e-3
+"""Smallest square of the roughness."""
+
+
+def width(rough):
+    """Return the parameter of the distribution: the square of the roughness (Burley 2012).
+
+    Parameters
+    ----------
+    rough : float
+        Roughness, 0 to 1.
+
+    Returns
+    -------
+    float
+        Width of the distribution of slopes.
+    """
+    return maximum(rough * rough, SMOOTHEST)
+
+
+def hidden(cosine, a):
+    """Smith's Lambda: the area of microfacets hidden in a direction, relative to the visible one.
+
+    Parameters
+    ----------
+    cosine : float
+        Cosine of the angle between the direction and the normal.
+    a : float
+        Width of the distribution.
+
+    Returns
+    -------
+    float
+        Lambda.
+    """
+    c2 = maximum(cosine * cosine, 1e-8)
+    return 0.5 * (sqrt(1.0 + a * a * maximum(1.0 - c2, 0.0) / c2) - 1.0)
+
+
+def tinted(cosine, least):
+    """Reflectance at an angle of incidence; 0 for a surface that does not reflect.
+
+    Parameters
+    ----------
+    cosine : float
+        Cosine of the angle of incidence.
+    least : float
+        Reflectance at normal incidence.
+
+    Returns
+    -------
+    float
+        Reflectance.
+    """
+    return where(least > 0.0, fresnel(cosine, least), 0.0)
+
+
+def highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough):
+    """Return the reflection of a light, but for Fresnel's factor.
+
+    Parameters
+    ----------
+    nx, ny, nz : float
+        Unit normal.
+    dx, dy, dz : float
+        Unit direction of the ray.
+    lx, ly, lz : float
+        Unit direction to the light.
+    rough : float
+        Roughness.
+
+    Returns
+    -------
+    value, cosine : float
+        Factor on the light (pi times the reflectance distribution times the cosine), and the cosine of the
+        angle between the light and the microfacet.
+    """
+    a = width(rough)
+    hx, hy, hz = normalised(lx - dx, ly - dy, lz - dz)
+    nl = nx * lx + ny * ly + nz * lz
+    nv = maximum(-(nx * dx + ny * dy + nz * dz), 1e-4)
+    nh = nx * hx + ny * hy + nz * hz
+    spread = nh * nh * (a * a - 1.0) + 1.0
+    facets = a * a / maximum(spread * spread, 1e-12)
+    seen = 1.0 / (1.0 + hidden(nv, a) + hidden(nl, a))
+    return where(nl > 0.0, 0.25 * facets * seen / nv, 0.0), lx * hx + ly * hy + lz * hz
+
+
+def glossy(dx, dy, dz, nx, ny, nz, rough, u, v):
+    """Sample a reflected ray by the visible microfacets (Heitz 2018).
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction of the ray.
+    nx, ny, nz : float
+        Unit normal.
+    rough : float
+        Roughness.
+    u, v : float
+        Random numbers in [0, 1).
+
+    Returns
+    -------
+    x, y, z : float
+        Unit direction of reflection.
+    weight, cosine : float
+        Factor on the light but for Fresnel's, and the cosine of the angle between ray and microfacet.
+    """
+    a = width(rough)
+    ax, ay, az, bx, by, bz = frame(nx, ny, nz)
+    vx, vy = -(ax * dx + ay * dy + az * dz), -(bx * dx + by * dy + bz * dz)
+    vz = maximum(-(nx * dx + ny * dy + nz * dz), 1e-4)
+    px, py, pz = normalised(a * vx, a * vy, vz)
+    across = px * px + py * py
+    over = where(across > 1e-12, rsqrt(maximum(across, 1e-12)), 0.0)
+    tx, ty = where(across > 1e-12, -py * over, 1.0), px * over
+    sx, sy, sz = -pz * ty, pz * tx, px * ty - py * tx
+    r = sqrt(u)
+    p, q = r * cos(TURN * v), r * sin(TURN * v)
+    s = 0.5 * (1.0 + pz)
+    q = (1.0 - s) * sqrt(maximum(1.0 - p * p, 0.0)) + s * q
+    w = sqrt(maximum(1.0 - p * p - q * q, 0.0))
+    mx, my, mz = p * tx + q * sx + w * px, p * ty + q * sy + w * py, q * sz + w * pz
+    mx, my, mz = normalised(a * mx, a * my, maximum(mz, 1e-6))
+    hx = mx * ax + my * bx + mz * nx
+    hy = mx * ay + my * by + mz * ny
+    hz = mx * az + my * bz + mz * nz
+    ex, ey, ez = mirrored(dx, dy, dz, hx, hy, hz)
+    nl = nx * ex + ny * ey + nz * ez
+    seen = 1.0 + hidden(vz, a)
+    weight = where(nl > 0.0, seen / (seen + hidden(nl, a)), 0.0)
+    return ex, ey, ez, weight, -(dx * hx + dy * hy + dz * hz)

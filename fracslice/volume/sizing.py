@@ -1,0 +1,170 @@
+"""Size and orientation of an object: mm per scene unit, compensation of shrinkage, and the direction up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SliceError
+from ..formulas import sphere, transform
+from ..formulas.algebra import length
+from ..formulas.box import Box, Triple
+from ..formulas.transforms import affine
+from ..kernel import Field
+from ..meshjob import RESOLUTION
+from ..scene import Scene
+from ..work import Work
+from . import with_depths
+from .extent import extent
+
+SAME: Triple = (1.0, 1.0, 1.0)
+UP: Triple = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Sizing:
+    """Size of an object.
+
+    Attributes
+    ----------
+    side : float
+        Longest side before compensation, mm; approximate if `unit` is given.
+    unit : float or None
+        mm per scene unit before compensation; None if `side` determines it.
+    factors : tuple of float
+        Compensation of shrinkage along x, y and z of the print.
+    """
+
+    side: float
+    unit: float | None = None
+    factors: Triple = SAME
+
+    @property
+    def longest(self) -> float:
+        """Approximate longest side, mm."""
+        return self.side * max(self.factors)
+
+    @property
+    def stretch(self) -> Triple:
+        """Factors of the field along each axis, of which the largest is 1."""
+        x, y, z = (factor / max(self.factors) for factor in self.factors)
+        return x, y, z
+
+    def scale(self, box: Box) -> float:
+        """Scale of the stretched field.
+
+        Parameters
+        ----------
+        box : Box
+            Bounds of the stretched object, scene units.
+
+        Returns
+        -------
+        float
+            mm per scene unit.
+        """
+        most = max(self.factors)
+        if self.unit is not None:
+            return self.unit * most
+        return self.side * most / max(s / f for s, f in zip(box.size, self.stretch, strict=True))
+
+
+def sizing(
+    scene: Scene, size_mm: float | None = None, factors: Triple = SAME, work: Work | None = None
+) -> Sizing:
+    """Size of the object of a scene. A scene with a unit is measured.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    size_mm : float, optional
+        Longest side, mm; by default the size or unit of the scene.
+    factors : tuple of float, optional
+        Compensation of shrinkage along x, y and z.
+    work : Work, optional
+        Threads and cancellation.
+
+    Returns
+    -------
+    Sizing
+
+    Raises
+    ------
+    VolumeError
+        If the scene is empty or unbounded.
+    Cancelled
+        When the work is cancelled.
+    """
+    side, unit = size_mm or scene.size_mm, None if size_mm else scene.unit_mm
+    if side is None or unit is not None:
+        assert unit is not None
+        side = unit * max(extent(with_depths(scene.root, work), RESOLUTION, work).box.size)
+    return Sizing(side, unit, factors)
+
+
+def oriented(root: Field, up: Triple, stretch: Triple = SAME, work: Work | None = None) -> Field:
+    """Rotate a field by the shortest way so that a direction points along z, then stretch it.
+
+    Parameters
+    ----------
+    root : Field
+        The field.
+    up : tuple of float
+        Direction.
+    stretch : tuple of float, optional
+        Factors along x, y and z.
+    work : Work, optional
+        Threads and cancellation.
+
+    Returns
+    -------
+    Field
+        The changed field, with the depths of the unchanged one; `root` itself if nothing changes.
+
+    Raises
+    ------
+    SliceError
+        If a field without a scene tree must be changed.
+    """
+    turn = _turn(up)
+    if turn[3] == 0 and stretch == SAME:
+        return root
+    if root.tree is None:
+        raise SliceError("up: expected a scene of formulas")
+    made = with_depths(root.tree, work)
+    if turn[3]:
+        made = transform(made, rotate=turn)
+    return made if stretch == SAME else transform(made, scale=stretch)
+
+
+def orientation(up: Triple, factors: Triple = SAME) -> NDArray[np.float64]:
+    """Linear map of `oriented`, for points.
+
+    Parameters
+    ----------
+    up : tuple of float
+        Direction.
+    factors : tuple of float, optional
+        Factors along x, y and z after the rotation.
+
+    Returns
+    -------
+    ndarray of float64, shape (3, 3)
+        Matrix by which rows of points are multiplied on the right.
+    """
+    linear, _ = affine(transform(sphere(), rotate=_turn(up)))
+    matrix: NDArray[np.float64] = (linear * np.array(factors)[:, None]).T
+    return matrix
+
+
+def _turn(up: Triple) -> tuple[float, float, float, float]:
+    """Axis and angle, degrees, of the shortest rotation of a direction to z."""
+    direction = np.asarray(up, float) / length(np.asarray(up, float))
+    axis = np.cross(direction, UP)
+    angle = math.degrees(math.atan2(length(axis), float(direction[2])))
+    x, y, z = axis.tolist() if length(axis) > 0 else (1.0, 0.0, 0.0)
+    return x, y, z, angle

@@ -1,0 +1,40 @@
+"""Small jobs import no more modules than they need: importing takes most of their time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BALL = '<scene version="1"><solid size="20mm"><sphere/></solid></scene>'
+MODULES = """
+import sys
+from fracslice.cli.main import run
+assert run(sys.argv[1:]) == 0
+print(*sorted(sys.modules))
+"""
+JOBS = {
+    "help": ("--help",),
+    "mesh": ("mesh", "ball.xml", "-o", "ball.stl", "--resolution", "16", "--quiet"),
+    "render": ("render", "ball.xml", "-o", "ball.png", "--size", "16x16", "--samples", "1", "--quiet"),
+}
+UNUSED = {
+    "help": ("numpy", "llvmlite", "concurrent", "json", "tempfile", "fracslice.scene", "fracslice.kernel"),
+    "mesh": ("scipy", "email", "importlib.metadata", "subprocess", "PIL", "rich", "json"),
+    "render": ("scipy", "email", "importlib.metadata", "numpy.ma", "subprocess", "rich", "fracslice._vdb"),
+}
+"""Packages that take long to import, by the job that has no use for them."""
+MOST = {"help": 160, "mesh": 480, "render": 450}
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_a_small_job_imports_what_it_needs(job: str, tmp_path: Path) -> None:
+    (tmp_path / "ball.xml").write_text(BALL)
+    words = [sys.executable, "-c", MODULES, *JOBS[job]]
+    run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    found = run.stdout.splitlines()[-1].split()
+    for package in UNUSED[job]:
+        assert not [name for name in found if name == package or name.startswith(package + ".")], package
+    assert len(found) <= MOST[job]

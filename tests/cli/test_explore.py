@@ -1,0 +1,80 @@
+"""fracslice explore: variations of a scene on a contact sheet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fracslice.cli.main import run
+from PIL import Image
+
+from fracslice.formulas import julia, mandelbulb, material, menger, sphere, superquadric, transform, union
+from fracslice.scene import Scene, read
+from fracslice.scene.variation import varied
+
+SOURCE = '<scene version="1"><solid size="40mm"><superquadric exponent="3"/></solid></scene>'
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    path = tmp_path / "own.xml"
+    path.write_text(SOURCE)
+    return path
+
+
+def explored(source: Path, name: str, *options: str) -> Path:
+    target = source.parent / f"{name}.png"
+    small = ("--size", "24x18", "--samples", "1", "--quiet")
+    assert run(["explore", str(source), "-o", str(target), *small, *options]) == 0
+    return target
+
+
+def test_a_sheet_has_a_scene_for_each_picture_and_can_be_gone_on_from(source: Path) -> None:
+    sheet = explored(source, "sheet", "--count", "5")
+    assert Image.open(sheet).size == (72, 36)
+    scenes = [read(path) for path in sorted(sheet.with_suffix("").iterdir())]
+    assert [path.name for path in sorted(sheet.with_suffix("").iterdir())] == [f"0{k}.xml" for k in range(5)]
+    assert scenes[0] == read(source) and len({scene.root["exponent"] for scene in scenes}) == 5
+    onward = explored(source, "onward", "--count", "2", "--from", str(sheet.with_suffix("") / "03.xml"))
+    assert read(onward.with_suffix("") / "00.xml") == scenes[3]
+
+
+def test_a_seed_makes_the_same_sheet_whatever_the_count(source: Path) -> None:
+    a, b, c = (explored(source, n, "--count", k, "--seed", s) for n, k, s in ("a21", "b31", "c22"))
+    first, same, other = ((p.with_suffix("") / "01.xml").read_text() for p in (a, b, c))
+    assert first == same != other
+
+
+def test_nothing_is_written_for_bad_input(source: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = sorted(source.parent.iterdir())
+    target = str(source.parent / "sheet.png")
+    for options in (["-o", "x.jpg"], ["-o", target, "--spread", "0"], ["-o", target, "--from", "no.xml"]):
+        assert run(["explore", str(source), *options]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+    assert sorted(source.parent.iterdir()) == before
+
+
+def test_numbers_stay_within_their_ranges_and_the_look_stays() -> None:
+    root = union(
+        material(transform(superquadric(exponent=90), translate=(0.3, 0, 0)), colour=(0.2, 0.3, 0.4)),
+        julia(iterations="auto"),
+        menger(level=3),
+        sphere(radius=0.5),
+        smooth=0.05,
+    )
+    for k in range(4):
+        new = varied(Scene(root, 40.0), (0, k), 2.0).root
+        painted, bulb, sponge, _ = new.children
+        assert painted.values == root.children[0].values
+        assert painted.children[0].values == root.children[0].children[0].values
+        assert 2 <= painted.children[0].children[0]["exponent"] <= 100
+        assert bulb["iterations"] == "auto" and max(map(abs, bulb["c"])) <= 4
+        assert 0 <= sponge["level"] <= 20 and new != root
+
+
+def test_every_variation_holds_a_solid() -> None:
+    for k in range(3):
+        root = varied(Scene(mandelbulb(iterations=4, julia=(0.9, -0.6, 0.5)), 40.0), (1, k), 1.0).root
+        points = np.random.default_rng(5).uniform(root.bounds.box.lo, root.bounds.box.hi, (20000, 3))
+        assert (root.distance(points) < 0).any()

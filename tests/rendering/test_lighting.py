@@ -1,0 +1,118 @@
+"""Light, fog and background as documented."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fracslice.errors import RenderError
+from fracslice.formulas import Node, box, material, plane, repeat, sphere, union
+from fracslice.rendering import Pass, Renderer, develop, progressive
+from fracslice.rendering.units.pixel import linear
+from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
+from fracslice.work import Work
+
+SIZE = (24, 18)
+CAMERA = Camera(eye=(0, -4, 0), fov=40)
+SKY = Light(kind="sky", colour=(0.1, 0.2, 0.9), horizon=(0.9, 0.5, 0.2), ground=(0.1, 0.1, 0.1))
+
+
+def rendered(root: Node, view: View, samples: int = 1, size: tuple[int, int] = SIZE) -> Pass:
+    *_, last = Renderer(root, view, size, Work(1), "cpu").passes(samples)
+    return last
+
+
+def test_fog_leaves_the_sky_and_hides_surfaces_in_its_colour() -> None:
+    ground, view = plane(offset=-1), View(camera=CAMERA, lights=(SKY,))
+    clear = rendered(ground, view)
+    sky = clear.alpha == 0
+    assert 0.3 < sky.mean() < 0.7
+    for colour in (None, (0.2, 0.9, 0.3)):
+        foggy = rendered(ground, replace(view, fog=Fog(colour=colour, density=5)))
+        assert (foggy.image[sky] == clear.image[sky]).all()
+        rows = foggy.image[~sky]
+        if colour:
+            assert np.allclose(rows, linear(colour), atol=1e-3)
+        else:
+            behind = rendered(sphere(radius=0.01), replace(view, fog=None))
+            assert np.allclose(rows, behind.image[~sky], atol=1e-3), "the colour of the sky behind"
+
+
+@pytest.mark.parametrize("distance", [2.0, 2.3, 4.0])
+def test_a_ball_that_refracts_nothing_is_invisible(distance: float) -> None:
+    """Its rays enter and leave once, at any distance, and meet no fog inside."""
+    ball, camera = material(sphere(radius=1), clear=1, index=1), replace(CAMERA, eye=(0, -distance, 0), fov=8)
+    view = View(camera=camera, lights=(SKY,))
+    seen, behind = (rendered(root, view).image for root in (ball, sphere(radius=1e-6)))
+    assert np.allclose(seen, behind, rtol=0.01)
+    foggy = rendered(ball, replace(view, fog=Fog(colour=(1, 0, 0), density=1))).image
+    air = np.exp(1 - distance)
+    assert np.allclose(foggy[9, 12], air * behind[9, 12] + (1 - air) * np.array((1, 0, 0)), atol=0.02)
+
+
+@pytest.mark.parametrize("colour", [(1.0, 1.0, 1.0), (0.2, 0.6, 0.8)])
+def test_the_background_is_shown_as_it_is(colour: tuple[float, float, float]) -> None:
+    film = Film(background=colour, exposure=1.5, bloom=0.5)
+    seen = rendered(sphere(radius=0.3), View(camera=CAMERA, film=film, lights=(Light(),)))
+    assert (seen.shown[0, 0] == np.round(255 * np.array(colour))).all()
+    assert (seen.shown[9, 12] != seen.shown[0, 0]).any()
+
+
+def test_a_transparent_film_holds_the_light_of_the_object_alone() -> None:
+    lights = (SKY, Light(shadows="no"))
+    view = View(camera=CAMERA, film=Film(alpha="yes"), lights=lights)
+    clear, plain = (rendered(sphere(), v, 16) for v in (view, View(camera=CAMERA, lights=lights)))
+    empty, full = clear.alpha == 0, clear.alpha == 1
+    assert empty.any() and full.any() and not clear.image[empty].any()
+    assert np.allclose(clear.image[full], plain.image[full])
+    shown = clear.developed
+    assert shown.shape == (*SIZE[::-1], 4)
+    assert np.allclose(shown[..., 3], clear.alpha)
+    assert np.allclose(shown[full, :3], plain.developed[full], atol=1e-6)
+
+
+def test_depth_and_distance_are_in_scene_units() -> None:
+    view = View(camera=CAMERA, shading=Shading(mode="depth"))
+    ball = sphere(radius=1)
+    depth = rendered(ball, view, 1, (25, 19)).image[..., 0]
+    assert depth[9, 12] == pytest.approx(3, abs=1e-3)
+    assert depth[0, 0] == 1e10
+    far = rendered(ball, replace(view, shading=Shading(mode="distance")), 1, (25, 19)).image[..., 0]
+    hit = depth < 1e9
+    assert (far[hit] >= depth[hit]).all() and far[hit].max() > depth[hit].max()
+    place = rendered(ball, replace(view, shading=Shading(mode="position")), 1, (25, 19)).image
+    assert np.allclose(np.linalg.norm(place[hit], axis=1), 1, atol=1e-3)
+    assert np.allclose(np.linalg.norm(place[hit] - CAMERA.eye, axis=1), far[hit], atol=1e-3)
+
+
+def test_a_scene_without_end_is_lit_from_the_camera() -> None:
+    lattice = repeat(sphere(radius=0.3), period=(1, 1, 1))
+    camera = Camera(eye=(0.5, 0.5, 0.5), target=(2.5, 1.5, 1), fov=60)
+    first = rendered(lattice, View(camera=camera), 1)
+    again = rendered(lattice, View(camera=camera), 16)
+    assert first.developed.mean() > 0.2
+    assert np.median(abs(first.developed - again.developed)) < 0.03, "no sparkles"
+    assert (rendered(box(), View()).image > 0).any()
+
+
+def test_a_light_at_the_camera_has_its_strength_at_the_target() -> None:
+    wall = box(size=(9, 0.2, 9))
+    light = Light(kind="camera", strength=0.5)
+    view = View(camera=replace(CAMERA, target=(0, -0.1, 0)), lights=(light,), film=Film(tone="none"))
+    white = material(wall, colour=(1, 1, 1), specular=0)
+    assert rendered(white, view, 1, (5, 5)).image[2, 2, 0] == pytest.approx(0.5, rel=1e-3)
+
+
+def test_a_picture_larger_than_the_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progressive, "available_bytes", lambda: 8 << 30)
+    with pytest.raises(RenderError, match="size: 1,074 million pixels need 64 GB of memory, 9 GB are free"):
+        Renderer(sphere(), View(), (32768, 32768), Work(1), "cpu")
+
+
+def test_albedo_is_the_colour_without_light() -> None:
+    scene = union(material(sphere(radius=0.5), colour=(0.9, 0.2, 0.1)), plane(offset=-3))
+    seen = rendered(scene, View(camera=CAMERA, shading=Shading(mode="albedo")), 1, (25, 19))
+    assert np.allclose(seen.image[9, 12], linear((0.9, 0.2, 0.1)), atol=1e-6)
+    assert np.allclose(develop(seen.mean, seen.view)[9, 12], (0.9, 0.2, 0.1), atol=1e-4)

@@ -1,0 +1,101 @@
+"""Scattered and reflected light: energy and reciprocity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import Node, box, difference, material, sphere
+from fracslice.rendering import Renderer
+from fracslice.rendering.units.glossy import glossy, highlight
+from fracslice.rendering.units.pixel import linear
+from fracslice.scene.view import Camera, Light, Shading, View
+from fracslice.work import Work
+
+WHITE = (1.0, 1.0, 1.0)
+FURNACE = (Light(kind="sky", colour=WHITE, horizon=WHITE, ground=WHITE),)
+CAMERA = Camera(eye=(0, -4, 0), fov=20)
+NORMAL = (0.0, 0.0, 1.0)
+
+
+def directions(count: int, seed: int) -> np.ndarray:
+    """Random unit vectors of the upper half space, [3, count]."""
+    d = np.random.default_rng(seed).normal(size=(3, count))
+    d[2] = abs(d[2]) + 0.05
+    return np.asarray(d / np.linalg.norm(d, axis=0))
+
+
+def albedo(rough: float, sine: float) -> float:
+    """Share of the light that is reflected towards an angle, by quadrature over the other one."""
+    z, turn = np.meshgrid((np.arange(4000) + 0.5) / 4000, (np.arange(200) + 0.5) / 200 * 2 * np.pi)
+    r = np.sqrt(1 - z * z)
+    ray = (sine, 0.0, -np.sqrt(1 - sine * sine))
+    value, _ = highlight(*NORMAL, *ray, r * np.cos(turn), r * np.sin(turn), z, rough)
+    return float(value.mean() * 2 * np.pi / np.pi)
+
+
+@pytest.mark.parametrize("rough", [0.2, 0.5, 1.0])
+def test_reflection_is_reciprocal(rough: float) -> None:
+    light, eye = directions(500, 1), directions(500, 2)
+    there, back = (highlight(*NORMAL, *(-v), *to, rough)[0] / to[2] for to, v in ((light, eye), (eye, light)))
+    assert np.allclose(there, back, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("rough", "sine"), [(0.3, 0.0), (0.5, 0.6), (1.0, 0.9)])
+def test_sampled_reflection_has_the_energy_of_its_distribution(rough: float, sine: float) -> None:
+    u, v = np.random.default_rng(3).random((2, 200_000))
+    ray = (sine + 0 * u, 0 * u, -np.sqrt(1 - sine * sine) + 0 * u)
+    normal = (0 * u, 0 * u, 1 + 0 * u)
+    *_, weight, _ = glossy(*ray, *normal, rough, u, v)
+    assert weight.max() <= 1 + 1e-9
+    assert weight.mean() == pytest.approx(albedo(rough, sine), abs=0.005)
+
+
+def seen(
+    root: Node, shading: Shading, samples: int = 64, camera: Camera = CAMERA, **view: object
+) -> np.ndarray:
+    """Light of the pixels that the object fills."""
+    whole = View(camera=camera, shading=shading, **{"lights": FURNACE, **view})  # type: ignore[arg-type]
+    *_, last = Renderer(root, whole, (16, 16), Work(1), "cpu").passes(samples, tolerance=0.0)
+    return np.asarray(last.image[last.alpha == 1])
+
+
+@pytest.mark.parametrize("rough", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("paths", ["no", "yes"])
+def test_metal_in_a_white_furnace_returns_no_more_than_it_receives(rough: float, paths: str) -> None:
+    ball = material(sphere(), colour=WHITE, metallic=1, roughness=rough, specular=0)
+    light = seen(ball, Shading(paths=paths, bounces=1))
+    assert light.max() < 1.0001
+    middle = seen(ball, Shading(paths=paths, bounces=1), camera=replace(CAMERA, fov=2))
+    assert middle.mean() == pytest.approx(albedo(rough, 0.0) if rough else 1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("reflect", [0.0, 0.3])
+def test_a_white_ball_vanishes_in_a_white_furnace(reflect: float) -> None:
+    """What it does not reflect, it scatters."""
+    ball = material(sphere(), colour=WHITE, reflect=reflect, specular=0)
+    assert np.allclose(seen(ball, Shading(paths="yes", bounces=1)).mean(0), 1, atol=0.01)
+
+
+def test_light_in_a_closed_room_is_the_sum_of_all_reflections() -> None:
+    """Glowing walls of albedo a: L = e (1 + a + a^2 + ...)."""
+    albedo_, glow = linear((0.6,))[0], 0.5
+    room = material(
+        difference(box(size=(4, 4, 4)), box(size=(3, 3, 3))), colour=(0.6, 0.6, 0.6), glow=glow, specular=0
+    )
+    camera = replace(CAMERA, eye=(0.3, -0.4, 0.2), target=(0, 1, 0.1), fov=80)
+    light = seen(room, Shading(paths="yes", bounces=12), 256, camera, lights=(Light(strength=0),))
+    assert light.mean() == pytest.approx(glow * albedo_ / (1 - albedo_), rel=0.01)
+
+
+def test_a_glowing_surface_lights_the_others_on_paths_only() -> None:
+    lamp = material(box(size=(2, 0.1, 2)), glow=3, colour=WHITE)
+    scene = lamp | material(sphere(radius=0.8), specular=0) + (0, 2, 0)
+    camera = replace(CAMERA, eye=(0, 6, 2), target=(0, 2, 0))
+    lights = (Light(strength=0),)
+    dark, lit = (
+        seen(scene, Shading(paths=paths), 16, camera, lights=lights).mean() for paths in ("no", "yes")
+    )
+    assert lit > dark + 0.01
