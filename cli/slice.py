@@ -12,6 +12,7 @@ import click
 
 from .closing import of_layers
 from .cluster import cluster_options, pooled
+from .families import families
 from .inputs import check_targets, load_scene
 from .layers import LAYER, PIXEL_MM, ending, heights, html_option, printer_option, shift, write_page
 from .options import (
@@ -120,6 +121,7 @@ if TYPE_CHECKING:
 @set_option
 @threads_option
 @quiet_option
+@families("output", "preview")
 def slice_(
     source: str,
     output: str,
