@@ -173,6 +173,7 @@ class _Job:
     def result(self, sized: _Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""
         from .mesh.missed import surface_to_mesh
+        from .mesh.touching import touching_note
         from .shown import mesh_amount
 
         what, clock, size, refined = self.what, self.clock, self.size, None
@@ -190,6 +191,9 @@ class _Job:
         whole, simplified = self.written(finish, check, finish.place.mm(surface.tips))
         with clock("checking"):
             amount, off = mesh_amount(planned, finish.volume, scale, clock.work)
+        touching: tuple[str, ...] = ()
+        if whole is not None and check.mesh.components > 1:
+            touching = touching_note(whole, planned.voxel * scale, clock.work.threads)
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
         report = Report(
             scene=self.scene.name,
@@ -208,7 +212,13 @@ class _Job:
             amount_mm3=amount,
             refined=refined,
             simplified=simplified,
-            notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
+            notes=(
+                *planned.notes,
+                *([fell] if thin else ()),
+                *(refined.notes if refined else ()),
+                *touching,
+                *off,
+            ),
             depths=planned.depths,
             contact_mm2=check.contact,
             cavities_mm3=finish.cavities,
