@@ -5,13 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .inputs import check_targets, is_model, load_model, load_scene, refuse_options
-from .layers import LAYER, PIXEL_MM, as_high_as_wanted, heights, printer_option
+from .layers import (
+    LAYER,
+    PIXEL_MM,
+    as_high_as_wanted,
+    ending,
+    heights,
+    html_option,
+    printer_option,
+    write_page,
+)
 from .options import (
     NAME,
     job_of,
@@ -37,7 +45,7 @@ if TYPE_CHECKING:
     from fracslice.volume.sizing import Sizing
     from fracslice.work import Work
 
-OF_LAYERS = {"pixel", "machine", "picture", "fix"}
+OF_LAYERS = {"pixel", "machine", "picture", "html", "fix"}
 OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
 OF_SCENES = {*OF_MESHES, "settings", "size"}
 
@@ -62,7 +70,14 @@ def limit(name: str, text: str) -> Callable[..., Any]:
     help="With layers: pixel size; the printer's by default, or 0.05mm.",
 )
 @printer_option('With layers: the printer it has to fit; "list" shows all.')
-@click.option("--picture", type=NAME, metavar="FILE.png", help="With layers: draw the worst layers.")
+@click.option(
+    "--picture",
+    type=NAME,
+    callback=ending(".png"),
+    metavar="FILE.png",
+    help="With layers: draw the worst layers.",
+)
+@html_option
 @click.option("--fix", is_flag=True, help="With layers: mend what can be mended, and check again.")
 @limit("wall", "walls")
 @limit("floor", "floors and roofs")
@@ -170,9 +185,7 @@ def of_layers(
     from fracslice.printing.problems import mended
     from fracslice.scene import Print
 
-    if options["picture"] and Path(options["picture"]).suffix.lower() != ".png":
-        raise click.UsageError(f"{options['picture']}: expected a file name that ends in .png")
-    check_targets(source, options["picture"])
+    check_targets(source, options["picture"], options["html"])
     numbers, lines, problems = examined(source, root, size, how, options, work)
     settings = mended(problems) if options["fix"] else {}
     if not settings:
@@ -209,6 +222,8 @@ def examined(
     report = check_layers(stack, limits_of(options), machine, work)
     if options["picture"]:
         draw(stack, report, options["picture"], work)
+    if options["html"]:
+        write_page(stack, report, [figures_of(report)], name, options["html"], work)
     return report.as_dict(), described(name, report), report.problems
 
 
@@ -230,9 +245,13 @@ def limits_of(options: dict[str, Any]) -> Limits:
 
 def described(name: str, report: PrintReport) -> list[str]:
     """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
+    return [f"{name}: {figures_of(report)}, {verdict(report.problems)}", report.solid.unseen]
+
+
+def figures_of(report: PrintReport) -> str:
+    """Layers, size, volume and weight of a print report."""
     size = " x ".join(f"{s:.2f}" for s in report.size)
-    figures = f"{report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
-    return [f"{name}: {figures}, {verdict(report.problems)}", report.solid.unseen]
+    return f"{report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
 
 
 def verdict(problems: Sequence[object]) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import io
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import length
+from .options import NAME, length
 
 if TYPE_CHECKING:
     from fracslice.slicing import Stack
+    from fracslice.slicing.checks import PrintReport
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
 
@@ -51,10 +53,46 @@ def printer(context: click.Context, _: click.Parameter, name: str | None) -> Pri
     context.exit()
 
 
+def ending(*endings: str) -> Callable[..., str | None]:
+    """Callback that checks the extension of a file."""
+
+    def checked(_: click.Context, __: click.Parameter, path: str | None) -> str | None:
+        if path is not None and not path.lower().endswith(endings):
+            raise click.BadParameter(f"{path}: expected a file name that ends in {' or '.join(endings)}")
+        return path
+
+    return checked
+
+
 def printer_option(text: str) -> Callable[..., Any]:
     """Decorator that adds --printer, parsed before missing options are reported. text: its help."""
     names = "--printer", "machine"
     return click.option(*names, callback=printer, is_eager=True, metavar="NAME|FILE", help=text)
+
+
+html_option = click.option(
+    "--html",
+    type=NAME,
+    callback=ending(".html"),
+    metavar="FILE.html",
+    help="Write a page: figures, problems, pictures of the worst layers, cross-section over height.",
+)
+
+
+def write_page(
+    stack: Stack, report: PrintReport, lines: Sequence[str], title: str, path: str, work: Work
+) -> None:
+    """Write the summary page of layers that were checked."""
+    import numpy as np
+
+    from fracslice.export import replacing
+    from fracslice.export.page import page
+    from fracslice.slicing.preview import worst_layers
+
+    with io.BytesIO() as picture, replacing(path) as file:
+        worst_layers(stack, report.worst, picture, work)
+        problems = [str(problem) for problem in report.problems]
+        file.write(page(title, lines, problems, stack.tops, np.array(report.areas), picture.getvalue()))
 
 
 def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:

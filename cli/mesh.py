@@ -29,8 +29,8 @@ from .summary import summary
 from .working import working
 
 if TYPE_CHECKING:
-    from fracslice.job import MeshResult
     from fracslice.meshjob import MeshJob
+    from fracslice.meshresult import MeshResult
     from fracslice.report import Report
     from fracslice.scene import Scene
     from fracslice.store import Store

@@ -14,7 +14,7 @@ from .closing import of_layers
 from .cluster import cluster_options, pooled
 from .families import families
 from .inputs import check_targets, load_scene
-from .layers import LAYER, PIXEL_MM, heights, printer_option, shift
+from .layers import LAYER, PIXEL_MM, ending, heights, html_option, printer_option, shift, write_page
 from .options import (
     NAME,
     NUMBER,
@@ -104,9 +104,11 @@ if TYPE_CHECKING:
 @click.option(
     "--preview",
     type=NAME,
+    callback=ending(".png", ".webp"),
     metavar="FILE",
     help="Write a contact sheet (.png) or an animation (.webp) of the layers.",
 )
+@html_option
 @click.option(
     "--send",
     "address",
@@ -133,7 +135,6 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
-    from fracslice.export.sending import send
     from fracslice.export.slices import PICTURES, PRINTS, printers_file, slice_format, write_slices
     from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
@@ -148,9 +149,7 @@ def slice_(
     if options["address"] is not None:
         refuse_to_send(output, kind, options["address"])
     preview = options["preview"]
-    if preview and Path(preview).suffix.lower() not in (".png", ".webp"):
-        raise click.UsageError(f"{preview}: expected a file name that ends in .png or .webp")
-    check_targets(source, None if Path(output).is_dir() else output, preview)
+    check_targets(source, None if Path(output).is_dir() else output, preview, options["html"])
     scene = load_scene(source, settings)
     shared = (options[name] for name in ("cluster", "shard", "store"))
     with pooled(output, threads, *shared) as pool, working(Work(threads, cluster=pool), quiet) as work:
@@ -173,10 +172,15 @@ def slice_(
         write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
-        sent = send(output, options["address"], work) if options["address"] is not None else None
-        if not quiet:
+        sent = uploaded(output, options["address"], work)
+        if not quiet or options["html"]:
             off = layers_amount(run.slicer, work)[1]
             last = list(of_layers(run, options["price"]).lines())
+        if options["html"]:
+            from fracslice.slicing.checks import check_layers
+
+            report = check_layers(stack, printer=options["machine"], work=work)
+            write_page(stack, report, last, output, options["html"], work)
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)
         rows, columns = screen.shape
@@ -224,6 +228,15 @@ def refuse_what_no_print_has(output: str, kind: str, options: dict[str, Any], re
         )
     if options["layer"][1] is not None and kind == "sl1":
         raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")
+
+
+def uploaded(output: str, address: str | None, work: Work) -> str | None:
+    """Upload the file to an address, if there is one; return what became of it."""
+    if address is None:
+        return None
+    from fracslice.export.sending import send  # imports an HTTP client
+
+    return send(output, address, work)
 
 
 def refuse_to_send(output: str, kind: str, address: str) -> None:

@@ -94,6 +94,7 @@ _WHERE = {
 register(
     compiler="fracslice.kernel.tree",
     orbits="fracslice.kernel.orbits",
+    growth="fracslice.kernel.growth",
     distances="fracslice.api.distances",
     files="fracslice.export",
 )

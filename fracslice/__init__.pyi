@@ -50,6 +50,7 @@ from .formulas import neovius as neovius
 from .formulas import noise as noise
 from .formulas import octahedron as octahedron
 from .formulas import offset as offset
+from .formulas import orbit as orbit
 from .formulas import plane as plane
 from .formulas import prism as prism
 from .formulas import pseudo_kleinian as pseudo_kleinian

@@ -14,9 +14,10 @@ import numpy as np
 
 from . import surfaces
 from .errors import SceneError, TooLargeError
-from .finishing import Check, Finish, Placement
+from .finishing import Check, Finish
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
+from .meshresult import MeshResult
 from .planning import Sized, edited, planned
 from .report import Report, SurfaceError, SurfaceToMesh
 from .scene import Scene
@@ -24,77 +25,14 @@ from .version import __version__
 from .work import Clock, Work, ahead
 
 if TYPE_CHECKING:
-    from .kernel import Field
     from .mesh import Mesh
     from .mesh.check import MeshReport
     from .mesh.simplify import Simplified
     from .surfaces import Surface
-    from .volume import Bricks, Plan, SignBricks
+    from .volume import SignBricks
     from .volume.sizing import Sizing
 
 STL = ".stl"
-
-
-@dataclass(frozen=True, eq=False)
-class MeshResult:
-    """Result of `make_mesh`.
-
-    Attributes
-    ----------
-    report : Report
-        Measures, checks and costs.
-    place : Placement
-        Map from the scene to the mesh.
-    planned : Plan
-        Sampled field.
-    whole : Mesh or None
-        The mesh; None if it is larger than memory and only in the file.
-    work : Work
-        Threads, progress and cancellation of the job.
-    """
-
-    report: Report
-    place: Placement
-    planned: Plan
-    whole: Mesh | None
-    work: Work
-
-    @property
-    def mesh(self) -> Mesh:
-        """The mesh in mm, standing on z = 0, quantised to float32.
-
-        Raises
-        ------
-        TooLargeError
-            If the mesh was written in pieces.
-        """
-        if self.whole is None:
-            raise TooLargeError("the mesh does not fit in memory; it is in the file that was written")
-        return self.whole
-
-    @property
-    def root(self) -> Field:
-        """Field that was meshed."""
-        return self.planned.root
-
-    @cached_property
-    def bricks(self) -> Bricks:
-        """Samples of the field around the surface, scene units; computed on first access."""
-        from .volume import sample_scene
-
-        return sample_scene(self.planned, self.work)
-
-    @property
-    def bricks_mm(self) -> Bricks:
-        """Samples in print space: positions and values in mm."""
-        scale, (x, y, z) = self.place.scale, self.bricks.origin
-        dx, dy, dz = self.place.offset
-        return replace(
-            self.bricks,
-            origin=(scale * x + dx, scale * y + dy, scale * z + dz),
-            voxel=scale * self.bricks.voxel,
-            values=self.bricks.values * np.float32(scale),
-        )
 
 
 def make_mesh(
@@ -234,6 +172,7 @@ class _Job:
 
     def result(self, sized: Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""
+        from .mesh.touching import touching_note
         from .shown import mesh_amount
 
         what, clock, size, refined = self.what, self.clock, self.size, None
@@ -248,6 +187,9 @@ class _Job:
         made = self.alone(surface, finish) if clock.work.cluster is None else self.joined(surface, finish)
         with clock("checking"):
             amount, off = mesh_amount(planned, finish.volume, scale, clock.work)
+        touching: tuple[str, ...] = ()
+        if made.whole is not None and made.report.components > 1:
+            touching = touching_note(made.whole, planned.voxel * scale, clock.work.threads)
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
         report = Report(
             scene=self.scene.name,
@@ -266,7 +208,13 @@ class _Job:
             amount_mm3=amount,
             refined=refined,
             simplified=made.simplified,
-            notes=(*planned.notes, *([fell] if thin else ()), *(refined.notes if refined else ()), *off),
+            notes=(
+                *planned.notes,
+                *([fell] if thin else ()),
+                *(refined.notes if refined else ()),
+                *touching,
+                *off,
+            ),
             depths=planned.depths,
             contact_mm2=made.contact,
             cavities_mm3=finish.cavities,

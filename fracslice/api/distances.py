@@ -62,7 +62,7 @@ def _points(points: ArrayLike) -> NDArray[np.floating]:
 def _with_depths(shape: Node) -> Node:
     """The shape with automatic iterations replaced by numbers. Raises `SceneError` if it is unbounded."""
     known = with_depths(shape)
-    for node in known.walk():
+    for node in known.solids():
         if AUTO in (value for value in node.values.values() if isinstance(value, str)):
             raise node.fail("iterations: expected a number where the shape has no end")
     return known

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from ..job import MeshResult
 from ..job import make_mesh as make_mesh_job
 from ..mesh import Mesh
 from ..meshjob import MeshJob
+from ..meshresult import MeshResult
 from ..scene import parse_length
 from ..work import Work
 from .options import Length, Options, Scale, keywords, print_of, work_of

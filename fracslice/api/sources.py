@@ -56,7 +56,7 @@ def found(source: Source) -> Node | Scene:
 def _is_ready(formula: Formula) -> bool:
     """True if a formula is a bounded shape without required parameters."""
     required = any(kind.default is REQUIRED for kind in formula.parameters.values())
-    return formula.kind == "shape" and "bounds" in formula.hooks and not required
+    return formula.kind == "shape" and not formula.children[1] and "bounds" in formula.hooks and not required
 
 
 def as_scene(source: Source, size: Length | None = None) -> Scene:

@@ -12,6 +12,7 @@ import json
 import os
 import uuid
 from collections.abc import Iterator
+from functools import partial
 from http.client import HTTPConnection, HTTPException, HTTPResponse
 from io import BufferedReader
 from pathlib import Path
@@ -28,22 +29,26 @@ TIMEOUT = 30.0
 """Seconds without an answer after which a printer counts as unreachable."""
 
 PORTS = {"prusalink": 80, "sdcp": 3030}
+STORAGES = {"prusalink": ("", "/", "/usb", "/local"), "sdcp": ("", "/")}
+"""Paths of addresses: the storages of PrusaLink, of which printers have one or both."""
 KEY, KEY_FILE = "FRACSLICE_KEY", "FRACSLICE_KEY_FILE"
 """Environment variables: the key of PrusaLink, or the name of a file that holds it."""
 
 
-def printer_address(text: str) -> tuple[str, str, int]:
+def printer_address(text: str) -> tuple[str, str, int, str]:
     """Parse the address of a printer.
 
     Parameters
     ----------
     text : str
-        "prusalink://HOST" or "sdcp://HOST", with an optional port.
+        "prusalink://HOST", with "/local" for a storage other than "usb", or "sdcp://HOST"; both with an
+        optional port.
 
     Returns
     -------
     protocol, host : str
     port : int
+    storage : str
 
     Raises
     ------
@@ -51,15 +56,15 @@ def printer_address(text: str) -> tuple[str, str, int]:
         For any other text, or if PrusaLink has no key.
     """
     try:
-        parts = urlsplit(text)
-        host, port = parts.hostname, parts.port
+        url = urlsplit(text)
+        host, port = url.hostname, url.port
     except ValueError:
         host, port = None, None
-    if not host or parts.scheme not in PORTS or parts.path.strip("/") or parts.username:
-        raise ExportError(f"{text}: expected prusalink://HOST or sdcp://HOST")
-    if parts.scheme == "prusalink":
+    if not host or url.path not in STORAGES.get(url.scheme, ()) or url.username:
+        raise ExportError(f"{text}: expected prusalink://HOST, prusalink://HOST/local or sdcp://HOST")
+    if url.scheme == "prusalink":
         _key()
-    return parts.scheme, host, port or PORTS[parts.scheme]
+    return url.scheme, host, port or PORTS[url.scheme], url.path.strip("/") or "usb"
 
 
 def send(path: str | Path, address: str, work: Work) -> str:
@@ -86,8 +91,8 @@ def send(path: str | Path, address: str, work: Work) -> str:
     Cancelled
         When the work is cancelled.
     """
-    protocol, host, port = printer_address(address)
-    upload = _prusalink if protocol == "prusalink" else _sdcp
+    protocol, host, port, storage = printer_address(address)
+    upload = partial(_prusalink, storage) if protocol == "prusalink" else _sdcp
     with reported(Path(path)), open(path, "rb") as file:
         connection = HTTPConnection(host, port, timeout=TIMEOUT)
         try:
@@ -123,7 +128,9 @@ def _packets(file: BufferedReader, size: int, work: Work) -> Iterator[bytes]:
         work.progress("sending", sent / size)
 
 
-def _prusalink(connection: HTTPConnection, name: str, file: BufferedReader, size: int, work: Work) -> None:
+def _prusalink(
+    storage: str, connection: HTTPConnection, name: str, file: BufferedReader, size: int, work: Work
+) -> None:
     """Store a file on a printer with PrusaLink; an existing one stays."""
     headers = {
         "X-Api-Key": _key(),
@@ -132,7 +139,7 @@ def _prusalink(connection: HTTPConnection, name: str, file: BufferedReader, size
         "Overwrite": "?0",
         "Print-After-Upload": "?0",
     }
-    url = f"/api/v1/files/usb/{quote(name)}"
+    url = f"/api/v1/files/{storage}/{quote(name)}"
     connection.request("PUT", url, _packets(file, size, work), headers)
     status = _answered(connection.getresponse()).status
     if status in (401, 403):

@@ -32,7 +32,7 @@ from .vocabulary import sin as sin
 from .vocabulary import sqrt as sqrt
 from .vocabulary import where as where
 
-def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1.0, 0.7), angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1.0, 0.7), angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The asymmetric Mandelbox, turned in each step (Rrrola and Knighty 2010, fractalforums.com).
 
     With a third size of 1e6, z is never folded: the Amazing Surf (Kali 2011). L = 2 is measured.
@@ -51,13 +51,15 @@ def abox(scale: float = 2.0, inner: float = 0.5, size: Sequence[float] = (1.0, 1
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def amazing_surf(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def amazing_surf(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Amazing Surf (Kali 2011, fractalforums.com): a Mandelbox that is not folded along z. L = 2 is
     measured.
 
@@ -71,6 +73,8 @@ def amazing_surf(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, 
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -121,7 +125,7 @@ def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') ->
     Node
     """
 
-def benesi(scale: float = 1.0, offset: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def benesi(scale: float = 1.0, offset: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """Folds in a frame along the space diagonal, then a square about the x axis (Benesi 2010,
     fractalforums.com: "Pine tree" and the transform T1).
 
@@ -138,6 +142,8 @@ def benesi(scale: float = 1.0, offset: float = 0.0, iterations: Union[int, Liter
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -178,7 +184,7 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), round: float = 0.0) -> Node:
     Node
     """
 
-def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Bristorbrot (Bristor 2009, fractalforums.com). L = 2 is measured.
 
     Parameters
@@ -187,13 +193,15 @@ def bristorbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequenc
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbulb of absolute coordinates, after Michelitsch and Roessler 1992, "The burning ship".
 
     L = 2 is measured.
@@ -206,6 +214,8 @@ def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = '
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -264,7 +274,7 @@ def cone(radius: float = 0.5, height: float = 1.0) -> Node:
     Node
     """
 
-def cosine_bulb(power: float = 9.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def cosine_bulb(power: float = 9.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbulb with angles counted from the equator (Nylander 2009, bugman123.com): odd powers.
 
     Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |cos n theta / cos theta|,
@@ -278,6 +288,8 @@ def cosine_bulb(power: float = 9.0, iterations: Union[int, Literal['auto']] = 'a
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -503,7 +515,7 @@ def jerusalem(level: int = 3) -> Node:
     Node
     """
 
-def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0) -> Node:
+def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0, repeat: int = 1) -> Node:
     """The filled Julia set of q^2 + c in the quaternions, cut at k = 0.
 
     Norton 1982, "Generation and Display of Geometric Fractals in 3-D"; distance: Hart, Sandin and Kauffman
@@ -520,13 +532,15 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     bailout : a number > 1 and <= 1e+06, default 2.0
         the solid is where the last step is not larger than this
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def kifs_dodecahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def kifs_dodecahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The dodecahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
 
     Parameters
@@ -539,13 +553,15 @@ def kifs_dodecahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def kifs_icosahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def kifs_icosahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The icosahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
 
     Parameters
@@ -558,13 +574,15 @@ def kifs_icosahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[i
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def kifs_octahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def kifs_octahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The octahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
 
     Parameters
@@ -577,13 +595,15 @@ def kifs_octahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[in
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def kifs_tetrahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def kifs_tetrahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 2 is measured.
 
     Parameters
@@ -596,6 +616,8 @@ def kifs_tetrahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[i
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -622,7 +644,7 @@ def koch(radius: float = 1.0, height: float = 0.5, level: int = 4) -> Node:
     Node
     """
 
-def lambda_bulb(power: float = 4.0, factor: float = 1.1, angle: float = 30.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def lambda_bulb(power: float = 4.0, factor: float = 1.1, angle: float = 30.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The filled Julia set of lambda (w - w^n) in the triplex numbers, after the logistic map (May 1976,
     "Simple mathematical models with very complicated dynamics"). L = 2 is measured.
 
@@ -638,6 +660,8 @@ def lambda_bulb(power: float = 4.0, factor: float = 1.1, angle: float = 30.0, it
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -662,7 +686,7 @@ def lidinoid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float]
     Node
     """
 
-def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbox (Lowe 2010, "What is a Mandelbox?"). L = 2 is measured.
 
     Parameters
@@ -675,13 +699,15 @@ def mandelbox(scale: float = 2.0, inner: float = 0.5, iterations: Union[int, Lit
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0, julia: Sequence[float] | None = None) -> Node:
+def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'auto', bailout: float = 2.0, julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
@@ -711,6 +737,8 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
         the solid is where the last step is not larger than this
     julia : 3 numbers >= -4 and <= 4
         adds this point in each step instead of the start point: a Julia set of the Mandelbulb
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
@@ -933,7 +961,7 @@ def pseudo_kleinian(size: Sequence[float] = (0.92436, 0.90756, 0.92436), ball: f
     Node
     """
 
-def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbrot set of q^2 + c in the quaternions, cut at k = 0 (Norton 1982).
 
     It is the complex Mandelbrot set turned about the real axis. L = 2 is measured.
@@ -944,13 +972,15 @@ def quaternion_mandelbrot(iterations: Union[int, Literal['auto']] = 'auto', juli
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------
     Node
     """
 
-def quaternion_power(power: int = 3, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None) -> Node:
+def quaternion_power(power: int = 3, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The Mandelbrot set of q^n + c in the quaternions, cut at k = 0, or with `julia` the Julia set (Bedding
     and Briggs 1995, "Iteration of quaternion maps").
 
@@ -965,6 +995,8 @@ def quaternion_power(power: int = 3, iterations: Union[int, Literal['auto']] = '
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
     julia : 3 numbers >= -100 and <= 100
         adds this point in each step instead of the start point: a Julia set
+    repeat : a whole number from 1 to 8, default 1
+        times that the step is taken in each round of an <orbit>
 
     Returns
     -------

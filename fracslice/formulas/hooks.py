@@ -61,6 +61,10 @@ class Hooks:
         """
         return self._hook("unordered", hook)
 
+    def step(self, hook: Callable[[Node], tuple[Any, ...]]) -> Callable[[Node], tuple[Any, ...]]:
+        """Set the hook that returns the step of an escape-time fractal, see `orbits.Stepped`."""
+        return self._hook("step", hook)
+
     def visible(self, hook: Callable[[Node, float], Node]) -> Callable[[Node, float], Node]:
         """Set the hook that returns the node without detail finer than a voxel size in its own units."""
         return self._hook("visible", hook)

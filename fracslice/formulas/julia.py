@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 from .box import Box
 from .escape import CORE, levels, potential_distance
+from .orbits import REPEAT, Stepped, single
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
-from .vocabulary import any_of, maximum, orbit, where
+from .vocabulary import any_of, maximum, orbit, sqrt, where
 
 ESCAPED = 256.0
 """|w| one step past the escape circle."""
@@ -32,6 +33,7 @@ ESCAPED = 256.0
         auto=True,
     ),
     bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
+    repeat=REPEAT,
 )
 def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat, loose):  # type: ignore[no-untyped-def]
     """The filled Julia set of q^2 + c in the quaternions, cut at k = 0.
@@ -105,8 +107,22 @@ def julia_steepening(node: Node) -> float:
 
 @julia.bounds
 def julia_bounds(node: Node) -> Box:
+    single(node)
     # |w_n+1| >= |w_n|^2 - |c|, so |w_N| <= R bounds every |w_n| backwards, down to the start point.
     radius, steps = node["bailout"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
     for _ in range(steps):
         radius = math.sqrt(radius + math.hypot(*node["c"]))
     return Box.centred(radius)
+
+
+def step(w, c):  # type: ignore[no-untyped-def]
+    """Step of the quaternions without k."""
+    x, y, z = w
+    return (x * x - y * y - z * z, 2.0 * x * y, 2.0 * x * z) + c, 2.0 * sqrt(x * x + y * y + z * z)
+
+
+@julia.step
+def julia_step(node: Node) -> Stepped:
+    if node["c"][3]:
+        raise node.fail("c: expected a last number of 0 inside <orbit>: its points have no k")
+    return step, {}, node["c"][:3]

@@ -7,8 +7,11 @@ import math
 from . import escape
 from .box import Box, Triple
 from .escape import CORE, potential_distance, sure_distance
+from .orbits import REPEAT, Stepped, single
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
+from .verbs import power as raised
+from .verbs import raise_whole
 from .vocabulary import (
     absolute,
     any_of,
@@ -54,6 +57,7 @@ counts. A smaller value costs fewer evaluations, but makes the level sets steepe
         most=4,
         least=-4,
     ),
+    repeat=REPEAT,
 )
 def mandelbulb(  # type: ignore[no-untyped-def]
     x,
@@ -277,6 +281,7 @@ def mandelbulb_check(node: Node) -> None:
 
 @mandelbulb.bounds
 def mandelbulb_bounds(node: Node) -> Box:
+    single(node)
     # |w_n+1| >= |w_n|^power - |c|, where c is the start point or the constant, bounds |w_n| backwards from
     # |w_N| <= R. Where c is the start point, its own bound is iterated from above.
     power, steps = node["power"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
@@ -287,3 +292,21 @@ def mandelbulb_bounds(node: Node) -> Box:
         for _ in range(steps):
             radius = (radius + (start if constant is None else constant)) ** (1 / power)
     return Box.centred(radius)
+
+
+def whole_step(w, c, digits, turns, half_digits, even, linear, power):  # type: ignore[no-untyped-def]
+    """Step of a whole power."""
+    return raise_whole(w, digits, turns, half_digits, even, linear, power) + c
+
+
+def step(w, c, power):  # type: ignore[no-untyped-def]
+    """Step of a fractional power."""
+    return raised(w, power) + c
+
+
+@mandelbulb.step
+def mandelbulb_step(node: Node) -> Stepped:
+    power = node["power"]
+    if power % 1:
+        return step, {"power": power}, node["julia"]
+    return whole_step, {**_products(power), "power": power}, node["julia"]

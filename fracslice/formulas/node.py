@@ -72,6 +72,19 @@ class Node(Operators, Field):
             yield node
             left += reversed(node.children)
 
+    @property
+    def fields(self) -> tuple[Node, ...]:
+        """Children whose fields this one is made of; those of a hybrid are steps, not fields."""
+        return () if self.formula.kind == "shape" else self.children
+
+    def solids(self) -> Iterator[Node]:
+        """Iterate over this node and all fields below it, parents first."""
+        left = [self]
+        while left:
+            node = left.pop()
+            yield node
+            left += reversed(node.fields)
+
     def changed(self, children: tuple[Node, ...] | None = None, **values: Any) -> Node:
         """Copy with other values or children.
 
@@ -126,7 +139,7 @@ class Node(Operators, Field):
     @cached_property
     def bounds(self) -> Bounds:
         """Box, Lipschitz bound and kind of this field."""
-        below = [child.bounds for child in self.children]
+        below = [child.bounds for child in self.fields]
         box = self._hooked("bounds", Box.everywhere())
         slope = self._hooked("slope", max([self.formula.lipschitz, *(b.lipschitz for b in below)]))
         steepening = self._hooked("steepening", max((b.steepening for b in below), default=0.0))
@@ -148,7 +161,7 @@ class Node(Operators, Field):
     @property
     def escape_time_only(self) -> bool:
         """See `Field.escape_time_only`."""
-        shapes = (node for node in self.walk() if node.formula.kind == "shape")
+        shapes = (node for node in self.solids() if node.formula.kind == "shape")
         return all(shape._hooked("potential", shape.formula.exterior_only) for shape in shapes)
 
     @property

@@ -1,109 +1,208 @@
-"""Escape-time fractals from their step."""
+"""Escape-time fractals from their step, and hybrids: rounds of several steps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
+
 from ..providers import provider
+from .algebra import inverse, product, stretches
 from .box import Box
 from .parameters import AUTO, Count, Parameter, Vector
-from .registry import Formula, Node, shape
+from .registry import Fixed, Formula, Node, register, shape
+from .transforms import affine
 
-Code = Growth = Any  # of `kernel.orbits`, a layer above
-STEPS: dict[str, Callable[..., Any]] = {}
-"""Steps of the orbits, by the name of their formula."""
+Growth = Any
+"""`kernel.growth.Growth`, a layer above."""
 
-OWN = {
-    "iterations": Count(
-        AUTO,
-        'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
-        least=1,
-        auto=True,
-    ),
-    "julia": Vector(
-        None, "adds this point in each step instead of the start point: a Julia set", least=-100, most=100
-    ),
-}
+Stepped = tuple[Callable[..., Any], dict[str, Any], tuple[float, ...] | None]
+"""Step ``f(w, c, ...)``, the values of its other parameters, and its own constant or None."""
+
+Affine = tuple[np.ndarray, np.ndarray]
+
+REPEAT = Count(1, "times that the step is taken in each round of an <orbit>", least=1, most=8)
+ITERATIONS = Count(
+    AUTO,
+    'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
+    least=1,
+    auto=True,
+)
+JULIA = Vector(
+    None, "adds this point in each step instead of the start point: a Julia set", least=-100, most=100
+)
+OWN = {"iterations": ITERATIONS, "julia": JULIA, "repeat": REPEAT}
 """Parameters of every orbit."""
 
 
-def orbit(**parameters: Parameter) -> Callable[[Callable[..., Any]], Formula]:
-    """Register the escape-time fractal of a step ``f(w, c, ...)``.
+class _Orbit(Formula):
+    """Formula of hybrids, and the decorator of steps."""
 
-    The step returns the next point from the last one, w, and a constant c: the start point, or that of a
-    Julia set. It is written with arithmetic on points, the verbs of `fracslice.formulas.verbs`, and on their
-    coordinates, ``x, y, z = w``, with the vocabulary. A second returned value is its stretch by w, if the one
-    derived from the text is not good enough. Everything else follows from the step: its derivative, the
-    radius of escape, the box, the field, and the kernels.
+    def __call__(self, *steps: Any, place: str | None = None, **values: Any) -> Any:
+        """Make a hybrid of some steps, or register the escape-time fractal of a step ``f(w, c, ...)``.
 
-    Parameters
-    ----------
-    **parameters : Parameter
-        Kinds of the parameters by name; `Count` and `Choice` are compiled into the kernel.
+        A step returns the next point from the last one, w, and a constant c: the start point, or that of a
+        Julia set. It is written with arithmetic on points, the verbs of `fracslice.formulas.verbs`, and on
+        their coordinates, ``x, y, z = w``, with the vocabulary. A second returned value is its stretch by w,
+        if the one derived from the text is not good enough. Everything else follows from the step: its
+        derivative, the radius of escape, the box, the field, and the kernels.
 
-    Returns
-    -------
-    callable
-        Decorator that turns the step into a `Formula`.
+        Parameters
+        ----------
+        *steps : Node
+            Escape-time fractals whose steps are taken in turn; none for the decorator.
+        place : str, optional
+            "file:line" of the element.
+        **values
+            Of a hybrid: its parameters. Of the decorator: kinds of the step's parameters by name; `Count` and
+            `Choice` are compiled into the kernel.
 
-    Raises
-    ------
-    SceneError
-        If another formula has this name.
-    """
+        Returns
+        -------
+        Node or callable
+            Hybrid, or the decorator that turns a step into a `Formula`.
 
+        Raises
+        ------
+        SceneError
+            If an element has no step, a value is invalid, or another formula has this name.
+        """
+        if steps or place or not all(isinstance(kind, Parameter) for kind in values.values()):
+            return super().__call__(*steps, place=place, **values)
+        return _registered(values)
+
+
+def _registered(parameters: dict[str, Any]) -> Callable[[Callable[..., Any]], Formula]:
     def decorate(step: Callable[..., Any]) -> Formula:
         formula = shape(lipschitz=2.0, exterior_only=True, **parameters, **OWN)(step)
-        STEPS[formula.name] = step
-        for hook in (
-            orbit_bounds,
-            orbit_arguments,
-            orbit_select,
-            orbit_steepening,
-            orbit_potential,
-            orbit_check,
-        ):
-            formula.hooks[hook.__name__.removeprefix("orbit_")] = hook
+        formula.hooks.update(HOOKS, step=orbit_step)
         return formula
 
     return decorate
 
 
-def code(node: Node) -> Any:
-    """`kernel.orbits.Code`: step of a node with the parameters that its code depends on."""
+def orbit_step(node: Node) -> Stepped:
     own = {name: value for name, value in node.values.items() if name not in OWN}
-    fixed = {name: value for name, value in own.items() if isinstance(value, (int, str))}
-    sizes = {name: len(v) if isinstance(v, tuple) else 1 for name, v in own.items() if name not in fixed}
-    return provider("orbits").Code(STEPS[node.formula.name], tuple(sizes.items()), tuple(fixed.items()))
+    values = {name: Fixed(v) if isinstance(v, (int, str)) else v for name, v in own.items()}
+    return node.formula.function, values, node["julia"]
 
 
-def grown(node: Node) -> Any:
-    """`kernel.orbits.Growth` of a node's orbits; raises `SceneError` if they do not escape."""
-    made = code(node)
-    values = tuple((name, node[name]) for name, _ in made.sizes)
-    steps = 1 if node["iterations"] == AUTO else node["iterations"]
-    found = provider("orbits").growth(made, values, node["julia"], steps)
-    if found is None:
-        raise node.fail("has orbits that do not escape: expected parameters that enlarge more")
+def _steps(node: Node) -> Iterator[tuple[Node, Affine | None]]:
+    """Steps of a round, and the maps of the transforms around them."""
+    if node.formula is not orbit:
+        yield node, None
+        return
+    for child in node.children:
+        inner, linear, offset = child, np.eye(3), np.zeros(3)
+        while inner.formula.name == "transform" and len(inner.children) == 1:
+            (a, b), inner = affine(inner), inner.children[0]
+            linear, offset = product(linear, a), product(linear, b) + offset
+        moved = (linear != np.eye(3)).any() or offset.any()
+        for _ in range(inner.values.get("repeat", 1)):
+            yield inner, (linear, offset) if moved else None
+
+
+def _step(node: Node) -> Stepped:
+    found: Stepped = node.formula.hooks["step"](node)
     return found
 
 
+def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Return the steps of a round as code, and the values of their arguments.
+
+    Parameters
+    ----------
+    node : Node
+        Orbit.
+
+    Returns
+    -------
+    (tuple of kernel.orbits.Code, dict)
+        Steps in order; values by name.
+    """
+    code, found, values = provider("orbits").Code, [], dict[str, Any]()
+    for place, (step, moved) in enumerate(_steps(node)):
+        function, own, constant = _step(step)
+        fixed = tuple((name, v.value) for name, v in own.items() if isinstance(v, Fixed))
+        passed = {name: v for name, v in own.items() if not isinstance(v, Fixed)}
+        sizes = tuple((name, len(v) if isinstance(v, tuple) else 1) for name, v in passed.items())
+        values |= {f"v{place}_{name}": v for name, v in passed.items()}
+        if moved:
+            linear, offset = moved
+            undone, spread = inverse(linear), stretches(linear)
+            values[f"back{place}"] = (*undone.ravel().tolist(), *(-product(undone, offset)).tolist())
+            values[f"forth{place}"] = (*linear.ravel().tolist(), *offset.tolist())
+            values[f"spread{place}"] = float(spread[0] / spread[-1])
+        if constant is None and node["julia"] is not None:
+            point = np.array(node["julia"])
+            constant = tuple((product(undone, point - offset) if moved else point).tolist())
+        if constant is not None:
+            values[f"c{place}"] = constant
+        found.append(code(function, sizes, fixed, constant is not None, moved is not None))
+    return tuple(found), values
+
+
+def grown(node: Node) -> Growth:
+    """`kernel.growth.Growth` of a node's orbits.
+
+    Parameters
+    ----------
+    node : Node
+        Orbit.
+
+    Returns
+    -------
+    Growth
+
+    Raises
+    ------
+    SceneError
+        If they do not escape, or grow too fast to compute.
+    """
+    made, values = steps(node)
+    rounds = 1 if node["iterations"] == AUTO else node["iterations"]
+    found = provider("growth").growth(made, tuple(values.items()), rounds)
+    if found is None:
+        raise node.fail("has orbits that do not escape: expected parameters that enlarge more")
+    if not found.fits:
+        raise node.fail("has orbits that grow too fast to compute: expected smaller powers")
+    return found
+
+
+def single(node: Node) -> None:
+    """Check that a node is not repeated; called where it is a solid of its own.
+
+    Parameters
+    ----------
+    node : Node
+        Escape-time fractal.
+
+    Raises
+    ------
+    SceneError
+        If `repeat` is not 1.
+    """
+    if node["repeat"] != 1:
+        raise node.fail(f"repeat={node['repeat']}: expected it inside an <orbit>")
+
+
 def orbit_bounds(node: Node) -> Box:
+    if node.formula is not orbit:
+        single(node)
     return Box.centred(*grown(node).half)
 
 
 def orbit_arguments(node: Node) -> dict[str, object]:
-    own = {f"v_{name}": node[name] for name, _ in code(node).sizes}
-    values: dict[str, object] = provider("orbits").arguments(grown(node), node["iterations"], node["julia"])
-    return {**values, **own}
+    made, values = steps(node)
+    found: dict[str, object] = provider("growth").arguments(made, grown(node), node["iterations"])
+    return {**found, **values}
 
 
 def orbit_select(node: Node) -> Callable[..., Any]:
-    found: Callable[..., Any] = provider("orbits").field(
-        code(node), grown(node).by_power, node["julia"] is not None
-    )
-    return found
+    found = grown(node)
+    function: Callable[..., Any] = provider("orbits").field(steps(node)[0], found.by_power, found.scaled)
+    return function
 
 
 def orbit_steepening(node: Node) -> float:
@@ -115,6 +214,58 @@ def orbit_potential(node: Node) -> bool:
     return bool(grown(node).by_power)
 
 
+def _default(node: Node, name: str) -> Any:
+    kind = node.formula.parameters.get(name)
+    return kind.default if kind else None
+
+
 def orbit_check(node: Node) -> None:
-    """Refuse parameters for which no orbit escapes."""
-    grown(node)
+    """Refuse steps that are not in the language, elements without a step, and values of the whole in them."""
+    for step, _ in _steps(node):
+        if "step" not in step.formula.hooks:
+            raise step.fail("has no step: expected an escape-time fractal inside <orbit>, or one transformed")
+        for name in ("iterations", "bailout"):
+            if node is not step and step.values.get(name) != _default(step, name):
+                raise step.fail(f"{name}={step[name]}: expected none inside <orbit>")
+    for place, code in enumerate(steps(node)[0]):
+        code.traced(place)
+
+
+HOOKS: dict[str, Callable[..., Any]] = {
+    "bounds": orbit_bounds,
+    "arguments": orbit_arguments,
+    "select": orbit_select,
+    "steepening": orbit_steepening,
+    "potential": orbit_potential,
+    "check": orbit_check,
+}
+
+
+def _hybrid(w, c):  # type: ignore[no-untyped-def]
+    """A hybrid: the steps of several escape-time fractals in turn (Marczak 2010, Mandelbulber).
+
+    A round takes the step of every element, `repeat` times each. A `transform` around an element is that of
+    its step's coordinates; `julia` of an element is the constant of its step, in these coordinates. With one
+    element it is that fractal, transformed. L = 3 is measured.
+    """
+    return w
+
+
+_hybrid.__name__ = "orbit"
+orbit = register(
+    "shape",
+    (1, None),
+    {
+        "iterations": Count(
+            AUTO,
+            'rounds of the orbit; "auto": until one more moves most by less than 1/512 of the size',
+            least=1,
+            auto=True,
+        ),
+        "julia": JULIA,
+    },
+    made=_Orbit,
+    lipschitz=3.0,
+    exterior_only=True,
+)(_hybrid)
+orbit.hooks.update(HOOKS)

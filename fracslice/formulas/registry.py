@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from inspect import Signature
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from ..errors import SceneError
 from . import signatures
@@ -186,7 +186,7 @@ def shape(
     SceneError
         If another formula has this name.
     """
-    return _register("shape", (0, 0), parameters, lipschitz=lipschitz, exterior_only=exterior_only)
+    return register("shape", (0, 0), parameters, lipschitz=lipschitz, exterior_only=exterior_only)
 
 
 def csg_operator(children: tuple[int, int | None], **parameters: Parameter) -> Callable[..., Formula]:
@@ -209,7 +209,7 @@ def csg_operator(children: tuple[int, int | None], **parameters: Parameter) -> C
     SceneError
         If another formula has this name.
     """
-    return _register("csg", children, parameters)
+    return register("csg", children, parameters)
 
 
 def domain_operator(**parameters: Parameter) -> Callable[..., Formula]:
@@ -230,15 +230,47 @@ def domain_operator(**parameters: Parameter) -> Callable[..., Formula]:
     SceneError
         If another formula has this name.
     """
-    return _register("domain", (1, 1), parameters)
+    return register("domain", (1, 1), parameters)
 
 
-def _register(
-    kind: Kind, children: tuple[int, int | None], parameters: dict[str, Parameter], **known: Any
-) -> Callable[..., Formula]:
-    def decorate(function: Callable[..., Any]) -> Formula:
+Made = TypeVar("Made", bound=Formula)
+
+
+def register(
+    kind: Kind,
+    children: tuple[int, int | None],
+    parameters: dict[str, Parameter],
+    made: type[Made] = Formula,  # type: ignore[assignment]
+    **known: Any,
+) -> Callable[[Callable[..., Any]], Made]:
+    """Return a decorator that makes a formula of a function and registers it.
+
+    Parameters
+    ----------
+    kind : {"shape", "csg", "domain"}
+        Kind of the formula.
+    children : (int, int or None)
+        Minimum and maximum number of elements; None: any number.
+    parameters : dict of str to Parameter
+        Kinds of the parameters by name.
+    made : type, optional
+        Class of the formula.
+    **known
+        Other attributes of the formula.
+
+    Returns
+    -------
+    callable
+
+    Raises
+    ------
+    SceneError
+        If another formula has this name.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Made:
         name = function.__name__.rstrip("_")
-        formula = Formula(name, kind, function, MappingProxyType(parameters), children, **known)
+        formula = made(name, kind, function, MappingProxyType(parameters), children, **known)
         if name in _REGISTRY and not _is_run_again(_REGISTRY[name].function, function):
             code = function.__code__
             raise SceneError(

@@ -60,7 +60,7 @@ def bound(
         if name not in formula.parameters:
             near = hint(name, names) if names else "it has none"
             raise SceneError(f"<{formula.name}> has no attribute {name!r}; {near}")
-    if formula.kind != "shape":
+    if formula.children[1] != 0:
         return positional, given
     if len(positional) > len(names):
         most = f"at most {len(names)}: {', '.join(names)}" if names else "none"
@@ -75,9 +75,9 @@ def signature(formula: Formula) -> Signature:
     """Signature of a formula as a Python function."""
     from .registry import Node
 
-    shape = formula.kind == "shape"
-    kind = Parameter.POSITIONAL_OR_KEYWORD if shape else Parameter.KEYWORD_ONLY
-    elements = [] if shape else [Parameter("elements", Parameter.VAR_POSITIONAL, annotation=Node)]
+    alone = formula.children[1] == 0
+    kind = Parameter.POSITIONAL_OR_KEYWORD if alone else Parameter.KEYWORD_ONLY
+    elements = [] if alone else [Parameter("elements", Parameter.VAR_POSITIONAL, annotation=Node)]
     values = [
         Parameter(
             python_name(name),
@@ -108,9 +108,9 @@ def annotation(parameter: Any) -> Any:
 def docstring(formula: Formula) -> str:
     """Docstring of a formula with its parameters, in numpydoc style."""
     lines = [inspect.cleandoc(formula.doc)]
-    if formula.kind != "shape" or formula.parameters:
+    if formula.children[1] != 0 or formula.parameters:
         lines += ["", "Parameters", "----------"]
-    if formula.kind != "shape":
+    if formula.children[1] != 0:
         lines += ["*elements : Node", f"    {_ELEMENTS[formula.children[1] == 1]}"]
     for name, parameter in ordered(formula).items():
         default = "" if parameter.default in (REQUIRED, None) else f", default {parameter.default!r}"
@@ -133,7 +133,9 @@ def stub() -> str:
     for node in imports:
         exported = sorted(vocabulary.NAMES) if node.module == "vocabulary" else [a.name for a in node.names]
         lines += [f"from .{node.module} import {name} as {name}" for name in exported if node.level]
-    return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in _shipped())]) + "\n"
+    imported = {alias.name for node in imports for alias in node.names}
+    made = [name for name in _shipped() if name not in imported]
+    return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in made)]) + "\n"
 
 
 def _shipped() -> list[str]:

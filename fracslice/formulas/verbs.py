@@ -175,3 +175,46 @@ def power_over(w, e, n):  # type: ignore[no-untyped-def]
     x, y, z = w
     far = sqrt(x * x + y * y + z * z) + e
     return n * n * exp((n - 1.0) * log(maximum(far, 1e-30)))
+
+
+def raise_whole(w, digits, turns, half_digits, even, linear, n):  # type: ignore[no-untyped-def]
+    """Raise to a whole power in the triplex numbers by products, see `mandelbulb`.
+
+    Compiled into the code are the binary digits of n, n // 2 and (n - 1) // 2 after the first, and whether n
+    is even or 2.
+    """
+    x, y, z = w
+    rho2 = maximum(x * x + y * y, 1e-30)
+    r2 = rho2 + z * z
+    re, im, norm2 = z, 1.0, r2
+    for odd in digits:
+        twice = re + re
+        re, im = twice * re - norm2, twice * im
+        norm2 = norm2 * norm2
+        if odd:
+            re, im = re * z - im * rho2, re + im * z
+            norm2 = norm2 * r2
+    over = ratio(y, rho2)
+    u, v = 1.0 - (y + y) * over, (x + x) * over
+    cu, cv = u, v
+    for odd in turns:
+        twice = cv + cv
+        cu, cv = 1.0 - twice * cv, twice * cu
+        if odd:
+            cu, cv = cu * u - cv * v, cu * v + cv * u
+    meridian = r2
+    for odd in half_digits:
+        meridian = meridian * meridian
+        if odd:
+            meridian = meridian * r2
+    if even:
+        meridian = meridian * sqrt(r2)
+    if linear:
+        meridian = sqrt(r2)
+    stretch = n * maximum(meridian, absolute(im))
+    if even:
+        s = im * sqrt(rho2)
+        image = (s * cu, s * cv, re)
+    else:
+        image = (im * (cu * x - cv * y), im * (cu * y + cv * x), re)
+    return image, stretch

@@ -73,10 +73,10 @@ def resolve_depths(root: Node, detail: float) -> Node:
         If a formula cannot be compiled.
     """
     detail = _within(root, detail)
-    children = tuple(resolve_depths(child, detail) for child in root.children)
+    children = tuple(resolve_depths(child, detail) for child in root.fields)
     if AUTO in (v for v in root.values.values() if isinstance(v, str)):
         return root.changed(iterations=_depth(root, detail))
-    return root if children == root.children else root.changed(children)
+    return root if children == root.fields else root.changed(children)
 
 
 def depth_notes(root: Node, known: Node) -> tuple[str, ...]:
@@ -123,9 +123,9 @@ def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
         for name, value in root.values.items()
         if found[name] != value
     ]
-    shown = [visible(child, _within(root, voxel)) for child in root.children]
+    shown = [visible(child, _within(root, voxel)) for child in root.fields]
     children = tuple(child for child, _ in shown)
-    whole = found if children == root.children else found.changed(children)
+    whole = found if children == root.fields else found.changed(children)
     return whole, tuple(dict.fromkeys([*told, *(note for _, notes in shown for note in notes)]))
 
 

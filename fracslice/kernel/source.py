@@ -11,6 +11,7 @@ from types import FunctionType
 from typing import Any
 
 from . import functions, language
+from .kept_copies import Texts, kept
 from .parsing import parse
 from .syntax import Folding, stored_names
 
@@ -132,7 +133,14 @@ def _shared(
     """Cached copy. The last argument distinguishes values that are equal but not the same: 1 and 1.0, a
     function and its redefinition.
     """
-    return copied(specialised(function, dict(fixed)), function, given)
+
+    def make() -> Texts:
+        copy = copied(specialised(function, dict(fixed)), function, given)
+        return copy.name, copy.text, list(copy.calls)
+
+    name, text, calls = kept(function, (repr(fixed), sorted(given)), make)
+    scope = functions.scope(function)
+    return Copy(name, text, {called: scope[called] for called in calls})
 
 
 def _plain(value: Any) -> Any:

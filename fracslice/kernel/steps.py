@@ -17,7 +17,7 @@ from ..errors import KernelError
 from . import functions, language
 from .parsing import parse, parse_expression
 from .source import specialised
-from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector
+from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector, as_number
 
 Value = Any
 """Scalar, Vector or tuple of these."""
@@ -43,7 +43,7 @@ class Step:
 
 
 def traced(
-    function: Callable[..., Any], parameters: Mapping[str, int], fixed: Mapping[str, Any], prefix: str = "s"
+    function: Callable[..., Any], parameters: Mapping[str, int], fixed: Mapping[str, Any], place: int = 0
 ) -> Step:
     """Follow the text of a step.
 
@@ -52,32 +52,31 @@ def traced(
     function
         Step ``f(w, c, ...)``.
     parameters
-        Number of components of each argument after w and c; names are prefixed with ``v_``.
+        Number of components of each argument after w and c.
     fixed
         Values of the arguments that are constants of the code.
-    prefix
-        Prefix of the names of the code.
+    place
+        Place of the step in the round, part of all names but x, y and z.
 
     Returns
     -------
     Step
-        Code in terms of x, y, z, cx, cy, cz and the arguments.
+        Code in terms of x, y, z, of cx0, cy0, cz0 and of the arguments, such as v0_scale, for place 0.
 
     Raises
     ------
     KernelError
         If the function is not in the language of steps.
     """
-    tape = Tape(prefix)
-    env: dict[str, Value] = {"w": tape.variable("x y z", 0), "c": tape.variable("cx cy cz", 3)}
-    for name, size in parameters.items():
-        parts = tuple(Scalar(f"v_{name}_{k}") for k in range(size))
-        env[name] = Scalar(f"v_{name}") if size == 1 else Vector(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
+    tape = Tape(f"s{place}_")
+    constant = tape.variable(f"cx{place} cy{place} cz{place}", 3)
+    env: dict[str, Value] = {"w": tape.variable("x y z", 0), "c": constant}
+    env |= {name: _argument(f"v{place}_{name}", size) for name, size in parameters.items()}
     names = functions.parameters(function)
     if names[:2] != ["w", "c"] or {*names[2:]} != {*parameters, *fixed}:
-        place = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
+        line = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
         wanted = ", ".join(("w", "c", *parameters, *fixed))
-        raise KernelError(f"{place}: step {function.__name__}: expected the arguments {wanted}")
+        raise KernelError(f"{line}: step {function.__name__}: expected the arguments {wanted}")
     value = _followed(function, fixed, env, tape)
     declared = value[1] if isinstance(value, tuple) and len(value) == 2 else None
     vector = _vector(value if declared is None else value[0], function)
@@ -87,6 +86,14 @@ def traced(
     point = tuple(part.atom for part in vector.parts)
     lines = _used(tape.lines, {*point, *filter(None, stretch)})
     return Step(lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
+
+
+def _argument(name: str, size: int) -> Value:
+    """Argument of a step: a number, a point or a tuple of numbers."""
+    if size == 1:
+        return Scalar(name)
+    parts = tuple(Scalar(f"{name}_{k}") for k in range(size))
+    return Vector(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
 
 
 def _used(lines: Sequence[str], wanted: set[str]) -> list[str]:
@@ -132,18 +139,35 @@ class _Reader:
                     for k in range(n):
                         self.env[counter] = Scalar(repr(float(k)))
                         self.run(inner)
+                case ast.For(target, ast.Name(name), inner) if name in self.env:
+                    for value in self.elements(self.env[name]):
+                        self.assign(target, value)
+                        self.run(inner)
+                case ast.If(test, body, others):
+                    self.run(body if self.known(test) else others)
                 case ast.Return(ast.expr() as value):
                     return self.value(value)
                 case _:
                     self.fail(statement, "expected assignments, loops over constants and a return")
         return None
 
+    def elements(self, value: Value) -> tuple[Value, ...]:
+        return value.parts if isinstance(value, Vector) else value
+
+    def known(self, test: ast.expr) -> bool:
+        """Truth of a condition that is known here."""
+        value = self.value(test)
+        number = as_number(value.atom) if isinstance(value, Scalar) else None
+        if number is None:
+            self.fail(test, "expected a condition on constants")
+        return number != 0
+
     def assign(self, target: ast.expr, value: Value) -> None:
         match target:
             case ast.Name(name):
                 self.env[name] = value
             case ast.Tuple(targets):
-                parts = value.parts if isinstance(value, Vector) else value
+                parts = self.elements(value)
                 if not isinstance(parts, tuple) or len(parts) != len(targets):
                     self.fail(target, f"expected {len(targets)} values")
                 for one, part in zip(targets, parts, strict=True):

@@ -189,7 +189,7 @@ class _Tree:
         while stack:
             node = stack.pop()
             order.append(node)
-            self.inside[id(node)] = [self.dialect.kept(child) for child in node.children]
+            self.inside[id(node)] = [self.dialect.kept(child) for child in node.fields]
             stack += self.inside[id(node)]
         for node in reversed(order):
             self.parts[id(node)] = self.part(node)

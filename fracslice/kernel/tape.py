@@ -72,7 +72,7 @@ class Tape:
 
     def name(self, code: str | None) -> str | None:
         """Name of an expression; equal expressions have one."""
-        if code is None or code.isidentifier() or _number(code) is not None:
+        if code is None or code.isidentifier() or as_number(code) is not None:
             return code
         if code not in self.names:
             self.names[code] = f"{self.prefix}{len(self.names)}"
@@ -83,8 +83,8 @@ class Tape:
         """Product of two expressions."""
         if a is None or b is None:
             return None
-        if _number(a) == 1 or _number(b) == 1:
-            return b if _number(a) == 1 else a
+        if as_number(a) == 1 or as_number(b) == 1:
+            return b if as_number(a) == 1 else a
         return self.name(f"{a} * {b}")
 
     def plus(self, a: str | None, b: str | None, sign: str = "+") -> str | None:
@@ -122,14 +122,14 @@ class Tape:
         """Vector times a scalar."""
         stretch = None
         if a.constant and b.stretch:
-            number = _number(a.atom)
+            number = as_number(a.atom)
             size = self.name(f"absolute({a.atom})" if number is None else repr(abs(number)))
             stretch = self.times(size, b.stretch[0]), self.times(size, b.stretch[1])
         return Vector(tuple(self.product(a, part) for part in b.parts), stretch)  # type: ignore[arg-type]
 
     def inverse(self, b: Scalar) -> Scalar:
         """Reciprocal of a scalar."""
-        number = _number(b.atom)
+        number = as_number(b.atom)
         if number:
             return Scalar(repr(1.0 / number))
         over = str(self.name(f"ratio(1.0, {b.atom})"))
@@ -170,7 +170,7 @@ class Tape:
         """
         if all(entry is None for row in rows for entry in row):
             return None
-        if all(_number(rows[i][k] or "0") == (i == k) for i in range(3) for k in range(3)):
+        if all(as_number(rows[i][k] or "0") == (i == k) for i in range(3) for k in range(3)):
             return "1.0"
         gram = {(i, k): self.dot(rows[i], rows[k]) for i in range(3) for k in range(i, 3)}
         trace = self.plus(self.plus(gram[0, 0], gram[1, 1]), gram[2, 2])
@@ -217,7 +217,8 @@ def _filled(text: str, places: Mapping[str, str]) -> str:
     return ast.unparse(tree)
 
 
-def _number(code: str) -> float | None:
+def as_number(code: str) -> float | None:
+    """Number that an expression spells, or None."""
     try:
         return float(code)
     except ValueError:

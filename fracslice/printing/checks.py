@@ -201,8 +201,8 @@ def check_solid(
     between = tight.beside(seen(gaps=True), most)
     floors = thin.beside(seen(direction=UP), most, UP)
     bare, narrow = (
-        _off_rims(_under(found, limit, scale), drains, 2 * limit / scale)
-        for found, limit in ((floors, limits.floor), (thick, limits.wall))
+        _off_rims(_under(measured, limit, scale), drains, 2 * limit / scale)
+        for measured, limit in ((floors, limits.floor), (thick, limits.wall))
     )
     speck = max(limits.speck, SPECK * (bricks.voxel * scale) ** 3) / scale**3
     result = _volumes(bricks, speck)
@@ -277,14 +277,14 @@ def _under(walls: Walls, limit: float, scale: float) -> Walls:
     return walls.chosen((walls.width * scale < 0.99 * limit) & (walls.facing < PARALLEL))
 
 
-def _off_rims(found: Walls, drains: Sequence[Drain], near: float) -> Walls:
+def _off_rims(thin: Walls, drains: Sequence[Drain], near: float) -> Walls:
     """Walls except for the sharp rims of drain holes: those nearer than `near` to the side of a hole."""
     for drain in drains:
         start, along = np.array(drain.start), np.array(drain.end) - drain.start
-        share = np.clip((found.middle - start) @ along / (along @ along), 0, 1)
-        away = np.linalg.norm(found.middle - start - share[:, None] * along, axis=1)
-        found = found.chosen(np.abs(away - drain.radius) > near)
-    return found
+        share = np.clip((thin.middle - start) @ along / (along @ along), 0, 1)
+        away = np.linalg.norm(thin.middle - start - share[:, None] * along, axis=1)
+        thin = thin.chosen(np.abs(away - drain.radius) > near)
+    return thin
 
 
 def loose(count: int, **where: Any) -> Problem:

@@ -155,7 +155,7 @@ def _refuse_impossible(root: Node) -> None:
 
     Errors of the tree as a whole thus surface at construction.
     """
-    for node in reversed(list(root.walk())):
+    for node in reversed(list(root.solids())):
         with computing(node.fail):
             depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
             _ = node.bounds, (node.changed(**depths) if depths else node).arguments

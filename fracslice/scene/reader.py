@@ -197,7 +197,7 @@ class _Builder:
             with computing(closed.fail):
                 node = closed.element(*closed.children, place=closed.place, **closed.values)
         except SceneError as error:
-            placed = str(error).startswith(closed.place)
+            placed = str(error).startswith(f"{self.source}:")
             raise error if placed else SceneError(f"{closed.place}: {error}") from None
         self.open[-1].children.append(node)
 

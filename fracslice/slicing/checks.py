@@ -46,6 +46,8 @@ class PrintReport:
         Size of the object.
     fits : bool or None
         True if the object fits the printer; None without a printer.
+    areas : list of float
+        Area of each layer.
     volume, weight_g : float
         Volume of the solid, and weight in grams.
     bodies, islands : list of Feature
@@ -74,6 +76,7 @@ class PrintReport:
     pixels: tuple[int, int]
     size: tuple[float, float, float]
     fits: bool | None
+    areas: list[float]
     volume: float
     weight_g: float
     bodies: list[Feature]
@@ -170,7 +173,7 @@ class _Collector:
         """The report of findings in the order of the layers."""
         stack, solid, empty = self.stack, Graph(), Graph()
         square = stack.pixel[0] * stack.pixel[1]
-        volume, overhangs, walls, gaps = 0.0, [], [np.empty((0, 2))], [np.empty((0, 2))]
+        areas, overhangs, walls, gaps = list[float](), [], [np.empty((0, 2))], [np.empty((0, 2))]
         limits, far = self.limits, list[Overhang]()
         for k, now in enumerate(findings):
             below = solid.last
@@ -182,10 +185,11 @@ class _Collector:
                 far.extend([worst] if worst else [])
             solid.add(now.solid)
             empty.add(now.empty)
-            volume += now.area * float(stack.heights[k])
+            areas.append(now.area)
             if now.walls is not None and now.gaps is not None:
                 walls.append(now.walls)
                 gaps.append(now.gaps)
+        volume = sum(area * height for area, height in zip(areas, stack.heights.tolist(), strict=True))
         unfit = misfit(stack, self.printer)
         overhang = np.array(overhangs)
         islands = self.found(solid, solid.islands())
@@ -199,6 +203,7 @@ class _Collector:
             pixels=stack.shape[::-1],
             size=stack.size,
             fits=not unfit if self.printer else None,
+            areas=areas,
             volume=volume,
             weight_g=volume * self.limits.density / 1000,
             bodies=kept,

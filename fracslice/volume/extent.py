@@ -176,8 +176,8 @@ class _Search:
 
     def inside(self, points: np.ndarray) -> np.ndarray:
         """Mask of the interior points, bool [...], of points [3, ...]."""
-        found: np.ndarray = values_at(self.kernel, points.reshape(3, -1), self.work) < 0
-        return found.reshape(points.shape[1:])
+        mask: np.ndarray = values_at(self.kernel, points.reshape(3, -1), self.work) < 0
+        return mask.reshape(points.shape[1:])
 
     def climb(self, sides: Sides, first: float, exact: float) -> None:
         """Move the tips of all sides outwards."""

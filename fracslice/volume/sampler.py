@@ -1,11 +1,9 @@
 """Sparse sampling of a distance field: bricks that contain its whole surface and little else.
 
-Top down, a cell is discarded if the field at its centre proves that no sign change is in it or within a voxel
-of it: ``|f| > L * (half diagonal + voxel)``. The remaining bricks are candidates. They are sampled from the
-outside in: first each candidate next to empty space or with its centre outside, then every neighbour across a
-face on which a sampled brick has an exterior sample, until none is left. The interior of an escape-time
-fractal, which costs every iteration and cannot be recognised from afar, is thus never entered beyond its
-first layer.
+Bricks that `pruning` does not discard are candidates. They are sampled from the outside in: first each
+candidate next to empty space or with its centre outside, then every neighbour across a face on which a
+sampled brick has an exterior sample, until none is left. The interior of an escape-time fractal, which costs
+every iteration and cannot be recognised from afar, is thus never entered beyond its first layer.
 
 The same rule guards against violated bounds: where a sign change would leave the samples, the neighbour is
 sampled too, whatever the bound claims. The audit is a second check: random grid points in unsampled bricks,
@@ -16,7 +14,7 @@ continues from there. Results depend on the field only, not on threads or order.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -29,11 +27,8 @@ from ..work import Work, chunks
 from .bricks import INSIDE, OUTSIDE, Bricks, SignBricks
 from .faces import FACES, SignFaces
 from .lattice import BRICK, Lattice
+from .pruning import Pruning
 from .states import BORDER, CANDIDATE, EMPTY, FULL, QUEUED, States
-from .values import values_at
-
-COARSEST = 16
-"""Bricks along a cell of the first level: 128 voxels, as in OpenVDB's tree."""
 
 AUDITS = 8
 """Largest number of audits."""
@@ -81,7 +76,7 @@ def sample(
     def keep(wave: np.ndarray) -> None:
         values.append(wave)
 
-    run = _Sampling(kernel, conservative or kernel, bounds, lattice, work or Work(), keep)
+    run = _Sampling(Pruning(kernel, conservative or kernel, bounds, lattice, work or Work()), keep)
     signs, order = run.signs()
     return Bricks(
         signs.origin,
@@ -129,7 +124,8 @@ def sample_signs(
     Cancelled
         If the job was cancelled.
     """
-    signs, _ = _Sampling(kernel, conservative or kernel, bounds, lattice, work or Work(), None).signs()
+    pruning = Pruning(kernel, conservative or kernel, bounds, lattice, work or Work())
+    signs, _ = _Sampling(pruning, None).signs()
     return signs
 
 
@@ -137,21 +133,20 @@ def sample_signs(
 class _Sampling:
     """State of one sampling."""
 
-    kernel: Kernel
-    conservative: Kernel
-    bounds: Bounds
-    lattice: Lattice
-    work: Work
+    pruning: Pruning
     keep: Callable[[np.ndarray], None] | None
-    evaluations: int = 0
     repaired: int = 0
     audited: int = 0
     numbers: list[np.ndarray] = field(default_factory=list)
     bits: list[np.ndarray] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        self.kernel, self.bounds = self.pruning.kernel, self.pruning.bounds
+        self.lattice, self.work = self.pruning.lattice, self.pruning.work
+
     def signs(self) -> tuple[SignBricks, np.ndarray]:
         """Sampled bricks that the surface needs, and their rows among all sampled bricks."""
-        states, outside = self.probe()
+        states, outside = self.pruning.probe()
         front = self.seeds(states, outside)
         for turn in range(AUDITS):
             self.explore(states, front)
@@ -160,40 +155,6 @@ class _Sampling:
                 break
         self.work.progress("sampling", 1.0)
         return self.finished(states)
-
-    # --- top down -------------------------------------------------------------------------------------------
-    def probe(self) -> tuple[States, np.ndarray]:
-        """State of every brick, and for each candidate, in order, whether its centre is outside."""
-        size = COARSEST
-        grid = np.full([-(-n // size) for n in self.lattice.bricks], CANDIDATE, np.uint8)
-        while True:
-            cells = np.nonzero(grid == CANDIDATE)
-            f, reach = self.centres(cells, size, self.conservative), self.reach(size * BRICK)
-            full = (f < -reach) & (not self.bounds.exterior_only)
-            near = ~((f > reach) | full)
-            grid[cells] = np.where(near, CANDIDATE, np.where(full, FULL, EMPTY))
-            if size == 1:
-                break
-            size //= 2
-            shape = tuple(slice(-(-n // size)) for n in self.lattice.bricks)
-            grid = grid.repeat(2, 0).repeat(2, 1).repeat(2, 2)[shape]
-        if self.conservative is self.kernel:
-            own = f[near]
-        else:
-            own = self.centres(tuple(c[near] for c in cells), 1, self.kernel)
-        return States.within(grid), ~(own < 0)
-
-    def centres(self, cells: tuple[np.ndarray, ...], size: int, kernel: Kernel) -> np.ndarray:
-        """Field at the centres of cells of `size` bricks."""
-        return self.values_at([size * BRICK * c + (size * BRICK - 1) / 2 for c in cells], kernel)
-
-    def values_at(self, indices: Sequence[np.ndarray], kernel: Kernel) -> np.ndarray:
-        """Field at positions in grid indices, three arrays [n]."""
-        points = np.empty((3, len(indices[0])))
-        for row, start, along in zip(points, self.lattice.origin, indices, strict=True):
-            np.add(start, self.lattice.voxel * along, out=row)
-        self.evaluations += points.shape[1]
-        return values_at(kernel, points, self.work)
 
     def seeds(self, states: States, outside: np.ndarray) -> np.ndarray:
         """Candidates to start from: all of them if the field bounds distances inside too."""
@@ -212,7 +173,7 @@ class _Sampling:
         """Sample the front, then each neighbour that must be sampled too, until the samples are closed."""
         flat = states.flat
         while len(front):
-            empty = self.emptied(states.places(front)) & (flat[front] == CANDIDATE)
+            empty = self.pruning.emptied(states.places(front)) & (flat[front] == CANDIDATE)
             bare, front = front[empty], front[~empty]
             flat[bare], flat[front] = EMPTY, QUEUED
             signs = self.sampled(states.places(front))
@@ -223,20 +184,6 @@ class _Sampling:
             near = np.concatenate([bare + states.step(*face) for face in FACES])
             result = self.neighbours(states, front, signs)
             front = states.distinct(np.concatenate([result, near[flat[near] == CANDIDATE]]))
-
-    def emptied(self, places: np.ndarray) -> np.ndarray:
-        """Mask of the bricks proven empty by their eight subcells: 8 evaluations to save 512."""
-        size = BRICK // 2
-        middle = np.indices((2, 2, 2)).reshape(3, 8, 1) * size + (size - 1) / 2
-        f = self.values_at((places[:, None] * BRICK + middle).reshape(3, -1), self.conservative)
-        empty: np.ndarray = f.reshape(8, -1).min(0) > self.reach(size)
-        return empty
-
-    def reach(self, size: int) -> float:
-        """Least |f| at the centre of a cell of `size` samples that excludes a sign change within a voxel of
-        it.
-        """
-        return self.bounds.lipschitz * float(np.sqrt(3)) * self.lattice.voxel * (size + 1) / 2
 
     def sampled(self, places: np.ndarray) -> np.ndarray:
         """Sample bricks; return their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set inside."""
@@ -252,7 +199,7 @@ class _Sampling:
             signs[part] = np.packbits(out < 0, axis=1, bitorder="little")
 
         self.work.map(task, chunks(len(corners), self.kernel.batch // BRICK**3))
-        self.evaluations += len(corners) * BRICK**3
+        self.pruning.evaluations += len(corners) * BRICK**3
         if self.keep:
             self.keep(values)
         return signs.reshape(-1, 8, 8)
@@ -282,7 +229,7 @@ class _Sampling:
         far = np.arange(flat.size) if few else rng.integers(flat.size, size=FAR_AUDITS)
         bricks = np.concatenate([near, far[bare[far]]])
         points = states.places(bricks) * BRICK + rng.integers(0, BRICK, (3, len(bricks)), np.uint8)
-        inside, assumed = self.values_at(points, self.kernel) < 0, flat[bricks]
+        inside, assumed = self.pruning.values_at(points, self.kernel) < 0, flat[bricks]
         wrong = inside != (assumed != EMPTY)
         self.audited += len(bricks)
         # A wrong candidate violates no bound: it contains an exterior pocket that was not reached.
@@ -310,7 +257,7 @@ class _Sampling:
             np.ascontiguousarray(states.places(numbers[order]).T * BRICK, np.int32),
             signs[order],
             states.inner(index),
-            evaluations=self.evaluations,
+            evaluations=self.pruning.evaluations,
             repaired=self.repaired,
             audited=self.audited,
         )

@@ -1,4 +1,4 @@
-"""The closing lines of meshes and layers, word by word."""
+"""The closing lines of meshes and layers, as exact text."""
 
 from __future__ import annotations
 

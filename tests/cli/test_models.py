@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 from pathlib import Path
+from xml.etree import ElementTree as Tree
 
+import numpy as np
 import pytest
 import trimesh
+from fracslice.cli.check import placed
 from fracslice.cli.main import run
+from PIL import Image
+
+from fracslice.mesh import Mesh
 
 COARSE = ["--layer", "0.5mm", "--pixel", "0.5mm", "-q"]
 PLATE = (20, 20, 2)
+
+
+@pytest.fixture(name="balls")
+def scene_of_balls(tmp_path: Path) -> Path:
+    path = tmp_path / "balls.xml"
+    balls = '<sphere/><transform translate="0 0 3"><sphere radius="0.5"/></transform>'
+    path.write_text(f'<scene version="1"><solid unit="4mm">{balls}</solid></scene>')
+    return path
 
 
 def box(size: tuple[float, float, float], height: float = 0.0) -> trimesh.Trimesh:
@@ -78,3 +94,30 @@ def test_options_of_scenes_are_refused(tmp_path: Path, capfd: pytest.CaptureFixt
     box(PLATE).export(tmp_path / "box.stl")
     assert run(["check", str(tmp_path / "box.stl"), "--voxel", "1mm"]) == 2
     assert "--voxel: only for scenes" in capfd.readouterr().err
+
+
+def test_a_page_holds_figures_problems_pictures_and_the_cross_section(
+    balls: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    page, out = balls.with_name("balls.html"), balls.with_name("layers")
+    assert run(["slice", str(balls), "-o", str(out), *COARSE, "--html", str(page)]) == 0
+    text = page.read_text()
+    assert "ml" in text and "<h2>Would not print</h2>" in text and "<li>2 loose bodies: layer" in text
+    picture = base64.b64decode(text.partition("base64,")[2].partition('"')[0])
+    assert Image.open(io.BytesIO(picture)).size[0] > 40
+    root = Tree.fromstring(text[text.index("<svg") : text.index("</svg>") + 6])
+    points = np.array([p.split(",") for p in root.find("polyline").get("points").split()], float)  # type: ignore[union-attr]
+    assert points[:, 1].min() == 40 and points[:, 1].argmin() == pytest.approx(len(points) / 4.5, abs=2)
+    capfd.readouterr()
+    assert run(["check", str(balls), *COARSE, "--html", str(page)]) == 1
+    assert "36 layers, 8.00 x 8.00 x 18.00 mm" in page.read_text()
+    assert run(["check", str(balls), *COARSE, "--html", "page.txt"]) == 2
+    assert "page.txt: expected a file name that ends in .html" in capfd.readouterr().err
+
+
+def test_a_model_is_turned_and_scaled_before_it_is_examined() -> None:
+    part = box((10, 20, 5))
+    model = Mesh(np.asarray(part.vertices, np.float64), np.asarray(part.faces, np.int32))
+    options = {"up": (1.0, 0.0, 0.0), "scale": (1.02, 1.0, 1.1)}
+    assert placed(model, options).size.tolist() == pytest.approx([5.1, 20, 11])
+    assert placed(model, {"up": (0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}) is model

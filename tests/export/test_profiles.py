@@ -47,6 +47,12 @@ def test_the_table_of_printers() -> None:
         ("sonic-mini-8k-s", "a.goo", ""),
         ("photon-mono-4k", "a.pwmx", "Anycubic Photon Mono 4K reads .pwma files: make a.pwma"),
         (
+            "mars-2",
+            "a.ctb",
+            "Elegoo Mars 2 reads encrypted .ctb files, which are not written: "
+            "make a.goo and convert it with UVtools",
+        ),
+        (
             "mars-5-ultra",
             "a.ctb",
             "Elegoo Mars 5 Ultra reads encrypted .ctb files, which are not written: "

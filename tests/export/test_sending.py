@@ -116,8 +116,8 @@ def test_the_key_is_in_the_environment_or_a_file(
     (tmp_path / "key").write_text("secret\n")
     monkeypatch.setenv("FRACSLICE_KEY_FILE", str(tmp_path / "key"))
     with printer(PrusaLink) as (port, files):
-        sending.send(job, f"prusalink://127.0.0.1:{port}", Work())
-        assert len(files) == 1
+        sending.send(job, f"prusalink://127.0.0.1:{port}/local", Work())
+        assert list(files) == ["/api/v1/files/local/my%20job.goo"]
 
 
 def test_sdcp_stores_the_packets_in_order(job: Path) -> None:
@@ -140,7 +140,9 @@ def test_no_printer_is_one_line(job: Path) -> None:
     with pytest.raises(ExportError, match=f"sdcp://127.0.0.1:{port}: Connection refused"):
         sending.send(job, f"sdcp://127.0.0.1:{port}", Work())
     for text in ("http://here", "sdcp://", "sdcp://here/folder", "sdcp://me:key@here", "sdcp://here:port"):
-        with pytest.raises(ExportError, match="expected prusalink://HOST or sdcp://HOST"):
+        with pytest.raises(
+            ExportError, match="expected prusalink://HOST, prusalink://HOST/local or sdcp://HOST"
+        ):
             sending.printer_address(text)
 
 

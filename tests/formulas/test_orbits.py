@@ -7,12 +7,12 @@ import pytest
 
 from fracslice.errors import KernelError, SceneError
 from fracslice.formulas import Number, Vector, bristorbrot, julia, mandelbox, quaternion_mandelbrot, verbs
-from fracslice.formulas.orbits import code, grown, orbit
+from fracslice.formulas.orbits import grown, orbit, steps
 from fracslice.formulas.registry import _REGISTRY
 from fracslice.formulas.verbs import ball, fold, positive, power, turn
 from fracslice.kernel import compile_scene, link, reference
 from fracslice.kernel.depth import resolve_depths
-from fracslice.kernel.orbits import _numpy
+from fracslice.kernel.growth import image
 from fracslice.kernel.steps import traced
 
 SHIFT = (0.3, -0.2, 0.1)
@@ -60,10 +60,10 @@ def scope_of(step, sizes: dict[str, int]):  # type: ignore[no-untyped-def]
     from fracslice.formulas import vocabulary
 
     made = traced(step, sizes, {})
-    names = "".join(f", v_{name}" for name in sizes)
+    names = "".join(f", v0_{name}" for name in sizes)
     text = "\n    ".join(
         [
-            f"def run(x, y, z, cx, cy, cz{names}):",
+            f"def run(x, y, z, cx0, cy0, cz0{names}):",
             *made.lines,
             f"return ({', '.join(made.point)}), ({', '.join(made.stretch)})",
         ]
@@ -158,7 +158,8 @@ def test_growth_is_found() -> None:
 )
 def test_orbits_do_not_come_back(root) -> None:  # type: ignore[no-untyped-def]
     found, p = grown(root), RNG.uniform(-0.57, 0.57, (3, 20000)) * root.bounds.box.hi[0]
-    step = _numpy(code(root), {"scale": root.values.get("scale"), "inner": root.values.get("inner")})
+    taken, values = steps(root)
+    step = image(taken, 0, values)
     w, gone = p, np.zeros(20000, bool)
     for _ in range(12):
         w = step(w, p)
@@ -169,7 +170,7 @@ def test_orbits_do_not_come_back(root) -> None:  # type: ignore[no-untyped-def]
 
 def test_orbits_that_stay_are_refused() -> None:
     with pytest.raises(SceneError, match=r"<mandelbox> has orbits that do not escape"):
-        mandelbox(scale=1.0)
+        mandelbox(scale=1.0).bounds  # noqa: B018
 
 
 def test_the_quaternion_set_is_that_of_the_complex_numbers_turned() -> None:

@@ -11,7 +11,6 @@ import numpy as np
 
 from fracslice.errors import FracsliceError
 from fracslice.formulas import Formula, Node, bounds
-from fracslice.formulas.orbits import STEPS
 from fracslice.formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
 from fracslice.kernel import reference
 from fracslice.scene.layout import formulas
@@ -26,17 +25,18 @@ DEEPEST = {"iterations": 20, "level": 4}
 SHALLOW = 6
 """For a first look, where a depth is automatic."""
 
+ORBITS = {f.name for f in formulas() if "step" in f.hooks} - {"mandelbulb", "julia"}
 FAMILIES = {
     *("flake", "cells", "prism", "superquadric", "jerusalem", "koch", "hilbert", "tree", "gear", "thread"),
     *("apollonian", "honeycomb", "pseudo_kleinian", "tetrabrot", "noise"),
     *WALLS,
-    *STEPS,
+    *ORBITS,
 }
 """Families with a suite of their own, `tests.formulas.test_families`."""
 
 LOOKED = 4000
 TREES, TRIES = 100, 10
-LEAVES = [f for f in formulas() if f.kind == "shape" and f.name not in FAMILIES]
+LEAVES = [f for f in formulas() if f.children[1] == 0 and f.name not in FAMILIES]
 OTHERS = [f for f in formulas() if f.kind != "shape" and f.name not in FAMILIES | {"material"}]
 Draw = Callable[[np.random.Generator, float], Any]
 

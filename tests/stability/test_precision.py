@@ -9,9 +9,9 @@ import pytest
 
 from fracslice.formulas import names, sphere, transform
 from fracslice.formulas.field import Precision
-from fracslice.formulas.orbits import STEPS
 from fracslice.kernel import compile_scene
 from tests.examples import EXAMPLES
+from tests.stability.random_scenes import ORBITS
 
 from .extremes import ends
 from .measure import coordinate_error, depth_error, nan_count, scale_error
@@ -44,7 +44,7 @@ def test_a_thousand_steps(name: str, precision: Precision) -> None:
 def test_every_formula_is_scaled() -> None:
     fractals = {name for name in names() if name not in LENGTHS}
     by_hand = {"mandelbulb", "julia", "menger", "flake", "cells", "jerusalem", "tetrabrot", "hilbert", "tree"}
-    assert fractals == by_hand | {"apollonian", "honeycomb", "pseudo_kleinian"} | STEPS.keys() & set(names())
+    assert fractals == by_hand | {"apollonian", "honeycomb", "pseudo_kleinian", "orbit", *ORBITS}
     assert scaled(sphere(radius=2), 3.0) == sphere(radius=6)
     assert scaled(transform(sphere(), translate=(1, 0, 0)), 2.0).values["translate"] == (2, 0, 0)
 

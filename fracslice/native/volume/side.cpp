@@ -85,9 +85,9 @@ void Side::prove(const FreeSpace& field, double aim, size_t most) {
 }
 
 Point Side::point(double u, double v, double height) const {
-    Point found;
-    found[(axis_ + 1) % 3] = u, found[(axis_ + 2) % 3] = v, found[axis_] = sign_ * height;
-    return found;
+    Point result;
+    result[(axis_ + 1) % 3] = u, result[(axis_ + 2) % 3] = v, result[axis_] = sign_ * height;
+    return result;
 }
 
 // Whether a ceiling is to be lowered.

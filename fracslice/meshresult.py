@@ -1,0 +1,81 @@
+"""Result of a mesh job: the mesh, its report and the samples that it was made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import TooLargeError
+from .finishing import Placement
+from .report import Report
+from .work import Work
+
+if TYPE_CHECKING:
+    from .kernel import Field
+    from .mesh import Mesh
+    from .volume import Bricks, Plan
+
+
+@dataclass(frozen=True, eq=False)
+class MeshResult:
+    """Result of `make_mesh`.
+
+    Attributes
+    ----------
+    report : Report
+        Measures, checks and costs.
+    place : Placement
+        Map from the scene to the mesh.
+    planned : Plan
+        Sampled field.
+    whole : Mesh or None
+        The mesh; None if it is larger than memory and only in the file.
+    work : Work
+        Threads, progress and cancellation of the job.
+    """
+
+    report: Report
+    place: Placement
+    planned: Plan
+    whole: Mesh | None
+    work: Work
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh in mm, standing on z = 0, quantised to float32.
+
+        Raises
+        ------
+        TooLargeError
+            If the mesh was written in pieces.
+        """
+        if self.whole is None:
+            raise TooLargeError("the mesh does not fit in memory; it is in the file that was written")
+        return self.whole
+
+    @property
+    def root(self) -> Field:
+        """Field that was meshed."""
+        return self.planned.root
+
+    @cached_property
+    def bricks(self) -> Bricks:
+        """Samples of the field around the surface, scene units; computed on first access."""
+        from .volume import sample_scene
+
+        return sample_scene(self.planned, self.work)
+
+    @property
+    def bricks_mm(self) -> Bricks:
+        """Samples in print space: positions and values in mm."""
+        scale, (x, y, z) = self.place.scale, self.bricks.origin
+        dx, dy, dz = self.place.offset
+        return replace(
+            self.bricks,
+            origin=(scale * x + dx, scale * y + dy, scale * z + dz),
+            voxel=scale * self.bricks.voxel,
+            values=self.bricks.values * np.float32(scale),
+        )

@@ -1,0 +1,22 @@
+"""Random hybrids of all orbits: none loses an inside sample against a dense grid. `make nightly`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tests.stability.random_hybrids import lost, random_hybrid
+
+from ..runner import Row, Run
+
+SMALLEST = {"count": 1, "resolution": 16.0}
+
+
+def rows(run: Run, count: int = 200, first: int = 0, resolution: float = 64.0) -> Iterator[Row]:
+    faulty = 0
+    for seed in range(first, first + count):
+        found = lost(random_hybrid(seed), resolution)
+        if found:
+            faulty += 1
+            run.faults.append(f"{seed}: {found} samples lost\n    {random_hybrid(seed)}")
+            yield {"": str(seed), "lost": str(found)}
+    yield {"": "all", "hybrids": str(count), "faults": str(faulty)}
