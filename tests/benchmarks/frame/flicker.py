@@ -20,7 +20,7 @@ from fracslice.scene import library
 from fracslice.scene.animation import Animation
 from fracslice.scene.camera import Camera
 from fracslice.scene.reader import reads
-from fracslice.scene.view import Film
+from fracslice.scene.view import View
 from fracslice.work import Work
 
 from ..runner import Row, Run
@@ -67,7 +67,7 @@ def popping(depths: Callable[..., list[Node]], frames: int, threads: int) -> flo
     job = FilmJob(Timeline(reads(ZOOM.format(frames=frames))), (64, 48), 16, 1.0, device="cpu")
     given, film.gradual_depths = film.gradual_depths, depths
     try:
-        shown = [255 * develop(job.light(k, Work(threads)), Film()) for k in range(frames)]
+        shown = [255 * develop(job.light(k, Work(threads)), View()) for k in range(frames)]
     finally:
         film.gradual_depths = given
     return float(np.diff(abs(np.diff(shown, axis=0)).mean((1, 2, 3))).max(initial=0.0))
