@@ -216,8 +216,8 @@ class _Job:
                 *off,
             ),
             depths=planned.depths,
-            contact_mm2=made.contact,
-            cavities_mm3=finish.cavities,
+            contact_mm2=float(f"{made.contact:.9g}"),  # sums over pieces differ in the last digit
+            cavities_mm3=float(f"{finish.cavities:.9g}"),
         )
         return MeshResult(report, finish.place, planned, made.whole, clock.work)
 
