@@ -13,6 +13,7 @@ from .options import (
     Positive,
     Whole,
     device_option,
+    moment,
     quiet_option,
     set_option,
     source_argument,
@@ -59,6 +60,13 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
     metavar="N",
     help="Maximum number of samples per pixel; the scene's by default, or 64.",
 )
+@click.option(
+    "--fly",
+    callback=moment,
+    metavar="TIME",
+    help="Fly along the surface for this time, such as 10s, on a path by the field; OUT may be its "
+    ".xml file.",
+)
 @click.option("--preview", is_flag=True, help="A quarter of the size, and 4 samples per pixel.")
 @click.option("--resume", is_flag=True, help="Keep the frames that are there.")
 @click.option("--exr", is_flag=True, help="Frames of linear floats, in a folder.")
@@ -73,6 +81,7 @@ def animate(
     fps: float | None,
     size: tuple[int, int] | None,
     samples: int | None,
+    fly: float | None,
     preview: bool,
     resume: bool,
     exr: bool,
@@ -85,7 +94,7 @@ def animate(
 
     The frames are numbered files, in OUT or in a folder beside it: --resume goes on with a film that stopped.
     """
-    from fracslice.animation import FilmJob, Timeline, check_film, encode, write_frames
+    from fracslice.animation import FilmJob, Timeline, check_film, encode, flown, write_frames
     from fracslice.export import replacing
     from fracslice.scene.writer import to_xml
 
@@ -98,8 +107,11 @@ def animate(
     check_folder(folder)
     check_targets(source, output if ending else None)
     scene = load_scene(source, settings)
-    timeline, film = Timeline(scene), scene.view.film
+    film = scene.view.film
     width, height = size or (film.width, film.height)
+    if fly:
+        scene = flown(scene, fly, (width, height))
+    timeline = Timeline(scene)
     if preview:
         width, height, samples = max(width // SMALLER, 1), max(height // SMALLER, 1), FEWER
     rate = fps or timeline.animation.fps
@@ -109,8 +121,9 @@ def animate(
     if chosen[-1] >= job.frames:
         raise click.UsageError(f"--frames: expected frames from 0 to {job.frames - 1}")
     if ending == ".xml":
+        whole = fly and frames is None
         with replacing(target) as file:
-            file.write(to_xml(job.scene(chosen[0])).encode())
+            file.write(to_xml(scene if whole else job.scene(chosen[0])).encode())
         return
     try:
         with working(threads, quiet) as work:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .closing import DENSITIES, of_mesh
+from .cluster import cluster_options, pooled
+from .families import MOST, families, going_on, suffixed
 from .inputs import check_folder, check_targets, load_scene, refuse_options
 from .options import (
     NAME,
     job_of,
     job_options,
+    moment,
     price_option,
     print_options,
     quiet_option,
@@ -33,18 +37,6 @@ if TYPE_CHECKING:
     from fracslice.work import Work
 
 GRID = ".vdb"
-
-
-def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
-    """Parse a time of an animation into seconds."""
-    if text is None:
-        return None
-    from fracslice.scene.animation import Seconds
-
-    try:
-        return Seconds(0.0, "").read(text)
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r}: expected {error}") from None
 
 
 @click.command()
@@ -67,6 +59,12 @@ def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | N
     metavar="TIME",
     help="Mesh the scene of this time of its <animation>, such as 2.5s.",
 )
+@click.option(
+    "--every",
+    callback=moment,
+    metavar="TIME",
+    help="Mesh the scene every so often, such as 0.5s, from the begin to the end of its <animation>.",
+)
 @click.option("--report", type=NAME, metavar="FILE.json", help="Write the figures that prove the mesh.")
 @click.option("--picture", type=NAME, metavar="FILE.png", help="Write a shaded picture of the mesh.")
 @click.option(
@@ -81,6 +79,7 @@ def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | N
     default="cpu",
     help="The device that samples the field; cpu by default. auto: the GPU, if there is one.",
 )
+@cluster_options
 @click.option(
     "--material",
     type=click.Choice(list(DENSITIES)),
@@ -91,6 +90,7 @@ def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | N
 @threads_option
 @quiet_option
 @click.pass_context
+@families("output", "report", "picture")
 def mesh(
     context: click.Context,
     /,
@@ -98,10 +98,14 @@ def mesh(
     output: str,
     settings: tuple[str, ...],
     seconds: float | None,
+    every: float | None,
     report: str | None,
     picture: str | None,
     cache: str | None,
     device: str,
+    cluster: str | None,
+    shard: str | None,
+    store: str | None,
     material: str,
     price: float | None,
     threads: int,
@@ -118,22 +122,44 @@ def mesh(
 
     check_outputs(source, output, report, picture)
     if Path(output).suffix.lower() == GRID:
-        refuse_options(context, {"chord", "simplify"}, "only for meshes, and a .vdb file holds samples")
-    scene = load_scene(source, settings)
-    if seconds is not None:
-        from fracslice.animation import Timeline
-
-        scene = Timeline(scene).at(seconds)
-    job = job_of(scene, **options)
+        names = {"chord", "simplify", "cluster", "shard", "store"}
+        refuse_options(context, names, "only for meshes, and a .vdb file holds samples")
+    scenes = moments(load_scene(source, settings), seconds, every)
     how = Work(threads, store=store_in(cache), device=chosen(device))
-    with working(how, quiet) as work:
-        result = made(scene, job, output, picture, work)
-        if report is not None:
-            write_report(result.report, report)
-    if not quiet:
-        click.echo(summary(output, result.report))
-        click.echo(os.linesep.join(of_mesh(result, material, price).lines()))
-    return 1 if result.report.problems else 0
+    problems = False
+    with (
+        pooled(output, threads, cluster, shard, store) as pool,
+        working(replace(how, cluster=pool), quiet) as work,
+    ):
+        for suffix, scene in scenes:
+            file, *others = (path and suffixed(path, suffix) for path in (output, picture, report))
+            with going_on(str(file)):
+                result = made(scene, job_of(scene, **options), str(file), others[0], work)
+                if others[1] is not None:
+                    write_report(result.report, others[1])
+                if not quiet:
+                    click.echo(summary(str(file), result.report))
+                    click.echo(os.linesep.join(of_mesh(result, material, price).lines()))
+                problems |= bool(result.report.problems)
+    return 1 if problems else 0
+
+
+def moments(scene: Scene, seconds: float | None, every: float | None) -> list[tuple[str, Scene]]:
+    """Scenes of --time and --every, and what their file names end in."""
+    if seconds is None and every is None:
+        return [("", scene)]
+    from fracslice.animation import Timeline
+
+    timeline = Timeline(scene)
+    if every is None:
+        return [("", timeline.at(seconds or 0.0))]
+    if seconds is not None or not every:
+        raise click.UsageError("--every: expected a time above zero, and no --time")
+    count = int(timeline.animation.duration / every + 1e-9) + 1
+    if count > MOST:
+        raise click.UsageError(f"--every: expected at most {MOST} outputs, and this makes {count}")
+    times = [float(f"{k * every:.6g}") for k in range(count)]
+    return [(f"-{time:g}s", timeline.at(time)) for time in times]
 
 
 def store_in(folder: str | None) -> Store | None:

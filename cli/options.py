@@ -74,6 +74,16 @@ def length(_: click.Context, __: click.Parameter, value: str | None) -> float | 
         raise click.BadParameter(str(error)) from None
 
 
+def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
+    """Parse a time of an animation into seconds."""
+    from fracslice.scene.animation import Seconds
+
+    try:
+        return None if text is None else Seconds(0.0, "").read(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: expected {error}") from None
+
+
 def amount(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
     """Check that a number is at least zero."""
     if value is not None and value < 0:
@@ -210,7 +220,8 @@ set_option = click.option(
     "settings",
     multiple=True,
     metavar="NAME.ATTRIBUTE=VALUE",
-    help="Change a value of the scene, such as mandelbulb.power=6; repeatable.",
+    help="Change a value of the scene, such as mandelbulb.power=6; repeatable. mesh, slice and render take a "
+    "range, such as mandelbulb.power=2..9:0.5, and make a file for each value.",
 )
 threads_option = click.option(
     "--threads",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +71,8 @@ def print_(
 
     The slicer's warnings are passed on. Exit status: 1 if the mesh would not print; nothing is sliced.
     """
+    import tempfile
+
     from fracslice.export.sending import printer_address, send
     from fracslice.export.slicers import SECONDS, SLICERS
     from fracslice.job import make_mesh

@@ -14,6 +14,7 @@ import click
 from fracslice.errors import Cancelled, SharedError
 
 from .cluster import cluster_options, pooled
+from .families import families
 from .inputs import check_folder, check_targets, load_scene
 from .options import NAME, Whole, device_option, quiet_option, set_option, source_argument, threads_option
 from .working import KeptError, working
@@ -123,6 +124,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 @set_option
 @threads_option
 @quiet_option
+@families("output", "state", "pass_images")
 def render(
     source: str,
     output: str,

@@ -12,6 +12,7 @@ import click
 
 from .closing import of_layers
 from .cluster import cluster_options, pooled
+from .families import families
 from .inputs import check_targets, load_scene
 from .layers import LAYER, PIXEL_MM, ending, heights, html_option, printer_option, shift, write_page
 from .options import (
@@ -120,6 +121,7 @@ if TYPE_CHECKING:
 @set_option
 @threads_option
 @quiet_option
+@families("output", "preview")
 def slice_(
     source: str,
     output: str,
@@ -133,7 +135,6 @@ def slice_(
 
     An interrupted job resumes when it is started again.
     """
-    from fracslice.export.sending import send
     from fracslice.export.slices import PICTURES, PRINTS, printers_file, slice_format, write_slices
     from fracslice.scene.writer import to_xml
     from fracslice.shown import layers_amount
@@ -171,7 +172,7 @@ def slice_(
         write_slices(run, output, form)
         if preview:
             write_preview(stack, preview, work)
-        sent = send(output, options["address"], work) if options["address"] is not None else None
+        sent = uploaded(output, options["address"], work)
         if not quiet or options["html"]:
             off = layers_amount(run.slicer, work)[1]
             last = list(of_layers(run, options["price"]).lines())
@@ -227,6 +228,15 @@ def refuse_what_no_print_has(output: str, kind: str, options: dict[str, Any], re
         )
     if options["layer"][1] is not None and kind == "sl1":
         raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")
+
+
+def uploaded(output: str, address: str | None, work: Work) -> str | None:
+    """Upload the file to an address, if there is one; return what became of it."""
+    if address is None:
+        return None
+    from fracslice.export.sending import send  # imports an HTTP client
+
+    return send(output, address, work)
 
 
 def refuse_to_send(output: str, kind: str, address: str) -> None:

@@ -12,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .scene import Print
-from .work import Clock
+from .work import Clock, Work
 
 if TYPE_CHECKING:
     from .mesh import Mesh
     from .mesh.check import MeshReport
     from .mesh.components import Removed
-    from .mesh.window import Finished
+    from .mesh.quantisation import Frame
+    from .mesh.window import Finished, Tally
     from .surfaces import Surface
+    from .volume import Plan, SignBricks
     from .volume.sizing import Sizing
 
 MOST_ERRORS = 1 << 20
@@ -82,6 +84,74 @@ class Placement:
         return scene
 
 
+def placing(planned: Plan, signs: SignBricks, place: Placement) -> tuple[NDArray[np.float64], Frame]:
+    """Return what quantisation needs of a placement.
+
+    Parameters
+    ----------
+    planned : Plan
+        Sampled field.
+    signs : SignBricks
+        Its samples.
+    place : Placement
+        Placement of the mesh.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, 3)
+        Planes of the grid, mm.
+    Frame
+        Scale, translation and height of the bed.
+    """
+    from .mesh.extract import minimum_edge_parameter
+    from .mesh.quantisation import grid_planes
+
+    bed = FLAT * minimum_edge_parameter(signs) * planned.voxel * place.scale
+    return place.mm(grid_planes(signs)), (place.scale, place.offset, bed)
+
+
+def stride(bricks: int) -> int:
+    """Return the stride of the vertices whose distance from the surface is measured.
+
+    Parameters
+    ----------
+    bricks : int
+        Bricks of samples.
+
+    Returns
+    -------
+    int
+        Each vertex of this stride is measured, in each piece.
+    """
+    return -(-VERTICES_A_BRICK * bricks // MOST_ERRORS)
+
+
+def off_surface(
+    planned: Plan, place: Placement, vertices: NDArray[np.float64], work: Work
+) -> NDArray[np.float64]:
+    """Measure the distances of vertices from the surface.
+
+    Parameters
+    ----------
+    planned : Plan
+        Sampled field.
+    place : Placement
+        Placement of the mesh.
+    vertices : ndarray of float64, shape (n, 3)
+        Vertices, mm.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Distances, scene units.
+    """
+    from .volume.accuracy import surface_error
+
+    return surface_error(planned.root, place.units(vertices), planned.voxel, work)
+
+
 class Finish:
     """Selection of bodies and placement of a surface, decided once for all pieces.
 
@@ -116,14 +186,12 @@ class Finish:
         clock: Clock,
     ) -> None:
         from .mesh.components import choose
-        from .mesh.extract import minimum_edge_parameter
-        from .mesh.quantisation import grid_planes
         from .volume.rest import box_of_the_rest
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
         self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
         unit = (scale or size.scale(planned.box)) ** 3
-        nested, self.misplaced = shells.nested(pieces, how.cavities == "fill", clock.work.threads)
+        nested, self.misplaced = surface.nested(how.cavities == "fill", clock.work.threads)
         sized = replace(nested, volumes=nested.volumes * unit)
         limit = dust(float(sized.volumes.sum()))
         self.stays, removed = choose(sized, keep=how.keep, dust_mm3=limit, cavities=how.cavities)
@@ -140,8 +208,24 @@ class Finish:
         volumes = nested.volumes[self.stays]
         self.cavities = -float(volumes[volumes < 0].sum()) * exact**3
         """Volume of the cavities that stay, mm3."""
-        self._planes = self.place.mm(grid_planes(surface.signs))
-        self._bed = FLAT * minimum_edge_parameter(surface.signs) * planned.voxel * exact
+        self._planes, self._frame = placing(planned, surface.signs, self.place)
+
+    def report(self, tally: Tally) -> MeshReport:
+        """Report on the whole mesh.
+
+        Parameters
+        ----------
+        tally : Tally
+            Sums over all pieces.
+
+        Returns
+        -------
+        MeshReport
+            The report.
+        """
+        hollow = self.shells.volumes < 0
+        bodies, cavities = int((self.stays & ~hollow).sum()), int((self.stays & hollow).sum())
+        return tally.report(bodies, cavities, self.misplaced)
 
     def finished(self) -> Iterator[Finished]:
         """Place and clean the pieces, mm. Pieces held in memory are released.
@@ -153,8 +237,7 @@ class Finish:
         """
         from .mesh.window import Window
 
-        frame = self.place.scale, self.place.offset, self._bed
-        window = Window(self.planned.voxel, self._planes, frame, self.clock.work.threads)
+        window = Window(self.planned.voxel, self._planes, self._frame, self.clock.work.threads)
         count = len(self.pieces)
         for number in range(count):
             with self.clock("finishing"):
@@ -184,7 +267,7 @@ class Check:
         from .mesh.window import Tally
 
         self._finish, self._tally = finish, Tally(finish.clock.work.threads)
-        self._stride = -(-VERTICES_A_BRICK * bricks // MOST_ERRORS)
+        self._stride = stride(bricks)
         self._errors: list[NDArray[np.float64]] = []
         self.contact = 0.0
         """Area on the plate, mm2."""
@@ -206,31 +289,35 @@ class Check:
             yield piece.passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
-                self.contact += _on_the_plate(piece.passed)
-                self._errors.append(self._off(piece.points[:: self._stride]))
-
-    def _off(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distances of vertices in mm from the surface, scene units."""
-        from .volume.accuracy import surface_error
-
-        planned, points = self._finish.planned, self._finish.place.units(vertices)
-        return surface_error(planned.root, points, planned.voxel, self._finish.clock.work)
+                self.contact += on_the_plate(piece.passed)
+                finish = self._finish
+                vertices = piece.points[:: self._stride]
+                self._errors.append(off_surface(finish.planned, finish.place, vertices, finish.clock.work))
 
     @property
     def mesh(self) -> MeshReport:
         """Report on the whole mesh, after all pieces have passed."""
-        hollow, stays = self._finish.shells.volumes < 0, self._finish.stays
-        bodies, cavities = int((stays & ~hollow).sum()), int((stays & hollow).sum())
-        return self._tally.report(bodies, cavities, self._finish.misplaced)
+        return self._finish.report(self._tally)
 
     @property
     def errors(self) -> NDArray[np.float64]:
-        """Distances of vertices from the surface, mm."""
-        return self._finish.place.scale * np.concatenate(self._errors)
+        """Distances of vertices from the surface, scene units."""
+        return np.concatenate(self._errors)
 
 
-def _on_the_plate(mesh: Mesh) -> float:
-    """Area of the triangles at z = 0."""
+def on_the_plate(mesh: Mesh) -> float:
+    """Return the area of the triangles at z = 0.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Finished triangles, mm.
+
+    Returns
+    -------
+    float
+        Area, mm2.
+    """
     lying = (mesh.vertices[:, 2] == 0)[mesh.triangles].all(1)
     x, y = np.moveaxis(mesh.vertices[mesh.triangles[lying], :2], 2, 0)
     double = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -18,16 +18,18 @@ from .finishing import Check, Finish
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
 from .meshresult import MeshResult
+from .planning import Sized, edited, planned
 from .report import Report, SurfaceError, SurfaceToMesh
-from .scene import Print, Scene
+from .scene import Scene
 from .version import __version__
 from .work import Clock, Work, ahead
 
 if TYPE_CHECKING:
     from .mesh import Mesh
+    from .mesh.check import MeshReport
     from .mesh.simplify import Simplified
     from .surfaces import Surface
-    from .volume import Plan, SignBricks
+    from .volume import SignBricks
     from .volume.sizing import Sizing
 
 STL = ".stl"
@@ -67,13 +69,17 @@ def make_mesh(
         return job.result(*job.surface(aside))
 
 
-@dataclass(frozen=True)
-class _Sized:
-    """A plan, its scale in mm per scene unit (None if not yet known), and the remaining choice of bodies."""
+class _Made(NamedTuple):
+    """The mesh, if in one piece; its simplification, if any; its checks; and distances between its vertices,
+    or points of the surface, and the other, scene units; area on the plate, mm2.
+    """
 
-    planned: Plan
-    scale: float | None
-    left: Print
+    whole: Mesh | None
+    simplified: Simplified | None
+    report: MeshReport
+    errors: np.ndarray
+    back: np.ndarray
+    contact: float
 
 
 @dataclass(frozen=True)
@@ -95,6 +101,11 @@ class _Job:
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
         self.what.voxels(self.size.longest)
+        if self.clock.work.cluster is not None:
+            for name, length in self.needing_all():
+                raise SceneError(
+                    f"{name} {length:g}mm needs the whole mesh: expected no cluster and no shard"
+                )
         if self.path is not None:
             from .export import check_format, check_target
 
@@ -117,62 +128,50 @@ class _Job:
                 stack.enter_context(tempfile.TemporaryDirectory(prefix=".fracslice-", dir=beside))
             )
 
-    def planned(self) -> _Sized:
-        """Field to be meshed, with its edits."""
-        from .volume import plan
-        from .volume.sizing import oriented
+    def needing_all(self) -> Iterator[tuple[str, float]]:
+        """Names and lengths of changes that need a mesh in one piece."""
+        for name, length in (("chord", self.what.chord_mm), ("simplify", self.what.simplify_mm)):
+            if length is not None:
+                yield name, length
 
-        how = self.what.how(self.scene)
-        with self.clock("planning"):
-            root = oriented(self.scene.root, self.what.up, self.size.stretch, self.clock.work)
-            planned = plan(root, self.what.voxels(self.size.longest), self.clock.work)
-        return _Sized(planned, None, how) if how.whole else self.edited(planned)
-
-    def edited(self, planned: Plan) -> _Sized:
-        """Field with all edits for printing."""
-        from .printing import printable
-
-        how = self.what.how(self.scene)
-        with self.clock("changing"):
-            made, scale = printable(planned, self.size, how, self.clock.work)
-        # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.
-        keep = how.keep if planned.root.bounds.exterior_only else "all"
-        # Keep cavities: the hollow is one.
-        return _Sized(made, scale, Print(keep=keep, cavities=how.cavities if how.whole else "keep"))
-
-    def sampled(self) -> tuple[_Sized, SignBricks]:
-        """Field, its samples, and the choice of bodies that is left to the mesh.
+    def sampled(self) -> tuple[Sized, SignBricks, bool]:
+        """Field, its samples, and the choice of bodies that is left to the mesh; true if the field chose.
 
         Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
         """
-        sized, how = self.planned(), self.what.how(self.scene)
+        sized, how = planned(self.scene, self.what, self.size, self.clock), self.what.how(self.scene)
         signs = surfaces.sampled(sized.planned, self.clock)
         thin = how.sorts and surfaces.has_thin_walls(signs)
-        if thin and how.whole:
-            sized = self.edited(sized.planned)
+        if again := thin and how.whole:
+            sized = edited(sized.planned, self.scene, self.what, self.size, self.clock)
             signs = surfaces.sampled(sized.planned, self.clock)
             thin = surfaces.has_thin_walls(signs)
-        return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, signs
+        return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, signs, again
 
-    def surface(self, aside: Callable[[], Path] | None) -> tuple[_Sized, Surface]:
+    def surface(self, aside: Callable[[], Path] | None) -> tuple[Sized, Surface]:
         """Surface, in one piece if it fits in memory, and the choice of bodies that is left."""
-        sized, signs = self.sampled()
+        sized, signs, again = self.sampled()
+        if (pool := self.clock.work.cluster) is not None:
+            from .meshtasks import MeshRecipe
+            from .scene.writer import to_xml
+            from .sharedmesh import made
+
+            recipe = MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
+            return sized, made(recipe, sized.planned, signs, pool, self.clock)
         most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
         except TooLargeError as error:
-            for name, length in (("chord", self.what.chord_mm), ("simplify", self.what.simplify_mm)):
-                if length is not None:
-                    raise SceneError(f"{name} {length:g}mm needs the whole mesh: {error}") from None
+            for name, length in self.needing_all():
+                raise SceneError(f"{name} {length:g}mm needs the whole mesh: {error}") from None
             if aside is None:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
         folder = aside() if aside and most < len(signs) else None
         return sized, surfaces.made(sized.planned, signs, most, folder, self.clock)
 
-    def result(self, sized: _Sized, surface: Surface) -> MeshResult:
+    def result(self, sized: Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""
-        from .mesh.missed import surface_to_mesh
         from .mesh.touching import touching_note
         from .shown import mesh_amount
 
@@ -185,15 +184,12 @@ class _Job:
         with clock("finishing"):
             finish = Finish(surface, sized.left, what.dust, size, sized.scale, clock)
         scale = finish.place.scale
-        with clock("checking"):
-            back = surface_to_mesh(planned, surface.pieces.meshes, scale, clock.work)
-        check = Check(finish, len(signs))
-        whole, simplified = self.written(finish, check, finish.place.mm(surface.tips))
+        made = self.alone(surface, finish) if clock.work.cluster is None else self.joined(surface, finish)
         with clock("checking"):
             amount, off = mesh_amount(planned, finish.volume, scale, clock.work)
         touching: tuple[str, ...] = ()
-        if whole is not None and check.mesh.components > 1:
-            touching = touching_note(whole, planned.voxel * scale, clock.work.threads)
+        if made.whole is not None and made.report.components > 1:
+            touching = touching_note(made.whole, planned.voxel * scale, clock.work.threads)
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
         report = Report(
             scene=self.scene.name,
@@ -201,17 +197,17 @@ class _Job:
             version=__version__,
             size_mm=size.longest,
             voxel_mm=planned.voxel * scale,
-            mesh=check.mesh,
+            mesh=made.report,
             removed=finish.removed,
-            surface_error_mm=SurfaceError.of(check.errors),
-            surface_to_mesh_mm=SurfaceToMesh.of(back),
+            surface_error_mm=SurfaceError.of(scale * made.errors),
+            surface_to_mesh_mm=SurfaceToMesh.of(scale * made.back),
             evaluations=signs.evaluations,
             bricks=len(signs),
             seconds=clock.seconds,
             peak_rss_mb=peak_rss_mb(),
             amount_mm3=amount,
             refined=refined,
-            simplified=simplified,
+            simplified=made.simplified,
             notes=(
                 *planned.notes,
                 *([fell] if thin else ()),
@@ -220,10 +216,49 @@ class _Job:
                 *off,
             ),
             depths=planned.depths,
-            contact_mm2=check.contact,
+            contact_mm2=made.contact,
             cavities_mm3=finish.cavities,
         )
-        return MeshResult(report, finish.place, planned, whole, clock.work)
+        return MeshResult(report, finish.place, planned, made.whole, clock.work)
+
+    def alone(self, surface: Surface, finish: Finish) -> _Made:
+        """Write the file while it is checked, by threads of this process."""
+        from .mesh.missed import surface_to_mesh
+
+        planned, work = surface.planned, self.clock.work
+        with self.clock("checking"):
+            back = surface_to_mesh(planned, surface.pieces.meshes, 1.0, work)
+        check = Check(finish, len(surface.signs))
+        whole, simplified = self.written(finish, check, finish.place.mm(surface.tips))
+        return _Made(whole, simplified, check.mesh, check.errors, back, check.contact)
+
+    def joined(self, surface: Surface, finish: Finish) -> _Made:
+        """Write the file from the pieces of a pool."""
+        from .export import FORMATS
+        from .export.stl import write_blocks
+        from .sharedmesh import SharedSurface, finished, whole
+
+        assert isinstance(surface, SharedSurface)
+        check, blocks = finished(surface, finish)
+        ending = STL if self.path is None else self.path.suffix.lower()
+        mesh = None if self.path and ending == STL else whole(list(blocks))
+        if self.path:
+            with self.file(self.path) as (file, about):
+                if mesh is None:
+                    write_blocks(blocks, file, about)
+                else:
+                    FORMATS[ending](mesh, file, about)
+        check.end()
+        errors = np.concatenate(check.off)
+        return _Made(mesh, None, finish.report(check.tally), errors, check.back, check.contact)
+
+    @contextmanager
+    def file(self, path: Path) -> Iterator[tuple[BinaryIO, dict[str, str]]]:
+        """Open the file, and return what it says about itself."""
+        from .export import application, replacing
+
+        with replacing(path) as file:
+            yield file, {"Application": application()} | metadata(self.scene)
 
     def written(
         self, finish: Finish, check: Check, tips: np.ndarray
@@ -231,7 +266,7 @@ class _Job:
         """Write the file while it is checked. Returns the mesh, if in one piece, and the result of its
         simplification, if any.
         """
-        from .export import FORMATS, application, replacing
+        from .export import FORMATS
         from .export.stl import write_pieces
         from .mesh.window import Finished, tips_last
 
@@ -256,8 +291,7 @@ class _Job:
                 with self.clock("writing"):  # the consumer writes during the yield
                     yield mesh
 
-        about = {"Application": application()} | metadata(self.scene)
-        with replacing(self.path) as file:
+        with self.file(self.path) as (file, about):
             if self.path.suffix.lower() == STL:
                 write_pieces(timed(), file, about)
             else:

@@ -66,8 +66,9 @@ def program() -> str:
     str
         Key of this installation.
     """
-    import scipy  # here, since few jobs need its version and importing it takes longer than hashing
-
     native = (find_spec(f"{__package__}.{name}") for name in ("_native", "_slices", "_vdb"))
     compiled = (Path(module.origin) for module in native if module and module.origin)
-    return key(texts(*sorted(HERE.rglob("*.py")), *compiled), np.__version__, scipy.__version__)
+    scipy = find_spec("scipy")  # importing it for its version takes longer than hashing the program
+    assert scipy and scipy.origin
+    version = Path(scipy.origin).with_name("version.py")
+    return key(texts(*sorted(HERE.rglob("*.py")), *compiled, version), np.__version__)

@@ -15,6 +15,7 @@ from .memory import available_bytes
 from .work import Clock
 
 if TYPE_CHECKING:
+    from .mesh.components import Shells
     from .mesh.pieces import Pieces
     from .mesh.refine import Refined
     from .mesh.survey import WholeShells
@@ -52,6 +53,21 @@ class Surface:
     pieces: Pieces
     shells: WholeShells
     tips: NDArray[np.float64]
+
+    def nested(self, bodies: bool, threads: int) -> tuple[Shells, int]:
+        """Nesting of the shells.
+
+        Parameters
+        ----------
+        bodies, threads
+            As for `WholeShells.nested`.
+
+        Returns
+        -------
+        Shells, int
+            As `WholeShells.nested`.
+        """
+        return self.shells.nested(self.pieces, bodies, threads)
 
     @property
     def thin(self) -> str:

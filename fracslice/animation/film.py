@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +15,18 @@ from ..export import application
 from ..export.images import write_image
 from ..files import replacing, reported
 from ..formulas.parameters import Number, validated
+from ..formulas.registry import Node
 from ..keys import key, program
 from ..rendering import Renderer, develop, picture
 from ..rendering.sequence import Samples
 from ..rendering.setup import default_lights
 from ..scene.model import Scene
 from ..work import Work
+from .depths import gradual_depths
 from .timeline import Timeline
+
+TURNS = 5
+"""Step through the depths from one time of the shutter to the next, so that a late one is not a deep one."""
 
 JOURNAL = "film.json"
 """File in the folder that says whose frames these are."""
@@ -102,7 +108,8 @@ class FilmJob:
     def light(self, number: int, work: Work) -> np.ndarray:
         """Render a frame.
 
-        With an open shutter, the points of a pixel's sample set are divided among the times.
+        The points of a pixel's sample set are divided among the times of an open shutter, and among depths if
+        the automatic ones are about to change; see `gradual_depths`.
 
         Parameters
         ----------
@@ -116,18 +123,46 @@ class FilmJob:
         ndarray of float32, shape (height, width, 4)
             Mean of the samples; see `Pass.mean`.
         """
-        animation = self.timeline.animation
-        times = min(animation.times, self.samples) if animation.shutter else 1
-        share = self.samples // times
+        moments, shift = self.moments(number), number + 1 if self.timeline.animation.noise == "moving" else 0
+        share, begin = self.samples // len(moments), 0
         mean = np.zeros((self.size[1], self.size[0], 4), np.float32)
-        for k in range(times):
-            time = (number + animation.shutter * (k + 0.5) / times if times > 1 else number) / self.fps
-            scene = self.timeline.at(time)
-            part = Samples(k * share, number + 1 if animation.noise == "moving" else 0)
+        for scene, same in groupby(moments):
+            count = len(list(same))
+            part = Samples(begin, shift)
             renderer = Renderer(scene.root, scene.view, self.size, work, self.device, part)
-            *_, done = renderer.passes(share)
-            mean += done.mean / np.float32(times)
+            *_, done = renderer.passes(count * share)
+            mean += done.mean * np.float32(count / len(moments))
+            begin += count * share
         return mean
+
+    def moments(self, number: int) -> list[Scene]:
+        """Return the scenes that a frame is the mean of: its times, each with another depth.
+
+        Parameters
+        ----------
+        number : int
+            Number of the frame, from 0.
+
+        Returns
+        -------
+        list of Scene
+            Scenes; equal ones follow each other.
+        """
+        animation, count = self.timeline.animation, min(self.timeline.animation.times, self.samples)
+        if not animation.shutter:
+            scene = self.scene(number)
+            return [replace(scene, root=root) for root in self.depths(scene, count)]
+        times = ((number + animation.shutter * (k + 0.5) / count) / self.fps for k in range(count))
+        scenes = [self.timeline.at(time) for time in times]
+        return [
+            replace(scene, root=self.depths(scene, count)[k * TURNS % count])
+            for k, scene in enumerate(scenes)
+        ]
+
+    def depths(self, scene: Scene, count: int) -> list[Node]:
+        """Trees of a scene for a range of details; see `gradual_depths`."""
+        camera = scene.view.camera
+        return gradual_depths(scene.root, camera, self.size, count) if camera else [scene.root] * count
 
 
 def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: bool, work: Work) -> list[Path]:

@@ -252,7 +252,9 @@ def connected(where: str, store: str, threads: int = 1) -> Iterator[Workers]:
     workers = int(count or threads)
     per_worker = max(1, threads // workers)
     with (
-        LocalCluster(workers, per_worker, memory_limit=None, dashboard_address=None) as cluster,
+        LocalCluster(
+            n_workers=workers, threads_per_worker=per_worker, memory_limit=None, dashboard_address=None
+        ) as cluster,
         Client(cluster, timeout=CONNECT, set_as_default=False) as client,
     ):
         yield Workers(client, Pieces(store))

@@ -14,12 +14,22 @@ from fracslice.version import __version__
 
 __all__ = ["FORMATS", "application", "check_format", "check_target", "replacing", "write"]
 
-FORMATS: dict[str, Callable[[Mesh, BinaryIO, Mapping[str, str]], None]] = {
+Write = Callable[[Mesh, BinaryIO, Mapping[str, str]], None]
+
+
+def _in_order(write: Write) -> Write:
+    """Writer of a mesh whose vertices are sorted by their first use: equal triangles give equal bytes,
+    however the mesh was made.
+    """
+    return lambda mesh, file, metadata: write(mesh.in_order(), file, metadata)
+
+
+FORMATS: dict[str, Write] = {
     ".stl": stl.write,
-    ".3mf": threemf.write,
-    ".ply": ply.write,
-    ".obj": obj.write,
-    ".glb": glb.write,
+    ".3mf": _in_order(threemf.write),
+    ".ply": _in_order(ply.write),
+    ".obj": _in_order(obj.write),
+    ".glb": _in_order(glb.write),
 }
 
 

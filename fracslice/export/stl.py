@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import BinaryIO
 
 import numpy as np
@@ -11,7 +11,8 @@ import numpy as np
 from fracslice.errors import ExportError
 from fracslice.mesh.model import Mesh
 
-BLOCK = 1 << 18
+BLOCK, TRIANGLE = 1 << 18, 50
+"""Triangles of a block, and bytes of a triangle."""
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
@@ -51,12 +52,32 @@ def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, 
     ExportError
         For more than 4294967295 triangles.
     """
+    write_blocks((block for mesh in meshes for block in _blocks(mesh)), file, metadata)
+
+
+def write_blocks(blocks: Iterable[bytes | memoryview], file: BinaryIO, metadata: Mapping[str, str]) -> None:
+    """Write a mesh from blocks of encoded triangles.
+
+    Parameters
+    ----------
+    blocks : iterable of bytes-like
+        Triangles of 50 bytes.
+    file : file
+        Binary file, open for writing and able to seek.
+    metadata : mapping of str to str
+        Names and values; the header holds Application.
+
+    Raises
+    ------
+    ExportError
+        For more than 4294967295 triangles.
+    """
     start, count = file.tell(), 0
     header = f"binary STL, units: mm, {metadata['Application']}".encode("ascii", "replace")
     file.write(header[:80].ljust(80) + bytes(4))
-    for mesh in meshes:
-        _write_triangles(mesh, file)
-        count += len(mesh.triangles)
+    for block in blocks:
+        file.write(block)
+        count += memoryview(block).nbytes // TRIANGLE
         if count >= 2**32:
             raise ExportError("STL cannot hold more than 4294967295 triangles")
     file.seek(start + 80)
@@ -64,8 +85,9 @@ def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, 
     file.seek(0, os.SEEK_END)
 
 
-def _write_triangles(mesh: Mesh, file: BinaryIO) -> None:
+def _blocks(mesh: Mesh) -> Iterator[memoryview]:
+    """Encoded triangles of a mesh."""
     from fracslice._native import stl
 
     for begin in range(0, len(mesh.triangles), BLOCK):
-        file.write(stl(mesh.vertices, mesh.triangles[begin : begin + BLOCK]).data)
+        yield stl(mesh.vertices, mesh.triangles[begin : begin + BLOCK]).data

@@ -1,41 +1,36 @@
 """CUDA back end: a scene's field on an NVIDIA GPU, by numba-cuda.
 
-Importing this module is cheap and always possible. `available` tests for a GPU; functions that need one raise
-`KernelError` with a line that names what is missing. Machine code is cached in the cache folder, next to its
+Importing this module is cheap and always possible. Functions that need a GPU raise `KernelError` with a line
+that names what is missing. Machine code is cached in the cache folder, next to its
 source text.
 """
 
 from __future__ import annotations
 
-import atexit
-import ctypes
-import importlib.util
 import math
 import os
-import shutil
 import sys
-import tempfile
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
-from ..errors import ExportError, KernelError
-from ..extras import lacking
-from ..files import Kept
 from ..formulas.field import Kernel, Precision
 from ..formulas.registry import Node
 from ..keys import key, texts
 from . import cuda_source
+from .cuda_driver import available as available
+from .cuda_driver import missing as missing
+from .cuda_driver import require as require
 from .cuda_loops import bricks, points
 from .linker import Linked, link
 from .loops import Loop
-from .objects import cache_folder
+from .modules import imported
 
 BLOCK = 128
 """Threads per block."""
@@ -47,63 +42,6 @@ the GIL anyway.
 
 LOOPS = points, bricks
 """Loops of every CUDA kernel."""
-
-NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
-"""Message for a missing GPU or driver."""
-
-
-def missing() -> str | None:
-    """Return the reason why this process cannot use CUDA.
-
-    Returns
-    -------
-    str
-        One line; None if CUDA can be used.
-    """
-    if reason := lacking("numba_cuda", "CUDA needs", "numba-cuda[cu13]"):
-        return reason
-    if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1" and not _driver():
-        return NO_GPU
-    try:
-        from . import cuda_intrinsics
-    except (ImportError, RuntimeError) as error:
-        return f"CUDA cannot be used: {str(error).splitlines()[0]}"
-    return None if cuda_intrinsics.cuda.is_available() else NO_GPU
-
-
-def _driver() -> bool:
-    """True if NVIDIA's driver is installed: a fast test without Numba."""
-    try:
-        ctypes.CDLL("nvcuda.dll" if os.name == "nt" else "libcuda.so.1")
-    except OSError:
-        return False
-    return True
-
-
-def available() -> bool:
-    """Return True if there is a GPU to compile for."""
-    return missing() is None
-
-
-def require() -> Any:
-    """Return Numba's ``cuda`` module.
-
-    Returns
-    -------
-    module
-        Module `numba.cuda`.
-
-    Raises
-    ------
-    KernelError
-        If no GPU can be used.
-    """
-    reason = missing()
-    if reason:
-        raise KernelError(reason)
-    from . import cuda_intrinsics
-
-    return cuda_intrinsics.cuda
 
 
 class CudaKernel(Kernel):
@@ -308,7 +246,7 @@ def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> M
     require()
     text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)
     name = f"cuda_{key(text, _toolchain())}"
-    return sys.modules.get(name) or _imported(name, text)
+    return sys.modules.get(name) or imported(name, text)
 
 
 @lru_cache(maxsize=1)
@@ -327,42 +265,3 @@ def _numba_settings() -> list[str]:
     with suppress(OSError):
         settings.append(repr(Path(".numba_config.yaml").read_bytes()))
     return settings
-
-
-def _imported(name: str, text: str) -> ModuleType:
-    """Import a module from a cached file: Numba caches machine code next to the source file. If other users
-    could write to the cache folder, the file is private to this process.
-    """
-    path = _kept(cache_folder(), name, text) or _kept(_own_folder(), name, text)
-    assert path
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return sys.modules.setdefault(name, module)
-
-
-@lru_cache(maxsize=1)
-def _own_folder() -> Path:
-    """Temporary folder of this process, removed at exit."""
-    folder = Path(tempfile.mkdtemp(prefix="fracslice-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
-
-
-def _kept(folder: Path, name: str, text: str) -> Path | None:
-    """File with this text; None if it cannot be cached. Its modification time is that of the first write,
-    which Numba's cache compares.
-    """
-    kept, file, whole = Kept(folder), f"{name}.py", text.encode()
-    if kept.get(file, _read) != whole:
-        with suppress(ExportError):
-            kept.put(file, lambda to: to.write(whole))
-        if kept.get(file, _read) != whole:
-            return None
-    return Path(os.path.realpath(folder), file)
-
-
-def _read(file: BinaryIO) -> bytes:
-    return file.read()

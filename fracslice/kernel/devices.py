@@ -31,7 +31,7 @@ def chosen(device: str) -> Device:
     validated("device", device, DEVICES, DeviceError)
     if device == "cpu":
         return "cpu"
-    from .cuda import missing
+    from .cuda_driver import missing
 
     reason = missing()
     if reason and device == "cuda":

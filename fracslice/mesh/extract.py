@@ -136,28 +136,93 @@ def contour_pieces(
     MeshError, Cancelled
         As `contour`.
     """
-    from .._native import Cells, Contouring
-
     work = work or Work()
-    signs = bricks.signs if isinstance(bricks, Bricks) else bricks
-    cells = _called(Cells, signs.ijk, signs.signs, signs.index, work.threads)
-    placement = origin, voxel, margin = _placement(signs)
-    refiner = Refiner(root, cells, origin, voxel, work)
-    for first, last in _layers(signs, most):
-        surface = Contouring(cells, first, last, origin, voxel, margin)
+    made = Contours(root, bricks.signs if isinstance(bricks, Bricks) else bricks, work.threads)
+    refiner = made.refiner(work)
+    for first, last in layers(made.signs, most):
+        yield made.piece(first, last, refiner, work)
+
+
+class Contours:
+    """Pieces of the exact surface of a scene, in any order.
+
+    Parameters
+    ----------
+    root : Field
+        Field that `signs` were sampled from.
+    signs : SignBricks
+        Samples, scene units.
+    threads : int
+        Threads; 0 for all cores.
+
+    Raises
+    ------
+    MeshError
+        If the surface leaves the samples.
+    """
+
+    def __init__(self, root: Field, signs: SignBricks, threads: int) -> None:
+        from .._native import Cells
+
+        self.root, self.signs = root, signs
+        self._cells = _called(Cells, signs.ijk, signs.signs, signs.index, threads)
+        self._placement = _placement(signs)
+
+    def refiner(self, work: Work) -> Refiner:
+        """Return a root finder for pieces by ascending x.
+
+        Parameters
+        ----------
+        work : Work
+            Threads and cancellation.
+
+        Returns
+        -------
+        Refiner
+            Root finder without roots.
+        """
+        origin, voxel, _ = self._placement
+        return Refiner(self.root, self._cells, origin, voxel, work)
+
+    def piece(self, first: int, last: int, refiner: Refiner, work: Work) -> Piece:
+        """Contour some layers of bricks.
+
+        Parameters
+        ----------
+        first, last : int
+            Layers, last excluded; see `layers`.
+        refiner : Refiner
+            Root finder; one that made the piece before has the roots at the seam.
+        work : Work
+            Threads and cancellation.
+
+        Returns
+        -------
+        Piece
+            Bitwise the same for any refiner.
+
+        Raises
+        ------
+        MeshError, Cancelled
+            As `contour`.
+        """
+        from .._native import Contouring
+
+        cells, signs = self._cells, self.signs
+        surface = Contouring(cells, first, last, *self._placement)
         for begin, end in _batches(cells, first - 1, last + 1, work.threads << 16):
             known = refiner.between(*map(cells.crossings_before, (min(begin, last - 1), end + 1)))
             _called(surface.advance, end, known.first, known.t, known.normals)
         vertices, triangles, count, cases, to_means = surface.finish()
         features = vertices[count:]
-        regions = partial(_trust_regions, (features, cases, to_means), placement)
-        moved, places = project(root, features, regions, signs.voxel, work)
+        regions = partial(_trust_regions, (features, cases, to_means), self._placement)
+        moved, places = project(self.root, features, regions, signs.voxel, work)
         features[moved] = places
         mesh, border = Mesh(vertices, triangles), np.inf
         if last < len(signs.index):  # Unused vertices belong to the next piece.
             mesh = mesh.compact()
             border = signs.origin[0] + signs.voxel * BRICK * last
-        yield Piece(mesh, border)
+        return Piece(mesh, border)
 
 
 def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[int, int]]:
@@ -171,9 +236,21 @@ def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[
             begin = end
 
 
-def _layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
-    """Split layers of bricks into pieces (first, last), last excluded. The pieces at both ends include the
-    layer beside the samples, which may have cells of the surface.
+def layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
+    """Split layers of bricks into pieces.
+
+    Parameters
+    ----------
+    bricks : SignBricks
+        Samples.
+    most : int
+        Approximate bricks per piece.
+
+    Returns
+    -------
+    list of tuple of int
+        First and last layer, last excluded. The pieces at both ends include the layer beside the samples,
+        which may have cells of the surface.
     """
     counts = np.bincount(bricks.ijk[:, 0] // BRICK, minlength=bricks.index.shape[0])
     cuts, size = [-1], 0

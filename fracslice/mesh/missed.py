@@ -47,10 +47,28 @@ def surface_to_mesh(
     Cancelled
         If the work is cancelled.
     """
+    return scale * distances(pieces, surface_samples(planned, work), planned.voxel, work)
+
+
+def surface_samples(planned: Plan, work: Work) -> NDArray[np.float64]:
+    """Extreme points of a field and other points on its surface, found without a mesh.
+
+    Parameters
+    ----------
+    planned : Plan
+        Sampled field.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    ndarray of float64, shape (n, 3)
+        Points, scene units.
+    """
     tips = planned.tips.T  # only extreme points that are still on the surface
     tips = tips[surface_error(planned.root, tips, planned.voxel, work) < NEAR * planned.voxel]
     found = surface_points(planned.root, planned.outer, planned.voxel, POINTS, work)
-    return scale * distances(pieces, np.concatenate([tips, found]), planned.voxel, work)
+    return np.concatenate([tips, found])
 
 
 def distances(
@@ -83,12 +101,35 @@ def distances(
     """
     found, far, reach = np.full(len(points), np.inf), np.arange(len(points)), NEARBY * voxel
     while len(far):
-        near_ones = (_near(mesh, points[far], reach, work) for mesh in pieces())
-        found[far] = _least(near_ones, points[far], work)
+        found[far] = nearest(pieces(), points[far], reach, work)
         # Triangles lie within a grid cell: any nearer one has its corners in reach.
         far = far[found[far] > reach - np.sqrt(3) * voxel]
         reach *= FARTHER
     return found
+
+
+def nearest(
+    pieces: Iterable[Mesh], points: NDArray[np.float64], reach: float, work: Work
+) -> NDArray[np.float64]:
+    """Distances from points to the triangles of a mesh within reach.
+
+    Parameters
+    ----------
+    pieces : iterable of Mesh
+        Pieces of the mesh.
+    points : ndarray of float64, shape (n, 3)
+        Points, in the units of the mesh.
+    reach : float
+        Triangles with a corner within this distance along each axis of a point are searched.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Distances; infinite where no triangle is within reach of any point.
+    """
+    return _least((_near(mesh, points, reach, work) for mesh in pieces), points, work)
 
 
 def _near(mesh: Mesh, points: NDArray[np.float64], reach: float, work: Work) -> Mesh:

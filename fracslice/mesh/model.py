@@ -168,6 +168,22 @@ class Mesh(Exchange):
         found = selected(self.vertices, self.triangles, keep, threads)
         return Mesh(*found) if found else self
 
+    def in_order(self) -> Mesh:
+        """Sort the vertices by their first use, so that the triangles alone determine the arrays.
+
+        Returns
+        -------
+        Mesh
+            The same triangles, in order, without unused vertices.
+        """
+        flat = self.triangles.ravel()
+        first = np.full(len(self.vertices), -1)
+        first[flat[::-1]] = np.arange(len(flat))[::-1]  # the last assignment stays
+        starts = np.zeros(len(flat), bool)
+        starts[first[first >= 0]] = True
+        number = np.cumsum(starts, dtype=np.int32) - np.int32(1)
+        return Mesh(self.vertices[flat[starts]], number[first[self.triangles]])
+
     def compact(self) -> Mesh:
         """Remove unused vertices.
 

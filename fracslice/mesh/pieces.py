@@ -43,6 +43,16 @@ class Pieces:
     def __len__(self) -> int:
         return len(self.ends)
 
+    def anew(self) -> Pieces:
+        """Return an empty collection in the same place, whose pieces replace those of this one.
+
+        Returns
+        -------
+        Pieces
+            No pieces.
+        """
+        return Pieces(self.folder)
+
     def add(self, piece: Piece, fresh: int = 0) -> None:
         """Append a piece.
 
@@ -54,10 +64,24 @@ class Pieces:
             Its trailing triangles that were not made by contouring.
         """
         self._put(f"mesh{len(self)}", vertices=piece.mesh.vertices, triangles=piece.mesh.triangles)
-        self.ends.append(piece.end)
+        self.count(piece.end, len(piece.mesh.triangles), fresh)
+
+    def count(self, end: float, triangles: int, fresh: int = 0) -> None:
+        """Append a piece that is stored already.
+
+        Parameters
+        ----------
+        end : float
+            x at which it ends.
+        triangles : int
+            Number of its triangles.
+        fresh : int, optional
+            Its trailing triangles that were not made by contouring.
+        """
+        self.ends.append(end)
         self.starts.append(self._count)
         self.fresh.append(fresh)
-        self._count += len(piece.mesh.triangles)
+        self._count += triangles
 
     def label(self, number: int, labels: NDArray[np.int32]) -> None:
         """Store the labels of a piece.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,9 @@ from ..errors import MeshError
 from .components import PIECES, Shells
 from .model import Mesh
 from .pieces import Pieces, beside, rows
+
+if TYPE_CHECKING:
+    from .nesting import Nesting
 
 
 def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
@@ -32,57 +37,133 @@ def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
     WholeShells
         The shells.
     """
-    found = _Survey(voxel, threads)
+    joined, start = Survey(), -np.inf
     for number, mesh in enumerate(pieces.meshes()):
-        pieces.label(number, found.add(mesh, pieces.ends[number]))
-    return found.shells()
+        labels, found = components(mesh, start, start := pieces.ends[number], voxel, threads)
+        pieces.label(number, labels + np.int32(joined.add(found)))
+    return joined.shells()
 
 
-class _Survey:
+@dataclass(frozen=True, eq=False)
+class Components:
+    """Connected components of a piece.
+
+    Attributes
+    ----------
+    volumes, areas : ndarray of float64, shape (c,)
+        Sizes; see `topology.Sizes`.
+    vectors : ndarray of float64, shape (c, 3)
+        Area vectors.
+    extremes : ndarray of float64, shape (c, 6, 3)
+        Vertices farthest out along -x, -y, -z, x, y and z.
+    first : ndarray of int32, shape (c,)
+        Vertex of least x.
+    points, after : ndarray of float64, shape (k, 3)
+        Vertices at the seams at the begin and at the end.
+    labels, labels_after : ndarray of int32, shape (k,)
+        Their components.
+    """
+
+    volumes: NDArray[np.float64]
+    areas: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+    extremes: NDArray[np.float64]
+    first: NDArray[np.int32]
+    points: NDArray[np.float64]
+    labels: NDArray[np.int32]
+    after: NDArray[np.float64]
+    labels_after: NDArray[np.int32]
+
+
+def components(
+    mesh: Mesh, start: float, end: float, voxel: float, threads: int = 0
+) -> tuple[NDArray[np.int32], Components]:
+    """Find the connected components of a piece.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The piece.
+    start, end : float
+        x of its seams; infinite at the ends of the surface.
+    voxel : float
+        Voxel, in the units of the piece.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    ndarray of int32, shape (n,)
+        Component of each vertex, from 0.
+    Components
+        The components.
+    """
+    from .topology import component_sizes, connected_components
+
+    labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
+    sizes = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)
+    here, there = (beside(mesh.vertices, seam, voxel / 2) for seam in (start, end))
+    return labels, Components(
+        sizes.volumes,
+        sizes.areas,
+        sizes.vectors,
+        mesh.vertices[sizes.outermost],
+        sizes.outermost[:, 0],
+        mesh.vertices[here],
+        labels[here],
+        mesh.vertices[there],
+        labels[there],
+    )
+
+
+NO_BORDER: dict[str, NDArray[Any]] = {
+    "points": np.empty((0, 3)),
+    "labels": np.empty(0, np.int32),
+    "after": np.empty((0, 3)),
+    "labels_after": np.empty(0, np.int32),
+}
+"""Fields of `Components` that only the next piece needs."""
+
+
+class Survey:
     """Sums over the components of pieces, in order. Labels count from the first piece on."""
 
-    def __init__(self, voxel: float, threads: int) -> None:
-        self.voxel, self.threads, self.end = voxel, threads, -np.inf
+    def __init__(self) -> None:
         self.starts = [0]
-        self.volumes: list[NDArray[np.float64]] = []
-        self.vectors: list[NDArray[np.float64]] = []
-        self.areas: list[NDArray[np.float64]] = []
-        self.extremes: list[NDArray[np.float64]] = []
-        self.first: list[NDArray[np.int32]] = []
+        self.pieces: list[Components] = []
         self.same: list[NDArray[np.int32]] = []
-        self.border: tuple[NDArray[np.void], NDArray[np.int32]] = (
-            rows(np.empty((0, 3))),
-            np.empty(0, np.int32),
-        )
 
-    def add(self, mesh: Mesh, end: float) -> NDArray[np.int32]:
-        """Add a piece that ends at x = `end`; returns the label of each of its vertices, int32 [n]."""
-        from .topology import component_sizes, connected_components
+    def add(self, piece: Components) -> int:
+        """Add the next piece.
 
-        labels, count = connected_components(mesh.triangles, len(mesh.vertices), self.threads)
-        found = component_sizes(mesh.vertices, mesh.triangles, labels, count, self.threads)
-        self.volumes.append(found.volumes)
-        self.areas.append(found.areas)
-        self.vectors.append(found.vectors)
-        self.extremes.append(mesh.vertices[found.outermost])
-        self.first.append(found.outermost[:, 0])
-        labels = labels + np.int32(self.starts[-1])
-        self.starts.append(self.starts[-1] + count)
-        self._join_to_last(mesh, labels, end)
-        return labels
-
-    def _join_to_last(self, mesh: Mesh, labels: NDArray[np.int32], end: float) -> None:
-        """Unite components that share a vertex with the previous piece: no surface crosses a seam without
+        Components that share a vertex with the piece before are united: no surface crosses a seam without
         one.
+
+        Parameters
+        ----------
+        piece : Components
+            Its components.
+
+        Returns
+        -------
+        int
+            Label of its first component.
         """
-        here, there = (beside(mesh.vertices, seam, self.voxel / 2) for seam in (self.end, end))
-        points, before = self.border
-        _, theirs, mine = np.intersect1d(points, rows(mesh.vertices[here]), return_indices=True)
-        if len(mine):
-            pairs = np.stack([before[theirs], labels[here[mine]]], axis=1)
-            self.same.append(np.unique(pairs, axis=0))
-        self.border = rows(mesh.vertices[there]), labels[there]
-        self.end = end
+        start = self.starts[-1]
+        if self.pieces:
+            before = self.pieces.pop()
+            _, theirs, mine = np.intersect1d(rows(before.after), rows(piece.points), return_indices=True)
+            pairs = before.labels_after[theirs] + np.int32(self.starts[-2]), piece.labels[mine]
+            if len(mine):
+                both = np.stack([pairs[0], pairs[1] + np.int32(start)], axis=1)
+                self.same.append(np.unique(both, axis=0))
+            self.pieces.append(replace(before, **NO_BORDER))
+        self.pieces.append(piece)
+        self.starts.append(start + len(piece.volumes))
+        return start
+
+    def _all(self, name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(piece, name) for piece in self.pieces])
 
     def shells(self) -> WholeShells:
         """Shells of all pieces together."""
@@ -91,7 +172,7 @@ class _Survey:
         own = np.arange(self.starts[-1], dtype=np.int32)
         pairs = np.concatenate([np.stack([own, own], axis=1), *self.same])
         of_label, count = connected_components(pairs[:, [0, 1, 1]], len(own))
-        extremes = np.concatenate(self.extremes)
+        extremes = self._all("extremes")
         outermost = np.empty((count, 6), np.int64)
         for side in range(6):
             height: NDArray[np.float64] = extremes[:, side, side % 3] * (1 if side < 3 else -1)
@@ -99,15 +180,15 @@ class _Survey:
             outermost[:, side] = order[np.searchsorted(of_label[order], np.arange(count))]
         # Cones over a component's own vertex, moved to one of its shell: precise even for dust.
         tips = extremes[outermost[:, 0], 0]
-        moved = ((extremes[:, 0] - tips[of_label]) * np.concatenate(self.vectors)).sum(axis=1) / 3
-        volumes = np.bincount(of_label, np.concatenate(self.volumes) + moved).astype(np.float64)
-        areas = np.bincount(of_label, np.concatenate(self.areas)).astype(np.float64)
+        moved = ((extremes[:, 0] - tips[of_label]) * self._all("vectors")).sum(axis=1) / 3
+        volumes = np.bincount(of_label, self._all("volumes") + moved).astype(np.float64)
+        areas = np.bincount(of_label, self._all("areas")).astype(np.float64)
         return WholeShells(
             of_label,
             volumes,
             areas,
             extremes[outermost, np.arange(6)],
-            np.concatenate(self.first)[outermost[:, 0]],
+            self._all("first")[outermost[:, 0]],
             np.searchsorted(self.starts, outermost[:, 0], side="right") - 1,
         )
 
@@ -199,17 +280,85 @@ class WholeShells:
         MeshError
             For a cavity without a body around it.
         """
+        searched = self.searched(bodies)
+        numbers = sorted(set(self.piece[searched].tolist()))
+        rays = (self.rays(n, pieces.mesh(n), pieces.labels(n), searched, threads) for n in numbers)
+        return self.nested_by(searched, dict(zip(numbers, rays, strict=True)))
+
+    def searched(self, bodies: bool) -> NDArray[np.bool_]:
+        """Shells whose surroundings are searched by rays; see `nested`.
+
+        Parameters
+        ----------
+        bodies : bool
+            False for cavities only.
+
+        Returns
+        -------
+        ndarray of bool, shape (s,)
+        """
+        hollow = self.volumes < 0
+        found: NDArray[np.bool_] = hollow | (bodies and len(hollow) > 1)
+        return found
+
+    def rays(
+        self,
+        number: int,
+        mesh: Mesh,
+        labels: NDArray[np.int32],
+        searched: NDArray[np.bool_],
+        threads: int = 0,
+    ) -> Nesting:
+        """Surroundings of the searched shells whose rays are in a piece.
+
+        Parameters
+        ----------
+        number : int
+            Index of the piece.
+        mesh : Mesh
+            The piece.
+        labels : ndarray of int32, shape (n,)
+            Label of each vertex.
+        searched : ndarray of bool, shape (s,)
+            Searched shells.
+        threads : int, optional
+            Threads; 0 for all cores.
+
+        Returns
+        -------
+        Nesting
+            Of all shells; only those of this piece are searched.
+        """
         from .nesting import nesting
 
+        first = np.where(searched & (self.piece == number), self.first, -1)
+        return nesting(mesh, self.of_label[labels], self.volumes, first, threads)
+
+    def nested_by(self, searched: NDArray[np.bool_], found: Mapping[int, Nesting]) -> tuple[Shells, int]:
+        """Join the results of `rays` of all pieces; see `nested`.
+
+        Parameters
+        ----------
+        searched : ndarray of bool, shape (s,)
+            Searched shells.
+        found : mapping
+            Results by index of the piece.
+
+        Returns
+        -------
+        Shells, int
+            As `nested`.
+
+        Raises
+        ------
+        MeshError
+            As `nested`.
+        """
         count, hollow = len(self.volumes), self.volumes < 0
         parent, winding = np.full(count, -1, np.int64), np.zeros(count, np.int64)
-        searched = hollow | (bodies and count > 1)
-        for number in sorted(set(self.piece[searched].tolist())):
-            mesh, own = pieces.mesh(number), searched & (self.piece == number)
-            first = np.where(own, self.first, -1)
-            shell = self.of_label[pieces.labels(number)]
-            found = nesting(mesh, shell, self.volumes, first, threads)
-            parent[own], winding[own] = found.parent[own], found.winding[own]
+        for number, one in found.items():
+            own = searched & (self.piece == number)
+            parent[own], winding[own] = one.parent[own], one.winding[own]
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():
             raise MeshError("a shell of the mesh is inside out: it looks inwards and no body is around it")
         return Shells(self.volumes, parent), int((winding != hollow)[searched].sum())

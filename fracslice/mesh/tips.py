@@ -28,6 +28,11 @@ POINTED = 0.15
 MANY, MOST_TIPS = 512, 64
 """Maximum number of pointed vertices (a rough surface has any number of tips), and of tips that are added."""
 
+NEAR_SEAM, AT_SEAM = 2.0, 5.0
+"""Distances from a seam, voxels: vertices within the first are examined with the triangles of both pieces
+within the second.
+"""
+
 ABOVE, STEP = 0.002, 0.25
 """Height of a start point above its triangle, and first step of the climb, voxels."""
 
@@ -46,6 +51,58 @@ REACH = 8.0
 """Radius around pointed vertices and tips within which triangles are examined, voxels."""
 
 
+class PointedPiece(NamedTuple):
+    """Pointed vertices of a piece.
+
+    Attributes
+    ----------
+    points : ndarray of float64, shape (n, 3)
+        Pointed vertices away from the seams; more than `MANY` on a rough surface.
+    head, tail : Mesh
+        Triangles at its begin and at its end.
+    """
+
+    points: NDArray[np.float64]
+    head: Mesh
+    tail: Mesh
+
+
+def pointed_in(mesh: Mesh, start: float, end: float, voxel: float, threads: int = 0) -> PointedPiece:
+    """Find the pointed vertices of a piece.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The piece.
+    start, end : float
+        x of its seams; infinite at the ends of the surface.
+    voxel : float
+        Voxel, in the units of the piece.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    PointedPiece
+        The vertices, and the triangles by which the neighbours find those at the seams.
+    """
+    x = mesh.vertices[:, 0]
+    points = _pointed(mesh, start + NEAR_SEAM * voxel, end - NEAR_SEAM * voxel, threads)
+    head, tail = (
+        Mesh(mesh.vertices, mesh.triangles[touching(mesh.triangles, near, threads)]).compact()
+        if near.any()
+        else NOTHING
+        for near in (x < start + AT_SEAM * voxel, x > end - AT_SEAM * voxel)
+    )
+    return PointedPiece(points, head, tail)
+
+
+def _pointed(mesh: Mesh, low: float, high: float, threads: int) -> NDArray[np.float64]:
+    """Pointed vertices with low <= x < high; more than `MANY` on a rough surface."""
+    at = mesh.vertices[pointed(mesh.vertices, mesh.triangles, POINTED, MANY, threads)]
+    return at if len(at) > MANY else at[(low <= at[:, 0]) & (at[:, 0] < high)]
+
+
 class Pointed:
     """Collects the pointed vertices of a surface in pieces.
 
@@ -58,35 +115,51 @@ class Pointed:
     """
 
     def __init__(self, voxel: float, threads: int = 0) -> None:
-        self._voxel, self._threads, self._points = voxel, threads, list[NDArray[np.float64]]()
-        self._near, self._seam = NOTHING, -np.inf
+        self._voxel, self._threads, self._points = voxel, threads, [np.empty((0, 3))]
+        self._tail, self._seam = NOTHING, -np.inf
 
     def add(self, piece: Piece) -> None:
-        """Add a piece. Vertices near its end are examined with the next one.
+        """Add a piece.
 
         Parameters
         ----------
         piece : Piece
             Pieces, by ascending x.
         """
-        if sum(map(len, self._points)) > MANY:
+        if not self.rough:
+            found = pointed_in(piece.mesh, self._seam, piece.end, self._voxel, self._threads)
+            self.join(found, piece.end)
+
+    def join(self, piece: PointedPiece, end: float) -> None:
+        """Add the pointed vertices of a piece, and those at its seam with the piece before.
+
+        Parameters
+        ----------
+        piece : PointedPiece
+            Pieces, by ascending x.
+        end : float
+            x at which the piece ends.
+        """
+        if self.rough:
             return
-        mesh, voxel = piece.mesh, self._voxel
-        if len(self._near.triangles):
-            mesh = joined(self._near, mesh, self._seam, voxel / 2)
-        at = mesh.vertices[pointed(mesh.vertices, mesh.triangles, POINTED, MANY, self._threads)]
-        low, high = self._seam - 2 * voxel, piece.end - 2 * voxel
-        self._points.append(at if len(at) > MANY else at[(low <= at[:, 0]) & (at[:, 0] < high)])
-        self._seam = piece.end
-        if np.isfinite(piece.end):
-            near = touching(mesh.triangles, mesh.vertices[:, 0] > piece.end - 5 * voxel, self._threads)
-            self._near = Mesh(mesh.vertices, mesh.triangles[near]).compact()
+        seam, voxel = self._seam, self._voxel
+        if len(self._tail.triangles):
+            both = joined(self._tail, piece.head, seam, voxel / 2)
+            reach = NEAR_SEAM * voxel
+            self._points.append(_pointed(both, seam - reach, seam + reach, self._threads))
+        self._points.append(piece.points)
+        self._tail, self._seam = piece.tail, end
+
+    @property
+    def rough(self) -> bool:
+        """True for a surface with more pointed vertices than tips are searched at."""
+        return sum(map(len, self._points)) > MANY
 
     @property
     def points(self) -> NDArray[np.float64]:
         """Pointed vertices, float64 [n, 3]; none for a rough surface."""
         found = np.concatenate(self._points)
-        return found if len(found) <= MANY else found[:0]
+        return found[:0] if self.rough else found
 
 
 def with_tips(
@@ -126,7 +199,7 @@ def with_tips(
     caps = _caps(planned, pieces, points, work) if len(points) else []
     if not caps:
         return pieces, np.empty((0, 3))
-    made, near = Pieces(pieces.folder), planned.voxel / 2
+    made, near = pieces.anew(), planned.voxel / 2
     for first, last in _spans(caps, pieces, near):
         mesh, start = pieces.together(first, last, near), pieces.starts[first]
         own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(mesh.triangles)]

@@ -7,7 +7,7 @@ they are cleaned, checked and handed on.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -225,6 +225,20 @@ class Tally:
             self.low = tuple(np.minimum(self.low, low).tolist())
             self.high = tuple(np.maximum(self.high, high).tolist())
 
+    def include(self, other: Tally) -> None:
+        """Add the sums over other pieces.
+
+        Parameters
+        ----------
+        other : Tally
+            The sums.
+        """
+        for name in (f.name for f in fields(self)):
+            if name not in ("threads", "low", "high"):
+                setattr(self, name, getattr(self, name) + getattr(other, name))
+        self.low = tuple(np.minimum(self.low, other.low).tolist())
+        self.high = tuple(np.maximum(self.high, other.high).tolist())
+
     def report(self, bodies: int, cavities: int, misplaced: int) -> MeshReport:
         """Report on the whole mesh, as `check_mesh` returns it.
 
@@ -280,20 +294,54 @@ def tips_last(meshes: Iterable[Mesh], tips: NDArray[np.float64]) -> Iterator[Mes
     Mesh
         The pieces without triangles at tips, then these triangles.
     """
-    places = {tuple(tip): number for number, tip in enumerate(tips.astype(np.float32).tolist())}
     late: list[tuple[int, NDArray[np.float64]]] = []
     for mesh in meshes:
-        if not places:
-            yield mesh
-            continue
-        near = np.flatnonzero(np.isin(mesh.vertices[:, 0], [tip[0] for tip in places]))
-        of_vertex = np.full(len(mesh.vertices), -1)
-        of_vertex[near] = [places.get(tuple(point), -1) for point in mesh.vertices[near].tolist()]
-        of = of_vertex[mesh.triangles].max(axis=1, initial=-1)
+        of = at_tips(mesh, tips)
         at = np.flatnonzero(of >= 0)
         late += zip(of[at].tolist(), mesh.corners[at], strict=True)
         yield mesh.selected(of < 0) if len(at) else mesh
     if late:
-        corners = np.array([corners for _, corners in sorted(late, key=lambda pair: pair[0])])
-        count = 3 * len(corners)
-        yield Mesh(corners.reshape(-1, 3), np.arange(count, dtype=np.int32).reshape(-1, 3))
+        yield by_tip(late)
+
+
+def at_tips(mesh: Mesh, tips: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Find the triangles at tips.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        A piece, mm, quantised.
+    tips : ndarray of float64, shape (k, 3)
+        Tips, mm, not rounded.
+
+    Returns
+    -------
+    ndarray of int64, shape (m,)
+        Tip of each triangle, or -1.
+    """
+    if not len(tips):
+        return np.full(len(mesh.triangles), -1)
+    places = {tuple(tip): number for number, tip in enumerate(tips.astype(np.float32).tolist())}
+    near = np.flatnonzero(np.isin(mesh.vertices[:, 0], [tip[0] for tip in places]))
+    of_vertex = np.full(len(mesh.vertices), -1)
+    of_vertex[near] = [places.get(tuple(point), -1) for point in mesh.vertices[near].tolist()]
+    found: NDArray[np.int64] = of_vertex[mesh.triangles].max(axis=1, initial=-1)
+    return found
+
+
+def by_tip(triangles: list[tuple[int, NDArray[np.float64]]]) -> Mesh:
+    """Mesh of triangles at tips, tip after tip.
+
+    Parameters
+    ----------
+    triangles : list of tuple
+        Tip and corners of each triangle.
+
+    Returns
+    -------
+    Mesh
+        The triangles, unconnected.
+    """
+    corners = np.array([corners for _, corners in sorted(triangles, key=lambda pair: pair[0])])
+    count = 3 * len(corners)
+    return Mesh(corners.reshape(-1, 3), np.arange(count, dtype=np.int32).reshape(-1, 3))

@@ -64,7 +64,7 @@ class CudaTracer:
             Unused.
         """
         if self.frame.sharp:
-            given = (self._parameters, self._starts, self.blocks, self.dtype.type(STEPS))
+            given = (self._parameters, self._starts, self.blocks, self.dtype.type(STEPS[self.dtype.name]))
             launched(self._loops.cones, self._starts.size, *given)
 
     def add(self, sums: Any, plan: Plan, work: Work) -> None:
@@ -89,7 +89,7 @@ class CudaTracer:
         if len(self._points) < plan.last:
             drawn = self.samples.points(2 * plan.last, self.frame.samples)
             self._points = self._cuda.to_device(drawn)
-        film = (plan.pixels, sums, self.width, self.dtype.type(STEPS), self.blocks)
+        film = (plan.pixels, sums, self.width, self.dtype.type(STEPS[self.dtype.name]), self.blocks)
         for _ in range((plan.last + 1) // 2):  # a goal is at most twice a count
             work.check()
             launched(self._loops.tile, plan.pixels.size, self._parameters, self._points, self._starts, *film)

@@ -60,7 +60,7 @@ class Follower:
     def __init__(self, root: Node, view: View, work: Work, device: str) -> None:
         self._root, self._view, self._work, self._device = root, view, work, device
         self._renderer: Renderer | None = None
-        self._settled = 0.0
+        self._distance_then = 0.0
 
     def follow(self, camera: Camera | None, size: tuple[int, int]) -> Renderer:
         """Return a renderer of an empty picture; it is made again only if depth or size must change.
@@ -88,7 +88,7 @@ class Follower:
             return made
         view = replace(self._view, camera=camera) if camera else self._view
         self._renderer = made = Renderer(self._root, view, size, self._work, self._device)
-        self._settled = self.distance
+        self._distance_then = self.distance
         return made
 
     def _near(self, camera: Camera) -> bool:
@@ -98,7 +98,7 @@ class Follower:
             distance = clearance(self._renderer.setup.roots[-1], camera)
         except SceneError:  # inside the solid at this depth
             return False
-        return self._settled / NEARER < distance < self._settled * NEARER
+        return self._distance_then / NEARER < distance < self._distance_then * NEARER
 
     @property
     def distance(self) -> float:

@@ -6,21 +6,19 @@ to its parameters under a name. Effects that a scene does not use generate no co
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linked, Linker
 from ..scene.view import Camera, View
+from .cameras import camera_unit
 from .colours import Look
 from .drawn import Drawn
 from .lighting import Lighting, text_of
 from .optics import Optics
 from .scattering import onward
-from .units import camera as cameras
 from .units import march
 from .units.intrinsics import GIVEN, surface
 from .units.normal import normal
@@ -128,8 +126,8 @@ class _Frame:
         linker.functions["background"] = self.lighting.background()
         linker.functions["surface"] = self.surface(look)
         linked = Linked(linker.text(), np.array(linker.parameters, np.float64))
-        samples, sharp = (camera_samples, self.drawn.count), self.camera.aperture == 0
-        kind = sharp, self.lit, self.view.film.transparent
+        samples = camera_samples, self.drawn.count
+        kind = self.sharp, self.lit, self.view.film.transparent
         return Frame(linked, *samples, self.bounces, *kind, far, self.block)
 
     def marching(self) -> None:
@@ -153,23 +151,15 @@ class _Frame:
 
     def cameras(self) -> int:
         """Bind the camera; return the number of random numbers per camera ray."""
-        camera, (width, height) = self.camera, self.seen.size
-        scale = 2 * self.seen.cone
-        right, up = np.array(camera.right), np.array(camera.above)
-        corner = np.array(camera.forward) - right * (scale * width / 2) + up * (scale * height / 2)
-        values: dict[str, Any] = {
-            "eye": camera.eye,
-            "corner": tuple(corner),
-            "across": tuple(right * scale),
-            "down": tuple(-up * scale),
-        }
-        if camera.aperture == 0:
-            self.linker.bind("camera_ray", cameras.pinhole, values)
-            return 2
-        focus = camera.focus or math.dist(camera.eye, camera.target)
-        values |= {"right": tuple(right * camera.aperture), "up": tuple(up * camera.aperture), "focus": focus}
-        self.linker.bind("camera_ray", cameras.lens, values)
-        return 4
+        function, values = camera_unit(self.camera, self.seen.size)
+        self.linker.bind("camera_ray", function, values)
+        return 2 if self.sharp else 4
+
+    @property
+    def sharp(self) -> bool:
+        """True if all rays start at the eye."""
+        camera = self.camera
+        return not (camera.aperture or camera.stereo or camera.kind == "orthographic")
 
     def surface(self, look: Look) -> str:
         """Source of `units.intrinsics.surface`."""

@@ -20,7 +20,8 @@ class Optics:
     cone : float
         Half width of a pixel at distance 1.
     least : float
-        Smallest hit tolerance, scene units: the rounding error of positions.
+        Smallest hit tolerance, scene units: the rounding error of positions, or half the width of a pixel of
+        parallel rays.
     far : float
         Distance beyond which the scene is empty, scene units.
     origin : tuple of int
@@ -32,6 +33,32 @@ class Optics:
     least: float
     far: float
     origin: tuple[int, int] = (0, 0)
+
+
+def footprint(camera: Camera, size: tuple[int, int]) -> tuple[float, float]:
+    """Return the width of a pixel as a function of the distance.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    size : tuple of int
+        Film width and height, pixels.
+
+    Returns
+    -------
+    tuple of float
+        Growth with the distance, and width at distance 0, scene units.
+    """
+    width, height = size
+    tangent = 2 * math.tan(math.radians(min(camera.fov, 178.0)) / 2) / height
+    if camera.kind == "orthographic":
+        return 0.0, tangent * math.dist(camera.eye, camera.target)
+    if camera.kind == "fisheye":
+        return math.radians(camera.fov) / height, 0.0
+    if camera.kind == "equirectangular":
+        return math.pi / min(height, width / (4 if camera.stereo else 2)), 0.0
+    return tangent, 0.0
 
 
 def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> Optics:
@@ -57,4 +84,7 @@ def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> O
     corners = [c for c in box.corners if all(map(math.isfinite, c))]
     far = max([math.dist(camera.eye, c) for c in corners] + [4 * math.dist(camera.eye, camera.target)])
     far = far if box.finite else 25 * far
-    return Optics(size, math.tan(math.radians(camera.fov) / 2) / size[1], least, far)
+    growth, base = footprint(camera, size)
+    if base:  # parallel rays start at the whole film
+        far += base * math.hypot(*size) / 2
+    return Optics(size, growth / 2, max(least, base / 2), far + camera.stereo)

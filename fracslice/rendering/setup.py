@@ -12,7 +12,7 @@ from ..formulas.registry import Node
 from ..kernel.cells import possible_cells
 from ..kernel.depth import resolve_depths
 from ..scene.view import Camera, Light, View
-from .optics import Optics, optics
+from .optics import Optics, footprint, optics
 
 SUN = Light(kind="sun", position=(-0.6, -1.0, 1.4), colour=(1.0, 0.95, 0.86), strength=1.6, size=2.0)
 SKY = Light(
@@ -87,11 +87,11 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     lights = view.lights or default_lights(root)
     if sum(light.kind == "sky" for light in lights) > 1:
         raise lights[-1].fail("kind: expected at most one sky")
-    pixel = 2 * math.tan(math.radians(camera.fov) / 2) / size[1]
-    near = surroundings(root, camera, pixel)
-    scale = max(map(abs, camera.eye))
-    precision = "float32" if pixel * near > 4 * ROUNDING["float32"] * scale else "float64"
-    resolved, _ = _around_eye(root, camera, DETAIL * pixel * near)
+    growth, base = footprint(camera, size)
+    near = surroundings(root, camera, growth) if growth else 0.0
+    pixel, scale = growth * near + base, max(map(abs, camera.eye))
+    precision = "float32" if pixel > 4 * ROUNDING["float32"] * scale else "float64"
+    resolved, _ = _around_eye(root, camera, DETAIL * pixel)
     seen = optics(camera, size, root, ROUNDING[precision] * scale)
     return RenderSetup(resolved, replace(view, lights=lights), camera, seen, precision)
 

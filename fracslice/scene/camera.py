@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..formulas.box import Box
-from ..formulas.parameters import Number, Vector, validated
+from ..formulas.parameters import Choice, Number, Vector, validated
 from .element import Part, described
 
 if TYPE_CHECKING:
@@ -26,11 +26,26 @@ class Camera(Part):
     """Position, direction and lens of the camera; without one, the whole object is in view."""
 
     element = "camera"
+    kind: str = described(
+        Choice(
+            "perspective",
+            "perspective; orthographic: parallel rays, the plane of the target as in perspective; "
+            "fisheye: equal angles are equal lengths from the middle; "
+            "equirectangular: all around, 360 by 180 degrees",
+            ("perspective", "orthographic", "fisheye", "equirectangular"),
+        )
+    )
     eye: Triple = described(Vector((2.2, -2.0, 1.4), "where the camera is, in scene units"))
     target: Triple = described(Vector((0.0, 0.0, 0.0), "the point in the middle of the picture"))
     up: Triple = described(Vector((0.0, 0.0, 1.0), "the direction that is up in the picture", nonzero=True))
     fov: float = described(
-        Number(40.0, "the angle between the picture's upper and lower edge, in degrees", above=0, below=179)
+        Number(
+            40.0,
+            "the angle between the picture's upper and lower edge, in degrees: below 179, or up to 360 of a "
+            "fisheye",
+            above=0,
+            most=360,
+        )
     )
     aperture: float = described(
         Number(
@@ -42,9 +57,26 @@ class Camera(Part):
     focus: float | None = described(
         Number(None, "distance that is in focus; without it, that of the target", above=0)
     )
+    stereo: float = described(
+        Number(
+            0.0,
+            "distance between two eyes, in scene units: above zero, the left eye's picture is in the left "
+            "half, the right eye's in the right one",
+            least=0,
+        )
+    )
 
     def validate(self) -> None:
-        """Raise `SceneError` if `eye`, `target` and `up` do not define a view."""
+        """Raise `SceneError` if `eye`, `target` and `up` do not define a view, or an effect is not of the
+        kind.
+        """
+        if self.kind in ("perspective", "orthographic") and self.fov >= 179:
+            raise self.fail(f"fov={self.fov:g}: expected a number < 179; a fisheye sees more")
+        if self.aperture and self.kind != "perspective":
+            raise self.fail(f"aperture={self.aperture:g}: expected kind='perspective'")
+        if self.stereo and (self.aperture or self.kind not in ("perspective", "equirectangular")):
+            kinds = "kind='perspective' without an aperture, or 'equirectangular'"
+            raise self.fail(f"stereo={self.stereo:g}: expected {kinds}")
         if not 0 < math.dist(self.eye, self.target) < math.inf:
             raise self.fail("eye and target: expected two different points")
         if math.hypot(*_cross(self.forward, _unit(self.up))) < 1e-6:

@@ -154,13 +154,13 @@ class View:
         SceneError
             If an element that is not repeatable occurs twice.
         """
-        found: dict[str, Any] = {}
+        elements: dict[str, Any] = {}
         for part in parts:
             name = "lights" if isinstance(part, Light) else part.element
-            if not part.many and name in found:
+            if not part.many and name in elements:
                 raise part.fail("may only stand once in a scene")
-            found[name] = (*found.get(name, ()), part) if part.many else part
-        return cls(**found)
+            elements[name] = (*elements.get(name, ()), part) if part.many else part
+        return cls(**elements)
 
     @property
     def parts(self) -> tuple[Part, ...]:

@@ -18,15 +18,17 @@ print(*sorted(sys.modules))
 JOBS = {
     "help": ("--help",),
     "mesh": ("mesh", "ball.xml", "-o", "ball.stl", "--resolution", "16", "--quiet"),
+    "slice": ("slice", "ball.xml", "-o", "ball.sl1", "--layer", "5mm", "--printer", "sl1s", "--quiet"),
     "render": ("render", "ball.xml", "-o", "ball.png", "--size", "16x16", "--samples", "1", "--quiet"),
 }
 UNUSED = {
     "help": ("numpy", "llvmlite", "concurrent", "json", "tempfile", "fracslice.scene", "fracslice.kernel"),
     "mesh": ("scipy", "email", "importlib.metadata", "subprocess", "PIL", "rich", "json"),
+    "slice": ("scipy", "importlib.metadata", "http", "ssl", "rich", "numpy.ma"),
     "render": ("scipy", "email", "importlib.metadata", "numpy.ma", "subprocess", "rich", "fracslice._vdb"),
 }
 """Packages that take long to import, by the job that has no use for them."""
-MOST = {"help": 160, "mesh": 480, "render": 450}
+MOST = {"help": 160, "mesh": 500, "slice": 600, "render": 500}
 
 
 @pytest.mark.parametrize("job", JOBS)

@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-SECONDS = 120.0
-"""Until something that must happen has happened."""
+SECONDS = 600.0
+"""Until something that must happen has happened: only a test that fails waits this long."""
 
 
 def wait_until(true: Callable[[], object]) -> None:
@@ -39,7 +39,7 @@ class Cluster:
     def _start(self, kind: str, *options: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "dask", kind, "--scheduler-file", str(self.file), *options]
         log = (self.folder / f"{time.monotonic_ns()}.log").open("wb")
-        environment = {**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "5s"}
+        environment = {**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "60s"}
         started = subprocess.Popen(command, stdout=log, stderr=log, cwd=self.folder, env=environment)
         self.processes.append(started)
         return started

@@ -1,4 +1,4 @@
-"""Slices and frames by a scheduler and its workers."""
+"""Slices, frames and meshes by a scheduler and its workers."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run as command
 
+from fracslice import meshtasks
 from fracslice.cluster import Pieces, Workers, connected, workers
 from fracslice.cluster.pieces import Identity
 from fracslice.errors import Cancelled, ClusterError
 from fracslice.export.slices import write_slices
-from fracslice.formulas import mandelbulb
+from fracslice.formulas import mandelbulb, sphere
+from fracslice.job import make_mesh
+from fracslice.meshjob import MeshJob
 from fracslice.rendering import Renderer, parts
 from fracslice.scene import scene
 from fracslice.scene.view import Camera, View
@@ -26,13 +29,14 @@ from fracslice.slicerecipe import SliceRecipe
 from fracslice.slicing import SliceJob
 from fracslice.work import Work
 
-from .processes import Cluster, wait_until
+from .processes import SECONDS, Cluster, wait_until
 
 pytest.importorskip("distributed")
 ROOT = mandelbulb(iterations=4)
 RECIPE = SliceRecipe(
     to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "a.cli", "cli"
 )
+MESHED = scene(mandelbulb(iterations=4) | sphere(radius=0.1).translate((-1.5, 0.0, 0.0)), size="20mm")
 VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
 SIZE, SAMPLES = (96, 72), 6
 
@@ -52,7 +56,13 @@ def rendered(work: Work, folder: Path) -> bytes:
     return of.accumulator.host().sums.tobytes()
 
 
-JOBS: dict[str, Job] = {"slice": sliced, "render": rendered}
+def meshed(work: Work, folder: Path) -> bytes:
+    """STL file of a mesh with dust that is removed."""
+    make_mesh(MESHED, MeshJob(resolution=40, dust_mm3=5.0), work, folder / "a.stl")
+    return (folder / "a.stl").read_bytes()
+
+
+JOBS: dict[str, Job] = {"slice": sliced, "render": rendered, "mesh": meshed}
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +89,8 @@ def no_workers_of_other_tests(cluster: Cluster) -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "PIXELS", 1024)
+    monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
 
 
 @pytest.mark.parametrize("name", JOBS)
@@ -86,12 +98,14 @@ def test_a_killed_worker_and_a_late_one(
     name: str, cluster: Cluster, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
     """SIGKILL in the middle of a job, with nobody left; then another worker comes."""
-    first, shares, late, made = cluster.worker(), [], [], []
+    first, late, made = cluster.worker(), [], []
+    shares: dict[str, list[float]] = {}
     pieces = tmp_path / "pieces"
 
-    def progress(_: str, share: float) -> None:
-        shares.append(share)
-        if share > 0 and not late and first.poll() is None:
+    def progress(stage: str, share: float) -> None:
+        shares.setdefault(stage, []).append(share)
+        shared = stage in ("slicing", "rendering", "meshing")
+        if shared and 0 < share < 1 and not late and first.poll() is None:
             first.send_signal(signal.SIGKILL)
             first.wait()
             made.append(len(list(pieces.glob("*/*-*"))))
@@ -101,7 +115,7 @@ def test_a_killed_worker_and_a_late_one(
         result = JOBS[name](Work(1, progress=progress, cluster=pool), tmp_path)
     assert late
     assert made[0] < 25
-    assert shares == sorted(shares)
+    assert all(of == sorted(of) for stage, of in shares.items() if stage in ("slicing", "rendering"))
     assert result == expected[name]
     assert not any(pieces.iterdir())
 
@@ -118,30 +132,47 @@ def test_a_worker_that_hangs(
         hung.send_signal(signal.SIGSTOP)
 
     with connected(cluster.address, str(tmp_path / "pieces")) as pool:
-        pool.client.wait_for_workers(2, timeout=60)
+        pool.client.wait_for_workers(2, timeout=SECONDS)
         quick = Workers(pool.client, pool.pieces, patience=0.5)
         assert sliced(Work(1, progress=progress, cluster=quick), tmp_path) == expected["slice"]
 
 
+SHARED = {
+    "slice": (["--layer", "0.1mm", "--pixel", "0.05mm"], "layers-*", "a.cli"),
+    "mesh": (["--resolution", "40", "--dust", "5"], "surface-*", "a.stl"),
+}
+"""Options, pieces and file of a command."""
+
+
+@pytest.mark.parametrize("name", SHARED)
 def test_the_client_dies_and_the_same_command_goes_on(
-    cluster: Cluster, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, cluster: Cluster, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "bulb.xml").write_text(RECIPE.scene)
-    output, pieces = tmp_path / "b.cli", tmp_path / ".fracslice-pieces"
-    given = ["slice", str(tmp_path / "bulb.xml"), "-o", str(output), "--layer", "0.1mm", "--pixel", "0.05mm"]
-    given += ["--cluster", cluster.address, "--quiet"]
+    options, piece, file = SHARED[name]
+    (tmp_path / "bulb.xml").write_text(RECIPE.scene if name == "slice" else to_xml(MESHED))
+    output, pieces = tmp_path / file, tmp_path / ".fracslice-pieces"
+    given = [name, str(tmp_path / "bulb.xml"), "-o", str(output), *options, "--quiet"]
+    given += ["--cluster", cluster.address]
+    started = (
+        "from fracslice import meshtasks; meshtasks.LEAST = 1; from fracslice.cli.main import main; main()"
+    )
     cluster.worker()
-    client = subprocess.Popen([sys.executable, "-m", "fracslice.cli", *given])
-    wait_until(lambda: len(list(pieces.glob("*/layers-*"))) > 2)
+    client = subprocess.Popen([sys.executable, "-c", started, *given])
+    wait_until(lambda: len(list(pieces.glob(f"*/{piece}"))) > 2)
     client.kill()
     client.wait()
     assert not output.exists()
-    submitted: list[int] = []
+    submitted: list[str] = []
     submit = workers._Attempt.submit
-    monkeypatch.setattr(workers._Attempt, "submit", lambda of, n: (submitted.extend(n), submit(of, n)))
+    monkeypatch.setattr(
+        workers._Attempt,
+        "submit",
+        lambda of, numbers: (submitted.extend(of.tasks[n].name for n in numbers), submit(of, numbers)),
+    )
     assert command(given) == 0
-    assert output.read_bytes() == expected["slice"]
-    assert 0 not in submitted
+    assert output.read_bytes() == expected[name]
+    assert submitted
+    assert not {piece.replace("*", first) for first in ("00000", "000000-000016")} & set(submitted)
     assert not pieces.exists()
 
 
@@ -157,7 +188,7 @@ def test_a_worker_of_another_version_is_not_used(
         warnings.catch_warnings(record=True) as lines,
     ):
         warnings.simplefilter("always")
-        pool.client.wait_for_workers(2, timeout=60)
+        pool.client.wait_for_workers(2, timeout=SECONDS)
         result = sliced(Work(1, cluster=pool), tmp_path)
     assert result == expected["slice"]
     (line,) = {str(one.message) for one in lines if "not used" in str(one.message)}
@@ -203,6 +234,12 @@ def test_a_memory_file_system(name: str, expected: dict[str, bytes], tmp_path: P
     with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=":0") as client:
         pool = Workers(client, Pieces(f"memory://{tmp_path.name}"))
         assert JOBS[name](Work(1, cluster=pool), tmp_path) == expected[name]
+
+
+def test_local_workers_are_processes(tmp_path: Path) -> None:
+    with connected("local:2", str(tmp_path / "pieces"), 2) as pool:
+        found = pool.client.scheduler_info(n_workers=-1)["workers"].values()
+    assert [worker["nthreads"] for worker in found] == [1, 1]
 
 
 def test_a_client_of_dask_is_a_cluster(

@@ -8,13 +8,18 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run as command
 
+from fracslice import meshtasks
 from fracslice.cluster import Pieces, Shard
-from fracslice.errors import ClusterError
+from fracslice.errors import ClusterError, SceneError, SharedError
 from fracslice.export.slices import write_slices
+from fracslice.formulas import box, cone, sphere
+from fracslice.job import MeshResult, make_mesh
+from fracslice.meshjob import MeshJob
 from fracslice.rendering import parts
+from fracslice.scene import scene
 from fracslice.work import Work
 
-from .test_cluster import RECIPE, rendered, sliced
+from .test_cluster import MESHED, RECIPE, rendered, sliced
 
 pytest.importorskip("fsspec")
 
@@ -50,6 +55,55 @@ def test_a_shard_makes_what_others_leave(tmp_path: Path) -> None:
     run = RECIPE.run(Work(1, cluster=shard))
     write_slices(run, tmp_path / "b.cli")
     assert (tmp_path / "b.cli").read_bytes() == sliced(Work(2), tmp_path)
+
+
+def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tips and dust included; the other shard ends when its pieces are made."""
+    monkeypatch.setattr(meshtasks, "LEAST", 1)
+    shape = cone(radius=0.5, height=2.0) | sphere(radius=0.05).translate((0.8, 0.0, 0.0))
+    turned = scene(shape.rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
+    job = MeshJob(resolution=32, dust_mm3=2.0)
+    shards = [Shard(Pieces(str(tmp_path / "pieces")), number, 2) for number in (1, 2)]
+    files = {number: tmp_path / f"{number}.stl" for number in (0, 1, 2)}
+
+    def made(shard: Shard | None) -> MeshResult | None:
+        number = shard.number if shard else 0
+        try:
+            return make_mesh(turned, job, Work(1, cluster=shard), files[number])
+        except SharedError:
+            return None
+
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(made, shards)
+    whole = made(None)
+    assert first and whole and second is None
+    assert not files[2].exists()
+    assert files[1].read_bytes() == files[0].read_bytes()
+    assert len(whole.whole.vertices) == first.report.mesh.vertices
+    for part in ("mesh", "removed"):
+        ours, theirs = (dict(vars(getattr(result.report, part))) for result in (first, whole))
+        assert ours.pop("bbox_mm", None) == theirs.pop("bbox_mm", None)
+        assert ours == pytest.approx(theirs)
+    assert first.report.surface_error_mm.max == pytest.approx(whole.report.surface_error_mm.max)
+    assert first.report.surface_to_mesh_mm.max == pytest.approx(whole.report.surface_to_mesh_mm.max)
+
+
+def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(meshtasks, "LEAST", 1)
+    hollowed, job = scene(box() - sphere(radius=0.6), size="20mm"), MeshJob(resolution=16)
+    shard = Shard(Pieces(str(tmp_path / "pieces")), 1, 1)
+    for ending in ("3mf", "ply"):
+        one, two = (tmp_path / f"{name}.{ending}" for name in ("one", "two"))
+        make_mesh(hollowed, job, Work(1), one)
+        shared = make_mesh(hollowed, job, Work(1, cluster=shard), two)
+        assert one.read_bytes() == two.read_bytes()
+        assert shared.mesh.is_watertight
+
+
+def test_what_needs_the_whole_mesh_is_refused(tmp_path: Path) -> None:
+    shard = Shard(Pieces(str(tmp_path / "pieces")), 1, 1)
+    with pytest.raises(SceneError, match=r"simplify 0\.1mm needs the whole mesh: expected no"):
+        make_mesh(MESHED, MeshJob(simplify_mm=0.1), Work(1, cluster=shard))
 
 
 def test_shards_of_a_frame_work_at_the_same_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from fracslice.errors import FracsliceWarning, KernelError
 from fracslice.formulas import Node, sphere
-from fracslice.kernel import cuda, cuda_loops, cuda_source, link
+from fracslice.kernel import cuda, cuda_loops, cuda_source, link, modules
 from tests.examples import EXAMPLES
 from tests.kernel.cuda_ptx import compiled
 
@@ -28,14 +28,14 @@ installed = pytest.mark.skipif(
 def test_text_that_others_can_write_is_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "kernels"
     monkeypatch.setenv("FRACSLICE_CACHE", str(folder))
-    kept = cuda._kept(folder, "text", "value = 1")
+    kept = modules.kept_text(folder, "text", "value = 1")
     assert kept == folder / "text.py" and kept.read_text() == "value = 1"
     kept.write_text("value = 2")
-    assert cuda._kept(folder, "text", "value = 1") == kept and kept.read_text() == "value = 1"
+    assert modules.kept_text(folder, "text", "value = 1") == kept and kept.read_text() == "value = 1"
     folder.chmod(0o777)
     with pytest.warns(FracsliceWarning, match="others can write"):
-        assert cuda._kept(folder, "text", "value = 1") is None
-    assert cuda._imported("fracslice_text", "value = 3").value == 3
+        assert modules.kept_text(folder, "text", "value = 1") is None
+    assert modules.imported("fracslice_text", "value = 3").value == 3
 
 
 @installed

@@ -41,6 +41,11 @@ CASES: dict[str, tuple[Node, View]] = {
         View(lights=SOFT, shading=Shading(paths="yes", bounces=2)),
     ),
     "normals": (torus(), View(shading=Shading(mode="normal"))),
+    "fisheye": (torus(), View(camera=Camera(kind="fisheye", fov=200.0, eye=(0.0, -1.0, 0.6)), lights=(SUN,))),
+    "all around": (
+        torus(),
+        View(camera=Camera(kind="equirectangular", stereo=0.1, eye=(0.0, -1.0, 0.6)), lights=(SUN,)),
+    ),
     "steps": (torus(), View(shading=Shading(mode="steps"))),
 }
 

@@ -79,14 +79,14 @@ def test_a_white_ball_vanishes_in_a_white_furnace(reflect: float) -> None:
     assert np.allclose(seen(ball, Shading(paths="yes", bounces=1)).mean(0), 1, atol=0.01)
 
 
-def test_light_in_a_closed_room_is_the_sum_of_all_reflections() -> None:
+def test_light_between_closed_walls_is_the_sum_of_all_reflections() -> None:
     """Glowing walls of albedo a: L = e (1 + a + a^2 + ...)."""
     albedo_, glow = linear((0.6,))[0], 0.5
-    room = material(
+    walls = material(
         difference(box(size=(4, 4, 4)), box(size=(3, 3, 3))), colour=(0.6, 0.6, 0.6), glow=glow, specular=0
     )
     camera = replace(CAMERA, eye=(0.3, -0.4, 0.2), target=(0, 1, 0.1), fov=80)
-    light = seen(room, Shading(paths="yes", bounces=12), 256, camera, lights=(Light(strength=0),))
+    light = seen(walls, Shading(paths="yes", bounces=12), 256, camera, lights=(Light(strength=0),))
     assert light.mean() == pytest.approx(glow * albedo_ / (1 - albedo_), rel=0.01)
 
 

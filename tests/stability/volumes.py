@@ -25,7 +25,7 @@ SIDE = 48
 
 @dataclass(frozen=True)
 class Volumes:
-    """faults: what is wrong and not said. told: that something is missing. off, layers: by how much of the
+    """faults: wrong and not reported. reported: something is missing. off, layers: by how much of the
     field's volume the mesh and the layers differ from it.
     """
 

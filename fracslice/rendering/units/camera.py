@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...formulas.vocabulary import cos, maximum, minimum, sin, sqrt, where
 from .lights import disc
 from .normal import normalised
 
@@ -78,3 +79,174 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
     fz = focus * (cz + px * az + py * bz) - sz
     dx, dy, dz = normalised(fx, fy, fz)
     return ex + sx, ey + sy, ez + sz, dx, dy, dz
+
+
+def stereo(px, py, lens_u, lens_v, eye, corner, across, down, apart, half, focus):
+    """Return the ray of one of two eyes: of the left one in the left half of the film.
+
+    Both pictures agree at the distance `focus`: the axes are parallel and the films shifted.
+
+    Parameters
+    ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers, not used.
+    eye : tuple of float
+        Point between the eyes.
+    corner, across, down : tuple of float
+        As for `pinhole`, of one picture.
+    apart : tuple of float
+        From that point to the right eye.
+    half : float
+        Width of one picture, pixels.
+    focus : float
+        Distance at which the pictures agree.
+
+    Returns
+    -------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction.
+    """
+    ex, ey, ez = eye
+    cx, cy, cz = corner
+    ax, ay, az = across
+    bx, by, bz = down
+    rx, ry, rz = apart
+    second = where(px < half, -1.0, 1.0 + 0.0 * px)
+    column = px - maximum(second, 0.0) * half
+    sx = second * rx
+    sy = second * ry
+    sz = second * rz
+    fx = focus * (cx + column * ax + py * bx) - sx
+    fy = focus * (cy + column * ay + py * by) - sy
+    fz = focus * (cz + column * az + py * bz) - sz
+    dx, dy, dz = normalised(fx, fy, fz)
+    return ex + sx, ey + sy, ez + sz, dx, dy, dz
+
+
+def orthographic(px, py, lens_u, lens_v, eye, corner, across, down, forward):
+    """Return one of parallel rays.
+
+    Parameters
+    ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers, not used.
+    eye : tuple of float
+        Not used: `corner` holds it.
+    corner : tuple of float
+        Position of the film's upper left corner.
+    across, down : tuple of float
+        Change of position per pixel, to the right and down.
+    forward : tuple of float
+        Unit direction of all rays.
+
+    Returns
+    -------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction.
+    """
+    cx, cy, cz = corner
+    ax, ay, az = across
+    bx, by, bz = down
+    fx, fy, fz = forward
+    ox = cx + px * ax + py * bx
+    oy = cy + px * ay + py * by
+    oz = cz + px * az + py * bz
+    zero = 0.0 * px
+    return ox, oy, oz, fx + zero, fy + zero, fz + zero
+
+
+def fisheye(px, py, lens_u, lens_v, eye, right, up, forward, middle, pixel):
+    """Return the ray of an equidistant fisheye: its angle grows evenly from the middle of the film.
+
+    Parameters
+    ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers, not used.
+    eye : tuple of float
+        Position of the camera.
+    right, up, forward : tuple of float
+        Unit axes of the camera.
+    middle : tuple of float
+        Middle of the film, pixels.
+    pixel : float
+        Angle of a pixel, radians.
+
+    Returns
+    -------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction. Beyond 180 degrees from the middle, rays look back.
+    """
+    ex, ey, ez = eye
+    rx, ry, rz = right
+    ux, uy, uz = up
+    fx, fy, fz = forward
+    mx, my = middle
+    a = pixel * (px - mx)
+    b = pixel * (my - py)
+    angle = maximum(sqrt(a * a + b * b), 1e-12)
+    turned = minimum(angle, 3.141592653589793)
+    along = cos(turned)
+    aside = sin(turned) / angle
+    a = a * aside
+    b = b * aside
+    dx, dy, dz = normalised(
+        along * fx + a * rx + b * ux, along * fy + a * ry + b * uy, along * fz + a * rz + b * uz
+    )
+    zero = 0.0 * px
+    return ex + zero, ey + zero, ez + zero, dx, dy, dz
+
+
+def equirectangular(px, py, lens_u, lens_v, eye, right, up, forward, width, height, radius):
+    """Return the ray of a picture all around: longitude across, latitude down.
+
+    With a radius, there is one such picture for each eye, side by side, and the eyes turn with the longitude
+    (Peleg, Ben-Ezra and Pritch 2001, "Omnistereo: Panoramic Stereo Imaging").
+
+    Parameters
+    ----------
+    px, py : float
+        Film position, pixels.
+    lens_u, lens_v : float
+        Random numbers, not used.
+    eye : tuple of float
+        Position of the camera.
+    right, up, forward : tuple of float
+        Unit axes of the camera; `forward` is in the middle of a picture.
+    width, height : float
+        Size of one picture, pixels.
+    radius : float
+        Half the distance between the eyes.
+
+    Returns
+    -------
+    ox, oy, oz, dx, dy, dz : float
+        Origin and unit direction.
+    """
+    ex, ey, ez = eye
+    rx, ry, rz = right
+    ux, uy, uz = up
+    fx, fy, fz = forward
+    second = where(px < width, -1.0, 1.0 + 0.0 * px)
+    column = px - maximum(second, 0.0) * width
+    longitude = 6.283185307179586 * (column / width - 0.5)
+    latitude = 3.141592653589793 * (0.5 - py / height)
+    c = cos(longitude)
+    s = sin(longitude)
+    level = cos(latitude)
+    rise = sin(latitude)
+    a = level * c
+    b = level * s
+    dx, dy, dz = normalised(
+        a * fx + b * rx + rise * ux, a * fy + b * ry + rise * uy, a * fz + b * rz + rise * uz
+    )
+    apart = second * radius
+    ox = ex + apart * (c * rx - s * fx)
+    oy = ey + apart * (c * ry - s * fy)
+    oz = ez + apart * (c * rz - s * fz)
+    return ox, oy, oz, dx, dy, dz

@@ -6,25 +6,39 @@ frame beside that of the mean of all frames: the eye averages.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from fracslice import read
-from fracslice.animation import FilmJob, Timeline
+from fracslice.animation import FilmJob, Timeline, film
+from fracslice.animation.depths import gradual_depths
+from fracslice.formulas import Node
 from fracslice.rendering import develop
 from fracslice.scene import library
 from fracslice.scene.animation import Animation
+from fracslice.scene.camera import Camera
+from fracslice.scene.reader import reads
+from fracslice.scene.view import Film
 from fracslice.work import Work
 
 from ..runner import Row, Run
 
-SMALLEST = {"width": 32, "height": 18, "frames": 2, "truth": 16}
+ZOOM = """<scene version="1"><solid size="80mm"><mandelbulb/></solid><camera target="0.9 0.1 0.2"/>
+<animation duration="{frames}s" noise="fixed"/>
+<track of="camera.eye" keys="0s: 1.8 0 0; {frames}s: 1.25 0.05 0.1" curve="linear"/></scene>"""
+SMALLEST = {"zoom": 3, "width": 32, "height": 18, "frames": 2, "truth": 16}
 
 
 def rows(
-    run: Run, width: int = 160, height: int = 90, samples: int = 8, frames: int = 8, truth: int = 1024
+    run: Run,
+    width: int = 160,
+    height: int = 90,
+    samples: int = 8,
+    frames: int = 8,
+    truth: int = 1024,
+    zoom: int = 48,
 ) -> Iterator[Row]:
     scene = read(library.path("mandelbulb"))
 
@@ -44,3 +58,21 @@ def rows(
             "error of a frame": float(one),
             "error of the mean": float(mean),
         }
+    for name, kind in (("zoom, depths change by shares", gradual_depths), ("zoom, one depth", one_depth)):
+        yield {"noise": name, "largest step of the difference": popping(kind, zoom, run.threads[0])}
+
+
+def popping(depths: Callable[..., list[Node]], frames: int, threads: int) -> float:
+    """Largest rise from one difference of successive frames to the next one, in a zoom with fixed noise."""
+    job = FilmJob(Timeline(reads(ZOOM.format(frames=frames))), (64, 48), 16, 1.0, device="cpu")
+    given, film.gradual_depths = film.gradual_depths, depths
+    try:
+        shown = [255 * develop(job.light(k, Work(threads)), Film()) for k in range(frames)]
+    finally:
+        film.gradual_depths = given
+    return float(np.diff(abs(np.diff(shown, axis=0)).mean((1, 2, 3))).max(initial=0.0))
+
+
+def one_depth(root: Node, camera: Camera, size: tuple[int, int], count: int) -> list[Node]:
+    """The depth of a picture."""
+    return [root] * count

@@ -1,8 +1,11 @@
-"""What a cluster costs: tasks by workers against threads, and the simulated growth to 1000 workers.
+"""What a cluster costs: jobs by workers against threads, and the simulated growth to 1000 workers.
 
-Tasks of some seconds wait, so that the machine's load does not count; empty tasks give the cost of one in the
-scheduler and the client, which are serial. The simulation takes that cost and the measured time of a range of
-layers: every task passes the serial part, then a free worker, and its result the serial part again.
+Each job is made by two local workers and by as many threads, in turn; the ratio is of CPU time, of
+workers and this process together. Empty tasks give the cost of one in the scheduler and the client,
+which are serial. A run of each job in one process gives the CPU time of its tasks and of the rest, which
+is serial. The simulation makes a larger job of more tasks of these times: every task passes the serial
+part, then a free worker, and its result the serial part again; all tasks of a stage end before the next
+one begins.
 """
 
 from __future__ import annotations
@@ -10,61 +13,127 @@ from __future__ import annotations
 import heapq
 import tempfile
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from fracslice.cluster import Pieces, Pool, connected
+from fracslice.cluster import Pieces, Pool, Task, Workers, connected
 from fracslice.cluster.pieces import run as make_piece
-from fracslice.export.ranges import RangeTask, _planned
+from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb
+from fracslice.job import make_mesh
+from fracslice.meshjob import MeshJob
+from fracslice.rendering import Renderer
 from fracslice.scene import scene
+from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
 from fracslice.slicerecipe import SliceRecipe
 from fracslice.slicing import SliceJob
 from fracslice.work import Work
 
-from ..runner import Row, Run, Spread, timed
+from ..runner import Figures, Row, Run, Spread
 
 RUNS, THREADS = 3, [2]
-SMALLEST = {"tasks": 2, "seconds": 0.05, "empty": 4, "pixels": 64, "workers": (1, 4)}
+SMALLEST = {"pixels": 64, "voxels": 16, "width": 16, "empty": 4, "tasks": 8, "workers": (1, 4)}
+SCENE = scene(mandelbulb(), size="80mm")
+VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
+Job = Callable[[Work, Path], object]
 
 
 @dataclass(frozen=True)
-class Pause:
-    """Task that waits."""
+class Nothing:
+    """Empty task."""
 
     job: str
     number: int
-    seconds: float
 
     @property
     def name(self) -> str:
-        return f"pause-{self.number:05}"
+        return f"nothing-{self.number:05}"
 
     def make(self, work: Work) -> bytes:
-        time.sleep(self.seconds)
         return b"done"
 
 
-def by_pool(pool: Pool, tasks: list[Pause]) -> None:
+def by_pool(pool: Pool, tasks: Sequence[Task]) -> None:
     """All results, in order; then removed."""
     assert sum(1 for _ in pool.results(tasks, Work(1))) == len(tasks)
     pool.finished(tasks[0].job)
 
 
-def by_threads(pieces: Pieces, tasks: list[Pause], work: Work) -> None:
-    """The same files by threads."""
-    work.map(lambda task: make_piece(task, pieces, work), tasks)
-    pieces.remove(tasks[0].job)
+@dataclass
+class Timed(Pool):
+    """Makes all tasks in this process, and measures them; stages by the begin of their names."""
+
+    pieces: Pieces
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+
+    def made(self, tasks: Sequence[Task], work: Work) -> Iterator[int]:
+        for index, task in enumerate(tasks):
+            begun = time.process_time()
+            make_piece(task, self.pieces, work)
+            self.seconds.setdefault(task.name.partition("-")[0], []).append(time.process_time() - begun)
+            yield index
 
 
-def layers_task(pixels: int) -> RangeTask:
-    """Range of 64 layers in the middle of a Mandelbulb."""
-    xml = to_xml(scene(mandelbulb(), size="80mm"))
-    recipe = SliceRecipe(xml, "bulb", SliceJob(80.0, 80 / 640, (80 / pixels, 80 / pixels)))
-    return RangeTask(recipe, _planned(recipe).job, 288, 352)
+def jobs(pixels: int, voxels: int, width: int) -> dict[str, Job]:
+    """A job of each kind."""
+    size = 80 / pixels
+    recipe = SliceRecipe(to_xml(SCENE), "bulb", SliceJob(80.0, 80 / 640, (size, size)), None, "a.cli", "cli")
+
+    def rendered(work: Work, _: Path) -> None:
+        for _ in Renderer(SCENE.root, VIEW, (width, width * 9 // 16), work, "cpu").passes(16):
+            pass
+
+    return {
+        "slice": lambda work, folder: write_slices(recipe.run(work), folder / "a.cli"),
+        "render": rendered,
+        "mesh": lambda work, folder: make_mesh(SCENE, MeshJob(resolution=voxels), work, folder / "a.stl"),
+    }
+
+
+def cpu_of(act: Callable[[], object], pool: Workers | None) -> Figures:
+    """CPU seconds of this process and of all workers."""
+
+    def used() -> float:
+        others: dict[str, float] = pool.client.run(time.process_time) if pool else {}
+        return time.process_time() + sum(others.values())
+
+    begun, wall = used(), time.perf_counter()
+    act()
+    return {"cpu_s": used() - begun, "wall_s": time.perf_counter() - wall}
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Measured tasks of a job: number and mean seconds of each stage, and serial seconds of a task."""
+
+    stages: tuple[tuple[int, float], ...]
+    serial: float
+
+    @classmethod
+    def of(cls, job: Job, folder: Path) -> Stages:
+        pool = Timed(Pieces(str(folder / "timed")))
+        begun = time.process_time()
+        job(Work(1, cluster=pool), folder)
+        total = time.process_time() - begun
+        stages = tuple((len(times), sum(times) / len(times)) for times in pool.seconds.values())
+        made = sum(count * mean for count, mean in stages)
+        return cls(stages, (total - made) / sum(count for count, _ in stages))
+
+    @property
+    def mean(self) -> float:
+        """Mean seconds of a task."""
+        return sum(count * mean for count, mean in self.stages) / sum(count for count, _ in self.stages)
+
+    def faster(self, workers: int, tasks: int, cost: float) -> float:
+        """Times faster than one process, with so many times the tasks that there are `tasks` in all."""
+        scale = tasks / sum(count for count, _ in self.stages)
+        larger = [(max(round(count * scale), 1), mean) for count, mean in self.stages]
+        alone = sum(count * (mean + self.serial) for count, mean in larger)
+        return alone / sum(simulated(workers, *stage, cost + self.serial) for stage in larger)
 
 
 def simulated(workers: int, tasks: int, seconds: float, cost: float) -> float:
@@ -84,50 +153,51 @@ def simulated(workers: int, tasks: int, seconds: float, cost: float) -> float:
 
 def rows(
     run: Run,
-    tasks: int = 8,
-    seconds: float = 2.0,
+    pixels: int = 8192,
+    voxels: int = 320,
+    width: int = 1280,
     empty: int = 200,
-    pixels: int = 16384,
+    tasks: int = 10_000,
     workers: tuple[int, ...] = (1, 10, 100, 300, 1000),
     plot: str = "",
 ) -> Iterator[Row]:
     threads = run.threads[0]
-    waiting = [Pause("waiting", number, seconds) for number in range(tasks)]
-    nothing = [Pause("nothing", number, 0.0) for number in range(empty)]
-    with tempfile.TemporaryDirectory() as folder, connected(f"local:{threads}", folder, threads) as pool:
-        acts = {
-            "workers": partial(by_pool, pool, waiting),
-            "threads": partial(by_threads, Pieces(folder + "/threads"), waiting, Work(threads)),
-            "empty": partial(by_pool, pool, nothing),
-        }
-        measured = run.interleaved(acts)
+    kinds, acts = jobs(pixels, voxels, width), dict[str, Callable[[], Any]]()
+    nothing = [Nothing("nothing", number) for number in range(empty)]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with connected(f"local:{threads}", f"{name}/pieces", threads) as pool:
+            for kind, job in kinds.items():
+                shared, alone = Work(threads, cluster=pool), Work(threads)
+                acts[f"{kind} by workers"] = partial(cpu_of, partial(job, shared, folder), pool)
+                acts[f"{kind} by threads"] = partial(cpu_of, partial(job, alone, folder), None)
+            acts["empty"] = partial(by_pool, pool, nothing)
+            measured = run.interleaved(acts)
+        measures = {kind: Stages.of(job, folder) for kind, job in kinds.items()}
     cost = Spread.of([figures["wall_s"] / empty for figures in measured["empty"]])
-    task = layers_task(pixels)
-    layers = min(timed(lambda: task.make(Work(1)))["cpu_s"] for _ in range(run.runs))
-    over = measured.ratio("workers", "threads", "wall_s")
-    yield {"": f"{tasks} tasks of {seconds:g} s, {threads} workers / {threads} threads", "figure": over}
-    yield {
-        "": "a task in the scheduler and the client, ms",
-        "figure": Spread(*(1e3 * v for v in vars(cost).values())),
-    }
-    yield {"": f"64 layers of {pixels} pixels, CPU s", "figure": layers}
+    yield {"": "a task in the scheduler and the client, ms", "slice": 1e3 * cost.median}
+    ratios = {kind: measured.ratio(f"{kind} by workers", f"{kind} by threads", "cpu_s") for kind in kinds}
+    yield {"": f"CPU time, {threads} workers / {threads} threads", **ratios}
+    yield {"": "tasks", **{kind: sum(n for n, _ in of.stages) for kind, of in measures.items()}}
+    yield {"": "a task, CPU s", **{kind: of.mean for kind, of in measures.items()}}
+    yield {"": "serial for a task, CPU s", **{kind: of.serial for kind, of in measures.items()}}
     for count in workers:
-        speed = {n: n * layers / simulated(count, n, layers, cost.median) for n in (157, 10_000)}
-        row = {"": f"simulated: {count} workers", "figure": speed[10_000]}
-        yield {**row, "157 tasks": speed[157], "efficiency": f"{speed[10_000] / count:.0%}"}
+        faster = {kind: of.faster(count, tasks, cost.median) for kind, of in measures.items()}
+        yield {"": f"simulated: {count} workers, {tasks:,} tasks", **faster}
     if plot:
-        draw(Path(plot), layers, cost.median)
+        draw(Path(plot), measures, tasks, cost.median)
 
 
-def draw(path: Path, seconds: float, cost: float) -> None:
-    """Speed against workers, for some numbers of tasks."""
+def draw(path: Path, measures: dict[str, Stages], tasks: int, cost: float) -> None:
+    """Speed against workers, for each kind of job."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5, 3.6), layout="constrained")
     axes, counts = figure.subplots(), [1, 2, 5, 10, 20, 50, 100, 200, 300, 500, 700, 1000]
-    for tasks in (157, 1000, 10_000):
-        faster = [tasks * seconds / simulated(count, tasks, seconds, cost) for count in counts]
-        axes.loglog(counts, faster, marker="o", markersize=3, label=f"{tasks:,} tasks of {seconds:.2g} s")
+    for kind, of in measures.items():
+        faster = [of.faster(count, tasks, cost) for count in counts]
+        label = f"{kind}: {tasks:,} tasks of {of.mean:.2g} s"
+        axes.loglog(counts, faster, marker="o", markersize=3, label=label)
     axes.loglog(counts, counts, color="0.7", linewidth=0.8, label="ideal")
     axes.set(xlabel="workers (simulated)", ylabel="times faster than one")
     axes.legend(fontsize=8)

@@ -1,0 +1,136 @@
+"""Cleaning of one piece of a surface, with the same result as `Window`: for pieces that are finished in any
+order, each with the triangles of its neighbours near the seams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._native import touching
+from .clean import cleaned
+from .model import Mesh
+from .pieces import seamed
+from .quantisation import NO_PLANES, UNMOVED, Frame
+from .window import MENDS, WAITS, Finished
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """A piece with the choice of its bodies.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The piece, scene units.
+    keep : ndarray of bool, shape (n,)
+        Vertices of the connected components that stay.
+    fresh : ndarray of int64, shape (k,)
+        Triangles that were not made by contouring, ascending.
+    """
+
+    mesh: Mesh
+    keep: NDArray[np.bool_]
+    fresh: NDArray[np.int64]
+
+    def near(self, vertices: NDArray[np.bool_], threads: int) -> Kept:
+        """Triangles that use some vertices.
+
+        Parameters
+        ----------
+        vertices : ndarray of bool, shape (n,)
+            The vertices.
+        threads : int
+            Threads; 0 for all cores.
+
+        Returns
+        -------
+        Kept
+            The triangles, with all vertices of the piece; unused ones do not stay.
+        """
+        rows = touching(self.mesh.triangles, vertices, threads)
+        triangles = self.mesh.triangles[rows]
+        used = np.zeros(len(self.keep), bool)
+        used[triangles] = True
+        fresh = np.flatnonzero(np.isin(rows, self.fresh))
+        return Kept(Mesh(self.mesh.vertices, triangles), self.keep & used, fresh)
+
+    def then(self, other: Kept, seam: float, near: float) -> Kept:
+        """Join the next piece; the triangles of this one come first.
+
+        Parameters
+        ----------
+        other : Kept
+            The next piece.
+        seam, near : float
+            As for `seamed`.
+
+        Returns
+        -------
+        Kept
+            Both.
+        """
+        mesh, number = seamed(self.mesh, other.mesh, seam, near)
+        keep = np.concatenate([other.keep, self.keep])
+        keep[number] |= keep  # a vertex of the seam may be unused in one of the pieces
+        keep &= number == np.arange(len(number))
+        return Kept(mesh, keep, np.concatenate([self.fresh, other.fresh + len(self.mesh.triangles)]))
+
+
+def finished_alone(
+    piece: Kept,
+    before: Kept | None,
+    after: Kept | None,
+    ends: tuple[float, float],
+    voxel: float,
+    planes: NDArray[np.float64] = NO_PLANES,
+    frame: Frame = UNMOVED,
+    threads: int = 0,
+) -> Finished:
+    """Clean a piece.
+
+    Every edit that changes a triangle of the piece is made, with all triangles that it depends on, in the
+    order of the whole mesh. The neighbours make the same edits at the seams.
+
+    Parameters
+    ----------
+    piece : Kept
+        The piece, at least a brick thick.
+    before, after : Kept or None
+        Its neighbours; None at the ends of the surface.
+    ends : tuple of float
+        x at which it begins and ends; infinite at the ends of the surface.
+    voxel : float
+        Voxel, scene units.
+    planes, frame, threads
+        As for `Window`.
+
+    Returns
+    -------
+    Finished
+        Triangles of the piece, mm, quantised. A vertex counts in the piece in which it lies.
+    """
+    (start, end), whole, first, last = ends, piece, 0, len(piece.mesh.triangles)
+    if before is not None:
+        strip = before.near(before.mesh.vertices[:, 0] > start - WAITS * voxel, threads)
+        first, last = (n + len(strip.mesh.triangles) for n in (first, last))
+        whole = strip.then(whole, start, voxel / 2)
+    if after is not None:
+        strip = after.near(after.mesh.vertices[:, 0] < end + WAITS * voxel, threads)
+        whole = whole.then(strip, end, voxel / 2)
+    between = start - MENDS * voxel, end + MENDS * voxel
+    mesh, keep = whole.mesh, whole.keep
+    final, suspects, edits = cleaned(
+        mesh, keep, whole.fresh, planes=planes, frame=frame, between=between, threads=threads
+    )
+    triangles = mesh.triangles.copy()
+    triangles[edits[0]] = edits[1]
+    stays = keep[triangles[:, 0]] & (triangles[:, 0] >= 0)
+    first, done = int(stays[:first].sum()), int(stays[first:last].sum())
+    low, high = (frame[0] * x + frame[1][0] for x in ends)
+    x = final.vertices[:, 0]
+    own_first = Mesh(final.vertices, np.roll(final.triangles, -first, axis=0))
+    moved = np.sort((suspects - first) % max(len(final.triangles), 1))
+    return Finished(own_first, moved, done, (x >= low) & (x < high))

@@ -1,0 +1,270 @@
+"""Mesh made by several processes: from the pieces that they make to one file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cluster import Pool, Shard
+from .errors import SharedError
+from .finishing import Finish, stride
+from .keys import key
+from .mesh.components import Shells
+from .mesh.missed import NEARBY, distances, surface_samples
+from .mesh.model import Mesh
+from .mesh.nesting import Nesting
+from .mesh.survey import Survey, survey
+from .mesh.tips import Pointed, PointedPiece, with_tips
+from .mesh.window import Tally, by_tip
+from .meshfiles import Files, StoredPieces, packed, unpacked
+from .meshtasks import (
+    CHOICE,
+    SAMPLES,
+    SHELLS,
+    ContourTask,
+    FinishTask,
+    MeshRecipe,
+    MeshTask,
+    NestTask,
+    cuts,
+    read_components,
+    read_mesh,
+    samples_key,
+)
+from .surfaces import Surface
+from .volume import Plan, SignBricks
+from .work import Clock
+
+
+@dataclass(frozen=True, eq=False)
+class SharedSurface(Surface):
+    """Surface whose pieces other processes make.
+
+    Attributes
+    ----------
+    recipe : MeshRecipe
+        The mesh.
+    pool : Pool
+        The processes.
+    job : str
+        Key of the mesh and its samples.
+    clock : Clock
+        Progress, cancellation and timing.
+    """
+
+    recipe: MeshRecipe
+    pool: Pool
+    job: str
+    clock: Clock
+
+    def results(self, kind: type[MeshTask], numbers: Iterable[int], stage: str) -> Iterator[Files]:
+        """Results of tasks, in order.
+
+        Parameters
+        ----------
+        kind : type
+            Kind of the tasks.
+        numbers : iterable of int
+            Indices of their pieces.
+        stage : str
+            Label of the progress.
+
+        Yields
+        ------
+        dict
+            Arrays by name.
+        """
+        abouts = ((number,) for number in numbers)
+        yield from results(kind, (self.recipe, self.pool, self.job), abouts, stage, self.clock)
+
+    def nested(self, bodies: bool, threads: int) -> tuple[Shells, int]:
+        """Nesting of the shells, searched by the pool; see `Surface.nested`."""
+        shells, stored = self.shells, self.pieces
+        assert isinstance(stored, StoredPieces)
+        searched = shells.searched(bodies)
+        numbers = np.unique(shells.piece[searched]).tolist()
+        first = np.array(stored.first_labels or [0] * len(stored), np.int32)
+        about = packed(searched=searched, labels=first, prefix=np.array(stored.prefix), **vars(shells))
+        self.pool.pieces.write(self.job, SHELLS, about)
+        found = self.results(NestTask, numbers, "nesting")
+        rays = {n: Nesting(**files) for n, files in zip(numbers, found, strict=True)}
+        return shells.nested_by(searched, rays)
+
+
+def results(
+    kind: type[MeshTask],
+    of: tuple[MeshRecipe, Pool, str],
+    abouts: Iterable[tuple[int, ...]],
+    stage: str,
+    clock: Clock,
+) -> Iterator[Files]:
+    """Results of tasks, in order; see `SharedSurface.results`."""
+    recipe, pool, job = of
+    tasks = [kind(recipe, pool.pieces, job, *about) for about in abouts]
+    yield from map(unpacked, pool.results(tasks, clock.work, stage))
+
+
+def made(recipe: MeshRecipe, planned: Plan, signs: SignBricks, pool: Pool, clock: Clock) -> SharedSurface:
+    """Mesh the surface of samples in pieces; join their components.
+
+    Parameters
+    ----------
+    recipe : MeshRecipe
+        The mesh.
+    planned : Plan
+        Sampled field.
+    signs : SignBricks
+        Its samples.
+    pool : Pool
+        Processes that make the pieces.
+    clock : Clock
+        Progress, cancellation and timing.
+
+    Returns
+    -------
+    SharedSurface
+        The surface with tips.
+    """
+    pieces, work = cuts(signs), clock.work
+    own = samples_key(recipe, planned.root.key, signs)
+    job = key(own, pieces)
+    arrays = packed(ijk=signs.ijk, signs=signs.signs, index=signs.index, key=np.array(own))
+    pool.pieces.write(job, SAMPLES, arrays)
+    stored, joined, pointed = StoredPieces(pool.pieces, job), Survey(), Pointed(planned.voxel, work.threads)
+    abouts = ((number, *layers) for number, layers in enumerate(pieces))
+    with clock("meshing"):
+        for files in results(ContourTask, (recipe, pool, job), abouts, "meshing", clock):
+            end, triangles = files["counts"].tolist()
+            stored.count(end, int(triangles))
+            stored.first_labels.append(joined.add(read_components(files)))
+            sharp = PointedPiece(files["pointed"], read_mesh(files, "head"), read_mesh(files, "tail"))
+            pointed.join(sharp, end)
+        tipped, tips = with_tips(planned, stored, pointed.points, work)
+        shells = joined.shells() if tipped is stored else survey(tipped, planned.voxel, work.threads)
+    return SharedSurface(planned, signs, tipped, shells, tips, recipe, pool, job, clock)
+
+
+@dataclass
+class SharedCheck:
+    """Sums over finished pieces.
+
+    Attributes
+    ----------
+    surface : SharedSurface
+        The surface.
+    points : ndarray of float64, shape (n, 3)
+        Points of the field's surface.
+    tally : Tally
+        Sums.
+    contact : float
+        Area on the plate, mm2.
+    off : list of ndarray
+        Distances of vertices from the surface, scene units.
+    back : ndarray of float64, shape (n,)
+        Distances of the points from the mesh, scene units.
+    """
+
+    surface: SharedSurface
+    points: NDArray[np.float64]
+    tally: Tally = field(default_factory=Tally)
+    contact: float = 0.0
+    off: list[NDArray[np.float64]] = field(default_factory=list)
+    back: NDArray[np.float64] = field(default_factory=lambda: np.array(np.inf))
+
+    def add(self, files: Files) -> None:
+        """Add the result of a `FinishTask`."""
+        self.tally.include(Tally(**json.loads(str(files["tally"]))))
+        self.contact += float(files["contact"])
+        self.off.append(np.asarray(files["errors"]))
+        self.back = np.minimum(self.back, files["distances"])
+
+    def end(self) -> None:
+        """Measure the distances of points without triangles nearby; remove the files of the job."""
+        surface, voxel = self.surface, self.surface.planned.voxel
+        far = self.back > (NEARBY - np.sqrt(3)) * voxel
+        if far.any():
+            self.back[far] = distances(surface.pieces.meshes, self.points[far], voxel, surface.clock.work)
+        surface.pool.finished(surface.job)
+
+
+def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Iterator[bytes]]:
+    """Finish the pieces.
+
+    Parameters
+    ----------
+    surface : SharedSurface
+        The surface.
+    finish : Finish
+        Selection and placement.
+
+    Returns
+    -------
+    SharedCheck
+        Checks and measures, complete after the last block.
+    iterator of bytes
+        Blocks of triangles, in order, as an STL file holds them.
+
+    Raises
+    ------
+    SharedError
+        For a shard that does not write the output, when its pieces are made.
+    """
+    stored, pool, place = surface.pieces, surface.pool, finish.place
+    assert isinstance(stored, StoredPieces)
+    points = surface_samples(surface.planned, surface.clock.work)
+    first = stored.first_labels or [0] * len(stored)
+    choice = packed(
+        prefix=np.array(stored.prefix),
+        ends=np.array(stored.ends),
+        fresh=np.array(stored.fresh, np.int64),
+        first_labels=np.array(first, np.int32),
+        stays=finish.stays[surface.shells.of_label],
+        placed=np.array([place.scale, *place.offset]),
+        points=points,
+        tips=place.mm(surface.tips),
+        stride=np.array(stride(len(surface.signs))),
+    )
+    pool.pieces.write(surface.job, CHOICE, choice)
+    if isinstance(pool, Shard) and not pool.first:
+        tasks = [FinishTask(surface.recipe, pool.pieces, surface.job, n) for n in range(len(stored))]
+        raise SharedError(f"{pool.share(tasks, surface.clock.work)} pieces are made; shard 1 writes the file")
+    check = SharedCheck(surface, points)
+    return check, _blocks(surface, check)
+
+
+def _blocks(surface: SharedSurface, check: SharedCheck) -> Iterator[bytes]:
+    from ._native import stl
+
+    late: list[tuple[int, NDArray[np.float64]]] = []
+    for files in surface.results(FinishTask, range(len(surface.pieces)), "finishing"):
+        check.add(files)
+        late += zip(files["late"].tolist(), np.asarray(files["corners"]), strict=True)
+        yield np.asarray(files["stl"]).tobytes()
+    if late:
+        last = by_tip(late)
+        yield bytes(stl(last.vertices, last.triangles).data)
+
+
+def whole(blocks: Sequence[bytes]) -> Mesh:
+    """Mesh of the triangles of an STL file; its vertices are in the order of their first use.
+
+    Parameters
+    ----------
+    blocks : sequence of bytes
+        Blocks of triangles.
+
+    Returns
+    -------
+    Mesh
+        The mesh, mm.
+    """
+    from ._native import weld
+
+    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+    corners = np.concatenate([np.frombuffer(block, kind)["corners"] for block in blocks]).reshape(-1, 3)
+    first, labels = weld(np.ascontiguousarray(corners))
+    return Mesh(corners[first].astype(np.float64), labels.reshape(-1, 3)).in_order()

@@ -1,0 +1,42 @@
+"""Automatic depths of films: they change without a jump."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fracslice.animation import FilmJob, Timeline
+from fracslice.animation.depths import gradual_depths
+from fracslice.formulas import mandelbulb
+from fracslice.scene.camera import Camera
+from fracslice.scene.reader import reads
+from fracslice.work import Work
+
+SIZE, COUNT = (48, 32), 8
+SCENE = """<scene version="1"><solid size="80mm"><mandelbulb iterations="{}"/></solid>
+<camera eye="1.6 0 0" target="0.9 0.1 0.2"/><animation duration="1s" fps="4" noise="fixed"/></scene>"""
+
+
+def film(depth: object) -> FilmJob:
+    return FilmJob(Timeline(reads(SCENE.format(depth))), SIZE, COUNT, 4.0, device="cpu")
+
+
+def test_one_share_of_the_samples_changes_its_depth_at_a_time() -> None:
+    root, sums = mandelbulb(), []
+    for x in np.linspace(1.6, 1.4, 24):
+        camera = Camera(eye=(float(x), 0.0, 0.0), target=(0.9, 0.1, 0.2))
+        depths = [int(node["iterations"]) for node in gradual_depths(root, camera, SIZE, COUNT)]
+        assert depths == sorted(depths)
+        sums.append(sum(depths))
+    assert set(np.diff(sums)) <= {0, 1}
+    assert sums[-1] - sums[0] > 1
+
+
+def test_a_frame_is_the_mean_of_its_depths() -> None:
+    depths = {int(scene.root["iterations"]) for scene in film("auto").moments(0)}
+    assert len(depths) > 1
+    alone = [film(depth).light(0, Work(1)).mean() for depth in depths]
+    assert min(alone) < film("auto").light(0, Work(1)).mean() < max(alone)
+
+
+def test_a_given_depth_is_kept() -> None:
+    assert {int(scene.root["iterations"]) for scene in film(5).moments(0)} == {5}
