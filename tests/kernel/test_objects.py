@@ -149,10 +149,10 @@ def test_planted_code_does_not_run_and_is_told_of_once(folder: Path, tmp_path: P
         return subprocess.run([sys.executable, "-c", program], text=True, capture_output=True, check=True)
 
     values("box()")
-    (planted,) = folder.iterdir()
+    (planted,) = folder.glob("*.o")
     planted.rename(tmp_path / "planted")
     right = values("sphere()").stdout
-    (kept,) = folder.iterdir()
+    (kept,) = folder.glob("*.o")
     (tmp_path / "planted").rename(kept)
     assert values("sphere()").stdout != right  # it would run
     folder.chmod(0o1777)
