@@ -650,7 +650,7 @@ def lambda_bulb(power: float = 4.0, factor: float = 1.1, angle: float = 30.0, it
 
     Parameters
     ----------
-    power : a number >= 2 and <= 16, default 4.0
+    power : a number >= 2 and <= 8, default 4.0
         the exponent
     factor : a number > 0 and <= 4, default 1.1
         size of lambda

@@ -83,7 +83,7 @@ def cosine_bulb(w, c, power):  # type: ignore[no-untyped-def]
 
 
 @orbit(
-    power=Number(4.0, "the exponent", least=2, most=16),
+    power=Number(4.0, "the exponent", least=2, most=8),
     factor=Number(1.1, "size of lambda", above=0, most=4),
     angle=Number(30.0, "angle of lambda, about the z axis, degrees"),
 )

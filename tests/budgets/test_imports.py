@@ -22,7 +22,7 @@ JOBS = {
     "render": ("render", "ball.xml", "-o", "ball.png", "--size", "16x16", "--samples", "1", "--quiet"),
 }
 UNUSED = {
-    "help": ("numpy", "llvmlite", "concurrent", "json", "tempfile", "fracslice.scene", "fracslice.kernel"),
+    "help": ("numpy", "llvmlite", "concurrent", "json", "fracslice.scene", "fracslice.kernel"),
     "mesh": ("scipy", "email", "importlib.metadata", "subprocess", "PIL", "rich", "json"),
     "slice": ("scipy", "importlib.metadata", "http", "ssl", "rich", "numpy.ma"),
     "render": ("scipy", "email", "importlib.metadata", "numpy.ma", "subprocess", "rich", "fracslice._vdb"),

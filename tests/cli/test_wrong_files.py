@@ -137,7 +137,7 @@ def test_a_file_that_cannot_be_read(wrong: Path, capfd, monkeypatch) -> None:
     [
         *((f"mesh ball.xml -o out/x.{e}", ".glb, .vdb") for e in ("step", "png", "sl1", "xml", "gz")),
         *((f"slice ball.xml -o out/x.{e}", "or a folder") for e in ("step", "stl", "png", "xml")),
-        *((f"render ball.xml -o out/x.{e}", "known are .png") for e in ("gif", "jpg", "stl")),
+        *((f"render ball.xml -o out/x.{e}", "known are .png") for e in ("gif", "bmp", "stl")),
         ("check ball.xml --layer 5mm --picture out/x.gif", "expected a file name that ends in .png"),
         ("slice ball.xml -o out/x.json --preview out/x.gif", "ends in .png or .webp"),
         ("slice ball.xml -o ball.xml --format json --layer 5mm", "ball.xml: expected another file"),

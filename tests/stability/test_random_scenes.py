@@ -29,5 +29,5 @@ def test_the_same_seeds_make_the_same_scene() -> None:
 
 def test_every_formula_is_in_some_scene_and_automatic_depths_too() -> None:
     nodes: list[Node] = [node for tree in range(60) for node in random_scene(tree, 0).walk()]
-    assert {node.formula.name for node in nodes} >= set(names()) - {"material", *FAMILIES}
+    assert {node.formula.name for node in nodes} >= set(names()) - {"material", "orbit", *FAMILIES}
     assert {node["iterations"] == AUTO for node in nodes if "iterations" in node.values} == {True, False}

@@ -12,7 +12,7 @@ from tests.benchmarks.stability.scenes import drawn_settings
 from .solids import Outcome, outcome
 
 
-@pytest.mark.parametrize("name", library.names())
+@pytest.mark.parametrize("name", sorted({*library.names()} - {"hybrid"}))  # its steps are no solids
 def test_other_numbers_make_a_solid(name: str) -> None:
     root = drawn_settings(name, 1)[1]
     found = outcome(root, 24, threads=2)
