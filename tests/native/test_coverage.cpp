@@ -27,7 +27,7 @@ struct Layer {
     int side;
 
     Layer(Distance distance, int side)
-        : slab(std::make_shared<Memory>(), std::make_shared<Formula<Distance>>(distance), {1, 1, 1, 1, 1, false}, {0, 0, 1, 1}, {0.0},
+        : slab(std::make_shared<Memory>(), std::make_shared<Formula<Distance>>(distance), {1, 1, 1, false}, {0, 0, 1, 1}, {0.0},
                side + 1, side + 1),
           side(side) {
         slab.sample(0);
