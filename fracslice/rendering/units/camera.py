@@ -81,6 +81,25 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
     return ex + sx, ey + sy, ez + sz, dx, dy, dz
 
 
+def beside(px, width):
+    """Return the picture of two side by side that a film position is in, and the position in that picture.
+
+    Parameters
+    ----------
+    px : float
+        Film position, pixels.
+    width : float
+        Width of one picture, pixels.
+
+    Returns
+    -------
+    second, column : float
+        -1 in the left picture, 1 in the right one; position across it, pixels.
+    """
+    second = where(px < width, -1.0, 1.0 + 0.0 * px)
+    return second, px - maximum(second, 0.0) * width
+
+
 def stereo(px, py, lens_u, lens_v, eye, corner, across, down, apart, half, focus):
     """Return the ray of one of two eyes: of the left one in the left half of the film.
 
@@ -113,8 +132,7 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, apart, half, focus
     ax, ay, az = across
     bx, by, bz = down
     rx, ry, rz = apart
-    second = where(px < half, -1.0, 1.0 + 0.0 * px)
-    column = px - maximum(second, 0.0) * half
+    second, column = beside(px, half)
     sx = second * rx
     sy = second * ry
     sz = second * rz
@@ -232,8 +250,7 @@ def equirectangular(px, py, lens_u, lens_v, eye, right, up, forward, width, heig
     rx, ry, rz = right
     ux, uy, uz = up
     fx, fy, fz = forward
-    second = where(px < width, -1.0, 1.0 + 0.0 * px)
-    column = px - maximum(second, 0.0) * width
+    second, column = beside(px, width)
     longitude = 6.283185307179586 * (column / width - 0.5)
     latitude = 3.141592653589793 * (0.5 - py / height)
     c = cos(longitude)
