@@ -12,7 +12,7 @@ from ..errors import SceneError
 from ..providers import provider
 from . import signatures
 from .box import Box
-from .field import Bounds, Device, Field, Kernel, Loops, Precision
+from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
 from .operators import Operators
 
 if TYPE_CHECKING:
@@ -173,6 +173,11 @@ class Node(Operators, Field):
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
         """See `Field.kernel`."""
         found: Kernel = provider("compiler").kernel(self, device, precision)
+        return found
+
+    def cells(self, precision: Precision = "float32") -> Cells | None:
+        """See `Field.cells`."""
+        found: Cells = provider("compiler").cells(self, precision)
         return found
 
     def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
