@@ -175,10 +175,10 @@ class Node(Operators, Field):
         found: Kernel = provider("compiler").kernel(self, device, precision)
         return found
 
-    def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
+    def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
         """See `Field.loops`."""
-        found: Loops = provider("compiler").loops(self, loops, precision)
-        return found
+        compiled: Loops = provider("compiler").loops(self, loops, precision, device)
+        return compiled
 
     @property
     def arguments(self) -> dict[str, Any]:

@@ -150,7 +150,7 @@ def test_roots_of_a_field_that_is_not_linked_move_as_the_compiled_ones_do() -> N
     found = []
     for way in ways:
         out = np.full((5, n), 0.25)
-        way._runs["polish"](way._frame, segments, out)
+        way._runs["polish"](way.frame, segments, out)
         found.append(out)
     np.testing.assert_allclose(found[1], found[0], atol=1e-9)
     assert found[0][4].min() > 0.01
