@@ -33,8 +33,8 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
     bits
         Width of a float: 32 or 64.
     loops
-        Loops over lanes, or loops marked ``@kernel``. In these and in functions marked ``@device`` numbers are
-        typed by hand.
+        Loops over lanes, or loops marked ``@kernel``. In these and in functions marked ``@device`` numbers
+        are typed by hand.
 
     Returns
     -------
