@@ -22,8 +22,8 @@ def test_a_flake_whose_corners_touch_is_joined_by_the_thickness_that_its_report_
 
 
 def test_bodies_apart_and_cavities_do_not_touch() -> None:
-    apart = make_mesh(union(*(transform(sphere(0.3), translate=(x, 0, 0)) for x in (-1, 1))), resolution=32)
-    assert apart.report.mesh.components == 2 and near_bodies(apart, 2 * apart.report.voxel_mm) == 0
-    assert not any("two voxels" in note for note in apart.report.notes)
+    spheres = make_mesh(union(*(transform(sphere(0.3), translate=(x, 0, 0)) for x in (-1, 1))), resolution=32)
+    assert spheres.report.mesh.components == 2 and near_bodies(spheres, 2 * spheres.report.voxel_mm) == 0
+    assert not any("two voxels" in note for note in spheres.report.notes)
     hollow = make_mesh(shell(sphere(), thickness=0.1), resolution=48)
     assert near_bodies(hollow, 4 * hollow.report.voxel_mm) == 0
