@@ -102,8 +102,8 @@ class CudaKernel(Kernel):
         placed = self._cuda.to_device(coordinates)
         out = self._cuda.device_array(coordinates.shape[1], self.dtype)
         self.points_on_device(placed[0], placed[1], placed[2], out)
-        found: np.ndarray = out.copy_to_host()
-        return found.reshape(shape)
+        result: np.ndarray = out.copy_to_host()
+        return result.reshape(shape)
 
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray

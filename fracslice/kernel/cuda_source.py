@@ -229,12 +229,12 @@ class _Typed(ast.NodeTransformer):
         """Visit an expression that becomes the value of a name or a function."""
         if isinstance(node, ast.Tuple):
             return ast.Tuple([self.given(e) for e in node.elts], ast.Load())
-        found: ast.expr = self.visit(node) if self.shifts else self.real(node)
-        return found
+        visited: ast.expr = self.visit(node) if self.shifts else self.real(node)
+        return visited
 
 
-def _listed(found: Any) -> list[ast.stmt]:
-    return found if isinstance(found, list) else [found]
+def _listed(visited: Any) -> list[ast.stmt]:
+    return visited if isinstance(visited, list) else [visited]
 
 
 def after_parameters(arguments: list[ast.expr]) -> list[ast.expr]:

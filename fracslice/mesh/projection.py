@@ -11,7 +11,7 @@ from ..kernel import Field
 from ..work import Work, chunks
 from .roots import Roots
 
-NEAR, FOUND = 1e-9, 1e-8
+NEAR, CONVERGED = 1e-9, 1e-8
 """Values of |f| in voxels: below `NEAR` a point needs no projection (a corner has no gradient to follow); a
 projected point should be below `FOUND`.
 """
@@ -91,12 +91,12 @@ def project(
     def brought(which: np.ndarray, f: np.ndarray) -> np.ndarray:
         p, region = np.ascontiguousarray(points[which].T), trust_regions(which, f < 0)
         rays = np.concatenate([p, guess.lead(_relative(p, region))])
-        t, miss = exact.aimed(rays, guess.found(rays.astype(np.float32)))
-        left = np.flatnonzero(miss > FOUND)
+        t, miss = exact.aimed(rays, guess.find(rays.astype(np.float32)))
+        left = np.flatnonzero(miss > CONVERGED)
         if len(left):
             left = exact.padded(left)
             slow = rays.take(left, 1)
-            t[left], miss[left] = exact.aimed(slow, exact.found(slow))
+            t[left], miss[left] = exact.aimed(slow, exact.find(slow))
         there = np.clip(p + t * rays[3:], region.low, region.high)
         return np.where(miss * voxel < np.abs(f), there, p)
 

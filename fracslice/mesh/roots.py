@@ -76,7 +76,7 @@ class Roots:
         """
         return np.concatenate([index, np.repeat(index[-1:], -len(index) % self.width)])
 
-    def found(self, segments: np.ndarray) -> np.ndarray:
+    def find(self, segments: np.ndarray) -> np.ndarray:
         """Find the roots on segments.
 
         Parameters
