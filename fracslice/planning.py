@@ -64,6 +64,7 @@ def planned(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
     with clock("planning"):
         root = oriented(scene.root, what.up, size.stretch, clock.work)
         made = plan(root, what.voxels(size.longest), clock.work)
+        made = made.strict if what.proved else made
     return Sized(made, None, how) if how.whole else edited(made, scene, what, size, clock)
 
 

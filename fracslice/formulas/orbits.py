@@ -199,6 +199,34 @@ def orbit_arguments(node: Node) -> dict[str, object]:
     return {**own, **values}
 
 
+def orbit_sign(node: Node) -> tuple[Callable[..., Any], dict[str, object]] | None:
+    code, values = steps(node)
+    grown_by = grown(node)
+    own = provider("growth").sign_arguments(code, grown_by, node["iterations"])
+    return (provider("orbits").sign(code, grown_by.scaled), {**own, **values}) if own else None
+
+
+def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Callable[..., Any], dict[str, object]]:
+    """Function with the sign of an escape-time fractal's field, and its arguments.
+
+    Parameters
+    ----------
+    node : Node
+        Escape-time fractal with a step.
+    radius : float
+        Bailout radius.
+    escape2 : float
+        Square of the radius where its orbits stop, which is not smaller.
+
+    Returns
+    -------
+    (callable, dict)
+    """
+    code, values = steps(node)
+    own = {"iterations": node["iterations"], "radius2": radius**2, "stop0": escape2}
+    return provider("orbits").sign(code, False), {**own, **values}
+
+
 def orbit_select(node: Node) -> Callable[..., Any]:
     bound = grown(node)
     function: Callable[..., Any] = provider("orbits").field(steps(node)[0], bound.by_power, bound.scaled)
@@ -235,6 +263,7 @@ HOOKS: dict[str, Callable[..., Any]] = {
     "bounds": orbit_bounds,
     "arguments": orbit_arguments,
     "select": orbit_select,
+    "sign": orbit_sign,
     "steepening": orbit_steepening,
     "potential": orbit_potential,
     "check": orbit_check,

@@ -107,6 +107,13 @@ class Plan:
     proved: bool = False
 
     @property
+    def strict(self) -> Plan:
+        """The same plan, with nothing skipped but by a proof: the box that the formulas state is sampled."""
+        stated = self.root.bounds.box
+        outer = self.outer | stated if stated.finite else self.outer
+        return replace(self, outer=outer.about(self.box.centre), proved=True)
+
+    @property
     def lattice(self) -> Lattice:
         """Sampling grid of the plan."""
         return Lattice.around(self.outer, self.voxel, self.box)
@@ -267,7 +274,7 @@ def _proofs(planned: Plan) -> Proofs | None:
     if not planned.proved and math.prod(planned.lattice.bricks) < MANY:
         return None
     cells = planned.root.cells()
-    return Proofs(cells, planned.proved) if cells else None
+    return Proofs(cells, planned.proved) if cells or planned.proved else None
 
 
 def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:
