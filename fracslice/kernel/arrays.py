@@ -40,7 +40,7 @@ class ArrayField(Field, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ArrayLoop:
-    """Python implementation of `formulas.field.CompiledLoop`.
+    """Python implementation of `formulas.field.FieldLoop`.
 
     Attributes
     ----------
