@@ -175,9 +175,9 @@ class Node(Operators, Field):
         kernel: Kernel = provider("compiler").kernel(self, device, precision)
         return kernel
 
-    def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
+    def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
         """See `Field.loops`."""
-        linked: Loops = provider("compiler").loops(self, loops, precision)
+        linked: Loops = provider("compiler").loops(self, loops, precision, device)
         return linked
 
     @property

@@ -76,8 +76,9 @@ def project(
     Cancelled
         If the job was cancelled.
     """
-    kernel, work = root.kernel("cpu", "float64"), work or Work()
-    guess, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
+    work = work or Work()
+    kernel = root.kernel(work.device, "float64")
+    guess, exact = (Roots(root, precision, voxel, work.device) for precision in ("float32", "float64"))
 
     def task(part: slice) -> tuple[np.ndarray, np.ndarray]:
         values = kernel.points(*points[part].T)
@@ -99,7 +100,7 @@ def project(
         there = np.clip(p + t * rays[3:], region.low, region.high)
         return np.where(miss * voxel < np.abs(f), there, p)
 
-    result = work.collect(task, chunks(len(points), 1 << 14))
+    result = work.collect(task, chunks(len(points), kernel.batch >> 3))
     if not result:
         return np.empty(0, np.int64), np.empty((0, 3))
     numbers, places = zip(*result, strict=True)
