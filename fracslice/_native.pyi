@@ -125,7 +125,7 @@ class Sides:
 def climb(
     field: Entry,
     starts: NDArray[float64],
-    ways: NDArray[float64],
+    steps: NDArray[float64],
     gain: NDArray[float64],
     first: float,
     exact: float,
