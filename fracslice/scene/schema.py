@@ -13,7 +13,7 @@ from typing import Any
 from xml.etree import ElementTree as Tree
 
 from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
-from .animation import Keys, Seconds, Target
+from .animation import AttributePath, Keys, Seconds
 from .layout import SCENE, SECTIONS, Element, formulas
 from .lengths import MILLIMETRES, Length
 
@@ -115,7 +115,7 @@ def _choices(parent: Tree.Element, kind: Choice) -> None:
         Tree.SubElement(values, "value").text = word
 
 
-def _text(parent: Tree.Element, _: Seconds | Target | Keys) -> None:
+def _text(parent: Tree.Element, _: Seconds | AttributePath | Keys) -> None:
     Tree.SubElement(parent, "data", type="string")
 
 
@@ -131,7 +131,7 @@ _PATTERNS: dict[type, Any] = {
     Choice: _choices,
     Length: _length,
     Seconds: _text,
-    Target: _text,
+    AttributePath: _text,
     Keys: _text,
 }
 
