@@ -73,7 +73,7 @@ class Parameter(ABC):
 
 
 @dataclass(frozen=True)
-class Limits(Parameter):
+class Bounded(Parameter):
     """Kind of finite numbers within limits.
 
     Attributes
@@ -114,7 +114,7 @@ class Limits(Parameter):
 
 
 @dataclass(frozen=True)
-class Number(Limits):
+class Number(Bounded):
     """One finite number."""
 
     @property
@@ -167,7 +167,7 @@ class Count(Parameter):
 
 
 @dataclass(frozen=True)
-class Vector(Limits):
+class Vector(Bounded):
     """Several finite numbers, separated by spaces; the limits hold for each.
 
     Attributes

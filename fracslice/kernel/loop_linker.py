@@ -173,7 +173,7 @@ class _Resolver(Folding):
             expression = ast.Constant(int(value))
         elif isinstance(node, ast.Name) and value is getattr(builtins, node.id, _UNKNOWN):
             expression = ast.Name(node.id, ast.Load())
-        elif name := language.intrinsic(value):
+        elif name := language.intrinsic_name(value):
             expression = ast.Name(name, ast.Load())
         elif is_intrinsic(value):
             expression = ast.Name(value.__name__, ast.Load())
@@ -191,7 +191,7 @@ class _Resolver(Folding):
             case ast.Call(ast.Name("tuple"), [ast.GeneratorExp(element, [generator])]):
                 return self.unrolled(node, element, generator)
         called = self.known(node.func)
-        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.intrinsic(called):
+        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.intrinsic_name(called):
             return self.generic_visit(node)
         fixed, passed = [], []
         for parameter, argument in zip(functions.parameters(called), node.args, strict=False):

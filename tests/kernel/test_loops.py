@@ -175,14 +175,14 @@ def test_a_loop_is_a_function_of_a_module() -> None:
 
 def test_the_text_of_loops_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """Linking it takes a tenth of a picture of one sample."""
-    loops = [example.fix(told=Told(True, 2))]
+    loops = [example.fix(setup=Setup(True, 2))]
     text = loop_source(loops)
     monkeypatch.setattr(loop_linker, "link_loops", None)
     assert loop_source(loops) == text
-    for changed in ([example.fix(told=Told(True, 3))], [example.fix(told=Told(False, 2))]):
+    for changed in ([example.fix(setup=Setup(True, 3))], [example.fix(setup=Setup(False, 2))]):
         with pytest.raises(TypeError):
             loop_source(changed)
-    monkeypatch.setattr(sys.modules[__name__], "FLAT", Told(True, 0))
+    monkeypatch.setattr(sys.modules[__name__], "FLAT", Setup(True, 0))
     with pytest.raises(TypeError):
         loop_source([Loop(applied_flat, "r")])
 
