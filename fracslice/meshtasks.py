@@ -192,7 +192,7 @@ class FinishTask(MeshTask):
             stl=np.frombuffer(stl(plain.vertices, plain.triangles).data, np.uint8),
             late=late[late >= 0],
             corners=made.passed.corners[late >= 0],
-            contact=np.array(on_the_plate(made.passed)),
+            contact=np.array(on_the_plate(made.passed, threads)),
             tally=np.array(json.dumps(asdict(tally))),
             errors=off_surface(of.planned, choice.place, made.points[:: choice.stride], work),
             distances=nearest([own.mesh], choice.points, NEARBY * voxel, work),

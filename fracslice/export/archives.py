@@ -110,7 +110,7 @@ def _archive(path: str | Path, members: Members) -> Path:
 
 def _preview(job: PrintData, width: int, height: int) -> bytes:
     file = io.BytesIO()
-    Image.fromarray(job.preview(width, height)).save(file, "PNG")
+    Image.fromarray(job.preview(width, height)).save(file, "PNG", compress_level=1)
     return file.getvalue()
 
 

@@ -11,6 +11,7 @@ import ast
 import builtins
 import copy
 import linecache
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -19,7 +20,9 @@ from typing import Any, NoReturn
 
 from ..errors import KernelError
 from . import functions, language
+from .identity import identity
 from .intrinsics import is_intrinsic
+from .kept_texts import kept_text
 from .loops import Loop
 from .parsing import parse
 from .syntax import Folding
@@ -72,7 +75,7 @@ def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
 
 
 def loop_source(loops: Sequence[Loop]) -> str:
-    """Return the text of loops and of the functions that they call.
+    """Return the text of loops and of the functions that they call: cached, or linked and cached.
 
     Parameters
     ----------
@@ -89,7 +92,12 @@ def loop_source(loops: Sequence[Loop]) -> str:
     KernelError
         If a loop is not in the language.
     """
-    return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
+
+    def linked() -> str:
+        return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
+
+    about = [identity(loop.function, *(value for pair in loop.fixed for value in pair)) for loop in loops]
+    return kept_text("linked", (sys.version, *about), linked)
 
 
 @dataclass
