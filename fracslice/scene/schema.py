@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
 
-from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
+from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, File, Number, Vector
 from .animation import Keys, Seconds, Target
 from .layout import SCENE, SECTIONS, Element, formulas
 from .lengths import MILLIMETRES, Length
@@ -115,7 +115,7 @@ def _words(parent: Tree.Element, kind: Choice) -> None:
         Tree.SubElement(values, "value").text = word
 
 
-def _text(parent: Tree.Element, _: Seconds | Target | Keys) -> None:
+def _text(parent: Tree.Element, _: File | Seconds | Target | Keys) -> None:
     Tree.SubElement(parent, "data", type="string")
 
 
@@ -130,6 +130,7 @@ _PATTERNS: dict[type, Any] = {
     Axis: _words,
     Choice: _words,
     Length: _length,
+    File: _text,
     Seconds: _text,
     Target: _text,
     Keys: _text,
