@@ -68,6 +68,11 @@ GRID = ".vdb"
 @click.option("--report", type=NAME, metavar="FILE.json", help="Write the figures that prove the mesh.")
 @click.option("--picture", type=NAME, metavar="FILE.png", help="Write a shaded picture of the mesh.")
 @click.option(
+    "--implicit",
+    is_flag=True,
+    help="Write the formula instead of triangles: an .3mf file for programs with the implicit extension.",
+)
+@click.option(
     "--cache",
     type=NAME,
     metavar="FOLDER",
@@ -77,7 +82,7 @@ GRID = ".vdb"
     "--device",
     type=click.Choice(["cpu", "cuda", "auto"]),
     default="cpu",
-    help="The device that samples the field; cpu by default. auto: the GPU, if there is one.",
+    help="The device that evaluates the field; cpu by default. auto: the GPU, if there is one.",
 )
 @cluster_options
 @click.option(
@@ -101,6 +106,7 @@ def mesh(
     every: float | None,
     report: str | None,
     picture: str | None,
+    implicit: bool,
     cache: str | None,
     device: str,
     cluster: str | None,
@@ -124,6 +130,8 @@ def mesh(
     if Path(output).suffix.lower() == GRID:
         names = {"chord", "simplify", "cluster", "shard", "store"}
         refuse_options(context, names, "only for meshes, and a .vdb file holds samples")
+    if implicit:
+        refuse_what_needs_triangles(context, output)
     scenes = moments(load_scene(source, settings), seconds, every)
     how = Work(threads, store=store_in(cache), device=chosen(device))
     problems = False
@@ -134,6 +142,9 @@ def mesh(
         for suffix, scene in scenes:
             file, *others = (path and suffixed(path, suffix) for path in (output, picture, report))
             with going_on(str(file)):
+                if implicit:
+                    write_formula(scene, job_of(scene, **options), str(file), work, quiet)
+                    continue
                 result = made(scene, job_of(scene, **options), str(file), others[0], work)
                 if others[1] is not None:
                     write_report(result.report, others[1])
@@ -160,6 +171,29 @@ def moments(scene: Scene, seconds: float | None, every: float | None) -> list[tu
         raise click.UsageError(f"--every: expected at most {MOST} outputs, and this makes {count}")
     times = [float(f"{k * every:.6g}") for k in range(count)]
     return [(f"-{time:g}s", timeline.at(time)) for time in times]
+
+
+def refuse_what_needs_triangles(context: click.Context, output: str) -> None:
+    """Raise a usage error for a file other than .3mf, or an option without effect on a formula."""
+    if Path(output).suffix.lower() != ".3mf":
+        raise click.UsageError(f"{output}: expected a file name that ends in .3mf, for --implicit")
+    names = {"chord", "simplify", "dust", "report", "picture", "cache", "device", "material", "price"}
+    refuse_options(
+        context, names | {"cluster", "shard", "store"}, "only for meshes, and --implicit makes none"
+    )
+
+
+def write_formula(scene: Scene, job: MeshJob, output: str, work: Work, quiet: bool) -> None:
+    """Write the formula of a scene, and print its size."""
+    from fracslice.implicit import make_implicit
+
+    made = make_implicit(scene, job, output, work)
+    for note in made.notes:
+        click.echo(note, err=True)
+    if not quiet:
+        size = " x ".join(f"{side:.2f}" for side in made.box.size)
+        kilobytes = made.path.stat().st_size / 1e3
+        click.echo(f"{output}: a formula of {made.operations} operations, {kilobytes:.1f} kB, {size} mm")
 
 
 def store_in(folder: str | None) -> Store | None:

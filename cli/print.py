@@ -46,7 +46,8 @@ MOST = 1_000_000
     type=NAME,
     multiple=True,
     metavar="FILE",
-    help="A profile of the slicer: .ini of PrusaSlicer, .json of the others. Repeatable.",
+    help="A profile of the slicer: .ini of PrusaSlicer, .json of the others (machine, process, filament). "
+    "Repeatable.",
 )
 @click.option(
     "--send", "address", metavar="ADDRESS", help="Upload the file: prusalink://HOST. Nothing is started."
@@ -85,7 +86,7 @@ def print_(
         raise click.UsageError(f"{missing[0]}: no such file")
     if address is not None:
         printer_address(address)
-    _ = chosen.program  # before the mesh, which may take minutes
+    chosen.check(profiles)  # before the mesh, which may take minutes
     scene = load_scene(source, settings)
     job = job_of(scene, **{**options, "simplify": options["simplify"] or TOLERANCE})
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, working(threads, quiet) as work:

@@ -151,7 +151,7 @@ def render(
     from fracslice.export.images import check_image
     from fracslice.rendering import Renderer
     from fracslice.rendering.layers import layers as rendered_layers
-    from fracslice.rendering.sequence import Samples
+    from fracslice.rendering.sequence import SampleRange
     from fracslice.work import Work
 
     if check_image(output) != ".exr" and layers:
@@ -166,7 +166,7 @@ def render(
         pooled(output, threads, cluster, shard, store) as pool,
         working(Work(threads, cluster=pool), quiet) as work,
     ):
-        renderer = Renderer(scene.root, scene.view, size, work, device, Samples(seed=seed), crop)
+        renderer = Renderer(scene.root, scene.view, size, work, device, SampleRange(seed=seed), crop)
         aside = None if pool is None or state else pool.pieces.path(f"{renderer.key}.npz")
         state = state or aside
         if state and Path(state).exists():

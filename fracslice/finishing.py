@@ -186,6 +186,7 @@ class Finish:
         clock: Clock,
     ) -> None:
         from .mesh.components import choose
+        from .mesh.touching import NearBodies
         from .volume.rest import box_of_the_rest
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
@@ -208,6 +209,8 @@ class Finish:
         volumes = nested.volumes[self.stays]
         self.cavities = -float(volumes[volumes < 0].sum()) * exact**3
         """Volume of the cavities that stay, mm3."""
+        self.near = NearBodies(shells, self.stays, planned.voxel, clock.work.threads)
+        """Bodies that nearly touch, complete after the last piece."""
         self._planes, self._frame = placing(planned, surface.signs, self.place)
 
     def report(self, tally: Tally) -> MeshReport:
@@ -243,7 +246,9 @@ class Finish:
             with self.clock("finishing"):
                 self.clock.work.progress("finishing", number / count)
                 mesh, end = self.pieces.mesh(number), self.pieces.ends[number]
-                keep = self.stays[self.shells.of_label][self.pieces.labels(number)]
+                labels = self.pieces.labels(number)
+                self.near.add(mesh.vertices, labels, end)
+                keep = self.stays[self.shells.of_label][labels]
                 fresh = np.arange(len(mesh.triangles) - self.pieces.fresh[number], len(mesh.triangles))
                 self.pieces.drop(number)
                 made = window.add(mesh, end, keep, fresh)
@@ -289,7 +294,7 @@ class Check:
             yield piece.passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
-                self.contact += on_the_plate(piece.passed)
+                self.contact += on_the_plate(piece.passed, self._finish.clock.work.threads)
                 finish = self._finish
                 vertices = piece.points[:: self._stride]
                 self._errors.append(off_surface(finish.planned, finish.place, vertices, finish.clock.work))
@@ -305,20 +310,25 @@ class Check:
         return np.concatenate(self._errors)
 
 
-def on_the_plate(mesh: Mesh) -> float:
+def on_the_plate(mesh: Mesh, threads: int = 0) -> float:
     """Return the area of the triangles at z = 0.
 
     Parameters
     ----------
     mesh : Mesh
         Finished triangles, mm.
+    threads : int, optional
+        Threads; 0 for all cores.
 
     Returns
     -------
     float
         Area, mm2.
     """
-    lying = (mesh.vertices[:, 2] == 0)[mesh.triangles].all(1)
-    x, y = np.moveaxis(mesh.vertices[mesh.triangles[lying], :2], 2, 0)
+    from ._native import touching
+
+    low = mesh.vertices[:, 2] == 0
+    near = mesh.triangles[touching(mesh.triangles, low, threads)]
+    x, y = np.moveaxis(mesh.vertices[near[low[near].all(1)], :2], 2, 0)
     double = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     return float(np.abs(double).sum()) / 2

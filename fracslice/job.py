@@ -154,10 +154,10 @@ class _Job:
         if (pool := self.clock.work.cluster) is not None:
             from .meshtasks import MeshRecipe
             from .scene.writer import to_xml
-            from .sharedmesh import made
+            from .sharedmesh import shared_surface
 
             recipe = MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
-            return sized, made(recipe, sized.planned, signs, pool, self.clock)
+            return sized, shared_surface(recipe, sized.planned, signs, pool, self.clock)
         most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
@@ -168,7 +168,7 @@ class _Job:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
         folder = aside() if aside and most < len(signs) else None
-        return sized, surfaces.made(sized.planned, signs, most, folder, self.clock)
+        return sized, surfaces.surface_of(sized.planned, signs, most, folder, self.clock)
 
     def result(self, sized: Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""
@@ -187,9 +187,6 @@ class _Job:
         made = self.alone(surface, finish) if clock.work.cluster is None else self.joined(surface, finish)
         with clock("checking"):
             amount, off = mesh_amount(planned, finish.volume, scale, clock.work)
-        touching: tuple[str, ...] = ()
-        if made.whole is not None and made.report.components > 1:
-            touching = touching_note(made.whole, planned.voxel * scale, clock.work.threads)
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
         report = Report(
             scene=self.scene.name,
@@ -212,7 +209,7 @@ class _Job:
                 *planned.notes,
                 *([fell] if thin else ()),
                 *(refined.notes if refined else ()),
-                *touching,
+                *touching_note(finish.near.count, planned.voxel * scale),
                 *off,
             ),
             depths=planned.depths,

@@ -85,9 +85,9 @@ def apollonian(level: int = 4, swell: float = 1.02) -> Node:
     """Apollonian packing of balls in the unit ball (Soddy 1936, "The kiss precise"; Boyd 1973).
 
     Inversions in the five spheres at right angles to four of the five first ones, the four balls and the
-    outside, make all others. A ball of radius d around an image
-    point comes from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured: balls of
-    further levels are left out.
+    outside, make all others. A ball of radius d around an image point, all outside or all in one ball, comes
+    from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured, on both sides: balls
+    of further levels are left out.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from ..errors import SceneError
 from ..providers import provider
 from . import signatures
 from .box import Box
-from .field import Bounds, Device, Field, Kernel, Loops, Precision
+from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
 from .operators import Operators
 
 if TYPE_CHECKING:
@@ -167,18 +167,23 @@ class Node(Operators, Field):
     @property
     def key(self) -> str:
         """See `Field.key`. All depths must be resolved, as for kernels and loops."""
-        found: str = provider("compiler").key(self)
-        return found
+        text: str = provider("compiler").key(self)
+        return text
 
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
         """See `Field.kernel`."""
-        found: Kernel = provider("compiler").kernel(self, device, precision)
-        return found
+        kernel: Kernel = provider("compiler").kernel(self, device, precision)
+        return kernel
 
-    def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
+    def cells(self, precision: Precision = "float32") -> Cells | None:
+        """See `Field.cells`."""
+        cells: Cells = provider("compiler").cells(self, precision)
+        return cells
+
+    def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
         """See `Field.loops`."""
-        found: Loops = provider("compiler").loops(self, loops, precision)
-        return found
+        linked: Loops = provider("compiler").loops(self, loops, precision, device)
+        return linked
 
     @property
     def arguments(self) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import ast
 import builtins
 import copy
 import linecache
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -19,7 +20,9 @@ from typing import Any, NoReturn
 
 from ..errors import KernelError
 from . import functions, language
+from .identity import identity
 from .intrinsics import is_intrinsic
+from .kept_texts import kept_text
 from .loops import Loop
 from .parsing import parse
 from .syntax import Folding
@@ -72,7 +75,7 @@ def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
 
 
 def loop_source(loops: Sequence[Loop]) -> str:
-    """Return the text of loops and of the functions that they call.
+    """Return the text of loops and of the functions that they call: cached, or linked and cached.
 
     Parameters
     ----------
@@ -89,7 +92,12 @@ def loop_source(loops: Sequence[Loop]) -> str:
     KernelError
         If a loop is not in the language.
     """
-    return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
+
+    def linked() -> str:
+        return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
+
+    about = [identity(loop.function, *(value for pair in loop.fixed for value in pair)) for loop in loops]
+    return kept_text("linked", (sys.version, *about), linked)
 
 
 @dataclass
@@ -158,22 +166,22 @@ class _Resolver(Folding):
 
     def resolved(self, node: ast.Name | ast.Attribute) -> ast.AST:
         value = self.known(node)
-        found: ast.expr
+        expression: ast.expr
         if isinstance(value, (bool, float)):
-            found = ast.Constant(value)
+            expression = ast.Constant(value)
         elif isinstance(value, int):
-            found = ast.Constant(int(value))
+            expression = ast.Constant(int(value))
         elif isinstance(node, ast.Name) and value is getattr(builtins, node.id, _UNKNOWN):
-            found = ast.Name(node.id, ast.Load())
-        elif name := language.intrinsic(value):
-            found = ast.Name(name, ast.Load())
+            expression = ast.Name(node.id, ast.Load())
+        elif name := language.intrinsic_name(value):
+            expression = ast.Name(name, ast.Load())
         elif is_intrinsic(value):
-            found = ast.Name(value.__name__, ast.Load())
+            expression = ast.Name(value.__name__, ast.Load())
         elif isinstance(value, FunctionType):
-            found = ast.Name(self.linker.linked(value, (), OF_LOOPS + value.__name__), ast.Load())
+            expression = ast.Name(self.linker.linked(value, (), OF_LOOPS + value.__name__), ast.Load())
         else:
             self.fail(node, f"{ast.unparse(node)!r} has no value here")
-        return ast.copy_location(found, node)
+        return ast.copy_location(expression, node)
 
     # --- calls ---
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -183,7 +191,7 @@ class _Resolver(Folding):
             case ast.Call(ast.Name("tuple"), [ast.GeneratorExp(element, [generator])]):
                 return self.unrolled(node, element, generator)
         called = self.known(node.func)
-        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.intrinsic(called):
+        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.intrinsic_name(called):
             return self.generic_visit(node)
         fixed, passed = [], []
         for parameter, argument in zip(functions.parameters(called), node.args, strict=False):
@@ -208,9 +216,9 @@ class _Resolver(Folding):
 
     def element(self, element: ast.expr, counter: str, k: int) -> ast.expr:
         outer, self.fixed = self.fixed, {**self.fixed, counter: k}
-        found: ast.expr = self.visit(copy.deepcopy(element))
+        expression: ast.expr = self.visit(copy.deepcopy(element))
         self.fixed = outer
-        return found
+        return expression
 
 
 def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
@@ -228,8 +236,8 @@ def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
 @lru_cache(maxsize=32)
 def _functions(text: str) -> dict[int, int]:
     """First and last line of each function of a file, decorators included."""
-    found = {}
+    ends = {}
     for node in parse(text).body:
         if isinstance(node, ast.FunctionDef):
-            found[min([node.lineno, *(mark.lineno for mark in node.decorator_list)])] = node.end_lineno or 0
-    return found
+            ends[min([node.lineno, *(mark.lineno for mark in node.decorator_list)])] = node.end_lineno or 0
+    return ends

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..formulas.field import Device, Kernel, Loops, Precision
+import numpy as np
+
+from ..formulas.field import Cells, Device, Kernel, Loops, Precision
 from ..formulas.registry import Node
 from ..keys import key as hashed
 from . import cpu
+from .enclosures import Enclosures
 from .linker import link
-from .loops import Loop
+from .loops import Loop, enclosures
 
 
 def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
@@ -41,8 +44,8 @@ def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
     return cuda.compile_scene(root, precision)
 
 
-def loops(root: Node, loops: Sequence[Loop], precision: Precision) -> Loops:
-    """Compile loops over a tree for the CPU.
+def loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Device = "cpu") -> Loops:
+    """Compile loops over a tree.
 
     Parameters
     ----------
@@ -52,6 +55,8 @@ def loops(root: Node, loops: Sequence[Loop], precision: Precision) -> Loops:
         Loops to compile.
     precision
         "float32" or "float64".
+    device
+        "cpu" or "cuda".
 
     Returns
     -------
@@ -61,9 +66,36 @@ def loops(root: Node, loops: Sequence[Loop], precision: Precision) -> Loops:
     Raises
     ------
     KernelError
-        If the scene or a loop cannot be compiled.
+        If the scene or a loop cannot be compiled or the device is not available.
     """
-    return cpu.compile_loops(link(root), tuple(loops), precision)
+    if device == "cpu":
+        return cpu.compile_loops(link(root), tuple(loops), precision)
+    from . import cuda
+
+    return cuda.compile_loops(link(root), tuple(loops), precision)
+
+
+def cells(root: Node, precision: Precision) -> Cells:
+    """Compile proofs that a tree's field has one sign on cells.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    Cells
+        Proofs by intervals.
+
+    Raises
+    ------
+    KernelError
+        If the scene cannot be compiled.
+    """
+    return Enclosures(cpu.compile_loops(link(root), (enclosures,), precision), np.dtype(precision))
 
 
 def key(root: Node) -> str:

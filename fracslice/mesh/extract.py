@@ -90,7 +90,7 @@ def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) 
         (piece,) = contour_pieces(root, signs, work, len(bricks))
         return {"vertices": piece.mesh.vertices, "triangles": piece.mesh.triangles}
 
-    parts = ("surface", bricks.origin, bricks.voxel, bricks.index, bricks.ijk, signs.signs)
+    parts = ("surface", work.device, bricks.origin, bricks.voxel, bricks.index, bricks.ijk, signs.signs)
     return Mesh(**stored(work.store, parts, root, made))
 
 
@@ -137,13 +137,13 @@ def contour_pieces(
         As `contour`.
     """
     work = work or Work()
-    made = Contours(root, bricks.signs if isinstance(bricks, Bricks) else bricks, work.threads)
+    made = SurfaceContours(root, bricks.signs if isinstance(bricks, Bricks) else bricks, work.threads)
     refiner = made.refiner(work)
     for first, last in layers(made.signs, most):
         yield made.piece(first, last, refiner, work)
 
 
-class Contours:
+class SurfaceContours:
     """Pieces of the exact surface of a scene, in any order.
 
     Parameters

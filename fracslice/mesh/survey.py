@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from .components import PIECES, Shells
 from .model import Mesh
-from .pieces import Pieces, beside, rows
+from .pieces import Pieces, near_plane, rows
 
 if TYPE_CHECKING:
     from .nesting import Nesting
@@ -39,13 +39,13 @@ def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
     """
     joined, start = Survey(), -np.inf
     for number, mesh in enumerate(pieces.meshes()):
-        labels, found = components(mesh, start, start := pieces.ends[number], voxel, threads)
-        pieces.label(number, labels + np.int32(joined.add(found)))
+        labels, sums = components(mesh, start, start := pieces.ends[number], voxel, threads)
+        pieces.label(number, labels + np.int32(joined.add(sums)))
     return joined.shells()
 
 
 @dataclass(frozen=True, eq=False)
-class Components:
+class PieceComponents:
     """Connected components of a piece.
 
     Attributes
@@ -77,7 +77,7 @@ class Components:
 
 def components(
     mesh: Mesh, start: float, end: float, voxel: float, threads: int = 0
-) -> tuple[NDArray[np.int32], Components]:
+) -> tuple[NDArray[np.int32], PieceComponents]:
     """Find the connected components of a piece.
 
     Parameters
@@ -102,8 +102,8 @@ def components(
 
     labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
     sizes = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)
-    here, there = (beside(mesh.vertices, seam, voxel / 2) for seam in (start, end))
-    return labels, Components(
+    here, there = (near_plane(mesh.vertices, seam, voxel / 2) for seam in (start, end))
+    return labels, PieceComponents(
         sizes.volumes,
         sizes.areas,
         sizes.vectors,
@@ -122,7 +122,7 @@ NO_BORDER: dict[str, NDArray[Any]] = {
     "after": np.empty((0, 3)),
     "labels_after": np.empty(0, np.int32),
 }
-"""Fields of `Components` that only the next piece needs."""
+"""Fields of `PieceComponents` that only the next piece needs."""
 
 
 class Survey:
@@ -130,10 +130,10 @@ class Survey:
 
     def __init__(self) -> None:
         self.starts = [0]
-        self.pieces: list[Components] = []
+        self.pieces: list[PieceComponents] = []
         self.same: list[NDArray[np.int32]] = []
 
-    def add(self, piece: Components) -> int:
+    def add(self, piece: PieceComponents) -> int:
         """Add the next piece.
 
         Components that share a vertex with the piece before are united: no surface crosses a seam without
@@ -141,7 +141,7 @@ class Survey:
 
         Parameters
         ----------
-        piece : Components
+        piece : PieceComponents
             Its components.
 
         Returns
@@ -298,8 +298,8 @@ class WholeShells:
         ndarray of bool, shape (s,)
         """
         hollow = self.volumes < 0
-        found: NDArray[np.bool_] = hollow | (bodies and len(hollow) > 1)
-        return found
+        searched: NDArray[np.bool_] = hollow | (bodies and len(hollow) > 1)
+        return searched
 
     def rays(
         self,
@@ -334,14 +334,14 @@ class WholeShells:
         first = np.where(searched & (self.piece == number), self.first, -1)
         return nesting(mesh, self.of_label[labels], self.volumes, first, threads)
 
-    def nested_by(self, searched: NDArray[np.bool_], found: Mapping[int, Nesting]) -> tuple[Shells, int]:
+    def nested_by(self, searched: NDArray[np.bool_], nestings: Mapping[int, Nesting]) -> tuple[Shells, int]:
         """Join the results of `rays` of all pieces; see `nested`.
 
         Parameters
         ----------
         searched : ndarray of bool, shape (s,)
             Searched shells.
-        found : mapping
+        nestings : mapping
             Results by index of the piece.
 
         Returns
@@ -356,7 +356,7 @@ class WholeShells:
         """
         count, hollow = len(self.volumes), self.volumes < 0
         parent, winding = np.full(count, -1, np.int64), np.zeros(count, np.int64)
-        for number, one in found.items():
+        for number, one in nestings.items():
             own = searched & (self.piece == number)
             parent[own], winding[own] = one.parent[own], one.winding[own]
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():

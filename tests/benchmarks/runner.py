@@ -86,13 +86,13 @@ class Run:
         warm : bool
             Whether each runs once before.
         """
-        found = Measured({name: [] for name in acts})
+        result = Measured({name: [] for name in acts})
         for turn in range(-int(warm), self.runs):
             for name, act in acts.items():
                 figures = timed(act)
                 if turn >= 0:
-                    found[name].append(figures)
-        return found
+                    result[name].append(figures)
+        return result
 
 
 def timed(act: Callable[[], Any]) -> Figures:
@@ -115,7 +115,8 @@ def process(command: Sequence[object], **environment: str) -> Figures:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "figures.json"
         words = [sys.executable, "-I", "-S", "-c", _LAUNCHER, str(path), *map(str, command)]
-        kept = {"env": {**os.environ, **environment}, "capture_output": True, "text": True}
+        installed = {"PYTHONDONTWRITEBYTECODE": ""}  # an installed package has byte code
+        kept = {"env": {**os.environ, **installed, **environment}, "capture_output": True, "text": True}
         done = subprocess.run(words, **kept)  # type: ignore[call-overload]
         if done.returncode > 1 or "Traceback" in done.stderr:
             raise SystemExit(f"{' '.join(map(str, command))}\n{done.stderr}{done.stdout}")

@@ -13,7 +13,7 @@ from fracslice.cli.main import run
 from PIL import Image
 
 from fracslice.rendering import Pass, Renderer
-from fracslice.rendering.accumulator import Plan
+from fracslice.rendering.accumulator import PassPlan
 
 SCENE = """<scene version="1">
   <solid size="80mm"><material colour="0.9 0.3 0.2"><sphere/></material></solid>
@@ -142,7 +142,7 @@ def stopped_after(passes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Press Ctrl-C in the pass after some others."""
     receive = Renderer._pass
 
-    def pressed(self: Renderer, plan: Plan) -> Pass:
+    def pressed(self: Renderer, plan: PassPlan) -> Pass:
         if self.accumulator.passes == passes:
             os.kill(os.getpid(), signal.SIGINT)
         return receive(self, plan)

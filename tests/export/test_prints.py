@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +17,11 @@ import pytest
 from fracslice.errors import ExportError
 from fracslice.export.jobs import SliceRun
 from fracslice.export.resins import Resin
-from fracslice.export.slices import PRINTS, write_slices
+from fracslice.export.slices import ENDINGS, PRINTS, printers_file, slice_format, write_slices
 from fracslice.formulas import difference, menger, sphere
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
-from fracslice.slicing.printers import Printer
+from fracslice.slicing.printers import PRINTERS, Printer
 from fracslice.slicing.raster import Screen
 from fracslice.stackmodel import StackModel
 from fracslice.work import Work
@@ -35,6 +37,26 @@ def quantised(bits: int) -> Callable[[np.ndarray], np.ndarray]:
     most = 2**bits - 1
     return lambda image: np.floor(image / 255 * most + 0.5).astype(int)
 
+
+READERS = {
+    "sl1": (readers.sl1, lambda image: image),
+    "goo": (readers.goo, lambda image: image),
+    "ctb": (readers.ctb, lambda image: image >> 1),
+    "pwmx": (readers.photon, quantised(4)),
+    "nanodlp": (readers.nanodlp, lambda image: image),
+}
+"""Readers of the formats of known printers, and what a format keeps of a grey level."""
+
+LARGEST = {
+    form: max(machines, key=lambda machine: math.prod(machine.pixels))
+    for form, machines in groupby(
+        sorted(
+            (p for p in PRINTERS.values() if f".{p.file}" in ENDINGS), key=lambda p: ENDINGS[f".{p.file}"]
+        ),
+        key=lambda p: ENDINGS[f".{p.file}"],
+    )
+}
+"""Of each format, the printer of most pixels."""
 
 CASES = {
     "goo": ("part.goo", readers.goo, lambda image: image),
@@ -67,28 +89,60 @@ def picture() -> np.ndarray:
 def test_every_pixel_height_and_exposure_comes_back(case: str, most: float | None, tmp_path: Path) -> None:
     name, read, level = CASES[case]
     job = run(int((case.split() + ["1"])[1]), most)
-    found = read(write_slices(job, tmp_path / name).read_bytes())
+    result = read(write_slices(job, tmp_path / name).read_bytes())
     expected = list(Slicer(job.stack).map(job.screen.picture))
-    assert len(found.pictures) == job.layers
+    assert len(result.pictures) == job.layers
     assert job.layers < 24 if most else job.layers == 24
-    for one, other in zip(found.pictures, expected, strict=True):
+    for one, other in zip(result.pictures, expected, strict=True):
         assert (one == level(other)).all()
-    np.testing.assert_allclose(found.tops, job.stack.tops, rtol=1e-5)
-    np.testing.assert_allclose(found.exposures, RESIN.exposures(job.layers), rtol=1e-6)
-    assert found.exposures[:3] == pytest.approx([30, 30, 30 - 27.5 / 4])
-    for preview in found.previews:  # rendered: neither empty nor of one colour
+    np.testing.assert_allclose(result.tops, job.stack.tops, rtol=1e-5)
+    np.testing.assert_allclose(result.exposures, RESIN.exposures(job.layers), rtol=1e-6)
+    assert result.exposures[:3] == pytest.approx([30, 30, 30 - 27.5 / 4])
+    for preview in result.previews:  # rendered: neither empty nor of one colour
         assert len(np.unique(preview.reshape(-1, 3), axis=0)) > 50
     unit = 1000 if name.endswith(("goo", "prz")) else 1
     area = sum(image.sum() / 255 * h for image, h in zip(expected, job.stack.heights, strict=True))
-    assert found.about["volume"] * 1000 / unit == pytest.approx(area * 0.25**2, rel=1e-3)
+    assert result.about["volume"] * 1000 / unit == pytest.approx(area * 0.25**2, rel=1e-3)
+
+
+def printed(machine: Printer, layer: float, path: Path) -> Path:
+    """A file of a ball that touches no side, for a machine; checked to be that machine's."""
+    job = SliceJob(size=12, layer=layer, pixel=machine.pixel)
+    stack = plan_stack(sphere(), job)
+    one = SliceRun(stack, Screen(stack, machine), resin=RESIN, metadata={"Title": "test"}, picture=picture)
+    form = slice_format(write_slices(one, path))
+    read, level = READERS[form]
+    found = read(path.read_bytes())
+    expected = [level(image) for image in Slicer(stack).map(one.screen.picture)]
+    assert len(found.pictures) == len(expected) == len(stack.z)
+    assert all(np.array_equal(a, b) for a, b in zip(found.pictures, expected, strict=True))
+    np.testing.assert_allclose(found.tops, stack.tops, rtol=1e-5)
+    assert sum(image.any() for image in found.pictures) == len(expected)
+    return path
+
+
+@pytest.mark.parametrize("name", PRINTERS)
+def test_one_object_through_every_printer(name: str, tmp_path: Path) -> None:
+    """An eighth of the pixels of the screen along each side, as the screen is turned and mirrored."""
+    machine = PRINTERS[name]
+    ending = f".{machine.file}" if f".{machine.file}" in ENDINGS else ".goo"
+    instead = printers_file(machine, f"part{ending}")
+    assert instead == "" or instead.endswith("make part.goo and convert it with UVtools")
+    columns, rows = machine.pixels
+    printed(replace(machine, pixels=(columns // 8, rows // 8)), 3.0, tmp_path / f"part{ending}")
+
+
+@pytest.mark.parametrize("form", LARGEST)
+def test_the_largest_screen_of_every_format(form: str, tmp_path: Path) -> None:
+    printed(LARGEST[form], 6.0, tmp_path / f"part.{LARGEST[form].file}")
 
 
 def test_pictures_that_are_compensated(tmp_path: Path) -> None:
     job = run(compensation=0.1)
     for name, read, level in (CASES["goo"], CASES["cbddlp"]):
-        found = read(write_slices(job, tmp_path / name).read_bytes())
+        result = read(write_slices(job, tmp_path / name).read_bytes())
         expected = list(Slicer(job.stack).map(job.screen.picture))
-        assert all((a == level(b)).all() for a, b in zip(found.pictures, expected, strict=True))
+        assert all((a == level(b)).all() for a, b in zip(result.pictures, expected, strict=True))
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -127,5 +181,5 @@ def test_goo_by_the_crate_goo(tmp_path: Path) -> None:
     path = write_slices(job, tmp_path / "part.goo")
     subprocess.run([crate / "target/release/layers", path, tmp_path / "pixels"], check=True)
     rows, columns = job.screen.shape
-    found = np.fromfile(tmp_path / "pixels", np.uint8).reshape(-1, rows, columns)
-    assert (found == list(Slicer(job.stack).map(job.screen.picture))).all()
+    result = np.fromfile(tmp_path / "pixels", np.uint8).reshape(-1, rows, columns)
+    assert (result == list(Slicer(job.stack).map(job.screen.picture))).all()

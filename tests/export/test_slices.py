@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import atexit
 import io
 import json
+import shutil
 import struct
+import tempfile
 import xml.etree.ElementTree as ET
 import zipfile
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +61,8 @@ def test_png_is_what_pillow_reads() -> None:
     data = png.encode(image)
     assert png.is_whole(data)
     assert not png.is_whole(data[:-1])
+    for place in (3, 9, 18, 28, 36, len(data) // 2, len(data) - 20, len(data) - 9):
+        assert not png.is_whole(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
     with Image.open(io.BytesIO(data)) as read:
         assert read.mode == "L"
         assert (np.asarray(read) == image).all()
@@ -112,30 +118,30 @@ def test_3mf_by_lib3mf(tmp_path: Path, areas: np.ndarray) -> None:
     stacks = model.GetSliceStacks()
     assert stacks.MoveNext()
     stack = stacks.GetCurrentSliceStack()
-    found = []
+    result = []
     for k in range(stack.GetSliceCount()):
         layer = stack.GetSlice(k)
         points = np.array([tuple(v.Coordinates) for v in layer.GetVertices()])
         rings = [list(layer.GetPolygonIndices(i)) for i in range(layer.GetPolygonCount())]
         assert all(ring[0] == ring[-1] for ring in rings)
-        found.append(sum(shoelace(points[ring[:-1]]) for ring in rings))
+        result.append(sum(shoelace(points[ring[:-1]]) for ring in rings))
         assert layer.GetZTop() == pytest.approx(0.5 * (k + 1))
-    np.testing.assert_allclose(found, areas, rtol=1e-5)
+    np.testing.assert_allclose(result, areas, rtol=1e-5)
 
 
 def test_3mf_holds_the_object_itself(tmp_path: Path, areas: np.ndarray) -> None:
     """For programs that do not read slices: its mesh, of the same volume, where the slices are."""
     with zipfile.ZipFile(write_slices(run(), tmp_path / "part.3mf")) as archive:
         model = ET.fromstring(archive.read("3D/3dmodel.model"))
-    found = model.find(".//{*}object")
-    assert found is not None
+    result = model.find(".//{*}object")
+    assert result is not None
     assert (
-        found.attrib["{http://schemas.microsoft.com/3dmanufacturing/slice/2015/07}meshresolution"]
+        result.attrib["{http://schemas.microsoft.com/3dmanufacturing/slice/2015/07}meshresolution"]
         == "fullres"
     )
-    points = np.array([[float(v.attrib[a]) for a in "xyz"] for v in found.iterfind(".//{*}vertex")])
+    points = np.array([[float(v.attrib[a]) for a in "xyz"] for v in result.iterfind(".//{*}vertex")])
     corners = points[
-        [[int(t.attrib[v]) for v in ("v1", "v2", "v3")] for t in found.iterfind(".//{*}triangle")]
+        [[int(t.attrib[v]) for v in ("v1", "v2", "v3")] for t in result.iterfind(".//{*}triangle")]
     ]
     volume = np.linalg.det(corners).sum() / 6
     assert volume == pytest.approx(0.5 * areas.sum(), rel=0.01)
@@ -179,39 +185,39 @@ def test_cli_as_text(tmp_path: Path, areas: np.ndarray) -> None:
     assert lines[:2] == ["$$HEADERSTART", "$$ASCII"]
     assert lines[-1] == "$$GEOMETRYEND"
     assert "$$LAYERS/000024" in lines
-    found: list[float] = []
+    result: list[float] = []
     for line in lines:
         if line.startswith("$$LAYER/"):
-            found.append(0.0)
-            assert float(line[8:]) * 1e-3 == pytest.approx(0.5 * len(found))
+            result.append(0.0)
+            assert float(line[8:]) * 1e-3 == pytest.approx(0.5 * len(result))
         if line.startswith("$$POLYLINE/"):
             _, direction, count, *numbers = line[11:].split(",")
             ring = np.array(numbers, float).reshape(-1, 2) * 1e-3
             assert len(ring) == int(count)
             assert (ring[0] == ring[-1]).all()
             assert (shoelace(ring[:-1]) > 0) == (direction == "1")
-            found[-1] += shoelace(ring[:-1])
-    np.testing.assert_allclose(found, areas, rtol=1e-4)
+            result[-1] += shoelace(ring[:-1])
+    np.testing.assert_allclose(result, areas, rtol=1e-4)
 
 
 def test_cli_in_binary(tmp_path: Path, areas: np.ndarray) -> None:
     data = write_slices(run(), tmp_path / "part.cli", "cli-binary").read_bytes()
     at = data.index(b"$$HEADEREND") + len(b"$$HEADEREND")
-    found: list[float] = []
+    result: list[float] = []
     while at < len(data):
         (command,) = struct.unpack_from("<H", data, at)
         if command == 127:
-            assert struct.unpack_from("<f", data, at + 2)[0] * 1e-3 == pytest.approx(0.5 * len(found) + 0.5)
-            found.append(0.0)
+            assert struct.unpack_from("<f", data, at + 2)[0] * 1e-3 == pytest.approx(0.5 * len(result) + 0.5)
+            result.append(0.0)
             at += 6
         else:
             assert command == 130
             _, direction, count = struct.unpack_from("<iii", data, at + 2)
             ring = np.frombuffer(data, "<f4", 2 * count, at + 14).reshape(-1, 2) * 1e-3
             assert (shoelace(ring[:-1]) > 0) == (direction == 1)
-            found[-1] += shoelace(ring[:-1])
+            result[-1] += shoelace(ring[:-1])
             at += 14 + 8 * count
-    np.testing.assert_allclose(found, areas, rtol=1e-4)
+    np.testing.assert_allclose(result, areas, rtol=1e-4)
 
 
 def test_json(tmp_path: Path, areas: np.ndarray) -> None:
@@ -264,35 +270,51 @@ def _beside(folder: Path, name: str) -> Path:
     return folder / "again" / name
 
 
+@cache
+def fresh(form: str) -> Path:
+    """The whole job, made at once."""
+    folder = Path(tempfile.mkdtemp(prefix="fracslice-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return write_slices(run(), folder / "part", form)
+
+
 def contents(path: Path) -> dict[str, bytes]:
     if path.is_dir():
         return {p.name: p.read_bytes() for p in path.iterdir()}
     return {"": path.read_bytes()}
 
 
-@pytest.mark.parametrize("cut", [1, 50, 700, 2000])
-@pytest.mark.parametrize("form", ["sl1", "goo", "cli", "3mf"])
+def last_layer(target: Path) -> Path:
+    """File with the last layers that an interrupted job left."""
+    if target.is_dir():
+        return max(path for path in target.iterdir() if path.suffix != ".json")
+    return target.with_name(f".{target.name}.part")
+
+
+@pytest.mark.parametrize("cut", [1, 150])
+@pytest.mark.parametrize("form", FORMATS)
 def test_a_truncated_remainder_goes_on_from_what_is_whole(form: str, cut: int, tmp_path: Path) -> None:
-    target, part = tmp_path / "part.sl1", tmp_path / ".part.sl1.part"
+    target = tmp_path / "part"
     with pytest.raises(Cancelled):
         write_slices(run(cancelled_after(16)), target, form)
+    part = last_layer(target)
     part.write_bytes(part.read_bytes()[:-cut])
     write_slices(run(), target, form)
-    assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1"), form))
+    assert contents(target) == contents(fresh(form))
 
 
-@pytest.mark.parametrize("form", ["goo", "png"])
+@pytest.mark.parametrize("form", FORMATS)
 def test_a_damaged_layer_is_made_again(form: str, tmp_path: Path) -> None:
     """One bit of a layer that looks whole: as long as it was, with the same end."""
     target = tmp_path / "part"
     with pytest.raises(Cancelled):
         write_slices(run(cancelled_after(16)), target, form)
-    layer = target / "00003.png" if form == "png" else tmp_path / ".part.part"
+    layer = last_layer(target)
     data = bytearray(layer.read_bytes())
     data[len(data) // 2] ^= 1
     layer.write_bytes(data)
     write_slices(run(), target, form)
-    assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part"), form))
+    assert contents(target) == contents(fresh(form))
 
 
 SMALLER = difference(menger(level=1), sphere(radius=0.8))

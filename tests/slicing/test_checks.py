@@ -15,7 +15,7 @@ from fracslice.slicing.checks import PrintReport, check_layers
 from fracslice.slicing.graph import Graph
 from fracslice.slicing.overhangs import unsupported
 from fracslice.slicing.printers import PRINTERS
-from fracslice.slicing.runs import Runs, components_of, overlaps
+from fracslice.slicing.runs import Runs, layer_components, overlaps
 from fracslice.slicing.thickness import widths
 
 
@@ -86,13 +86,13 @@ def test_cup_that_is_open_above_and_trap_that_is_open_below() -> None:
     assert trap.traps[0].area == pytest.approx(25, rel=0.03)
 
 
-@pytest.mark.parametrize(("depth", "found"), [(0.4, 0), (0.6, 1)])
-def test_cups_on_the_plate_count_when_they_are_deep(depth: float, found: int) -> None:
+@pytest.mark.parametrize(("depth", "count"), [(0.4, 0), (0.6, 1)])
+def test_cups_on_the_plate_count_when_they_are_deep(depth: float, count: int) -> None:
     """A hole through all, with a way out to the sides `depth` mm above the plate."""
     hole, way = box(size=(0.5, 0.5, 3)), box(size=(2, 0.1, 0.1))
     limits = Limits(deep=0.5)
     report = checked(difference(CUBE, hole, at(way, 0, 0, -0.45 + depth / 10)), limits=limits)
-    assert len(report.cups) == len(report.problems) == found
+    assert len(report.cups) == len(report.problems) == count
 
 
 def test_a_drain_hole_ends_the_cup() -> None:
@@ -189,11 +189,11 @@ def test_parts_by_hand() -> None:
     image = 255 * np.array(
         [[0, 0, 0, 0, 0], [0, 1, 1, 0, 0], [0, 1, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 0]], np.uint8
     )
-    solid, empty = components_of(runs_of(image))
+    solid, empty = layer_components(runs_of(image))
     assert solid.nodes.area.tolist() == [5]
     assert sorted(empty.nodes.area.tolist()) == [1, 19]
     assert empty.nodes.open[np.argsort(empty.nodes.area)].tolist() == [False, True]
-    other, _ = components_of(runs_of(np.roll(image, 1, 1)))
+    other, _ = layer_components(runs_of(np.roll(image, 1, 1)))
     assert overlaps(solid, other).tolist() == [[0, 0]]
     bare = unsupported(solid.runs, other.runs, 0.0)
     assert (bare.end - bare.begin).sum() == 5 - (image & np.roll(image, 1, 1) > 0).sum()
@@ -212,7 +212,7 @@ def test_time_is_linear_in_the_holes() -> None:
         image[2:-2, 2:-2][(y % side < side // 2) & (x % side < side // 2)] = 0
         begin, graph = time.perf_counter(), Graph()
         for _ in range(3):
-            graph.add(components_of(runs_of(image))[1])
+            graph.add(layer_components(runs_of(image))[1])
         assert len(graph.groups(~graph.nodes.open, np.ones(3), (1, 1), image.shape)) == holes**2
         return time.perf_counter() - begin
 

@@ -81,7 +81,7 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
     return ex + sx, ey + sy, ez + sz, dx, dy, dz
 
 
-def beside(px, width):
+def stereo_half(px, width):
     """Return the picture of two side by side that a film position is in, and the position in that picture.
 
     Parameters
@@ -100,7 +100,7 @@ def beside(px, width):
     return second, px - maximum(second, 0.0) * width
 
 
-def stereo(px, py, lens_u, lens_v, eye, corner, across, down, apart, half, focus):
+def stereo(px, py, lens_u, lens_v, eye, corner, across, down, offset, half, focus):
     """Return the ray of one of two eyes: of the left one in the left half of the film.
 
     Both pictures agree at the distance `focus`: the axes are parallel and the films shifted.
@@ -115,7 +115,7 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, apart, half, focus
         Point between the eyes.
     corner, across, down : tuple of float
         As for `pinhole`, of one picture.
-    apart : tuple of float
+    offset : tuple of float
         From that point to the right eye.
     half : float
         Width of one picture, pixels.
@@ -131,8 +131,8 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, apart, half, focus
     cx, cy, cz = corner
     ax, ay, az = across
     bx, by, bz = down
-    rx, ry, rz = apart
-    second, column = beside(px, half)
+    rx, ry, rz = offset
+    second, column = stereo_half(px, half)
     sx = second * rx
     sy = second * ry
     sz = second * rz
@@ -250,7 +250,7 @@ def equirectangular(px, py, lens_u, lens_v, eye, right, up, forward, width, heig
     rx, ry, rz = right
     ux, uy, uz = up
     fx, fy, fz = forward
-    second, column = beside(px, width)
+    second, column = stereo_half(px, width)
     longitude = 6.283185307179586 * (column / width - 0.5)
     latitude = 3.141592653589793 * (0.5 - py / height)
     c = cos(longitude)
@@ -262,8 +262,8 @@ def equirectangular(px, py, lens_u, lens_v, eye, right, up, forward, width, heig
     dx, dy, dz = normalised(
         a * fx + b * rx + rise * ux, a * fy + b * ry + rise * uy, a * fz + b * rz + rise * uz
     )
-    apart = second * radius
-    ox = ex + apart * (c * rx - s * fx)
-    oy = ey + apart * (c * ry - s * fy)
-    oz = ez + apart * (c * rz - s * fz)
+    offset = second * radius
+    ox = ex + offset * (c * rx - s * fx)
+    oy = ey + offset * (c * ry - s * fy)
+    oz = ez + offset * (c * rz - s * fz)
     return ox, oy, oz, dx, dy, dz

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from fracslice import read
 from fracslice.rendering import Renderer
-from fracslice.rendering.accumulator import GOAL, Plan
+from fracslice.rendering.accumulator import GOAL, PassPlan
 from fracslice.rendering.host_accumulator import HostAccumulator
 from fracslice.rendering.tiles import ordered
 from fracslice.scene import library
@@ -38,8 +38,8 @@ def rows(run: Run, cameras: int = 40, width: int = 640, height: int = 360) -> It
         _ = last.shown
 
     for name, show in {"coarse": coarse, "full": full}.items():
-        found = [moved(of, show, start.orbited(360 * k / cameras)) for k in range(cameras)]
-        spread = {key: Spread.of([figures[key] for figures in found]) for key in found[0]}
+        result = [moved(of, show, start.orbited(360 * k / cameras)) for k in range(cameras)]
+        spread = {key: Spread.of([figures[key] for figures in result]) for key in result[0]}
         row = {"": name, "ms": spread["wall_ms"], "CPU ms": spread["cpu_ms"], "rays": spread["rays"]}
         yield {**row, "of tracing the rays": spread["of the bound"]}
 
@@ -52,7 +52,7 @@ def moved(of: Renderer, show: Callable[[Camera], None], camera: Camera) -> Figur
     picture, pixels = HostAccumulator.empty(*size, kept.sums.dtype), ordered(*size)
     picture.channels[..., GOAL] = 1
     pixels = pixels[kept.counts[pixels >> 16, pixels & 65535] > 0]
-    plan = Plan(pixels, len(pixels), 1)
+    plan = PassPlan(pixels, len(pixels), 1)
     bound = timed(lambda: of.tracer.add(picture.sums, plan, of.work))["cpu_s"]
     spent = {"wall_ms": 1e3 * whole["wall_s"], "cpu_ms": 1e3 * whole["cpu_s"]}
     return {**spent, "rays": float(len(pixels)), "of the bound": whole["cpu_s"] / bound}
