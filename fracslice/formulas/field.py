@@ -102,7 +102,7 @@ class Kernel(Protocol):
         return evaluate
 
 
-class CompiledLoop(Protocol):
+class FieldLoop(Protocol):
     """A loop over a field."""
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
@@ -151,7 +151,7 @@ class Loops:
 
     width: int
     batch: int
-    runs: Mapping[str, CompiledLoop]
+    runs: Mapping[str, FieldLoop]
 
 
 class Cells(Protocol):
