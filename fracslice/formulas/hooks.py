@@ -57,6 +57,10 @@ class Hooks:
         """
         return self._hook("sign", hook)
 
+    def proved_bounds(self, hook: Callable[[Node], Box]) -> Callable[[Node], Box]:
+        """Set the hook that returns a box proved to enclose the inside, if that of `bounds` is measured."""
+        return self._hook("proved_bounds", hook)
+
     def keeps_sign(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
         """Set the hook that returns True if the sign of an operator's field depends on the signs of its
         elements' fields alone.

@@ -228,6 +228,20 @@ class Node(Operators, Field):
         return self
 
     @property
+    def proved_box(self) -> Box:
+        """Box that is proved to enclose all points where the field is negative."""
+        return self._boxed().bounds.box
+
+    def _boxed(self) -> Node:
+        """Tree with proved boxes."""
+        if self.formula.kind != "shape":
+            return replace(self, children=tuple(child._boxed() for child in self.children))
+        hooks = self.formula.hooks
+        if "proved_bounds" not in hooks:
+            return self
+        return replace(self, formula=replace(self.formula, hooks={**hooks, "bounds": hooks["proved_bounds"]}))
+
+    @property
     def is_identity(self) -> bool:
         """True if the node changes nothing and can be left out."""
         return bool(self._hooked("identity", False))

@@ -293,30 +293,3 @@ def arguments(steps: Round, bound: Growth, iterations: int) -> dict[str, object]
         if steps[k].julia:
             own[f"least{k}"] = power * CORE ** ((power - 1) / 2) if power > POWER else 0.0
     return own
-
-
-def sign_arguments(steps: Round, grown: Growth, iterations: int) -> dict[str, object] | None:
-    """Return the arguments of the sign of an orbit's field, besides those of its steps.
-
-    Parameters
-    ----------
-    steps
-        Steps of a round.
-    grown
-        Growth of the orbit.
-    iterations
-        Number of rounds.
-
-    Returns
-    -------
-    dict or None
-        Values by name; None if an orbit that stops within a round may end inside.
-    """
-    own = arguments(steps, grown, iterations)
-    stops = {name: value for name, value in own.items() if name.startswith("stop")}
-    scales = grown.scales if grown.scaled else (1.0,) * len(steps)
-    radius = max(grown.escape * scales[-1], 1.1) if grown.by_power else grown.escape
-    if any(scale**2 * stop < radius**2 for scale, stop in zip(scales, stops.values(), strict=True)):  # type: ignore[operator]
-        return None
-    scale = {"scale": scales[-1]} if grown.scaled else {}
-    return {"iterations": iterations, "radius2": radius**2, **scale, **stops}

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..errors import VolumeError
 from ..formulas.box import Box, Triple
 from ..formulas.field import Bounds
 from ..formulas.registry import Node
@@ -109,8 +110,10 @@ class Plan:
     @property
     def strict(self) -> Plan:
         """The same plan, with nothing skipped but by a proof: the box that the formulas state is sampled."""
-        stated = self.root.bounds.box
-        outer = self.outer | stated if stated.finite else self.outer
+        stated = self.root.tree.proved_box if self.root.tree else self.root.bounds.box
+        if not stated.finite:
+            raise VolumeError("no box is proved to hold the object: expected <bounds> around it")
+        outer = self.outer | stated
         return replace(self, outer=outer.about(self.box.centre), proved=True)
 
     @property
