@@ -229,7 +229,7 @@ class Node(Operators, Field):
 
     @property
     def proved_box(self) -> Box:
-        """Box that is proved to enclose all points where the field is negative."""
+        """See `Field.proved_box`."""
         return self._boxed().bounds.box
 
     def _boxed(self) -> Node:

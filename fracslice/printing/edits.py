@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from ..formulas import difference, intersection, union
+from ..formulas.box import Box
 from ..formulas.field import Bounds, Cells, Device, Precision
 from ..kernel import Field, Kernel
 from ..kernel.arrays import ArrayField
@@ -52,6 +53,12 @@ class EditedField(ArrayField):
     def key(self) -> str:
         """`Field.key`."""
         return key(self.root.key, self.does, self.shape.key)
+
+    @property
+    def proved_box(self) -> Box:
+        """`Field.proved_box`."""
+        own = self.root.proved_box
+        return own | self.shape.proved_box if self.does == "add" else own
 
     def conservative(self) -> EditedField:
         """`Field.conservative`. A cut shape stays exact: a conservative one would cut too much."""

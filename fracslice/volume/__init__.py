@@ -110,7 +110,7 @@ class Plan:
     @property
     def strict(self) -> Plan:
         """The same plan, with nothing skipped but by a proof: the box that the formulas state is sampled."""
-        stated = self.root.tree.proved_box if self.root.tree else self.root.bounds.box
+        stated = self.root.proved_box
         if not stated.finite:
             raise VolumeError("no box is proved to hold the object: expected <bounds> around it")
         outer = self.outer | stated
