@@ -117,7 +117,8 @@ def printed(machine: Printer, layer: float, path: Path) -> Path:
     assert len(found.pictures) == len(expected) == len(stack.z)
     assert all(np.array_equal(a, b) for a, b in zip(found.pictures, expected, strict=True))
     np.testing.assert_allclose(found.tops, stack.tops, rtol=1e-5)
-    assert sum(image.any() for image in found.pictures) == len(expected)
+    assert all(image.any() for image in found.pictures)
+    assert found.previews and all(len(np.unique(p.reshape(-1, 3), axis=0)) > 50 for p in found.previews)
     return path
 
 
