@@ -1,5 +1,5 @@
-"""Layers read by programs of others: CLI by the Rust crate colain, SVG drawn by librsvg. (3MF by lib3mf:
-`test_slices`.) Skipped where cargo or rsvg-convert is missing.
+"""Layers read by programs of others: CLI by the Rust crate colain, SVG drawn by librsvg, the mesh of a 3MF by
+PrusaSlicer. (3MF by lib3mf: `test_slices`; print files: `test_prints`.) Skipped where the program is missing.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ import io
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,17 +18,21 @@ from PIL import Image
 from fracslice.export.jobs import SliceRun
 from fracslice.export.slices import write_slices
 from fracslice.formulas import difference, menger, sphere
+from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.raster import Screen
+from fracslice.stackmodel import StackModel
+from fracslice.work import Work
 
+ROOT = difference(menger(level=2), sphere(radius=1.05))
+JOB = SliceJob(size=12, layer=0.5, pixel=(0.1, 0.1))
 SVG = "{http://www.w3.org/2000/svg}svg"
 
 
 @pytest.fixture(scope="module")
 def run() -> SliceRun:
     """Layers with holes, and islands in them."""
-    root = difference(menger(level=2), sphere(radius=1.05))
-    stack = plan_stack(root, SliceJob(size=12, layer=0.5, pixel=(0.1, 0.1)))
+    stack = plan_stack(ROOT, JOB)
     return SliceRun(stack, Screen(stack))
 
 
@@ -75,3 +80,16 @@ def test_svg_by_librsvg(run: SliceRun, layers: np.ndarray, tmp_path: Path) -> No
         layered = drawn(ET.tostring(group), "black")
         result = [alone.mean() * window, layered.mean() * window]
         np.testing.assert_allclose(result, layers[k, 1], rtol=2e-3)
+
+
+@pytest.mark.skipif(not shutil.which("prusa-slicer"), reason="needs prusa-slicer")
+def test_3mf_by_prusaslicer(run: SliceRun, layers: np.ndarray, tmp_path: Path) -> None:
+    """It reads no slices; the mesh beside them is the object, not its box."""
+    mesh = StackModel(scene(ROOT, size=12), JOB, Work()).mesh
+    path = write_slices(replace(run, mesh=mesh), tmp_path / "part.3mf")
+    command = ["prusa-slicer", "--info", path]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    values = dict(line.split(" = ") for line in lines if " = " in line)
+    assert values["manifold"] == "yes"
+    assert float(values["size_z"]) == pytest.approx(12, abs=1e-3)
+    assert float(values["volume"]) == pytest.approx(layers[:, 1].sum() * 0.5, rel=0.05)
