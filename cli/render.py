@@ -16,7 +16,7 @@ from fracslice.errors import Cancelled, SharedError
 from .cluster import cluster_options, pooled
 from .families import families
 from .inputs import check_folder, check_targets, load_scene
-from .options import NAME, Whole, device_option, quiet_option, set_option, source_argument, threads_option
+from .options import NAME, Whole, device_option, output_option, run_options, samples_option, source_argument
 from .working import KeptError, working
 
 if TYPE_CHECKING:
@@ -63,20 +63,11 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 
 @click.command(short_help="Render a picture of SCENE.")
 @source_argument("SCENE")
-@click.option(
-    "-o",
-    "--output",
-    type=NAME,
-    required=True,
-    metavar="FILE",
-    help="A .png, .jpg or .webp file, or .exr or .tif for linear floats.",
+@output_option(
+    "FILE",
+    "A .png, .jpg or .webp file, or .exr or .tif for linear floats.",
 )
-@click.option(
-    "--samples",
-    type=Whole(1, 1_000_000),
-    metavar="N",
-    help="Maximum number of samples per pixel; the scene's by default, or 64.",
-)
+@samples_option
 @click.option(
     "--size",
     callback=pixels,
@@ -122,9 +113,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     help="Resume from this file if it exists, and save to it after every pass.",
 )
 @cluster_options
-@set_option
-@threads_option
-@quiet_option
+@run_options
 @families("output", "state", "pass_images")
 def render(
     source: str,
