@@ -18,6 +18,7 @@ from .options import (
     job_of,
     job_options,
     moment,
+    output_option,
     price_option,
     print_options,
     quiet_option,
@@ -41,13 +42,9 @@ GRID = ".vdb"
 
 @click.command()
 @source_argument("SCENE")
-@click.option(
-    "-o",
-    "--output",
-    type=NAME,
-    required=True,
-    metavar="FILE",
-    help="An .stl, .3mf, .ply, .obj or .glb file; or .vdb, for the samples of the field.",
+@output_option(
+    "FILE",
+    "An .stl, .3mf, .ply, .obj or .glb file; or .vdb, for the samples of the field.",
 )
 @print_options
 @job_options

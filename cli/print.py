@@ -10,16 +10,7 @@ import click
 
 from .closing import duration
 from .inputs import check_targets, load_scene
-from .options import (
-    NAME,
-    job_of,
-    job_options,
-    print_options,
-    quiet_option,
-    set_option,
-    source_argument,
-    threads_option,
-)
+from .options import NAME, job_of, job_options, output_option, print_options, run_options, source_argument
 from .working import working
 
 TOLERANCE = 0.02
@@ -31,9 +22,7 @@ MOST = 1_000_000
 
 @click.command("print")
 @source_argument("SCENE")
-@click.option(
-    "-o", "--output", type=NAME, required=True, metavar="OUT", help="A .gcode file; .3mf for orca and bambu."
-)
+@output_option("OUT", "A .gcode file; .3mf for orca and bambu.")
 @click.option(
     "--slicer",
     type=click.Choice(["prusa", "orca", "bambu", "cura"]),
@@ -54,9 +43,7 @@ MOST = 1_000_000
 )
 @print_options
 @job_options
-@set_option
-@threads_option
-@quiet_option
+@run_options
 def print_(
     source: str,
     output: str,
