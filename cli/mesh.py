@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from fracslice.work import Work
 
 GRID = ".vdb"
+COLOURS = ("material", "point", "axes", "planes", "sphere", "steps", "direction")
 
 
 @click.command()
@@ -79,6 +80,12 @@ GRID = ".vdb"
     default="cpu",
     help="The device that evaluates the field; cpu by default. auto: the GPU, if there is one.",
 )
+@click.option(
+    "--colour",
+    type=click.Choice(COLOURS),
+    help="Colour the vertices of a .ply, .glb or .3mf file: as the scene's materials, or by a property of "
+    "the orbit. PLY and GLB hold the property itself, too.",
+)
 @cluster_options
 @click.option(
     "--material",
@@ -103,6 +110,7 @@ def mesh(
     picture: str | None,
     cache: str | None,
     device: str,
+    colour: str | None,
     cluster: str | None,
     shard: str | None,
     store: str | None,
@@ -122,7 +130,7 @@ def mesh(
 
     check_outputs(source, output, report, picture)
     if Path(output).suffix.lower() == GRID:
-        names = {"chord", "simplify", "cluster", "shard", "store"}
+        names = {"chord", "simplify", "colour", "cluster", "shard", "store"}
         refuse_options(context, names, "only for meshes, and a .vdb file holds samples")
     scenes = moments(load_scene(source, settings), seconds, every)
     how = Work(threads, store=store_in(cache), device=chosen(device))
@@ -134,7 +142,8 @@ def mesh(
         for suffix, scene in scenes:
             file, *others = (path and suffixed(path, suffix) for path in (output, picture, report))
             with going_on(str(file)):
-                result = made(scene, job_of(scene, **options), str(file), others[0], work)
+                job = replace(job_of(scene, **options), colour=colour)
+                result = made(scene, job, str(file), others[0], work)
                 if others[1] is not None:
                     write_report(result.report, others[1])
                 if not quiet:
