@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
 
-from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
-from .animation import Keys, Seconds, Target
+from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, File, Number, Vector
+from .animation import AttributePath, Keys, Seconds
 from .identifier import Identifier
 from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, Element, formulas
 from .lengths import MILLIMETRES, Length
@@ -150,7 +150,7 @@ def _identifier(parent: Tree.Element, _: Identifier) -> None:
     _param(Tree.SubElement(parent, "data", type="string"), "pattern", "[a-z][a-z0-9_]*")
 
 
-def _text(parent: Tree.Element, _: Seconds | Target | Keys) -> None:
+def _text(parent: Tree.Element, _: File | Seconds | AttributePath | Keys) -> None:
     Tree.SubElement(parent, "data", type="string")
 
 
@@ -165,9 +165,10 @@ _PATTERNS: dict[type, Any] = {
     Axis: _choices,
     Choice: _choices,
     Length: _length,
+    File: _text,
     Identifier: _identifier,
     Seconds: _text,
-    Target: _text,
+    AttributePath: _text,
     Keys: _text,
 }
 
