@@ -54,6 +54,8 @@ class MeshJob:
     colour : str, optional
         Colours and scalars of the vertices: "material" for the materials of the scene, or a property of the
         orbit: "point", "axes", "planes", "sphere", "steps" or "direction".
+    proved : bool
+        Skip no space by a measured bound, only by a proof.
 
     Raises
     ------
@@ -71,6 +73,7 @@ class MeshJob:
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     colour: str | None = None
+    proved: bool = False
 
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:

@@ -113,6 +113,7 @@ def make_mesh(
     simplify: Length | None = None,
     dust: float | None = None,
     colour: Literal["material", "point", "axes", "planes", "sphere", "steps", "direction"] | None = None,
+    proved: bool | None = None,
     path: str | Path | None = None,
     **options: Unpack[Options],
 ) -> Result:
@@ -148,6 +149,8 @@ def make_mesh(
         Drop connected components of less volume, mm3; 1e-5 of the whole by default.
     colour : str, optional
         Colours and scalars of the vertices: those of the scene's materials, or a property of the orbit.
+    proved : bool, optional
+        Skip no space by a measured bound, only by a proof.
     path : str or path, optional
         The file to write, in the format of its extension. An .stl file may be larger than memory: the mesh
         is then only in that file, and access to its vertices raises `TooLargeError`.
@@ -195,7 +198,14 @@ def make_mesh(
     given: dict[str, Any] = {
         f"{name}_mm": parse_length(value, name) for name, value in lengths.items() if value is not None
     }
-    others = {"resolution": resolution, "dust_mm3": dust, "up": up, "scale": scale, "colour": colour}
+    others = {
+        "resolution": resolution,
+        "dust_mm3": dust,
+        "up": up,
+        "scale": scale,
+        "colour": colour,
+        "proved": proved,
+    }
     given |= {name: value for name, value in others.items() if value is not None}
     job, how = replace(what or MeshJob(), **given), work_of(options, work)
     scene = as_scene(shape)
