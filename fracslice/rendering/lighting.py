@@ -15,7 +15,7 @@ from ..kernel.structure import link_tree
 from ..scene.view import Camera, Light, View
 from .colours import Look, opaque_part
 from .drawn import Drawn
-from .optics import Optics
+from .optics import Optics, ray_bound
 from .scattering import divided
 from .units import lights, march, shade
 from .units.glossy import highlight
@@ -91,7 +91,7 @@ class Lighting:
             lines += ["ambient = ambient + glow"] * look.glows
             lines += [f"{c} = ambient * c{c}" for c in "rgb"]
         if any(map(casts_shadows, self.view.lights)):
-            steepness = 1 / self.root.bounds.lipschitz
+            steepness = 1 / ray_bound(self.root)
             self.linker.bind("visible_", march.visible, {"steepness": steepness, "patience": PATIENCE})
             self.linker.functions["blocker"] = self.blocker()
             lines += [f"s{a} = {a} + 3.0 * h * n{a}" for a in "xyz"]
