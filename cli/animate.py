@@ -9,15 +9,13 @@ import click
 
 from .inputs import check_folder, check_targets, load_scene
 from .options import (
-    NAME,
     Positive,
-    Whole,
     device_option,
     moment,
-    quiet_option,
-    set_option,
+    output_option,
+    run_options,
+    samples_option,
     source_argument,
-    threads_option,
 )
 from .render import pixels
 from .working import StoppedError, working
@@ -38,13 +36,9 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
 
 @click.command(short_help="Render a film of SCENE.")
 @source_argument("SCENE")
-@click.option(
-    "-o",
-    "--output",
-    type=NAME,
-    required=True,
-    metavar="OUT",
-    help="A film (.mp4, .webm, .mov, .gif, .apng), a contact sheet (.png), the first frame's scene (.xml), "
+@output_option(
+    "OUT",
+    "A film (.mp4, .webm, .mov, .gif, .apng), a contact sheet (.png), the first frame's scene (.xml), "
     "or a folder of frames.",
 )
 @click.option(
@@ -54,12 +48,7 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
 @click.option(
     "--size", callback=pixels, metavar="WxH", help="Pixels across and down; the scene's by default."
 )
-@click.option(
-    "--samples",
-    type=Whole(1, 1_000_000),
-    metavar="N",
-    help="Maximum number of samples per pixel; the scene's by default, or 64.",
-)
+@samples_option
 @click.option(
     "--fly",
     callback=moment,
@@ -71,9 +60,7 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
 @click.option("--resume", is_flag=True, help="Keep the frames that are there.")
 @click.option("--exr", is_flag=True, help="Frames of linear floats, in a folder.")
 @device_option
-@set_option
-@threads_option
-@quiet_option
+@run_options
 def animate(
     source: str,
     output: str,

@@ -75,12 +75,13 @@ def bench(
     "cpu_s". Needs matplotlib; what scikit-image makes is left out without it.
     """
     from fracslice.bench.report import require_plots, write_report
-    from fracslice.bench.runs import Peer, Task, measure
+    from fracslice.bench.runs import BenchmarkTask, Peer, measure
 
     require_plots()
     chosen = {"workloads": workloads, "resolutions": resolutions}
     given = {name: values for name, values in chosen.items() if values}
-    task = Task(**given, peers=tuple(Peer.read(text) for text in peers), repeats=repeat, limit_s=limit)  # type: ignore[arg-type]
+    others = tuple(Peer.read(text) for text in peers)
+    task = BenchmarkTask(**given, peers=others, repeats=repeat, limit_s=limit)  # type: ignore[arg-type]
     folder = Path(output)
     check_folder(folder)
     with working(threads, quiet) as work:

@@ -294,7 +294,7 @@ class Check:
             yield piece.passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
-                self.contact += on_the_plate(piece.passed)
+                self.contact += on_the_plate(piece.passed, self._finish.clock.work.threads)
                 finish = self._finish
                 vertices = piece.points[:: self._stride]
                 self._errors.append(off_surface(finish.planned, finish.place, vertices, finish.clock.work))
@@ -310,20 +310,25 @@ class Check:
         return np.concatenate(self._errors)
 
 
-def on_the_plate(mesh: Mesh) -> float:
+def on_the_plate(mesh: Mesh, threads: int = 0) -> float:
     """Return the area of the triangles at z = 0.
 
     Parameters
     ----------
     mesh : Mesh
         Finished triangles, mm.
+    threads : int, optional
+        Threads; 0 for all cores.
 
     Returns
     -------
     float
         Area, mm2.
     """
-    lying = (mesh.vertices[:, 2] == 0)[mesh.triangles].all(1)
-    x, y = np.moveaxis(mesh.vertices[mesh.triangles[lying], :2], 2, 0)
+    from ._native import touching
+
+    low = mesh.vertices[:, 2] == 0
+    near = mesh.triangles[touching(mesh.triangles, low, threads)]
+    x, y = np.moveaxis(mesh.vertices[near[low[near].all(1)], :2], 2, 0)
     double = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     return float(np.abs(double).sum()) / 2

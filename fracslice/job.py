@@ -154,10 +154,10 @@ class _Job:
         if (pool := self.clock.work.cluster) is not None:
             from .meshtasks import MeshRecipe
             from .scene.writer import to_xml
-            from .sharedmesh import made
+            from .sharedmesh import shared_surface
 
             recipe = MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
-            return sized, made(recipe, sized.planned, signs, pool, self.clock)
+            return sized, shared_surface(recipe, sized.planned, signs, pool, self.clock)
         most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
@@ -168,7 +168,7 @@ class _Job:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
         folder = aside() if aside and most < len(signs) else None
-        return sized, surfaces.made(sized.planned, signs, most, folder, self.clock)
+        return sized, surfaces.surface_of(sized.planned, signs, most, folder, self.clock)
 
     def result(self, sized: Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""

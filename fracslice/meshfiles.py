@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .cluster import Pieces
+from .cluster import ResultFolder
 from .mesh.model import Mesh
 from .mesh.pieces import Pieces as MeshPieces
 from .store import Arrays
@@ -65,7 +65,7 @@ class StoredPieces(MeshPieces):
         Begin of their names.
     """
 
-    def __init__(self, store: Pieces, job: str, prefix: str = "") -> None:
+    def __init__(self, store: ResultFolder, job: str, prefix: str = "") -> None:
         super().__init__()
         self.store, self.job, self.prefix = store, job, prefix
         self.first_labels = list[int]()

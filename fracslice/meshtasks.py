@@ -11,15 +11,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .cluster import Pieces
+from .cluster import ResultFolder
 from .errors import ClusterError
 from .finishing import Placement, off_surface, on_the_plate, placing
 from .keys import key, program
-from .mesh.extract import Contours, layers
-from .mesh.halo import Kept, finished_alone
+from .mesh.extract import SurfaceContours, layers
+from .mesh.halo import SelectedPiece, finished_alone
 from .mesh.missed import NEARBY, nearest
 from .mesh.model import Mesh
-from .mesh.survey import Components, WholeShells, components
+from .mesh.survey import PieceComponents, WholeShells, components
 from .mesh.tips import pointed_in
 from .mesh.window import Tally, at_tips
 from .meshfiles import Files, StoredPieces, packed, unpacked
@@ -88,7 +88,7 @@ class MeshTask(ABC):
     """
 
     recipe: MeshRecipe
-    pieces: Pieces
+    pieces: ResultFolder
     job: str
     number: int
 
@@ -192,13 +192,13 @@ class FinishTask(MeshTask):
             stl=np.frombuffer(stl(plain.vertices, plain.triangles).data, np.uint8),
             late=late[late >= 0],
             corners=made.passed.corners[late >= 0],
-            contact=np.array(on_the_plate(made.passed)),
+            contact=np.array(on_the_plate(made.passed, threads)),
             tally=np.array(json.dumps(asdict(tally))),
             errors=off_surface(of.planned, choice.place, made.points[:: choice.stride], work),
             distances=nearest([own.mesh], choice.points, NEARBY * voxel, work),
         )
 
-    def kept(self, choice: Choice, number: int) -> Kept | None:
+    def kept(self, choice: Selection, number: int) -> SelectedPiece | None:
         """A piece with the choice of its bodies; None beyond the ends of the surface."""
         if not 0 <= number < len(choice.ends):
             return None
@@ -206,11 +206,11 @@ class FinishTask(MeshTask):
         mesh, count = stored.mesh(number), int(choice.fresh[number])
         labels = stored.labels(number) + choice.first_labels[number]
         fresh = np.arange(len(mesh.triangles) - count, len(mesh.triangles))
-        return Kept(mesh, choice.stays[labels], fresh)
+        return SelectedPiece(mesh, choice.stays[labels], fresh)
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class Selection:
     """What stays of a surface, and where it is placed.
 
     Attributes
@@ -258,13 +258,13 @@ class Sampled:
         The field.
     signs : SignBricks
         Its samples.
-    contours : Contours
+    contours : SurfaceContours
         Pieces of its surface.
     """
 
     planned: Plan
     signs: SignBricks
-    contours: Contours
+    contours: SurfaceContours
 
 
 def cuts(signs: SignBricks) -> list[tuple[int, int]]:
@@ -306,29 +306,29 @@ def samples_key(recipe: MeshRecipe, root_key: str, signs: SignBricks) -> str:
 _READING = threading.Lock()
 
 
-def _sampled(recipe: MeshRecipe, pieces: Pieces, job: str) -> Sampled:
+def _sampled(recipe: MeshRecipe, pieces: ResultFolder, job: str) -> Sampled:
     """Field and samples of a job, planned and read once in a process."""
     with _READING:
         return _kept(recipe, pieces, job)
 
 
 @lru_cache(maxsize=1)
-def _kept(recipe: MeshRecipe, pieces: Pieces, job: str) -> Sampled:
+def _kept(recipe: MeshRecipe, pieces: ResultFolder, job: str) -> Sampled:
     made, files = recipe.plan(), unpacked(pieces.read(job, SAMPLES))
     lattice = made.lattice
     signs = SignBricks(lattice.origin, lattice.voxel, files["ijk"], files["signs"], files["index"])
     if samples_key(recipe, made.root.key, signs) != str(files["key"]):
         raise ClusterError("the field planned here is another than that of the job")
-    return Sampled(made, signs, Contours(made.root, signs, threads=1))
+    return Sampled(made, signs, SurfaceContours(made.root, signs, threads=1))
 
 
-def _chosen(pieces: Pieces, job: str) -> Choice:
+def _chosen(pieces: ResultFolder, job: str) -> Selection:
     files = unpacked(pieces.read(job, CHOICE))
     prefix, stride = str(files.pop("prefix")), int(files.pop("stride"))
-    return Choice(prefix=prefix, stride=stride, **files)
+    return Selection(prefix=prefix, stride=stride, **files)
 
 
-def read_components(files: Files) -> Components:
+def read_components(files: Files) -> PieceComponents:
     """Components of a piece from the result of its `ContourTask`.
 
     Parameters
@@ -341,10 +341,10 @@ def read_components(files: Files) -> Components:
     Components
         The components.
     """
-    return Components(**{name: files[name] for name in Components.__dataclass_fields__})
+    return PieceComponents(**{name: files[name] for name in PieceComponents.__dataclass_fields__})
 
 
-def read_mesh(files: Files, name: str) -> Mesh:
+def read_seam(files: Files, name: str) -> Mesh:
     """Triangles at a seam from the result of a `ContourTask`.
 
     Parameters

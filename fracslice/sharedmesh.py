@@ -32,7 +32,7 @@ from .meshtasks import (
     NestTask,
     cuts,
     read_components,
-    read_mesh,
+    read_seam,
     samples_key,
 )
 from .surfaces import Surface
@@ -108,7 +108,9 @@ def results(
     yield from map(unpacked, pool.results(tasks, clock.work, stage))
 
 
-def made(recipe: MeshRecipe, planned: Plan, signs: SignBricks, pool: Pool, clock: Clock) -> SharedSurface:
+def shared_surface(
+    recipe: MeshRecipe, planned: Plan, signs: SignBricks, pool: Pool, clock: Clock
+) -> SharedSurface:
     """Mesh the surface of samples in pieces; join their components.
 
     Parameters
@@ -141,7 +143,7 @@ def made(recipe: MeshRecipe, planned: Plan, signs: SignBricks, pool: Pool, clock
             end, triangles = files["counts"].tolist()
             stored.count(end, int(triangles))
             stored.first_labels.append(joined.add(read_components(files)))
-            sharp = PointedPiece(files["pointed"], read_mesh(files, "head"), read_mesh(files, "tail"))
+            sharp = PointedPiece(files["pointed"], read_seam(files, "head"), read_seam(files, "tail"))
             pointed.join(sharp, end)
         tipped, tips = with_tips(planned, stored, pointed.points, work)
         shells = joined.shells() if tipped is stored else survey(tipped, planned.voxel, work.threads)

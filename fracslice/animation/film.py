@@ -18,7 +18,7 @@ from ..formulas.parameters import Number, validated
 from ..formulas.registry import Node
 from ..keys import key, program
 from ..rendering import Renderer, develop, picture
-from ..rendering.sequence import Samples
+from ..rendering.sequence import SampleRange
 from ..rendering.setup import default_lights
 from ..scene.model import Scene
 from ..work import Work
@@ -128,7 +128,7 @@ class FilmJob:
         mean = np.zeros((self.size[1], self.size[0], 4), np.float32)
         for scene, same in groupby(moments):
             count = len(list(same))
-            part = Samples(begin, shift)
+            part = SampleRange(begin, shift)
             renderer = Renderer(scene.root, scene.view, self.size, work, self.device, part)
             *_, done = renderer.passes(count * share)
             mean += done.mean * np.float32(count / len(moments))

@@ -75,7 +75,7 @@ class Peer:
 
 
 @dataclass(frozen=True)
-class Task:
+class BenchmarkTask:
     """Benchmark task.
 
     Attributes
@@ -144,12 +144,12 @@ class Measurement:
     failed: str = ""
 
 
-def measure(task: Task, work: Work) -> list[Measurement]:
+def measure(task: BenchmarkTask, work: Work) -> list[Measurement]:
     """Run a benchmark. A failed method is reported, and the others continue.
 
     Parameters
     ----------
-    task : Task
+    task : BenchmarkTask
         The task.
     work : Work
         Threads, progress and cancellation.

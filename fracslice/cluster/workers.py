@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ClusterError
 from ..extras import lacking
 from ..files import warn
-from .pieces import Identity, Pieces, Pool, Task, run
+from .pieces import Identity, Pool, ResultFolder, Task, run
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -31,7 +31,7 @@ class UnfitWorkerError(ClusterError):
     """Worker that would make other bytes: its address, and the difference."""
 
 
-def on_worker(task: Task, pieces: Pieces, expected: Identity) -> None:
+def on_worker(task: Task, pieces: ResultFolder, expected: Identity) -> None:
     """Make the result of a task on a worker, in one thread.
 
     Nothing is returned: a value would have to be fetched from a worker that may be gone. Exceptions travel
@@ -41,7 +41,7 @@ def on_worker(task: Task, pieces: Pieces, expected: Identity) -> None:
     ----------
     task : Task
         The task.
-    pieces : Pieces
+    pieces : ResultFolder
         Where its result belongs.
     expected : Identity
         Identity of the process that started the job.
@@ -71,7 +71,7 @@ class Workers(Pool):
     ----------
     client : distributed.Client
         Connection to the scheduler.
-    pieces : Pieces
+    pieces : ResultFolder
         Results.
     patience : float
         Seconds without a result until missing tasks are submitted once more; doubled every time.
@@ -80,7 +80,7 @@ class Workers(Pool):
     """
 
     client: Client
-    pieces: Pieces
+    pieces: ResultFolder
     patience: float = 60.0
     limit: float = 1800.0
 
@@ -98,7 +98,7 @@ class Workers(Pool):
         Workers
 
         """
-        return cls(client, Pieces(os.path.abspath(HIDDEN)))
+        return cls(client, ResultFolder(os.path.abspath(HIDDEN)))
 
     def made(self, tasks: Sequence[Task], work: Work) -> Iterator[int]:
         """Submit tasks and yield them as they end; see `Pool.made`."""
@@ -221,7 +221,7 @@ def connected(where: str, store: str, threads: int = 1) -> Iterator[Workers]:
     where : str
         Address of a scheduler, such as "tcp://host:8786"; or "local" or "local:4" for processes here.
     store : str
-        Folder of the results, see `Pieces`.
+        Folder of the results, see `ResultFolder`.
     threads : int
         Threads of all local workers together.
 
@@ -245,7 +245,7 @@ def connected(where: str, store: str, threads: int = 1) -> Iterator[Workers]:
         except (OSError, ValueError) as error:
             raise ClusterError(f"{where}: no scheduler answers: {error}") from None
         with client:
-            yield Workers(client, Pieces(store))
+            yield Workers(client, ResultFolder(store))
         return
     if count and not 1 <= int(count if count.isdigit() else 0) <= 1024:
         raise ClusterError(f"{where!r}: expected local, local:N or the address of a scheduler")
@@ -257,4 +257,4 @@ def connected(where: str, store: str, threads: int = 1) -> Iterator[Workers]:
         ) as cluster,
         Client(cluster, timeout=CONNECT, set_as_default=False) as client,
     ):
-        yield Workers(client, Pieces(store))
+        yield Workers(client, ResultFolder(store))

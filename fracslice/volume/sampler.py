@@ -27,7 +27,7 @@ from ..work import Work, chunks
 from .bricks import INSIDE, OUTSIDE, Bricks, SignBricks
 from .faces import FACES, SignFaces
 from .lattice import BRICK, Lattice
-from .pruning import Pruning
+from .pruning import Proofs, Pruning
 from .states import BORDER, CANDIDATE, EMPTY, FULL, QUEUED, States
 
 AUDITS = 8
@@ -43,6 +43,7 @@ def sample(
     lattice: Lattice,
     work: Work | None = None,
     conservative: Kernel | None = None,
+    proofs: Proofs | None = None,
 ) -> Bricks:
     """Sample a scene's field around its surface.
 
@@ -58,6 +59,8 @@ def sample(
         Execution settings.
     conservative
         Kernel to prune by, if not `kernel`; `bounds` are then its own (`Node.conservative`).
+    proofs
+        Proofs of the cells that the bound does not discard.
 
     Returns
     -------
@@ -76,7 +79,7 @@ def sample(
     def keep(wave: np.ndarray) -> None:
         values.append(wave)
 
-    run = _Sampling(Pruning(kernel, conservative or kernel, bounds, lattice, work or Work()), keep)
+    run = _Sampling(Pruning(kernel, conservative or kernel, bounds, lattice, work or Work(), proofs), keep)
     signs, order = run.signs()
     return Bricks(
         signs.origin,
@@ -87,6 +90,7 @@ def sample(
         evaluations=signs.evaluations,
         repaired=signs.repaired,
         audited=signs.audited,
+        proved=signs.proved,
     )
 
 
@@ -96,6 +100,7 @@ def sample_signs(
     lattice: Lattice,
     work: Work | None = None,
     conservative: Kernel | None = None,
+    proofs: Proofs | None = None,
 ) -> SignBricks:
     """Sample the same bricks but keep only signs, in 1/32 of the memory.
 
@@ -111,6 +116,8 @@ def sample_signs(
         Execution settings.
     conservative
         Kernel to prune by, if not `kernel`.
+    proofs
+        Proofs of the cells that the bound does not discard.
 
     Returns
     -------
@@ -124,7 +131,7 @@ def sample_signs(
     Cancelled
         If the job was cancelled.
     """
-    pruning = Pruning(kernel, conservative or kernel, bounds, lattice, work or Work())
+    pruning = Pruning(kernel, conservative or kernel, bounds, lattice, work or Work(), proofs)
     signs, _ = _Sampling(pruning, None).signs()
     return signs
 
@@ -161,7 +168,7 @@ class _Sampling:
         flat = states.flat
         candidates = np.flatnonzero(flat == CANDIDATE)
         edge = states.beside((flat == EMPTY) | (flat == BORDER))
-        if self.bounds.exterior_only:
+        if not self.pruning.everywhere:
             candidates = candidates[edge[candidates] | outside]
         # A full brick next to an empty one: the bound is wrong there.
         wrong = np.flatnonzero((flat == FULL) & edge)
@@ -260,6 +267,7 @@ class _Sampling:
             evaluations=self.pruning.evaluations,
             repaired=self.repaired,
             audited=self.audited,
+            proved=self.pruning.share,
         )
         return bricks, order
 

@@ -11,7 +11,7 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice.bench.measure import errors, spread
-from fracslice.bench.runs import Peer, Task, measure
+from fracslice.bench.runs import BenchmarkTask, Peer, measure
 from fracslice.bench.workloads import WORKLOADS
 from fracslice.errors import BenchError, Cancelled
 from fracslice.export import write
@@ -76,7 +76,7 @@ def test_the_command_writes_page_numbers_and_plots(tmp_path, peer, capfd):
 def test_a_peer_that_fails_is_reported_and_the_rest_goes_on():
     broken = Peer.read(f"broken={sys.executable} -c 1/0 {{workload}} {{resolution}} {{output}}")
     missing = Peer.read("missing=/no/such/program {workload} {resolution} {output}")
-    result = measure(Task(("sphere",), (16,), (broken, missing), repeats=1), Work())
+    result = measure(BenchmarkTask(("sphere",), (16,), (broken, missing), repeats=1), Work())
     failed = {one.method: one.failed for one in result if one.failed}
     assert failed == {
         "broken": "ZeroDivisionError: division by zero",
@@ -114,7 +114,7 @@ def test_it_can_be_cancelled():
     work = Work()
     work.cancel.set()
     with pytest.raises(Cancelled):
-        measure(Task(("sphere",), (16,)), work)
+        measure(BenchmarkTask(("sphere",), (16,)), work)
 
 
 def test_a_peer_needs_all_its_places():

@@ -14,7 +14,7 @@ import pytest
 from fracslice.cli.main import run as command
 
 from fracslice import meshtasks
-from fracslice.cluster import Pieces, Workers, connected, workers
+from fracslice.cluster import ResultFolder, Workers, connected, workers
 from fracslice.cluster.pieces import Identity
 from fracslice.errors import Cancelled, ClusterError
 from fracslice.export.slices import write_slices
@@ -232,7 +232,7 @@ def test_a_memory_file_system(name: str, expected: dict[str, bytes], tmp_path: P
     from distributed import Client
 
     with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=":0") as client:
-        pool = Workers(client, Pieces(f"memory://{tmp_path.name}"))
+        pool = Workers(client, ResultFolder(f"memory://{tmp_path.name}"))
         assert JOBS[name](Work(1, cluster=pool), tmp_path) == expected[name]
 
 

@@ -1,8 +1,8 @@
 """CPU time of a Mandelbulb frame, 800 x 600 with Phong's shading, against hand-written C++ on the same rays.
 
-Same work: the C++ program marches the same signed field to its first root by the same rule, every ray from the
-box on. Coarser: it stops half a pixel before the surface by the estimate of its distance. Ours chooses its depth
-elsewhere; here it is pinned to the peer's ten steps. Ratios are fracslice / C++.
+Same work: the C++ program marches the same signed field to its first root by the same rule, each ray from the
+box on. Coarser: it stops half a pixel before the surface by the estimate of its distance. Ours chooses its
+depth elsewhere; here it is pinned to the peer's ten steps. Ratios are fracslice / C++.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice.formulas import mandelbulb
-from fracslice.rendering.accumulator import GOAL, Plan
+from fracslice.rendering.accumulator import GOAL, PassPlan
 from fracslice.rendering.cpu import BLOCK, CpuTracer
 from fracslice.rendering.host_accumulator import HostAccumulator
 from fracslice.rendering.linking import link_frame
@@ -45,7 +45,7 @@ def ours(of: CpuTracer, pixels: np.ndarray, samples: int, work: Work) -> Figures
 
     def add(goal: int) -> None:
         picture.channels[..., GOAL] = goal
-        of.add(picture.sums, Plan(pixels, goal * pixels.size, goal), work)
+        of.add(picture.sums, PassPlan(pixels, goal * pixels.size, goal), work)
 
     def first() -> None:
         of.look_ahead(work)
