@@ -199,6 +199,7 @@ class _Job:
             surface_error_mm=SurfaceError.of(scale * made.errors),
             surface_to_mesh_mm=SurfaceToMesh.of(scale * made.back),
             evaluations=signs.evaluations,
+            proved=signs.proved,
             bricks=len(signs),
             seconds=clock.seconds,
             peak_rss_mb=peak_rss_mb(),
@@ -238,7 +239,10 @@ class _Job:
         assert isinstance(surface, SharedSurface)
         check, blocks = finished(surface, finish)
         ending = STL if self.path is None else self.path.suffix.lower()
-        mesh = None if self.path and ending == STL else whole(list(blocks))
+        mesh = None
+        if not self.path or ending != STL:
+            mesh = whole(list(blocks))
+            finish.count_near()
         if self.path:
             with self.file(self.path) as (file, about):
                 if mesh is None:

@@ -216,8 +216,7 @@ class SurfaceContours:
         vertices, triangles, count, cases, to_means = surface.finish()
         features = vertices[count:]
         regions = partial(_trust_regions, (features, cases, to_means), self._placement)
-        moved, places = project(self.root, features, regions, signs.voxel, work)
-        features[moved] = places
+        project(self.root, features, regions, signs.voxel, work)
         mesh, border = Mesh(vertices, triangles), np.inf
         if last < len(signs.index):  # Unused vertices belong to the next piece.
             mesh = mesh.compact()
