@@ -199,6 +199,7 @@ class _Job:
             surface_error_mm=SurfaceError.of(scale * made.errors),
             surface_to_mesh_mm=SurfaceToMesh.of(scale * made.back),
             evaluations=signs.evaluations,
+            proved=signs.proved,
             bricks=len(signs),
             seconds=clock.seconds,
             peak_rss_mb=peak_rss_mb(),

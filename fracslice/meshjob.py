@@ -47,6 +47,8 @@ class MeshJob:
         Direction of the scene that is up in the print.
     scale : tuple of float
         Compensation of shrinkage along x, y and z; one factor or percentage for all, or three.
+    proved : bool
+        Skip no space by a measured bound, only by a proof.
 
     Raises
     ------
@@ -63,6 +65,7 @@ class MeshJob:
     simplify_mm: float | None = None
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    proved: bool = False
 
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:

@@ -102,6 +102,7 @@ def make_mesh(
     chord: Length | None = None,
     simplify: Length | None = None,
     dust: float | None = None,
+    proved: bool | None = None,
     path: str | Path | None = None,
     **options: Unpack[Options],
 ) -> Result:
@@ -135,6 +136,8 @@ def make_mesh(
         Remove triangles within this tolerance.
     dust : float, optional
         Drop connected components of less volume, mm3; 1e-5 of the whole by default.
+    proved : bool, optional
+        Skip no space by a measured bound, only by a proof.
     path : str or path, optional
         The file to write, in the format of its extension. An .stl file may be larger than memory: the mesh
         is then only in that file, and access to its vertices raises `TooLargeError`.
@@ -182,7 +185,7 @@ def make_mesh(
     given: dict[str, Any] = {
         f"{name}_mm": parse_length(value, name) for name, value in lengths.items() if value is not None
     }
-    others = {"resolution": resolution, "dust_mm3": dust, "up": up, "scale": scale}
+    others = {"resolution": resolution, "dust_mm3": dust, "up": up, "scale": scale, "proved": proved}
     given |= {name: value for name, value in others.items() if value is not None}
     job, how = replace(what or MeshJob(), **given), work_of(options, work)
     scene = as_scene(shape)

@@ -15,9 +15,10 @@ __all__ = [
     "step_cone",
     "step_ray",
     "surface",
+    "transparent",
 ]
 
-GIVEN = frozenset({"blocker", "field", "gather"})
+GIVEN = frozenset({"blocker", "field", "gather", "transparent"})
 """Intrinsics that units may call before the linker writes them."""
 
 
@@ -36,6 +37,26 @@ def blocker(x, y, z, P):
     -------
     float
         Field value.
+    """
+    raise NotImplementedError
+
+
+@intrinsic
+def transparent(x, y, z, P):
+    """Evaluate the field of the transparent parts of the scene.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Coordinates, scene units.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    f, r, g, b, kept : float
+        Field value, absorption of red, green and blue per scene unit, and the fraction of the light that
+        passes the surface.
     """
     raise NotImplementedError
 
