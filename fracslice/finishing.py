@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .clock import Clock
 from .scene import Print
-from .work import Clock, Work
+from .work import Work
 
 if TYPE_CHECKING:
     from .mesh import Mesh

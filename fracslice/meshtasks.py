@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from .clock import Clock
 from .cluster import ResultFolder
 from .errors import ClusterError
 from .finishing import Placement, off_surface, on_the_plate, placing
@@ -19,8 +20,8 @@ from .mesh.extract import SurfaceContours, layers
 from .mesh.halo import SelectedPiece, finished_alone
 from .mesh.missed import NEARBY, nearest
 from .mesh.model import Mesh
+from .mesh.pointed_vertices import pointed_in
 from .mesh.survey import PieceComponents, WholeShells, components
-from .mesh.tips import pointed_in
 from .mesh.window import Tally, at_tips
 from .meshfiles import Files, StoredPieces, packed, unpacked
 from .meshjob import MeshJob
@@ -29,7 +30,7 @@ from .scene.reader import reads
 from .volume import Plan, SignBricks
 from .volume.lattice import BRICK
 from .volume.sizing import sizing
-from .work import Clock, Work
+from .work import Work
 
 MOST, LEAST, COUNT = 1 << 13, 1 << 10, 256
 """Bricks of a task: at most those of about two seconds; fewer for more than `COUNT` tasks of the whole."""

@@ -112,12 +112,12 @@ def printed(machine: Printer, layer: float, path: Path) -> Path:
     one = SliceRun(stack, Screen(stack, machine), resin=RESIN, metadata={"Title": "test"}, picture=picture)
     form = slice_format(write_slices(one, path))
     read, level = READERS[form]
-    found = read(path.read_bytes())
+    result = read(path.read_bytes())
     expected = [level(image) for image in Slicer(stack).map(one.screen.picture)]
-    assert len(found.pictures) == len(expected) == len(stack.z)
-    assert all(np.array_equal(a, b) for a, b in zip(found.pictures, expected, strict=True))
-    np.testing.assert_allclose(found.tops, stack.tops, rtol=1e-5)
-    assert sum(image.any() for image in found.pictures) == len(expected)
+    assert len(result.pictures) == len(expected) == len(stack.z)
+    assert all(np.array_equal(a, b) for a, b in zip(result.pictures, expected, strict=True))
+    np.testing.assert_allclose(result.tops, stack.tops, rtol=1e-5)
+    assert sum(image.any() for image in result.pictures) == len(expected)
     return path
 
 
