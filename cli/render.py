@@ -90,6 +90,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 @click.option(
     "--layers", is_flag=True, help="Add depth, normal, position, albedo and samples to the .exr file."
 )
+@click.option("--denoise", is_flag=True, help="Remove the noise that is left.")
 @device_option
 @click.option(
     "--time",
@@ -122,6 +123,7 @@ def render(
     crop: tuple[int, int, int, int] | None,
     seed: int,
     layers: bool,
+    denoise: bool,
     device: str,
     limit: float | None,
     bits: str,
@@ -147,6 +149,8 @@ def render(
     if pass_images:
         check_folder(Path(pass_images))
     scene, start = load_scene(source, settings), time.monotonic()
+    if denoise and scene.view.shading.mode != "light":
+        raise click.BadParameter('expected a scene with shading mode="light"', param_hint="--denoise")
     with (
         pooled(output, threads, cluster, shard, store) as pool,
         working(Work(threads, cluster=pool), quiet) as work,
@@ -180,7 +184,7 @@ def render(
     if not first:
         raise SharedError("the samples are made; shard 1 writes the file")
     more = rendered_layers(renderer) if layers else None
-    save(output, renderer.seen(), scene, bits, threads, more)
+    save(output, without_noise(renderer) if denoise else renderer.seen(), scene, bits, threads, more)
     if aside:
         Path(aside).unlink(missing_ok=True)
     if not quiet:
@@ -188,6 +192,15 @@ def render(
         click.echo(
             f"{described(output, renderer)}, {renderer.setup.precision}, {renderer.device}, {took:.1f} s"
         )
+
+
+def without_noise(renderer: Renderer) -> Pass:
+    """Picture of a renderer without noise; note if Open Image Denoise is not installed."""
+    from fracslice.rendering.denoising import advice, denoised
+
+    if missing := advice():
+        click.echo(f"--denoise: {missing}", err=True)
+    return denoised(renderer)
 
 
 def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:

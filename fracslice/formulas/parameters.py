@@ -237,6 +237,20 @@ class Axis(Choice):
     choices: tuple[str, ...] = ("x", "y", "z")
 
 
+@dataclass(frozen=True)
+class File(Parameter):
+    """Name of a file; in a scene file, relative to its folder."""
+
+    @property
+    def expects(self) -> str:
+        return "the name of a file"
+
+    def check(self, value: Any) -> Any:
+        if not isinstance(value, str) or not value.isprintable():
+            raise ValueError(self.expects)
+        return value.strip()
+
+
 def validate(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exception]) -> None:
     """Validate and convert fields of a frozen record in place. None is kept where it is the default.
 

@@ -45,6 +45,7 @@ _OWN = {
     "around": 2,
     "lower": 1,
     "upper": 1,
+    "gather": 2,
 }
 """Intrinsics with a method of their own, and their numbers of arguments."""
 
@@ -301,6 +302,19 @@ class Expressions:
         parts = self.lanes.vec(self.builder, value).parts
         for address, part in zip(self.registers(place, index), parts, strict=True):
             self.builder.store(part, address, align=self.lanes.bits // 8)
+
+    def intrinsic_gather(self, index: Value, place: Any) -> Vec:
+        """Load an element from memory for each lane."""
+        like = self.lanes.register
+        parts = []
+        for register in self.lanes.vec(self.builder, index).to_whole().parts:
+            loaded = ir.Constant(like, ir.Undefined)
+            for k in range(like.count):
+                lane = ir.Constant(ir.IntType(32), k)
+                address = self.builder.gep(place, [self.builder.extract_element(register, lane)])
+                loaded = self.builder.insert_element(loaded, self.builder.load(address), lane)
+            parts.append(loaded)
+        return Vec(self.builder, tuple(parts))
 
     def registers(self, place: Any, index: Value) -> list[Any]:
         """Addresses of the registers of lanes, starting at an array element."""

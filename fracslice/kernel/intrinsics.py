@@ -144,6 +144,25 @@ def upper(interval: Interval) -> Any:
 
 
 @intrinsic
+def gather(i: Any, P: np.ndarray) -> Any:
+    """Load an element of P for each lane.
+
+    Parameters
+    ----------
+    i
+        Whole, possible indices, as reals.
+    P
+        Parameters of the scene.
+
+    Returns
+    -------
+    Any
+        Elements.
+    """
+    return P[np.asarray(i).astype(np.intp)]
+
+
+@intrinsic
 def field(x: Any, y: Any, z: Any, P: Any) -> Any:
     """Evaluate the scene's signed field.
 

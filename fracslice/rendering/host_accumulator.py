@@ -147,7 +147,7 @@ class HostAccumulator:
             step = COARSE if self.passes == 0 else 1
             self.channels[::step, ::step, GOAL] = 1
             plan = self._wanted()
-        if not plan.samples:
+        if not plan.samples and self.counts.min() < most:
             self._judge(most, tolerance)
             plan = self._wanted()
         return plan

@@ -15,7 +15,7 @@ from xml.parsers import expat
 
 from ..errors import SceneError
 from ..formulas import Node
-from ..formulas.parameters import REQUIRED, Parameter
+from ..formulas.parameters import REQUIRED, File, Parameter
 from ..formulas.registry import DEEPEST, TOO_DEEP
 from ..nearest import hint
 from .animation import Animation, Track
@@ -160,12 +160,18 @@ class _Builder:
             raise SceneError(f"{self.place}: <{name}> {TOO_DEEP}")
         opened = _Open(self.element(name), self.place, {})
         for attribute, text in attributes.items():
-            opened.values[attribute] = _value(opened, attribute, text)
+            opened.values[attribute] = self.located(_value(opened, attribute, text), opened, attribute)
         for attribute, kind in opened.element.parameters.items():
             if kind.default is REQUIRED and attribute not in attributes:
                 raise opened.fail(f'needs the attribute {attribute}="...": expected {kind.expects}')
         self.open.append(opened)
         self.parser.buffer_text = opened.element not in (DEFINE, PARAMETER)
+
+    def located(self, value: Any, opened: _Open, attribute: str) -> Any:
+        """The value of an attribute; the name of a file is relative to the scene's folder."""
+        if isinstance(opened.element.parameters[attribute], File) and value:
+            return str(Path(self.source).absolute().parent / value)
+        return value
 
     def element(self, name: str) -> Element:
         """The element of this name, if it is allowed here."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
 
-from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
+from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, File, Number, Vector
 from .animation import AttributePath, Keys, Seconds
 from .identifier import Identifier
 from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, Element, formulas
@@ -150,7 +150,7 @@ def _identifier(parent: Tree.Element, _: Identifier) -> None:
     _param(Tree.SubElement(parent, "data", type="string"), "pattern", "[a-z][a-z0-9_]*")
 
 
-def _text(parent: Tree.Element, _: Seconds | AttributePath | Keys) -> None:
+def _text(parent: Tree.Element, _: File | Seconds | AttributePath | Keys) -> None:
     Tree.SubElement(parent, "data", type="string")
 
 
@@ -165,6 +165,7 @@ _PATTERNS: dict[type, Any] = {
     Axis: _choices,
     Choice: _choices,
     Length: _length,
+    File: _text,
     Identifier: _identifier,
     Seconds: _text,
     AttributePath: _text,
