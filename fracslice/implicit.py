@@ -9,10 +9,10 @@ import numpy as np
 
 from .clock import Clock
 from .errors import SceneError
-from .finishing import Placement
 from .formulas import Node
 from .formulas.box import Box
 from .meshjob import MeshJob
+from .placement import Placement
 from .planning import planned
 from .scene import Print, Scene
 from .work import Work

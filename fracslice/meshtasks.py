@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .clock import Clock
 from .cluster import ResultFolder
 from .errors import ClusterError
-from .finishing import Placement, off_surface, on_the_plate, placing
+from .finishing import off_surface, on_the_plate, placing
 from .keys import key, program
 from .mesh.extract import SurfaceContours, layers
 from .mesh.halo import SelectedPiece, finished_alone
@@ -25,6 +25,7 @@ from .mesh.survey import PieceComponents, WholeShells, components
 from .mesh.window import Tally, at_tips
 from .meshfiles import Files, StoredPieces, packed, unpacked
 from .meshjob import MeshJob
+from .placement import Placement
 from .planning import edited, planned
 from .scene.reader import reads
 from .volume import Plan, SignBricks
