@@ -104,6 +104,8 @@ def cleaned(
 
 def _with_edited(edits: Edits, edited: NDArray[np.int64], triangles: NDArray[np.int32]) -> Edits:
     """Edits, and triangles edited before, as they are."""
+    if not len(edited):
+        return edits
     edited = np.setdiff1d(edited, edits[0], assume_unique=True)
     rows = np.concatenate([edits[0], edited])
     order = np.argsort(rows)
