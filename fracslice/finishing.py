@@ -1,18 +1,20 @@
-"""Placement, selection of bodies, cleaning and checking: from a surface in scene units to finished triangles
+"""Selection of bodies, placement, cleaning and checking: from a surface in scene units to finished triangles
 in mm.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .clock import Clock
+from .placement import Placement
 from .scene import Print
-from .work import Clock, Work
+from .work import Work
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -33,55 +35,6 @@ FLAT = 0.1
 """Fraction of the minimum distance between vertices. Vertices within this height of the bed are moved to the
 bed, which keeps a flat base flat; a larger one would fold the small triangles around a lowest vertex.
 """
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Map from the scene to print space: ``mm = scale * scene units + offset``.
-
-    Attributes
-    ----------
-    scale : float
-        mm per scene unit.
-    offset : tuple of float
-        Translation, mm.
-    """
-
-    scale: float
-    offset: tuple[float, float, float]
-
-    def mm(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transform points from the scene to print space.
-
-        Parameters
-        ----------
-        points : ndarray of float64, shape (n, 3)
-            Points, scene units.
-
-        Returns
-        -------
-        ndarray of float64, shape (n, 3)
-            Points, mm.
-        """
-        placed: NDArray[np.float64] = points * self.scale + np.array(self.offset)
-        return placed
-
-    def units(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transform points from print space to the scene.
-
-        Parameters
-        ----------
-        points : ndarray of float64, shape (n, 3)
-            Points, mm.
-
-        Returns
-        -------
-        ndarray of float64, shape (n, 3)
-            Points, scene units.
-        """
-        axes = np.ascontiguousarray(points.T)  # three long rows: NumPy is slow on many short ones
-        scene: NDArray[np.float64] = ((axes - np.array(self.offset)[:, None]) / self.scale).T
-        return scene
 
 
 def placing(planned: Plan, signs: SignBricks, place: Placement) -> tuple[NDArray[np.float64], Frame]:

@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from .clock import Clock
 from .errors import SceneError
-from .finishing import Placement
 from .formulas import Node
 from .formulas.box import Box
 from .meshjob import MeshJob
+from .placement import Placement
 from .planning import planned
 from .scene import Print, Scene
-from .work import Clock, Work
+from .work import Work
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 import numpy as np
 
 from . import surfaces
+from .clock import Clock
 from .errors import SceneError, TooLargeError
 from .finishing import Check, Finish
 from .memory import peak_rss_mb
@@ -22,7 +23,7 @@ from .planning import Sized, edited, planned
 from .report import Report, SurfaceError, SurfaceToMesh
 from .scene import Scene
 from .version import __version__
-from .work import Clock, Work, ahead
+from .work import Work, ahead
 
 if TYPE_CHECKING:
     from .mesh import Mesh

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import TooLargeError
-from .finishing import Placement
+from .placement import Placement
 from .report import Report
 from .work import Work
 

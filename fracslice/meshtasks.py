@@ -11,25 +11,27 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from .clock import Clock
 from .cluster import ResultFolder
 from .errors import ClusterError
-from .finishing import Placement, off_surface, on_the_plate, placing
+from .finishing import off_surface, on_the_plate, placing
 from .keys import key, program
 from .mesh.extract import SurfaceContours, layers
 from .mesh.halo import SelectedPiece, finished_alone
 from .mesh.missed import NEARBY, nearest
 from .mesh.model import Mesh
+from .mesh.pointed_vertices import pointed_in
 from .mesh.survey import PieceComponents, WholeShells, components
-from .mesh.tips import pointed_in
 from .mesh.window import Tally, at_tips
 from .meshfiles import Files, StoredPieces, packed, unpacked
 from .meshjob import MeshJob
+from .placement import Placement
 from .planning import edited, planned
 from .scene.reader import reads
 from .volume import Plan, SignBricks
 from .volume.lattice import BRICK
 from .volume.sizing import sizing
-from .work import Clock, Work
+from .work import Work
 
 MOST, LEAST, COUNT = 1 << 13, 1 << 10, 256
 """Bricks of a task: at most those of about two seconds; fewer for more than `COUNT` tasks of the whole."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from .clock import Clock
 from .meshjob import MeshJob
 from .scene import Print, Scene
-from .work import Clock
 
 if TYPE_CHECKING:
     from .volume import Plan

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .clock import Clock
 from .cluster import Pool, Shard
 from .errors import SharedError
 from .finishing import Finish, stride
@@ -17,8 +18,9 @@ from .mesh.components import Shells
 from .mesh.missed import NEARBY, distances, surface_samples
 from .mesh.model import Mesh
 from .mesh.nesting import Nesting
+from .mesh.pointed_vertices import Pointed, PointedPiece
 from .mesh.survey import Survey, survey
-from .mesh.tips import Pointed, PointedPiece, with_tips
+from .mesh.tips import with_tips
 from .mesh.window import Tally, by_tip
 from .meshfiles import Files, StoredPieces, packed, unpacked
 from .meshtasks import (
@@ -37,7 +39,6 @@ from .meshtasks import (
 )
 from .surfaces import Surface
 from .volume import Plan, SignBricks
-from .work import Clock
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .clock import Clock
 from .errors import TooLargeError
 from .memory import available_bytes
-from .work import Clock
 
 if TYPE_CHECKING:
     from .mesh.components import Shells
@@ -168,8 +168,9 @@ def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None,
     """
     from .mesh.extract import Piece, contour, contour_pieces
     from .mesh.pieces import Pieces
+    from .mesh.pointed_vertices import Pointed
     from .mesh.survey import survey
-    from .mesh.tips import Pointed, with_tips
+    from .mesh.tips import with_tips
 
     work, pieces = clock.work, Pieces(folder)
     pointed = Pointed(planned.voxel, work.threads)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..finishing import Placement
     from ..formulas.field import Field
+    from ..placement import Placement
     from ..report import Report
     from ..volume import Bricks
 

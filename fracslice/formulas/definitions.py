@@ -211,9 +211,9 @@ def definitions(root: Node) -> list[Definition]:
     SceneError
         If two definitions have one name.
     """
-    found = dict.fromkeys(n.formula.definition for n in root.walk() if isinstance(n.formula, Defined))
+    used = dict.fromkeys(n.formula.definition for n in root.walk() if isinstance(n.formula, Defined))
     named: dict[str, Definition] = {}
-    for definition in found:
+    for definition in used:
         if named.setdefault(definition.name, definition) != definition:
             raise SceneError(f"<define> {definition.name}: expected one definition of this name in a scene")
-    return list(found)
+    return list(used)

@@ -13,7 +13,7 @@ from .orbits import REPEAT, Stepped, escape_sign, single
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
 from .verbs import power as raised
-from .verbs import raise_whole
+from .verbs import products, raise_whole
 from .vocabulary import (
     absolute,
     any_of,
@@ -199,11 +199,6 @@ def mandelbulb(  # type: ignore[no-untyped-def]
     return f
 
 
-def _digits(n: int) -> tuple[int, ...]:
-    """Binary digits of n after the first. Exponentiation squares for each and multiplies where it is 1."""
-    return tuple(int(d) for d in bin(n)[3:])
-
-
 @mandelbulb.arguments
 def mandelbulb_arguments(node: Node) -> dict[str, object]:
     power = node["power"]
@@ -223,7 +218,7 @@ def mandelbulb_arguments(node: Node) -> dict[str, object]:
         "loose": Fixed(loose),
         "torn": Fixed(torn),
         "curved": Fixed(loose or torn),
-        **_products(power),
+        **products(power),
     }
 
 
@@ -252,19 +247,6 @@ def _step(w: Triple, power: float, c: Triple) -> Triple:
     theta, phi = power * math.atan2(math.hypot(x, y), z), power * math.atan2(y, x)
     s = rn * math.sin(theta)
     return s * math.cos(phi) + c[0], s * math.sin(phi) + c[1], rn * math.cos(theta) + c[2]
-
-
-def _products(power: float) -> dict[str, Fixed]:
-    """Products that make a whole power; a fractional power compiles none."""
-    whole = power == int(power)
-    n = int(power) if whole else 2
-    return {
-        "digits": Fixed(_digits(n) if whole else ()),
-        "turns": Fixed(_digits(n // 2)),
-        "half_digits": Fixed(_digits((n - 1) // 2)),
-        "even": Fixed(n % 2 == 0),
-        "linear": Fixed(n == 2),
-    }
 
 
 @mandelbulb.steepening
@@ -311,7 +293,7 @@ def mandelbulb_step(node: Node) -> Stepped:
     power = node["power"]
     if power % 1:
         return step, {"power": power}, node["julia"]
-    return whole_step, {**_products(power), "power": power}, node["julia"]
+    return whole_step, {**products(power), "power": power}, node["julia"]
 
 
 @mandelbulb.sign

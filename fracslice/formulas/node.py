@@ -219,8 +219,8 @@ class Node(Operators, Field):
         -------
         Node
         """
-        if found := self._hooked("sign", None):
-            function, values = found
+        if hooked := self._hooked("sign", None):
+            function, values = hooked
             own = {"select": lambda _: function, "arguments": lambda _: values}
             return replace(self, formula=replace(self.formula, hooks={**self.formula.hooks, **own}))
         if self._hooked("keeps_sign", False):

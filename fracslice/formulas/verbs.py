@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from .registry import Fixed
 from .vocabulary import (
     absolute,
     atan2,
@@ -221,3 +222,32 @@ def raise_whole(w, digits, turns, half_digits, even, linear, n):  # type: ignore
     else:
         image = (im * (cu * x - cv * y), im * (cu * y + cv * x), re)
     return image, stretch
+
+
+def products(power: float) -> dict[str, Fixed]:
+    """Arguments of `raise_whole` for a power; those of a fractional one make no products.
+
+    Parameters
+    ----------
+    power : float
+        The power.
+
+    Returns
+    -------
+    dict
+        Fixed arguments by name.
+    """
+    whole = power == int(power)
+    n = int(power) if whole else 2
+    return {
+        "digits": Fixed(_digits(n) if whole else ()),
+        "turns": Fixed(_digits(n // 2)),
+        "half_digits": Fixed(_digits((n - 1) // 2)),
+        "even": Fixed(n % 2 == 0),
+        "linear": Fixed(n == 2),
+    }
+
+
+def _digits(n: int) -> tuple[int, ...]:
+    """Binary digits of n after the first. Exponentiation squares for each and multiplies where it is 1."""
+    return tuple(int(d) for d in bin(n)[3:])

@@ -281,13 +281,13 @@ class Expressions:
 
     def intrinsic_lower(self, value: Value) -> Vec:
         """Emit the lower bound of an interval."""
-        found: Vec = self.lanes.interval(self.builder, value).lo
-        return found
+        end: Vec = self.lanes.interval(self.builder, value).lo
+        return end
 
     def intrinsic_upper(self, value: Value) -> Vec:
         """Emit the upper bound of an interval."""
-        found: Vec = self.lanes.interval(self.builder, value).hi
-        return found
+        end: Vec = self.lanes.interval(self.builder, value).hi
+        return end
 
     def intrinsic_load(self, place: Any, index: Value) -> Vec:
         """Load lanes from memory."""

@@ -181,8 +181,8 @@ class Interval:
         if factor.known < 0:
             low, high = high, low
         exact = math.frexp(factor.known)[0] in (0.0, 0.5, -0.5)
-        found = Interval(low, high, self.of)._limited()
-        return found if exact else found.outward()
+        scaled = Interval(low, high, self.of)._limited()
+        return scaled if exact else scaled.outward()
 
     def __truediv__(self, other: Interval | float) -> Interval:
         other = self.number(other)
@@ -196,8 +196,8 @@ class Interval:
         choose, huge, one = self.of.functions.where, self._like(self.of.huge), self._like(1.0)
         signed = (self.lo > self.of.tiny) | (self.hi < -self.of.tiny)
         low, high = (one / choose(signed, end, one) for end in (self.hi, self.lo))
-        found = Interval(low, high, self.of).outward()
-        return Interval(choose(signed, found.lo, -huge), choose(signed, found.hi, huge), self.of)
+        inverse = Interval(low, high, self.of).outward()
+        return Interval(choose(signed, inverse.lo, -huge), choose(signed, inverse.hi, huge), self.of)
 
     # --- conditions ---
     def __lt__(self, other: Interval | float) -> Possible:
@@ -261,15 +261,15 @@ class Interval:
     def exp(self) -> Interval:
         """See `vocabulary.exp`."""
         choose, low = self.of.functions.where, -0.9 * math.log(1 / self.of.tiny)
-        found = self._each(self.of.functions.exp)._limited()
-        return Interval(choose(self.lo > low, found.lo, self._like(0.0)), found.hi, self.of)
+        image = self._each(self.of.functions.exp)._limited()
+        return Interval(choose(self.lo > low, image.lo, self._like(0.0)), image.hi, self.of)
 
     def log(self) -> Interval:
         """See `vocabulary.log`."""
         choose, least = self.of.functions.where, self._like(self.of.tiny)
-        found = self.maximum(self.of.tiny)._each(self.of.functions.log)
+        image = self.maximum(self.of.tiny)._each(self.of.functions.log)
         none = self._like(-self.of.huge)
-        return Interval(choose(self.lo > least, found.lo, none), found.hi, self.of)
+        return Interval(choose(self.lo > least, image.lo, none), image.hi, self.of)
 
     def sin(self) -> Interval:
         """See `vocabulary.sin`."""
@@ -297,8 +297,8 @@ class Interval:
     def _widened(self) -> Interval:
         """Interval that encloses errors of elementary functions."""
         by = ROUNDED * self.of.unit
-        found = self.outward(ROUNDED)
-        return Interval(found.lo - by, found.hi + by, self.of)
+        wider = self.outward(ROUNDED)
+        return Interval(wider.lo - by, wider.hi + by, self.of)
 
     def _wave(self, function: Callable[[Bound], Bound], shift: float) -> Interval:
         """Image under a wave with maxima at ``2 pi k + shift pi`` and minima between."""
@@ -307,12 +307,12 @@ class Interval:
         first, last = m.floor(turns.lo), m.floor(turns.hi)
         least, most = m.minimum(self.lo, self._like(LONGEST)), m.maximum(self.hi, self._like(-LONGEST))
         ends = [function(end) for end in (m.maximum(least, -one * LONGEST), m.minimum(most, one * LONGEST))]
-        found = Interval(m.minimum(*ends), m.maximum(*ends), self.of)._widened()
+        image = Interval(m.minimum(*ends), m.maximum(*ends), self.of)._widened()
         top = last * 0.5 - m.floor(last * 0.5) < 0.25
         all_of = (last - first > 1.5) | (self.lo < -LONGEST) | (self.hi > LONGEST)
         some = last - first > 0.5
-        high = m.where(all_of | (some & top), one, m.minimum(found.hi, one))
-        low = m.where(all_of | (some & ~top), -one, m.maximum(found.lo, -one))
+        high = m.where(all_of | (some & top), one, m.minimum(image.hi, one))
+        low = m.where(all_of | (some & ~top), -one, m.maximum(image.lo, -one))
         return Interval(low, high, self.of)
 
 

@@ -24,7 +24,7 @@ from ..formulas import vocabulary
 from ..nearest import hint
 from .functions import fingerprint, is_number, parameters, scope
 from .parsing import parse, parse_expression
-from .syntax import depends_on_points, point_names, stored_names
+from .syntax import Naming, depends_on_points, point_names, stored_names
 
 _OF_THE_KERNEL = re.compile(r"[NT]\d+|P0?")
 
@@ -193,7 +193,7 @@ class _Language(ast.NodeTransformer):
             return self.power(node, node.left, node.right)
         if on_points and type(node.op) in _FLOORED:
             names = {"a": node.left, "b": node.right}
-            floored: ast.expr = _Named(names).visit(parse_expression(_FLOORED[type(node.op)]))
+            floored: ast.expr = Naming(names).visit(parse_expression(_FLOORED[type(node.op)]))
             return floored
         return node
 
@@ -276,16 +276,6 @@ class _Language(ast.NodeTransformer):
             return node
         near = hint(name, {*vocabulary.NAMES, *self.local, *_PYTHON}, "{}")
         self.fail(node, f"{_short(node)} is not in the language of formulas; {near}")
-
-
-class _Named(ast.NodeTransformer):
-    """Puts expressions in the place of names."""
-
-    def __init__(self, values: dict[str, ast.expr]) -> None:
-        self.values = values
-
-    def visit_Name(self, node: ast.Name) -> ast.AST:
-        return self.values.get(node.id, node)
 
 
 def _breaks(body: Sequence[ast.stmt]) -> Iterator[ast.Break]:

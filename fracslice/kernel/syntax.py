@@ -10,6 +10,16 @@ CHILD = "child"
 """Name of a domain operator's child function."""
 
 
+class Naming(ast.NodeTransformer):
+    """Puts expressions in the place of names."""
+
+    def __init__(self, values: dict[str, ast.expr]) -> None:
+        self.values = values
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        return self.values.get(node.id, node)
+
+
 class Folding(ast.NodeTransformer):
     """Evaluates operators on whole numbers and truth values; keeps the branch that a constant selects."""
 

@@ -126,11 +126,11 @@ def _derivative(root: Node, points: np.ndarray) -> tuple[bool, str]:
     body = [*code.unpacked(0), start, *made.lines, image]
     step = written(taken, ["x", "y", "z", "px", "py", "pz", *names], body)
     given = [values[name] for name in names]
-    apart = np.random.default_rng(1).normal(size=points.shape)
-    apart *= NEAR / np.linalg.norm(apart, axis=0)
+    offset = np.random.default_rng(1).normal(size=points.shape)
+    offset *= NEAR / np.linalg.norm(offset, axis=0)
     with np.errstate(all="ignore"):
         here, stretch = step(*points, *points, *given)
-        there, _ = step(*(points + apart), *points, *given)
+        there, _ = step(*(points + offset), *points, *given)
         moved = np.linalg.norm(np.array(np.broadcast_arrays(*there)) - np.broadcast_arrays(*here), axis=0)
         broken = float((moved > NEAR * (1.001 * np.asarray(stretch) + 1e-3)).mean())
     return broken < CREASES, f"derivative of the step: too small at {broken:.1%} of the points"

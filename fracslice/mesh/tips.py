@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._native import pointed, touching
 from ..volume import Plan
 from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
@@ -18,20 +17,13 @@ from .caps import Cap, Rings, best, capped, disjoint
 from .extract import Piece
 from .fit import Fit
 from .model import Mesh
-from .pieces import NOTHING, Pieces, joined
+from .pieces import Pieces
+from .pointed_vertices import POINTED
 from .quantisation import quantise, used
 from .self_intersections import self_intersecting_triangles
 
-POINTED = 0.15
-"""Minimum sine of the angle by which all edges descend from a pointed vertex."""
-
-MANY, MOST_TIPS = 512, 64
-"""Maximum number of pointed vertices (a rough surface has any number of tips), and of tips that are added."""
-
-NEAR_SEAM, AT_SEAM = 2.0, 5.0
-"""Distances from a seam, voxels: vertices within the first are examined with the triangles of both pieces
-within the second.
-"""
+MOST_TIPS = 64
+"""Maximum number of tips that are added."""
 
 ABOVE, STEP = 0.002, 0.25
 """Height of a start point above its triangle, and first step of the climb, voxels."""
@@ -49,117 +41,6 @@ SAME = 0.05
 
 REACH = 8.0
 """Radius around pointed vertices and tips within which triangles are examined, voxels."""
-
-
-class PointedPiece(NamedTuple):
-    """Pointed vertices of a piece.
-
-    Attributes
-    ----------
-    points : ndarray of float64, shape (n, 3)
-        Pointed vertices away from the seams; more than `MANY` on a rough surface.
-    head, tail : Mesh
-        Triangles at its begin and at its end.
-    """
-
-    points: NDArray[np.float64]
-    head: Mesh
-    tail: Mesh
-
-
-def pointed_in(mesh: Mesh, start: float, end: float, voxel: float, threads: int = 0) -> PointedPiece:
-    """Find the pointed vertices of a piece.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The piece.
-    start, end : float
-        x of its seams; infinite at the ends of the surface.
-    voxel : float
-        Voxel, in the units of the piece.
-    threads : int, optional
-        Threads; 0 for all cores.
-
-    Returns
-    -------
-    PointedPiece
-        The vertices, and the triangles by which the neighbours find those at the seams.
-    """
-    x = mesh.vertices[:, 0]
-    points = _pointed(mesh, start + NEAR_SEAM * voxel, end - NEAR_SEAM * voxel, threads)
-    head, tail = (
-        Mesh(mesh.vertices, mesh.triangles[touching(mesh.triangles, near, threads)]).compact()
-        if near.any()
-        else NOTHING
-        for near in (x < start + AT_SEAM * voxel, x > end - AT_SEAM * voxel)
-    )
-    return PointedPiece(points, head, tail)
-
-
-def _pointed(mesh: Mesh, low: float, high: float, threads: int) -> NDArray[np.float64]:
-    """Pointed vertices with low <= x < high; more than `MANY` on a rough surface."""
-    at = mesh.vertices[pointed(mesh.vertices, mesh.triangles, POINTED, MANY, threads)]
-    return at if len(at) > MANY else at[(low <= at[:, 0]) & (at[:, 0] < high)]
-
-
-class Pointed:
-    """Collects the pointed vertices of a surface in pieces.
-
-    Parameters
-    ----------
-    voxel : float
-        Voxel, in the units of the pieces.
-    threads : int, optional
-        Threads; 0 for all cores.
-    """
-
-    def __init__(self, voxel: float, threads: int = 0) -> None:
-        self._voxel, self._threads, self._points = voxel, threads, [np.empty((0, 3))]
-        self._tail, self._seam = NOTHING, -np.inf
-
-    def add(self, piece: Piece) -> None:
-        """Add a piece.
-
-        Parameters
-        ----------
-        piece : Piece
-            Pieces, by ascending x.
-        """
-        if not self.rough:
-            pointed = pointed_in(piece.mesh, self._seam, piece.end, self._voxel, self._threads)
-            self.join(pointed, piece.end)
-
-    def join(self, piece: PointedPiece, end: float) -> None:
-        """Add the pointed vertices of a piece, and those at its seam with the piece before.
-
-        Parameters
-        ----------
-        piece : PointedPiece
-            Pieces, by ascending x.
-        end : float
-            x at which the piece ends.
-        """
-        if self.rough:
-            return
-        seam, voxel = self._seam, self._voxel
-        if len(self._tail.triangles):
-            both = joined(self._tail, piece.head, seam, voxel / 2)
-            reach = NEAR_SEAM * voxel
-            self._points.append(_pointed(both, seam - reach, seam + reach, self._threads))
-        self._points.append(piece.points)
-        self._tail, self._seam = piece.tail, end
-
-    @property
-    def rough(self) -> bool:
-        """True for a surface with more pointed vertices than tips are searched at."""
-        return sum(map(len, self._points)) > MANY
-
-    @property
-    def points(self) -> NDArray[np.float64]:
-        """Pointed vertices, float64 [n, 3]; none for a rough surface."""
-        points = np.concatenate(self._points)
-        return points[:0] if self.rough else points
 
 
 def with_tips(

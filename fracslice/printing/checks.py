@@ -113,16 +113,8 @@ def check_object(
         Conservative bounds of the object, scene units.
     scale : float
         mm per scene unit.
-    limits : Limits, optional
-        Limits of the checks.
-    work : Work, optional
-        Threads, progress and cancellation.
-    finest : float, optional
-        Width in mm below which a mesh or layers may lose walls; the sample spacing if not given.
-    origin : three floats, optional
-        Point from which places are measured, scene units; by default the middle of the samples' lower face.
-    drains : sequence of Drain, optional
-        Drain holes, whose rims may be sharp.
+    limits, work, finest, origin, drains
+        As for `check_solid`.
 
     Returns
     -------

@@ -219,8 +219,8 @@ class Pruning:
         if self.proofs and self.everywhere:
             left = ~empty
             empty[left] = self._proved(indices[:, left], size)[0]
-        found: np.ndarray = empty.reshape(8, -1).min(0)
-        return found
+        emptied: np.ndarray = empty.reshape(8, -1).min(0)
+        return emptied
 
     def _reach(self, size: int) -> float:
         """Least |f| at the centre of a cell of `size` samples that excludes a sign change within a voxel of

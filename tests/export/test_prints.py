@@ -112,13 +112,13 @@ def printed(machine: Printer, layer: float, path: Path) -> Path:
     one = SliceRun(stack, Screen(stack, machine), resin=RESIN, metadata={"Title": "test"}, picture=picture)
     form = slice_format(write_slices(one, path))
     read, level = READERS[form]
-    found = read(path.read_bytes())
+    result = read(path.read_bytes())
     expected = [level(image) for image in Slicer(stack).map(one.screen.picture)]
-    assert len(found.pictures) == len(expected) == len(stack.z)
-    assert all(np.array_equal(a, b) for a, b in zip(found.pictures, expected, strict=True))
-    np.testing.assert_allclose(found.tops, stack.tops, rtol=1e-5)
-    assert all(image.any() for image in found.pictures)
-    assert found.previews and all(len(np.unique(p.reshape(-1, 3), axis=0)) > 50 for p in found.previews)
+    assert len(result.pictures) == len(expected) == len(stack.z)
+    assert all(np.array_equal(a, b) for a, b in zip(result.pictures, expected, strict=True))
+    np.testing.assert_allclose(result.tops, stack.tops, rtol=1e-5)
+    assert all(image.any() for image in result.pictures)
+    assert result.previews and all(len(np.unique(p.reshape(-1, 3), axis=0)) > 50 for p in result.previews)
     return path
 
 
@@ -192,9 +192,9 @@ def test_photon_by_pyphotonfile(tmp_path: Path) -> None:
     machine = PRINTERS["photon"]
     stack = plan_stack(sphere(), SliceJob(size=12, layer=3, pixel=machine.pixel))
     job = SliceRun(stack, Screen(stack, machine), resin=RESIN, picture=picture)
-    found = pyphotonfile.Photon(str(write_slices(job, tmp_path / "part.photon")))
-    assert (found.layer_height, found.exposure_time, found.exposure_time_bottom) == (3, 2.5, 30)
-    pictures = [decoders.picture(decoders.rle1(layer._data), (2560, 1440)) for layer in found.layers]
+    result = pyphotonfile.Photon(str(write_slices(job, tmp_path / "part.photon")))
+    assert (result.layer_height, result.exposure_time, result.exposure_time_bottom) == (3, 2.5, 30)
+    pictures = [decoders.picture(decoders.rle1(layer._data), (2560, 1440)) for layer in result.layers]
     expected = [image >= 224 for image in Slicer(stack).map(job.screen.picture)]
     assert len(pictures) == 4 and expected[1].any()
     assert all((one == other).all() for one, other in zip(pictures, expected, strict=True))

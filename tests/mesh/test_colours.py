@@ -88,9 +88,9 @@ def test_3mf_by_lib3mf(two: Mesh, tmp_path: Path) -> None:
     solid, group = objects.GetCurrentMeshObject(), groups.GetCurrentColorGroup()
     ordered = two.in_order()
     for k in (0, len(two.triangles) // 2, len(two.triangles) - 1):
-        found = solid.GetTriangleProperties(k)
+        properties = solid.GetTriangleProperties(k)
         for corner in range(3):
-            colour = group.GetColor(found.PropertyIDs[corner])
+            colour = group.GetColor(properties.PropertyIDs[corner])
             expected = ordered.colours[ordered.triangles[k, corner]]  # type: ignore[index]
             assert (colour.Red, colour.Green, colour.Blue) == tuple(expected)
 

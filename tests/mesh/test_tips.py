@@ -12,8 +12,9 @@ from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.extract import Piece, contour
 from fracslice.mesh.pieces import Pieces
+from fracslice.mesh.pointed_vertices import Pointed
 from fracslice.mesh.quantisation import quantised
-from fracslice.mesh.tips import Pointed, with_tips
+from fracslice.mesh.tips import with_tips
 from fracslice.scene import scene
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work

@@ -55,8 +55,8 @@ def test_a_defined_step_is_the_same_step_of_the_package() -> None:
     expected = reference(mandelbox(scale=-1.7, inner=0.5, iterations=4))(*p)
     assert np.array_equal(reference(scene.root)(*p), expected)
     for precision, tolerance in (("float64", 1e-12), ("float32", 1e-4)):
-        found = compile_scene(scene.root, precision).points(*p)
-        assert np.quantile(abs(found - expected), 0.98) < tolerance
+        values = compile_scene(scene.root, precision).points(*p)
+        assert np.quantile(abs(values - expected), 0.98) < tolerance
 
 
 def test_a_distance_has_parameters_loops_and_its_box() -> None:

@@ -115,10 +115,10 @@ def rows(
         proofs = root.cells()
         tests: dict[str, Test] = {"L": by_bound(root), "field": by_field(root), "sign": proofs}
         row: Row = {"": name, **figures(root, tests, cells)}
-        ways = {"by L": None, "by both": Proofs(proofs), "by proofs": Proofs(proofs, True)}
-        spent = {way: [sampled(planned, how) for _ in range(run.runs)] for way, how in ways.items()}
+        methods = {"by L": None, "by both": Proofs(proofs), "by proofs": Proofs(proofs, True)}
+        spent = {method: [sampled(planned, how) for _ in range(run.runs)] for method, how in methods.items()}
         first = min(seconds for _, seconds in spent["by L"])
-        for way, all_of in spent.items():
+        for method, all_of in spent.items():
             share = min(seconds for _, seconds in all_of) / first
-            row[way] = f"{all_of[0][0] / 1e6:.1f} M, {share:.2f}"
+            row[method] = f"{all_of[0][0] / 1e6:.1f} M, {share:.2f}"
         yield row
