@@ -30,6 +30,7 @@ MIRRORS = ((0.0, 0.0, 0.0, MIDDLE), *((*(-3.0 * v for v in axis), 8.0) for axis 
 
 @shape(
     lipschitz=2.0,
+    exterior_only=True,
     level=Count(4, "how often the gaps are filled", most=12),
     swell=Number(1.02, "radius of the balls in units of that at which they touch", least=0.5, most=1.1),
 )
@@ -69,6 +70,11 @@ def apollonian(x, y, z, level, swell):  # type: ignore[no-untyped-def]
 @apollonian.bounds
 def apollonian_bounds(node: Node) -> Box:
     return Box.centred(max(node["swell"], 1.0))
+
+
+@apollonian.potential
+def apollonian_potential(node: Node) -> bool:
+    return False
 
 
 @shape(
