@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..formulas.field import Loops
-from .intervals import LANES
+from .intervals import TINY
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Enclosures:
     def __call__(self, centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
         """See `formulas.field.Cells`."""
         low, high = self.bounds(centres, half)
-        tiny = LANES[self.dtype.itemsize * 8].tiny
+        tiny = TINY[self.dtype.itemsize * 8]
         return low > tiny, high < -tiny
 
     def bounds(self, centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 from llvmlite import ir
 
 from . import lanes_math
-from .intervals import LANES, Interval, Possible
+from .intervals import Interval, Possible
 from .registers import Vec
 from .scalars import BOOL, DOUBLE, WHOLE, MismatchError, common, compare, number, operate, truth, widened
-from .values import Kind, Lanes, Value, as_kind, is_mask, joined, kind_of, made_of, parts_of, types_of
+from .values import LANES, Kind, Lanes, Value, as_kind, is_mask, joined, kind_of, made_of, parts_of, types_of
 
 if TYPE_CHECKING:
     from .emitter import Emitter

@@ -18,11 +18,13 @@ from typing import Any
 import numpy as np
 
 from ..formulas import vocabulary
-from . import lanes_math
-from .registers import Vec
 
 Bound = Any
 """Lanes or NumPy array."""
+
+
+TINY = {32: 1e-36, 64: 1e-290}
+"""Smallest magnitude that has a sign, by the width of floats."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +39,18 @@ class Numbers:
         Distance from 1 to the next number.
     huge, tiny
         Largest magnitude, and the smallest that has a sign.
+    constant
+        Function of a bound and a number that returns the number in the form of the bound.
     """
 
     functions: Any
     unit: float
     huge: float
     tiny: float
+    constant: Callable[[Bound, float], Bound]
 
 
-ARRAYS = Numbers(vocabulary, 2.0**-52, 1e300, 1e-290)
-LANES = {32: Numbers(lanes_math, 2.0**-23, 1e37, 1e-36), 64: Numbers(lanes_math, 2.0**-52, 1e300, 1e-290)}
+ARRAYS = Numbers(vocabulary, 2.0**-52, 1e300, TINY[64], np.full_like)
 
 ROUNDED = 16
 """Errors of the elementary functions, units in the last place; the tests hold them to less."""
@@ -124,7 +128,7 @@ class Interval:
 
     def _like(self, number: float) -> Bound:
         """Constant in the form of the bounds."""
-        return self.lo.const(number) if isinstance(self.lo, Vec) else np.full_like(self.lo, number)
+        return self.of.constant(self.lo, number)
 
     def number(self, value: Interval | float) -> Interval:
         """Interval of a number; an interval unchanged."""

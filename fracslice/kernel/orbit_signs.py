@@ -59,18 +59,21 @@ def proved_box(steps: Round, values: tuple[tuple[str, Any], ...], iterations: in
     Returns
     -------
     Box
-        The box of `growth`, larger where intervals leave doubt, and endless where there is no proof.
+        The box of `growth`, larger where intervals leave doubt; at most that of the ball where orbits start.
     """
     grown = growth(steps, values, iterations)
-    known = sign_arguments(steps, grown, iterations) if grown else None
-    if grown is None or known is None:
+    if grown is None:
         return Box.everywhere()
-    enclosed, own = on_intervals(sign(steps, grown.scaled)), {**known, **dict(values)}
+    known = arguments(steps, grown, iterations)
+    radius = math.sqrt(cast("float", known[f"stop{len(steps) - 1}"]))
+    signed = sign_arguments(steps, grown, iterations)
+    if signed is None:
+        return Box.centred(radius)
+    enclosed, own = on_intervals(sign(steps, grown.scaled)), {**signed, **dict(values)}
     given = [own[name] for name in functions.parameters(enclosed)[3:]]
 
     def outside(*cells: Interval) -> Interval:
         with np.errstate(all="ignore"):
             return cast("Interval", enclosed(*cells, *given))
 
-    radius = math.sqrt(cast("float", known[f"stop{len(steps) - 1}"]))
     return Box.centred(*proved_half(outside, radius, grown.half))

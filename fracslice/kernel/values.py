@@ -15,12 +15,20 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 
-from .intervals import LANES, Interval, Possible
+from . import lanes_math
+from .intervals import TINY, Interval, Numbers, Possible
 from .registers import Vec, splat
 from .scalars import BOOL, DOUBLE, FLOAT, MismatchError, common, number, truth
 
 Value = Any
 """`Vec`, `Interval`, `Possible`, LLVM value, or tuple of these."""
+
+
+LANES = {
+    32: Numbers(lanes_math, 2.0**-23, 1e37, TINY[32], Vec.const),
+    64: Numbers(lanes_math, 2.0**-52, 1e300, TINY[64], Vec.const),
+}
+"""Bounds of intervals by the width of floats."""
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,12 @@ from fracslice.formulas import Node, gyroid, mandelbox, mandelbulb, menger, sphe
 from fracslice.formulas.box import Box
 from fracslice.formulas.field import Precision
 from fracslice.kernel import compile_scene
+from fracslice.kernel.cpu import compile_loops
 from fracslice.kernel.depth import resolve_depths
+from fracslice.kernel.enclosures import Enclosures
 from fracslice.kernel.intervals import ARRAYS, Interval
 from fracslice.kernel.linker import CALLED, FIELD, link
+from fracslice.kernel.loops import enclosures
 from fracslice.kernel.reference import enclosure
 from tests.examples import EXAMPLES
 
@@ -66,7 +69,8 @@ def test_bounds_enclose_the_exact_field(name: str) -> None:
 def test_bounds_on_lanes_enclose_the_exact_field_and_the_kernel(name: str, precision: Precision) -> None:
     """Rounding is outward: cells of a few units in the last place show it."""
     root, dtype = KINDS[name], np.dtype(precision)
-    proofs, kernel, field = root.cells(precision), compile_scene(root, precision), exact(root)
+    proofs = Enclosures(compile_loops(link(root), (enclosures,), precision), dtype)
+    kernel, field = compile_scene(root, precision), exact(root)
     for half in (2 * float(np.finfo(dtype).eps), 1e-3, 0.1):
         centres, points = cells(half)
         low, high = proofs.bounds(centres, half)
@@ -76,7 +80,7 @@ def test_bounds_on_lanes_enclose_the_exact_field_and_the_kernel(name: str, preci
 
 
 def test_a_sphere_is_enclosed_to_rounding() -> None:
-    proofs = sphere(0.5).cells("float64")
+    proofs = Enclosures(compile_loops(link(sphere(0.5)), (enclosures,), "float64"), np.dtype("float64"))
     low, high = proofs.bounds(np.array([[1.0], [0.0], [0.0]]), 0.0)
     assert high - low < 1e-14 and low < 0.5 < high
 
@@ -94,8 +98,9 @@ def test_no_cell_is_lost(name: str) -> None:
     half, n = max(box.size) / 2 * 1.05, 16
     centres = np.array(box.centre)[:, None] + half / n * (2 * np.indices((n,) * 3).reshape(3, -1) + 1 - n)
     x, y, z = (Interval(c - half / n, c + half / n, ARRAYS).outward() for c in centres)
-    bounds = enclosure(root)(x, y, z)
     within = half / n * (2 * np.indices((4,) * 3).reshape(3, 1, -1) / 3 - 1)
     inside = compile_scene(root).points(*(centres[:, :, None] + within)) < 0
-    assert not (inside.any(1) & (bounds.lo > 0)).any()
-    assert not (~inside.all(1) & (bounds.hi < 0)).any()
+    for tree in (root, root.signs()):
+        bounds = enclosure(tree)(x, y, z)
+        assert not (inside.any(1) & (bounds.lo > 0)).any()
+        assert not (~inside.all(1) & (bounds.hi < 0)).any()
