@@ -91,7 +91,8 @@ def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) 
         return {"vertices": piece.mesh.vertices, "triangles": piece.mesh.triangles}
 
     parts = ("surface", work.device, bricks.origin, bricks.voxel, bricks.index, bricks.ijk, signs.signs)
-    return Mesh(**stored(work.store, parts, root, made))
+    arrays = stored(work.store, parts, root, made)
+    return Mesh(arrays["vertices"], arrays["triangles"])
 
 
 @dataclass(frozen=True, eq=False)

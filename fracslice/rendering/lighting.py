@@ -16,7 +16,7 @@ from ..scene.view import Camera, Light, View
 from .colours import Look, opaque_part
 from .drawn import Drawn
 from .haze import fogged
-from .optics import Optics
+from .optics import Optics, ray_bound
 from .scattering import divided, lacquered
 from .surroundings import Surroundings, seen_as_disc
 from .units import lights, march, shade
@@ -99,7 +99,7 @@ class Lighting:
             lines += ["ambient = ambient + glow"] * look.glows
             lines += [f"{c} = ambient * c{c}" for c in "rgb"]
         if any(map(casts_shadows, self.view.lights)):
-            steepness = 1 / self.root.bounds.lipschitz
+            steepness = 1 / ray_bound(self.root)
             marched = {"steepness": steepness, "patience": PATIENCE}
             self.linker.bind("visible_", march.visible, {**marched, "glass": Fixed(False)})
             if look.inside:

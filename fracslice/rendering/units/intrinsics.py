@@ -137,9 +137,9 @@ def step_cone(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
     t, before, stride : float
         Distance along the ray, radius of the previous ball, step taken from its centre.
     side : float
-        -1 inside the solid, 1 outside.
+        Unused.
     path : float
-        Length of the path before this ray.
+        Half width of the cone at distance 1.
     P : array of float
         Scene parameters.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...formulas.vocabulary import absolute, any_of, exp, maximum, minimum, sqrt, where
 from .intrinsics import blocker, field, transparent
 
-MOST = 1.9
+MOST = 1.8
 """Maximum over-relaxation factor; above 2, balls do not touch."""
 
 
@@ -110,7 +110,7 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     return after, where(kept, radius, before), where(kept, step, before), where(hit, -1.0, 1.0)
 
 
-def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, spread):
+def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness):
     """Take one step of a cone, as far as the empty ball contains the whole cone.
 
     Parameters
@@ -120,15 +120,13 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, s
     t, before, stride : float
         Distance along the ray, radius of the previous ball, step taken from its centre.
     side : float
-        -1 inside the solid, 1 outside.
+        Unused.
     path : float
-        Length of the path before this ray.
+        Half width of the cone at distance 1.
     P : array of float
         Scene parameters.
     steepness : float
         Reciprocal of the field's Lipschitz bound.
-    spread : float
-        Half width of the cone at distance 1.
 
     Returns
     -------
@@ -137,8 +135,8 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, s
         up to t.
     """
     radius = field(ox + t * dx, oy + t * dy, oz + t * dz, P) * steepness
-    width = spread * (t + maximum(radius, 0.0))
-    gap = radius - 1.5 * width
+    width = path * (t + maximum(radius, 0.0))
+    gap = radius - 1.2 * width
     step = sqrt(maximum(radius * radius - width * width, 0.0))
     return where(gap < 0.0, t, t + step), before, stride, gap
 
