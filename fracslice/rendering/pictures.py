@@ -101,8 +101,8 @@ def _loaded(path: str, most: int, _: tuple[int, int]) -> Picture:
 
 def _halved(light: np.ndarray) -> np.ndarray:
     """Mean of each 2 x 2 pixels; an odd last row or column is repeated."""
-    even = np.pad(light, ((0, light.shape[0] % 2), (0, light.shape[1] % 2), (0, 0)), "edge")
-    rows = (even[::2] + even[1::2]) * np.float32(0.5)
+    padded = np.pad(light, ((0, light.shape[0] % 2), (0, light.shape[1] % 2), (0, 0)), "edge")
+    rows = (padded[::2] + padded[1::2]) * np.float32(0.5)
     return np.asarray((rows[:, ::2] + rows[:, 1::2]) * np.float32(0.5))
 
 

@@ -191,7 +191,7 @@ def test_light_that_grows_with_the_height(tmp_path: Path, shadows: str) -> None:
 
 
 @pytest.mark.parametrize("paths", ["no", "yes"])
-def test_a_white_ball_vanishes_in_an_even_picture(tmp_path: Path, paths: str) -> None:
+def test_a_white_ball_vanishes_in_a_white_picture(tmp_path: Path, paths: str) -> None:
     lamp = (Light(kind="environment", file=written(tmp_path / "a.hdr", 0 * sky() + 0.5), strength=2),)
     ball = material(sphere(), colour=WHITE, specular=0)
     assert rendered(ball, lamp, 256, paths=paths, bounces=2).image.mean() == pytest.approx(1, abs=0.005)

@@ -155,7 +155,7 @@ def test_coloured_glass_casts_a_coloured_shadow() -> None:
 
 def test_surroundings_are_seen_once_through_glass(tmp_path: Path) -> None:
     """A ball that refracts nothing hides nothing from the ground, on paths too."""
-    file = tmp_path / "even.png"
+    file = tmp_path / "white.png"
     Image.new("RGB", (8, 4), (255, 255, 255)).save(file)
     lights = (Light(kind="environment", file=str(file)),)
     floor = material(plane(offset=-1), colour=(1, 1, 1), specular=0)

@@ -125,8 +125,8 @@ def test_roughness_follows_the_orbit() -> None:
     assert (varied(0.9, 0.6, tone) <= 1).all() and (varied(0.1, -0.6, tone) >= 0).all()
     bulb = mandelbulb(iterations=4)
     shading, camera = Shading(bounces=1), Camera(eye=(2, -2, 1), fov=60)
-    polished, uneven = (
+    polished, varying = (
         seen(material(bulb, metallic=1, roughness=0.2, vary=v, shift=0.2), shading, 4, camera, lights=SUN)
         for v in (0, 0.7)
     )
-    assert abs(polished - uneven).mean() > 0.01
+    assert abs(polished - varying).mean() > 0.01

@@ -161,7 +161,7 @@ def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience, glass):
     patience : int
         Maximum steps.
     glass : bool
-        True if what is transparent blocks the ray, too.
+        True if transparent elements block the ray, too.
 
     Returns
     -------
