@@ -18,14 +18,14 @@ SIZE = (48, 30)
 
 def test_every_scene_has_its_picture() -> None:
     scenes = {path.stem for path in (library.folder() / "gallery").glob("*.xml")}
-    assert {path.stem for path in PICTURES.glob("*.png")} == scenes
-    assert max(path.stat().st_size for path in PICTURES.glob("*.png")) < 310_000
+    assert {path.stem for path in PICTURES.glob("*.webp")} == scenes
+    assert max(path.stat().st_size for path in PICTURES.glob("*.webp")) < 450_000
 
 
 @pytest.mark.parametrize("name", ["coral", "dusk", "tower"])
 def test_a_picture_is_of_its_scene(name: str) -> None:
     scene = read(library.folder() / "gallery" / f"{name}.xml")
     *_, last = Renderer(scene.root, scene.view, SIZE, Work(2), "cpu").passes(8)
-    with Image.open(PICTURES / f"{name}.png") as picture:
+    with Image.open(PICTURES / f"{name}.webp") as picture:
         shipped = np.asarray(picture.resize(SIZE, Image.Resampling.BOX)).astype(float)
     assert abs(last.shown - shipped).mean() < 12
