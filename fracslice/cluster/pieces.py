@@ -8,7 +8,7 @@ import posixpath
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any, Protocol
@@ -244,7 +244,8 @@ def run(task: Task, pieces: Pieces, work: Work) -> None:
         Threads.
     """
     if not pieces.has(task):
-        pieces.write(task.job, task.name, task.make(work))
+        alone = replace(work, cluster=None)  # a task that shared its own work would wait for itself
+        pieces.write(task.job, task.name, task.make(alone))
 
 
 class Pool(ABC):

@@ -14,6 +14,7 @@ import pytest
 from fracslice.cli.main import run as command
 
 from fracslice import meshtasks
+from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import Pieces, Workers, connected, workers
 from fracslice.cluster.pieces import Identity
 from fracslice.errors import Cancelled, ClusterError
@@ -23,6 +24,7 @@ from fracslice.job import make_mesh
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import Renderer, parts
 from fracslice.scene import scene
+from fracslice.scene.reader import reads
 from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
 from fracslice.slicerecipe import SliceRecipe
@@ -39,6 +41,8 @@ RECIPE = SliceRecipe(
 MESHED = scene(mandelbulb(iterations=4) | sphere(radius=0.1).translate((-1.5, 0.0, 0.0)), size="20mm")
 VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
 SIZE, SAMPLES = (96, 72), 6
+FILM = """<scene version="1"><solid size="80mm"><mandelbulb iterations="4"/></solid><camera eye="2 -2 1"/>
+<animation duration="1s" shutter="0.5" times="2"/><track of="camera.eye" keys="0s: 2 -2 1; 1s: 2 -1.5 1"/></scene>"""
 
 Job = Callable[[Work, Path], bytes]
 
@@ -60,6 +64,14 @@ def meshed(work: Work, folder: Path) -> bytes:
     """STL file of a mesh with dust that is removed."""
     make_mesh(MESHED, MeshJob(resolution=40, dust_mm3=5.0), work, folder / "a.stl")
     return (folder / "a.stl").read_bytes()
+
+
+def filmed(work: Work, folder: Path) -> bytes:
+    """Frames of a film."""
+    timeline = Timeline(reads(FILM))
+    job = FilmJob(timeline, (32, 24), 4, 6.0, device="cpu")
+    paths = write_frames(job, range(job.frames), folder / "frames", False, work)
+    return b"".join(path.read_bytes() for path in paths)
 
 
 JOBS: dict[str, Job] = {"slice": sliced, "render": rendered, "mesh": meshed}
@@ -104,7 +116,7 @@ def test_a_killed_worker_and_a_late_one(
 
     def progress(stage: str, share: float) -> None:
         shares.setdefault(stage, []).append(share)
-        shared = stage in ("slicing", "rendering", "meshing")
+        shared = stage in ("slicing", "rendering", "meshing", "frames")
         if shared and 0 < share < 1 and not late and first.poll() is None:
             first.send_signal(signal.SIGKILL)
             first.wait()
@@ -115,7 +127,7 @@ def test_a_killed_worker_and_a_late_one(
         result = JOBS[name](Work(1, progress=progress, cluster=pool), tmp_path)
     assert late
     assert made[0] < 25
-    assert all(of == sorted(of) for stage, of in shares.items() if stage in ("slicing", "rendering"))
+    assert all(of == sorted(of) for stage, of in shares.items() if stage in ("slicing", "rendering", "frames"))
     assert result == expected[name]
     assert not any(pieces.iterdir())
 
