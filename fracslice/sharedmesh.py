@@ -20,21 +20,9 @@ from .mesh.nesting import Nesting
 from .mesh.survey import Survey, survey
 from .mesh.tips import Pointed, PointedPiece, with_tips
 from .mesh.window import Tally, by_tip
-from .meshfiles import Files, StoredPieces, packed, unpacked
-from .meshtasks import (
-    CHOICE,
-    SAMPLES,
-    SHELLS,
-    ContourTask,
-    FinishTask,
-    MeshRecipe,
-    MeshTask,
-    NestTask,
-    cuts,
-    read_components,
-    read_mesh,
-    samples_key,
-)
+from .meshfiles import CHOICE, Files, StoredPieces, packed, read_components, read_mesh, unpacked
+from .meshrecipe import SAMPLES, MeshRecipe, samples_key
+from .meshtasks import SHELLS, ContourTask, FinishTask, MeshTask, NestTask, cuts
 from .surfaces import Surface
 from .volume import Plan, SignBricks
 from .work import Clock

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run as command
 
-from fracslice import meshtasks
+from fracslice import meshsampling, meshtasks
 from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import Pieces, Workers, connected, workers
 from fracslice.cluster.pieces import Identity
@@ -29,6 +29,7 @@ from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
 from fracslice.slicerecipe import SliceRecipe
 from fracslice.slicing import SliceJob
+from fracslice.volume import sampler
 from fracslice.work import Work
 
 from .processes import SECONDS, Cluster, wait_until
@@ -42,7 +43,8 @@ MESHED = scene(mandelbulb(iterations=4) | sphere(radius=0.1).translate((-1.5, 0.
 VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
 SIZE, SAMPLES = (96, 72), 6
 FILM = """<scene version="1"><solid size="80mm"><mandelbulb iterations="4"/></solid><camera eye="2 -2 1"/>
-<animation duration="1s" shutter="0.5" times="2"/><track of="camera.eye" keys="0s: 2 -2 1; 1s: 2 -1.5 1"/></scene>"""
+<animation duration="1s" shutter="0.5" times="2"/>
+<track of="camera.eye" keys="0s: 2 -2 1; 1s: 2 -1.5 1"/></scene>"""
 
 Job = Callable[[Work, Path], bytes]
 
@@ -102,6 +104,8 @@ def no_workers_of_other_tests(cluster: Cluster) -> Iterator[None]:
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "PIXELS", 1024)
     monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(sampler, "MANY", 1)
+    monkeypatch.setattr(meshsampling, "BRICKS", 32)
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
 
 
@@ -127,7 +131,9 @@ def test_a_killed_worker_and_a_late_one(
         result = JOBS[name](Work(1, progress=progress, cluster=pool), tmp_path)
     assert late
     assert made[0] < 25
-    assert all(of == sorted(of) for stage, of in shares.items() if stage in ("slicing", "rendering", "frames"))
+    assert all(
+        of == sorted(of) for stage, of in shares.items() if stage in ("slicing", "rendering", "frames")
+    )
     assert result == expected[name]
     assert not any(pieces.iterdir())
 
