@@ -77,7 +77,7 @@ GRID = ".vdb"
     "--device",
     type=click.Choice(["cpu", "cuda", "auto"]),
     default="cpu",
-    help="The device that samples the field; cpu by default. auto: the GPU, if there is one.",
+    help="The device that evaluates the field; cpu by default. auto: the GPU, if there is one.",
 )
 @cluster_options
 @click.option(

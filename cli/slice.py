@@ -199,15 +199,15 @@ def resin_of(options: dict[str, Any]) -> Resin | None:
     from fracslice.export.resins import Resin, default_resin, moving, resin
 
     machine, layer = options["machine"], options["layer"][0]
-    found = default_resin(machine, layer) if machine else None
+    profile = default_resin(machine, layer) if machine else None
     if options["resin"] is not None:
-        found = resin(options["resin"], machine, layer)
+        profile = resin(options["resin"], machine, layer)
     if options["exposure"] is None:
-        return found
+        return profile
     exposure, bottom = options["exposure"]
-    if found is None:
+    if profile is None:
         return moving(Resin(exposure, bottom), machine)
-    return replace(found, exposure=exposure, bottom_exposure=bottom)
+    return replace(profile, exposure=exposure, bottom_exposure=bottom)
 
 
 def refuse_what_no_print_has(output: str, kind: str, options: dict[str, Any], resin: Resin | None) -> None:

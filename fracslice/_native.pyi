@@ -125,7 +125,7 @@ class Sides:
 def climb(
     field: Entry,
     starts: NDArray[float64],
-    ways: NDArray[float64],
+    steps: NDArray[float64],
     gain: NDArray[float64],
     first: float,
     exact: float,
@@ -383,6 +383,21 @@ def near(
     threads: int = 0,
 ) -> NDArray[int64]:
     """Triangles, ascending, with a corner near some points: within `reach` along each axis, and others."""
+
+def near_bodies(
+    points: NDArray[float64],
+    labels: NDArray[int32],
+    bodies: NDArray[int32],
+    count: int,
+    largest: int,
+    origin: Point,
+    edge: float,
+    threads: int = 0,
+) -> NDArray[int64]:
+    """Bodies, ascending, with a point in a cube that holds a point of another one: see `mesh.touching`.
+
+    `bodies` are those of the labels, -1 for none, and below `count`; `largest` is the one of most points.
+    """
 
 def surroundings(
     vertices: NDArray[float64], triangles: NDArray[int32], of: NDArray[bool_], threads: int = 0

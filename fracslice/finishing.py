@@ -186,6 +186,7 @@ class Finish:
         clock: Clock,
     ) -> None:
         from .mesh.components import choose
+        from .mesh.touching import NearBodies
         from .volume.rest import box_of_the_rest
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
@@ -208,6 +209,8 @@ class Finish:
         volumes = nested.volumes[self.stays]
         self.cavities = -float(volumes[volumes < 0].sum()) * exact**3
         """Volume of the cavities that stay, mm3."""
+        self.near = NearBodies(shells, self.stays, planned.voxel, clock.work.threads)
+        """Bodies that nearly touch, complete after the last piece."""
         self._planes, self._frame = placing(planned, surface.signs, self.place)
 
     def report(self, tally: Tally) -> MeshReport:
@@ -243,7 +246,9 @@ class Finish:
             with self.clock("finishing"):
                 self.clock.work.progress("finishing", number / count)
                 mesh, end = self.pieces.mesh(number), self.pieces.ends[number]
-                keep = self.stays[self.shells.of_label][self.pieces.labels(number)]
+                labels = self.pieces.labels(number)
+                self.near.add(mesh.vertices, labels, end)
+                keep = self.stays[self.shells.of_label][labels]
                 fresh = np.arange(len(mesh.triangles) - self.pieces.fresh[number], len(mesh.triangles))
                 self.pieces.drop(number)
                 made = window.add(mesh, end, keep, fresh)

@@ -202,9 +202,6 @@ class _Job:
         made = self.joined(surface, finish) or self.alone(surface, finish)
         with clock("checking"):
             amount, off = mesh_amount(planned, finish.volume, scale, clock.work)
-        touching: tuple[str, ...] = ()
-        if made.whole is not None and made.report.components > 1:
-            touching = touching_note(made.whole, planned.voxel * scale, clock.work.threads)
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
         report = Report(
             scene=self.scene.name,
@@ -227,7 +224,7 @@ class _Job:
                 *planned.notes,
                 *([fell] if thin else ()),
                 *(refined.notes if refined else ()),
-                *touching,
+                *touching_note(finish.near.count, planned.voxel * scale),
                 *off,
             ),
             depths=planned.depths,

@@ -27,13 +27,13 @@ def key(*parts: object) -> str:
     """
     digest = hashlib.sha256()
     for part in parts:
-        for data in _told(part):
+        for data in _identity(part):
             digest.update(len(data).to_bytes(8, "little"))
             digest.update(data)
     return digest.hexdigest()[:32]
 
 
-def _told(part: object) -> tuple[bytes | memoryview, ...]:
+def _identity(part: object) -> tuple[bytes | memoryview, ...]:
     """Bytes that identify a value: type and shape, then contents."""
     if isinstance(part, np.ndarray):
         array = np.ascontiguousarray(part)

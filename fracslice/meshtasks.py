@@ -89,7 +89,7 @@ class ContourTask(MeshTask):
         piece = of.contours.piece(self.first, self.last, of.contours.refiner(work), work)
         start = of.signs.origin[0] + of.signs.voxel * BRICK * self.first if self.number else -np.inf
         voxel = of.planned.voxel
-        labels, found = components(piece.mesh, start, piece.end, voxel, work.threads)
+        labels, sums = components(piece.mesh, start, piece.end, voxel, work.threads)
         sharp = pointed_in(piece.mesh, start, piece.end, voxel, work.threads)
         stored = self.stored
         stored.put(self.number, piece.mesh)
@@ -100,7 +100,7 @@ class ContourTask(MeshTask):
             for part in ("vertices", "triangles")
         }
         counts = np.array([piece.end, len(piece.mesh.triangles)])
-        return packed(counts=counts, pointed=sharp.points, **ends, **vars(found))
+        return packed(counts=counts, pointed=sharp.points, **ends, **vars(sums))
 
 
 class NestTask(MeshTask):

@@ -78,8 +78,8 @@ class SharedSurface(Surface):
         first = np.array(stored.first_labels or [0] * len(stored), np.int32)
         about = packed(searched=searched, labels=first, prefix=np.array(stored.prefix), **vars(shells))
         self.pool.pieces.write(self.job, SHELLS, about)
-        found = self.results(NestTask, numbers, "nesting")
-        rays = {n: Nesting(**files) for n, files in zip(numbers, found, strict=True)}
+        results = self.results(NestTask, numbers, "nesting")
+        rays = {n: Nesting(**files) for n, files in zip(numbers, results, strict=True)}
         return shells.nested_by(searched, rays)
 
 

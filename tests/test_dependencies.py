@@ -65,8 +65,8 @@ def used() -> set[str]:
     """What is imported at run time and is neither ours nor Python's."""
     files = [*ROOT.glob("fracslice/**/*.py"), *ROOT.glob("cli/*.py")]
     assert len(files) > 100
-    found = {name.partition(".")[0] for file in files for name in imports(ast.parse(file.read_text()))}
-    return {WITHIN.get(name, name) for name in found - set(sys.stdlib_module_names) - {"fracslice", "cli"}}
+    result = {name.partition(".")[0] for file in files for name in imports(ast.parse(file.read_text()))}
+    return {WITHIN.get(name, name) for name in result - set(sys.stdlib_module_names) - {"fracslice", "cli"}}
 
 
 def test_every_core_dependency_is_imported_at_run_time() -> None:
@@ -135,8 +135,8 @@ def test_a_missing_extra_is_one_line_that_says_what_to_install(
     ball_xml: Path, module: str, arguments: str, line: str
 ) -> None:
     done = without(module, arguments, cwd=ball_xml.parent)
-    told = line.format(", which is not installed: pip install")
-    assert (done.returncode, done.stderr) == (2, f"fracslice: {told}\n")
+    expected = line.format(", which is not installed: pip install")
+    assert (done.returncode, done.stderr) == (2, f"fracslice: {expected}\n")
     assert list(ball_xml.parent.iterdir()) == [ball_xml]
 
 

@@ -107,7 +107,7 @@ def made_often(name: str, times: int) -> None:
 def test_no_bit_depends_on_the_processor_s_algebra() -> None:
     """A library of linear algebra sums in the order that suits a processor; sums over points are not its."""
     program = "from tests.test_determinism import summed; summed()"
-    found = {
+    result = {
         subprocess.run(
             [sys.executable, "-c", program],
             env={**os.environ, "OPENBLAS_CORETYPE": core},
@@ -117,7 +117,7 @@ def test_no_bit_depends_on_the_processor_s_algebra() -> None:
         ).stdout
         for core in ("Nehalem", "Haswell")
     }
-    assert len(found) == 1
+    assert len(result) == 1
 
 
 def summed() -> None:
@@ -130,4 +130,4 @@ def summed() -> None:
     )
     turned = [transform(sphere(), rotate=(1, k, 2, 7 * k), scale=0.1 * k) for k in range(1, 41)]
     sums = *sums, link(union(*turned)).parameters
-    print([hashlib.sha256(np.ascontiguousarray(found).tobytes()).hexdigest() for found in sums])
+    print([hashlib.sha256(np.ascontiguousarray(result).tobytes()).hexdigest() for result in sums])

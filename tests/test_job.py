@@ -197,7 +197,7 @@ def test_the_result_does_not_depend_on_threads_or_run():
     assert (one.triangles == two.triangles).all()
 
 
-def test_what_is_thinner_than_a_voxel_and_missing_is_told():
+def test_what_is_thinner_than_a_voxel_and_missing_is_reported():
     """Of the dust -99.97 % was in no line."""
     dust = scene(julia(c=(-0.2703, 0.3049, 0.68, -0.5194), iterations=12), size="40mm")
     report = make_mesh(dust, MeshJob(resolution=48)).report
@@ -207,7 +207,7 @@ def test_what_is_thinner_than_a_voxel_and_missing_is_told():
     assert json.loads(json.dumps(report.as_dict()))["amount_mm3"]["off"] == amount.off
 
 
-def test_what_is_all_there_is_not_told():
+def test_what_is_all_there_is_not_reported():
     report = make_mesh(BALL, MeshJob(resolution=48)).report
     assert report.amount_mm3.off == 0 and report.notes == report.depths == ()
     assert report.amount_mm3.object == pytest.approx(4 / 3 * math.pi * 20**3, rel=0.01)

@@ -102,14 +102,14 @@ def test_keys_tell_arrays_of_other_shapes_and_types_apart() -> None:
     assert keys.key(a.T) == keys.key(np.ascontiguousarray(a.T))
 
 
-def test_what_is_altered_is_kept_and_known_by_all_its_parts(tmp_path: Path) -> None:
+def test_an_edited_field_is_kept_and_known_by_all_its_parts(tmp_path: Path) -> None:
     work, near = Work(store=Store(tmp_path)), Lattice.around(BOX, 0.2)
     inner = [sample(compile_scene(s), s.bounds, near) for s in (sphere(radius=0.5), sphere(radius=0.6))]
     roots = [EditedField(sphere(), does, Samples(bricks)) for bricks in inner for does in ("cut", "add")]
     assert len({root.key for root in roots}) == len(roots)
-    found = [sample_scene(planned(roots[0]), work) for _ in range(2)]
-    assert found[0].evaluations > 0 == found[1].evaluations
-    assert found[0].values.tobytes() == found[1].values.tobytes()
+    result = [sample_scene(planned(roots[0]), work) for _ in range(2)]
+    assert result[0].evaluations > 0 == result[1].evaluations
+    assert result[0].values.tobytes() == result[1].values.tobytes()
 
 
 def test_a_folder_that_others_can_write_is_not_used(tmp_path: Path) -> None:

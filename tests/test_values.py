@@ -144,7 +144,7 @@ def with_value(what: Formula, inside: list[Node], needed: dict[str, Any], attrib
 
 def elements() -> dict[str, Callable[[Any], Any]]:
     """Every attribute of every formula and of every part of a view, by name."""
-    found: dict[str, Callable[[Any], Any]] = {}
+    result: dict[str, Callable[[Any], Any]] = {}
     for name in names():
         what = formula(name)
         inside = [sphere() for _ in range(what.children[0])]
@@ -155,12 +155,12 @@ def elements() -> dict[str, Callable[[Any], Any]]:
         }
         for attribute, kind in what.parameters.items():
             if isinstance(kind, Number | Count | Vector):
-                found[f"{name}.{attribute}"] = partial(with_value, what, inside, needed, attribute)
+                result[f"{name}.{attribute}"] = partial(with_value, what, inside, needed, attribute)
     for part in PARTS:
         for attribute, kind in part.kinds().items():
             if isinstance(kind, Number | Count | Vector):
-                found[f"{part.element}.{attribute}"] = lambda v, p=part, a=attribute: p(**{a: v})
-    return found
+                result[f"{part.element}.{attribute}"] = lambda v, p=part, a=attribute: p(**{a: v})
+    return result
 
 
 ELEMENTS = elements()

@@ -13,11 +13,11 @@ T = TypeVar("T")
 
 def together(count: int, call: Callable[..., T], *arguments: object) -> list[T]:
     """What so many threads get that make the same call at the same time."""
-    barrier, found = threading.Barrier(count), []
+    barrier, result = threading.Barrier(count), []
 
     def run() -> None:
         barrier.wait()
-        found.append(call(*arguments))
+        result.append(call(*arguments))
 
     threads = [threading.Thread(target=run) for _ in range(count)]
     with hurried():
@@ -25,8 +25,8 @@ def together(count: int, call: Callable[..., T], *arguments: object) -> list[T]:
             thread.start()
         for thread in threads:
             thread.join()
-    assert len(found) == count, "a thread raised"
-    return found
+    assert len(result) == count, "a thread raised"
+    return result
 
 
 @contextmanager

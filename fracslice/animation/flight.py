@@ -104,7 +104,7 @@ def flight(root: Node, camera: Camera, least: float, steps: int) -> tuple[Points
     def distance(points: Points) -> Points:
         return np.asarray(kernel.points(*points.T)) / bound
 
-    ways, eye, ahead = _directions(), np.array(camera.eye), np.array(camera.forward)
+    directions, eye, ahead = _directions(), np.array(camera.eye), np.array(camera.forward)
     points, targets = [], []
     for _ in range(steps):
         (here,) = distance(eye[None])
@@ -112,7 +112,7 @@ def flight(root: Node, camera: Camera, least: float, steps: int) -> tuple[Points
             raise camera.fail(
                 f"eye: expected a place {least:g} away from the surface, and it is {here:.3g} away"
             )
-        best = ways[int(_worth(distance, eye, ways, ahead, least).argmax())]
+        best = directions[int(_worth(distance, eye, directions, ahead, least).argmax())]
         ahead = _unit((1 - TURNED) * ahead + TURNED * best)
         points.append(eye)
         slope = distance(eye + least * STAR)
@@ -123,16 +123,16 @@ def flight(root: Node, camera: Camera, least: float, steps: int) -> tuple[Points
 
 
 def _worth(
-    distance: Callable[[Points], Points], eye: Points, ways: Points, ahead: Points, least: float
+    distance: Callable[[Points], Points], eye: Points, directions: Points, ahead: Points, least: float
 ) -> Points:
     """Worth of directions: the free way, more ahead than aside, less for one that leads away."""
-    free = np.zeros(len(ways))
+    free = np.zeros(len(directions))
     for _ in range(TRACED):
-        there = distance(eye + free[:, None] * ways)
+        there = distance(eye + free[:, None] * directions)
         free += np.maximum(there - least, 0.0)
     long = np.minimum(free / (REACH * least), 1.0)
     away = np.maximum(np.log(np.maximum(there, least) / (FAR * least)), 0.0)
-    return np.asarray(long * (1 + ways @ ahead) / 2 - away)
+    return np.asarray(long * (1 + directions @ ahead) / 2 - away)
 
 
 def _directions() -> Points:

@@ -37,13 +37,13 @@ def distance(shape: Node, points: ArrayLike) -> NDArray[np.floating]:
     """
     array = _points(points)
     kernel = _with_depths(shape).kernel("cpu", "float32" if array.dtype == np.float32 else "float64")
-    flat, found = array.reshape(-1, 3), np.empty(array.size // 3, array.dtype)
+    flat, values = array.reshape(-1, 3), np.empty(array.size // 3, array.dtype)
 
     def evaluate(part: slice) -> None:
-        found[part] = kernel.points(*flat[part].T)
+        values[part] = kernel.points(*flat[part].T)
 
     Work().map(evaluate, chunks(len(flat), kernel.batch))
-    return found.reshape(array.shape[:-1])
+    return values.reshape(array.shape[:-1])
 
 
 def _points(points: ArrayLike) -> NDArray[np.floating]:

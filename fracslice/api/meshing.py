@@ -82,10 +82,10 @@ class Result(Mesh):
     @property
     def bricks(self) -> Bricks:
         """Samples of the field near the surface, in scene units, read-only; computed on first access."""
-        found = self.made.bricks
-        for array in (found.ijk, found.values, found.index):
+        bricks = self.made.bricks
+        for array in (bricks.ijk, bricks.values, bricks.index):
             array.flags.writeable = False
-        return found
+        return bricks
 
 
 @keywords

@@ -193,10 +193,10 @@ def _coverage(layer: Layer) -> NDArray[np.uint8]:
 
 
 def _contours(layer: Layer) -> Contours:
-    found = layer.contours
-    for array in (found.points, found.starts, found.parent):
+    contours = layer.contours
+    for array in (contours.points, contours.starts, contours.parent):
         _frozen(array)
-    return found
+    return contours
 
 
 def _frozen(array: NDArray[S]) -> NDArray[S]:

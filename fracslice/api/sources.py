@@ -18,7 +18,7 @@ from .options import Length
 Source: TypeAlias = Node | Scene | str | os.PathLike[str]
 
 
-def found(source: Source) -> Node | Scene:
+def resolved(source: Source) -> Node | Scene:
     """Resolve a source to a shape or scene.
 
     Parameters
@@ -76,9 +76,9 @@ def as_scene(source: Source, size: Length | None = None) -> Scene:
     Raises
     ------
     SceneError
-        As `found`.
+        As `resolved`.
     """
-    what = found(source)
+    what = resolved(source)
     if isinstance(what, Scene):
         return what
     return scene(what, unit=1.0) if size is None else scene(what, size=size)

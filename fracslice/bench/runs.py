@@ -216,33 +216,33 @@ def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder:
         path = Path(folder) / "mesh.ply"
         places = {"workload": about["workload"], "resolution": about["resolution"], "output": path}
-        words = [word.format(**places) for word in peer.command]
-        output, used = _run(words, "", work)
+        command = [word.format(**places) for word in peer.command]
+        output, used = _run(command, "", work)
         with suppress(ValueError, IndexError):
             figures = json.loads(output.splitlines()[-1])
             used |= {key: float(figures[key]) for key in FIGURES if key in figures}
         if not path.exists():
-            raise _FailedError(f"{words[0]} wrote no mesh")
+            raise _FailedError(f"{command[0]} wrote no mesh")
         return used | _child(about | {"mesh": str(path)}, work)
 
 
-def _run(words: list[str], text: str, work: Work) -> tuple[str, dict[str, float]]:
+def _run(command: list[str], text: str, work: Work) -> tuple[str, dict[str, float]]:
     """Run a command; return its output, time and memory. Raises `_FailedError`, `Cancelled`."""
     start = time.perf_counter()
     with tempfile.TemporaryFile() as fed, tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         fed.write(text.encode())
         fed.seek(0)
         try:
-            child = subprocess.Popen(words, stdin=fed, stdout=out, stderr=err)
+            child = subprocess.Popen(command, stdin=fed, stdout=out, stderr=err)
         except OSError as error:
-            raise _FailedError(f"{words[0]}: {error.strerror}") from None
+            raise _FailedError(f"{command[0]}: {error.strerror}") from None
         status, usage = _ended(child, work)
         wall = time.perf_counter() - start
         out.seek(0)
         err.seek(0)
         if status:
             lines = err.read().decode(errors="replace").strip().splitlines()
-            raise _FailedError(lines[-1] if lines else f"{words[0]} ended with status {status}")
+            raise _FailedError(lines[-1] if lines else f"{command[0]} ended with status {status}")
         peak = usage.ru_maxrss / (1 << 20 if sys.platform == "darwin" else 1 << 10)
         used = {"wall_s": wall, "cpu_s": usage.ru_utime + usage.ru_stime, "peak_mb": peak}
         return out.read().decode(errors="replace"), used

@@ -56,26 +56,26 @@ def potential_distance(r2, slope2, level, first_level, last_level, least):  # ty
     return (height - level) * (level * quotient) / damping
 
 
-def sure_distance(apart, slope, bend):  # type: ignore[no-untyped-def]
-    """Radius around the start point within which the orbit's n-th point moves by less than `apart`.
+def sure_distance(margin, slope, bend):  # type: ignore[no-untyped-def]
+    """Radius around the start point within which the orbit's n-th point moves by less than `margin`.
 
     When w, |w| = r, moves by e < 1/b, w^p moves by at most ``(r + e)^p - r^p <= a e / (1 - b e)`` with
     ``a = p r^(p-1)`` and ``b = (p - 1) / (2 r)``, term by term of the binomial series. A further step and the
     addition of the start point keep this form: a is multiplied, and bend grows by slope * b. So e is at least
-    ``apart / (slope + bend * apart)``: the method of majorants (Cauchy 1842). The bound holds for
+    ``margin / (slope + bend * margin)``: the method of majorants (Cauchy 1842). The bound holds for
     disconnected sets, too, but for connected ones it is several times less than that of the potential.
 
     Parameters
     ----------
-    apart
+    margin
         Displacement of the n-th point of the orbit.
     slope
         Bound of the norm of the derivative of w_n at the start point.
     bend
         Sum over the steps k < n of ``slope_k (p - 1) / (2 |w_k|)``.
     """
-    apart = maximum(apart, 1e-30)
-    return apart / minimum(slope + bend * apart, 1e30)
+    margin = maximum(margin, 1e-30)
+    return margin / minimum(slope + bend * margin, 1e30)
 
 
 def levels(

@@ -213,8 +213,8 @@ class Field(Protocol):
             If the field cannot be compiled.
         """
 
-    def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
-        """Compiled loops (`kernel.loops`) over the field on the CPU.
+    def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
+        """Compiled loops (`kernel.loops`) over the field.
 
         Parameters
         ----------
@@ -222,6 +222,8 @@ class Field(Protocol):
             The loops to compile.
         precision : {"float32", "float64"}
             Type of the values.
+        device : {"cpu", "cuda"}
+            Device that runs them; the CPU serves where the device cannot.
 
         Returns
         -------

@@ -84,11 +84,11 @@ def julia_arguments(node: Node) -> dict[str, object]:
         "escape2": escape2,
         "least": least,
         "flat": flat,
-        "loose": Fixed(_falls_apart(node["c"], node["iterations"], node["bailout"], escape2)),
+        "loose": Fixed(_may_be_disconnected(node["c"], node["iterations"], node["bailout"], escape2)),
     }
 
 
-def _falls_apart(c: Sequence[float], iterations: int, bailout: float, escape2: float) -> bool:
+def _may_be_disconnected(c: Sequence[float], iterations: int, bailout: float, escape2: float) -> bool:
     """True if the critical point 0 is outside: the set is disconnected. Its orbit stays in the complex plane
     of c.
     """

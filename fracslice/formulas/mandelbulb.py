@@ -186,8 +186,8 @@ def mandelbulb(  # type: ignore[no-untyped-def]
         level = where(alive, reached, level)
         if loose:
             radius = sqrt(r2)
-            apart = where(level < 0.75 * last_level, radius - reach, radius - bailout)
-            sure = where(alive, maximum(sure, sure_distance(apart, slope, bend)), sure)
+            margin = where(level < 0.75 * last_level, radius - reach, radius - bailout)
+            sure = where(alive, maximum(sure, sure_distance(margin, slope, bend)), sure)
         alive = alive & (r2 < escape2)
     f = potential_distance(end_r2, slope * slope, level, first_level, last_level, least_r2)
     if loose:
@@ -206,7 +206,7 @@ def _digits(n: int) -> tuple[int, ...]:
 def mandelbulb_arguments(node: Node) -> dict[str, object]:
     power = node["power"]
     first, last, escape2, least_r2 = escape.levels(power, node["iterations"], node["bailout"], ESCAPED)
-    loose, torn = _falls_apart(node, escape2), bool(node.is_conservative and power % 1)
+    loose, torn = _may_be_disconnected(node, escape2), bool(node.is_conservative and power % 1)
     reach = escape.farthest(power, node["bailout"], _constant(node))
     fading = 1 / (min(CALM * reach**2, escape2) - reach**2)
     return {
@@ -230,7 +230,7 @@ def _constant(node: Node) -> float:
     return math.hypot(*node["julia"]) if node["julia"] else node.bounds.box.hi[0]
 
 
-def _falls_apart(node: Node, escape2: float) -> bool:
+def _may_be_disconnected(node: Node, escape2: float) -> bool:
     """True if 0, the critical point of w^n, is outside: for one constant at all points, the set is then
     disconnected.
     """

@@ -167,18 +167,18 @@ class Node(Operators, Field):
     @property
     def key(self) -> str:
         """See `Field.key`. All depths must be resolved, as for kernels and loops."""
-        found: str = provider("compiler").key(self)
-        return found
+        text: str = provider("compiler").key(self)
+        return text
 
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
         """See `Field.kernel`."""
-        found: Kernel = provider("compiler").kernel(self, device, precision)
-        return found
+        kernel: Kernel = provider("compiler").kernel(self, device, precision)
+        return kernel
 
-    def loops(self, loops: Sequence[Any], precision: Precision) -> Loops:
+    def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
         """See `Field.loops`."""
-        found: Loops = provider("compiler").loops(self, loops, precision)
-        return found
+        linked: Loops = provider("compiler").loops(self, loops, precision, device)
+        return linked
 
     @property
     def arguments(self) -> dict[str, Any]:

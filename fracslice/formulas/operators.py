@@ -274,8 +274,8 @@ class Operators:
         >>> sphere(0.5).distance([[0, 0, 0], [2, 0, 0]])
         array([-0.5,  1.5])
         """
-        found: NDArray[np.floating] = provider("distances").distance(self, points)
-        return found
+        values: NDArray[np.floating] = provider("distances").distance(self, points)
+        return values
 
 
 def _made(name: str, *elements: Operators, **values: Any) -> Node:

@@ -104,8 +104,8 @@ def _steps(node: Node) -> Iterator[tuple[Node, Affine | None]]:
 
 
 def _step(node: Node) -> Stepped:
-    found: Stepped = node.formula.hooks["step"](node)
-    return found
+    step: Stepped = node.formula.hooks["step"](node)
+    return step
 
 
 def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
@@ -121,7 +121,7 @@ def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
     (tuple of kernel.orbits.Code, dict)
         Steps in order; values by name.
     """
-    code, found, values = provider("orbits").Code, [], dict[str, Any]()
+    code, codes, values = provider("orbits").Code, [], dict[str, Any]()
     for place, (step, moved) in enumerate(_steps(node)):
         function, own, constant = _step(step)
         fixed = tuple((name, v.value) for name, v in own.items() if isinstance(v, Fixed))
@@ -139,8 +139,8 @@ def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
             constant = tuple((product(undone, point - offset) if moved else point).tolist())
         if constant is not None:
             values[f"c{place}"] = constant
-        found.append(code(function, sizes, fixed, constant is not None, moved is not None))
-    return tuple(found), values
+        codes.append(code(function, sizes, fixed, constant is not None, moved is not None))
+    return tuple(codes), values
 
 
 def grown(node: Node) -> Growth:
@@ -162,12 +162,12 @@ def grown(node: Node) -> Growth:
     """
     made, values = steps(node)
     rounds = 1 if node["iterations"] == AUTO else node["iterations"]
-    found = provider("growth").growth(made, tuple(values.items()), rounds)
-    if found is None:
+    bound = provider("growth").growth(made, tuple(values.items()), rounds)
+    if bound is None:
         raise node.fail("has orbits that do not escape: expected parameters that enlarge more")
-    if not found.fits:
+    if not bound.fits:
         raise node.fail("has orbits that grow too fast to compute: expected smaller powers")
-    return found
+    return bound
 
 
 def single(node: Node) -> None:
@@ -195,13 +195,13 @@ def orbit_bounds(node: Node) -> Box:
 
 def orbit_arguments(node: Node) -> dict[str, object]:
     made, values = steps(node)
-    found: dict[str, object] = provider("growth").arguments(made, grown(node), node["iterations"])
-    return {**found, **values}
+    own: dict[str, object] = provider("growth").arguments(made, grown(node), node["iterations"])
+    return {**own, **values}
 
 
 def orbit_select(node: Node) -> Callable[..., Any]:
-    found = grown(node)
-    function: Callable[..., Any] = provider("orbits").field(steps(node)[0], found.by_power, found.scaled)
+    bound = grown(node)
+    function: Callable[..., Any] = provider("orbits").field(steps(node)[0], bound.by_power, bound.scaled)
     return function
 
 

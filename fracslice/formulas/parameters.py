@@ -213,19 +213,19 @@ class Choice(Parameter):
 
     Attributes
     ----------
-    words : tuple of str
+    choices : tuple of str
         Allowed words.
     """
 
-    words: tuple[str, ...]
+    choices: tuple[str, ...]
 
     @property
     def expects(self) -> str:
-        *others, last = self.words
+        *others, last = self.choices
         return f"{', '.join(others)} or {last}" if others else last
 
     def check(self, value: Any) -> Any:
-        if not isinstance(value, str) or value not in self.words:
+        if not isinstance(value, str) or value not in self.choices:
             raise ValueError(self.expects)
         return value
 
@@ -234,7 +234,7 @@ class Choice(Parameter):
 class Axis(Choice):
     """One of the letters x, y and z."""
 
-    words: tuple[str, ...] = ("x", "y", "z")
+    choices: tuple[str, ...] = ("x", "y", "z")
 
 
 def validate(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exception]) -> None:

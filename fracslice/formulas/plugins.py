@@ -41,9 +41,9 @@ def run_file(path: str) -> list[Formula]:
         spec = spec_from_file_location(module, file)
         if spec is None or spec.loader is None or not file.is_file():
             raise SceneError(f"{path}: expected a Python file of formulas")
-        found = sys.modules[module] = module_from_spec(spec)
+        loaded = sys.modules[module] = module_from_spec(spec)
         try:
-            spec.loader.exec_module(found)
+            spec.loader.exec_module(loaded)
         except FracsliceError:
             raise
         except Exception as error:

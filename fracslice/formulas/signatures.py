@@ -94,15 +94,15 @@ def annotation(parameter: Any) -> Any:
     """Type annotation of a parameter's values."""
     match parameter:
         case Count(auto=auto):
-            found: Any = int | Literal["auto"] if auto else int
+            type_: Any = int | Literal["auto"] if auto else int
         case Vector(sizes=sizes, whole=whole):
             several = Sequence[int] if whole else Sequence[float]
-            found = float | several if 1 in sizes else several
-        case Choice(words=words):
-            found = Literal[*words]
+            type_ = float | several if 1 in sizes else several
+        case Choice(choices=choices):
+            type_ = Literal[*choices]
         case _:
-            found = float
-    return found | None if parameter.default is None else found
+            type_ = float
+    return type_ | None if parameter.default is None else type_
 
 
 def docstring(formula: Formula) -> str:

@@ -57,10 +57,10 @@ def arguments(node: Node, leading: int) -> Arguments:
     names = functions.parameters(function)[leading:]
     if set(names) != set(values):
         place = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
-        wanted, found = (", ".join(s) or "nothing" for s in (values, names))
+        wanted, given = (", ".join(s) or "nothing" for s in (values, names))
         raise KernelError(
             f"{place}: formula {node.formula.name}: expected {function.__name__} to take {wanted} "
-            f"after its points, found {found}"
+            f"after its points, found {given}"
         )
     fixed = tuple((name, values[name].value) for name in names if isinstance(values[name], Fixed))
     numbers: list[float] = []

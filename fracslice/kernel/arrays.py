@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..formulas.field import Field, Kernel, Loops, Precision
+from ..formulas.field import Device, Field, Kernel, Loops, Precision
 from .loops import Loop
 
 BATCH = 1 << 14
@@ -19,7 +19,7 @@ BATCH = 1 << 14
 class ArrayField(Field, Protocol):
     """Field whose kernel evaluates arrays."""
 
-    def loops(self, loops: Sequence[Loop], precision: Precision) -> Loops:
+    def loops(self, loops: Sequence[Loop], precision: Precision, device: Device = "cpu") -> Loops:
         """Run loops over the field by NumPy, with all points as one vector.
 
         Parameters
@@ -28,6 +28,8 @@ class ArrayField(Field, Protocol):
             Loops to run.
         precision
             "float32" or "float64".
+        device
+            Not used: the CPU runs them.
 
         Returns
         -------

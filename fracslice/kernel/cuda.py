@@ -11,16 +11,17 @@ import math
 import os
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from ..formulas.field import Kernel, Precision
+from ..formulas.field import Kernel, Loops, Precision
 from ..formulas.registry import Node
 from ..keys import key, texts
 from . import cuda_source
@@ -39,6 +40,9 @@ _LAUNCH = threading.Lock()
 """Lock around kernel launches: Numba's first launch of a kernel must happen only once, and launching holds
 the GIL anyway.
 """
+
+LANES = 1 << 18
+"""Lanes of a call of a loop: few enough that one call is copied while native code prepares others."""
 
 LOOPS = points, bricks
 """Loops of every CUDA kernel."""
@@ -98,8 +102,8 @@ class CudaKernel(Kernel):
         placed = self._cuda.to_device(coordinates)
         out = self._cuda.device_array(coordinates.shape[1], self.dtype)
         self.points_on_device(placed[0], placed[1], placed[2], out)
-        found: np.ndarray = out.copy_to_host()
-        return found.reshape(shape)
+        result: np.ndarray = out.copy_to_host()
+        return result.reshape(shape)
 
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
@@ -152,6 +156,72 @@ class CudaKernel(Kernel):
         """
         frame = [self.dtype.type(v) for v in (*origin, voxel)]
         launched(self._loops.bricks, math.prod(out.shape), self._parameters, *frame, corners, out)
+
+
+@dataclass(frozen=True, eq=False)
+class CudaLoop:
+    """`formulas.field.CompiledLoop` on the GPU, with a thread per lane. Rows are copied there and back.
+
+    Attributes
+    ----------
+    loop
+        Kernel.
+    parameters
+        Parameters of the scene, on the GPU.
+    """
+
+    loop: Any
+    parameters: Any
+
+    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
+        cuda, count = require(), rows.shape[1]
+        given, result = cuda.to_device(rows), cuda.to_device(out)
+        arrays = [self.parameters, cuda.to_device(frame), *map(given.__getitem__, range(len(rows)))]
+        arrays += map(result.__getitem__, range(len(out)))
+        launched(self.loop, count, *arrays, *numbers, count)
+        result.copy_to_host(out)
+
+    def native(self, frame: np.ndarray) -> Callable[..., None]:
+        """Return a function for native code.
+
+        Parameters
+        ----------
+        frame
+            Frame of the loop.
+
+        Returns
+        -------
+        Callable
+            Function of the loop's other arguments.
+        """
+        return partial(self, frame)
+
+
+@lru_cache(maxsize=32)
+def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision) -> Loops:
+    """Compile loops over lanes for the GPU.
+
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    loops
+        Loops to compile.
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    Loops
+        Loops by name, with one lane.
+
+    Raises
+    ------
+    KernelError
+        If a loop cannot be compiled, or no GPU can be used.
+    """
+    module, placed = load_loops(linked, precision, loops), parameters(linked, precision)
+    return Loops(1, LANES, {loop.name: CudaLoop(getattr(module, loop.name), placed) for loop in loops})
 
 
 def launched(loop: Any, threads: int, *arguments: Any) -> None:

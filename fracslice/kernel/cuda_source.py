@@ -1,5 +1,5 @@
 """Source text of the CUDA module of a linked scene: one thread per point, numbers of the kernel's float
-width.
+width. A loop over lanes becomes a kernel whose threads each do the work of one lane.
 
 Numba types a literal as float64 or int64. Arithmetic with float32 then happens in float64, which is up to 64
 times slower on a GPU. The text therefore has ``real(2.0)`` where the formula has ``2.0``.
@@ -8,6 +8,7 @@ times slower on a GPU. The text therefore has ``real(2.0)`` where the formula ha
 from __future__ import annotations
 
 import ast
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -32,7 +33,8 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
     bits
         Width of a float: 32 or 64.
     loops
-        Loops marked ``@kernel``. In these and in functions marked ``@device`` numbers are typed by hand.
+        Loops over lanes, or loops marked ``@kernel``. In these and in functions marked ``@device`` numbers
+        are typed by hand.
 
     Returns
     -------
@@ -56,10 +58,47 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
         "together",
     ]
     header = f"from {INTRINSICS} import {', '.join(names)}\n"
-    trees = [function.tree for function in link_loops(tuple(loops)).values()]
-    units = [ast.unparse(tree) for tree in trees if not tree.decorator_list]
-    by_hand = [ast.unparse(tree) for tree in trees if tree.decorator_list]
+    over_lanes = {loop.name for loop in loops if loop.arguments}
+    trees = [
+        _threaded(tree) if name in over_lanes else tree
+        for name, tree in ((name, function.tree) for name, function in link_loops(tuple(loops)).items())
+    ]
+    units = [ast.unparse(tree) for tree in trees if not tree.decorator_list or tree.name in over_lanes]
+    by_hand = [ast.unparse(tree) for tree in trees if tree.decorator_list and tree.name not in over_lanes]
     return "\n\n".join([header, typed("\n\n".join([linked.source, *units])), *by_hand]) + "\n"
+
+
+def _threaded(tree: ast.FunctionDef) -> ast.FunctionDef:
+    """Kernel of a loop over lanes: its body once, for the lane of the thread."""
+    tree = copy.deepcopy(tree)  # the linker keeps it
+    match tree.body:
+        case [*before, ast.For(ast.Name(i), ast.Call(ast.Name("range"), [_, end, _]), body)]:
+            (first,) = parse(f"{i} = thread()").body
+            lanes: list[ast.stmt] = [_Lane().visit(statement) for statement in body]
+            tree.body = [*before, first, ast.If(ast.Compare(ast.Name(i), [ast.Lt()], [end]), lanes, [])]
+            tree.decorator_list = [ast.Name("kernel", ast.Load())]
+            return tree
+    raise KernelError(f"loop {tree.name} has no loop over lanes at its end")
+
+
+class _Lane(ast.NodeTransformer):
+    """Writes access to lanes as access to elements."""
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        match self.generic_visit(node):
+            case ast.Call(ast.Name("load"), [array, i]):
+                return ast.Subscript(array, i, ast.Load())
+            case ast.Call() as call:
+                return call
+        raise AssertionError(node)
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST:
+        match self.generic_visit(node):
+            case ast.Expr(ast.Call(ast.Name("store"), [array, i, value])):
+                return ast.Assign([ast.Subscript(array, i, ast.Store())], value, lineno=node.lineno)
+            case ast.Expr() as expression:
+                return expression
+        raise AssertionError(node)
 
 
 def typed(source: str) -> str:
@@ -120,6 +159,11 @@ class _Typed(ast.NodeTransformer):
         """Visit an expression in a place that requires a real."""
         return _call("real", node) if self.whole(node) else self.visit(node)
 
+    def operand(self, node: ast.BinOp, side: ast.expr) -> Any:
+        """Visit an operand: in arithmetic, a comparison is 1 or 0."""
+        mask = isinstance(side, ast.Compare) and isinstance(node.op, (ast.Add, ast.Sub, ast.Mult))
+        return _call("real", self.visit(side)) if mask else self.real(side)
+
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
         return _call("real", node) if isinstance(node.value, float) else node
 
@@ -135,7 +179,7 @@ class _Typed(ast.NodeTransformer):
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         if self.whole(node):
             return node
-        left, right = self.real(node.left), self.real(node.right)
+        left, right = self.operand(node, node.left), self.operand(node, node.right)
         match node:
             case ast.BinOp(ast.Constant(0.0), ast.Mult()):
                 return _call("real", node.left)
@@ -185,12 +229,12 @@ class _Typed(ast.NodeTransformer):
         """Visit an expression that becomes the value of a name or a function."""
         if isinstance(node, ast.Tuple):
             return ast.Tuple([self.given(e) for e in node.elts], ast.Load())
-        found: ast.expr = self.visit(node) if self.shifts else self.real(node)
-        return found
+        visited: ast.expr = self.visit(node) if self.shifts else self.real(node)
+        return visited
 
 
-def _listed(found: Any) -> list[ast.stmt]:
-    return found if isinstance(found, list) else [found]
+def _listed(visited: Any) -> list[ast.stmt]:
+    return visited if isinstance(visited, list) else [visited]
 
 
 def after_parameters(arguments: list[ast.expr]) -> list[ast.expr]:

@@ -117,16 +117,16 @@ def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
     notes : tuple of str
         Descriptions of the dropped parts.
     """
-    found = root.visible(voxel)
-    told = [
-        f"{root.formula.name}: {name} {found[name]} of {value}; finer parts are thinner than a voxel"
+    coarser = root.visible(voxel)
+    changed = [
+        f"{root.formula.name}: {name} {coarser[name]} of {value}; finer parts are thinner than a voxel"
         for name, value in root.values.items()
-        if found[name] != value
+        if coarser[name] != value
     ]
     shown = [visible(child, _within(root, voxel)) for child in root.fields]
     children = tuple(child for child, _ in shown)
-    whole = found if children == root.fields else found.changed(children)
-    return whole, tuple(dict.fromkeys([*told, *(note for _, notes in shown for note in notes)]))
+    whole = coarser if children == root.fields else coarser.changed(children)
+    return whole, tuple(dict.fromkeys([*changed, *(note for _, notes in shown for note in notes)]))
 
 
 def _within(node: Node, voxel: float) -> float:

@@ -175,14 +175,14 @@ class Expressions:
         if isinstance(index, ir.Constant):
             return place[index.constant]
         kind = reduce(joined, map(kind_of, place))
-        found, *others = (as_kind(v, kind, self.lanes, self.builder) for v in place)
+        value, *others = (as_kind(v, kind, self.lanes, self.builder) for v in place)
         for k, other in enumerate(others, 1):
             here = self.builder.icmp_signed("==", index, ir.Constant(WHOLE, k))
             parts = [
-                self.builder.select(here, a, b) for a, b in zip(parts_of(other), parts_of(found), strict=True)
+                self.builder.select(here, a, b) for a, b in zip(parts_of(other), parts_of(value), strict=True)
             ]
-            found = made_of(kind, parts, self.lanes, self.builder)
-        return found
+            value = made_of(kind, parts, self.lanes, self.builder)
+        return value
 
     def call(self, name: str, given: list[Value]) -> Value:
         """Emit a call of a function or an intrinsic."""
@@ -198,8 +198,8 @@ class Expressions:
             return self.called(name, given)
         if name in _INTRINSICS:
             return _INTRINSICS[name][0](*(self.lanes.vec(self.builder, v) for v in given))
-        found: Value = getattr(self, f"intrinsic_{name}")(*given)
-        return found
+        value: Value = getattr(self, f"intrinsic_{name}")(*given)
+        return value
 
     def called(self, name: str, given: Sequence[Value]) -> Value:
         """Emit a call of a function of the text."""

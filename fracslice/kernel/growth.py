@@ -94,11 +94,11 @@ class Growth:
         for p, factor in zip(reversed(self.powers), reversed(self.factors), strict=True):
             last += power * factor
             power *= p
-        shift, found = last / (power - 1), []
+        shift, scales = last / (power - 1), []
         for p, factor in zip(self.powers, self.factors, strict=True):
             shift = p * shift - factor
-            found.append(math.exp(shift))
-        return tuple(found)
+            scales.append(math.exp(shift))
+        return tuple(scales)
 
     @property
     def scaled(self) -> bool:
@@ -149,25 +149,25 @@ def growth(steps: Round, values: tuple[tuple[str, Any], ...], iterations: int) -
     escapes = [_escape(_composed([*images[k:], *images[:k]]), points, size) for k in range(1, len(steps))]
     sampled = 1.5 * _radius(whole, points, iterations, radius)
     powers, factors = zip(*rates, strict=True)
-    found = Growth(powers, factors, (*escapes, radius), (sampled, sampled, sampled))
-    return replace(found, half=_half(steps, found, known, iterations)) if found.fits else found
+    bound = Growth(powers, factors, (*escapes, radius), (sampled, sampled, sampled))
+    return replace(bound, half=_half(steps, bound, known, iterations)) if bound.fits else bound
 
 
 def _half(
-    steps: Round, found: Growth, values: Mapping[str, Any], iterations: int
+    steps: Round, bound: Growth, values: Mapping[str, Any], iterations: int
 ) -> tuple[float, float, float]:
     """Half sizes of a box around the cells that the field does not prove to be empty; the search begins with
     one half more than the samples reach.
     """
-    function = field(steps, found.by_power, found.scaled)
-    own = {**arguments(steps, found, iterations), **values}
+    function = field(steps, bound.by_power, bound.scaled)
+    own = {**arguments(steps, bound, iterations), **values}
     given = [own[name] for name in functions.parameters(function)[3:]]
 
     def evaluate(points: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
             return np.asarray(function(*points, *given))
 
-    centres, _, size = possible_cells(evaluate, LIPSCHITZ, Box.centred(*found.half), CELLS)
+    centres, _, size = possible_cells(evaluate, LIPSCHITZ, Box.centred(*bound.half), CELLS)
     x, y, z = (np.ceil((abs(centres).max(axis=1, initial=0) + size / 2) * 256) / 256).tolist()
     return x, y, z
 
@@ -245,8 +245,8 @@ def image(steps: Round, place: int, values: Mapping[str, Any]) -> Image:
     def taken(w: np.ndarray, c: np.ndarray) -> np.ndarray:
         constant = c if c.ndim == 2 else c[:, None]
         with np.errstate(all="ignore"):
-            found = np.array(np.broadcast_arrays(*function(*w, *constant, *given), w[0])[:3])
-        finite: np.ndarray = np.nan_to_num(found, nan=1e300, posinf=1e300, neginf=-1e300)
+            values = np.array(np.broadcast_arrays(*function(*w, *constant, *given), w[0])[:3])
+        finite: np.ndarray = np.nan_to_num(values, nan=1e300, posinf=1e300, neginf=-1e300)
         return finite.clip(-1e170, 1e170)
 
     return taken
@@ -257,14 +257,14 @@ def _composed(images: Sequence[Image]) -> Image:
     return lambda w, c: reduce(lambda v, step: step(v, c), images, w)
 
 
-def arguments(steps: Round, found: Growth, iterations: int) -> dict[str, object]:
+def arguments(steps: Round, bound: Growth, iterations: int) -> dict[str, object]:
     """Return the arguments of an orbit's field, besides those of its steps.
 
     Parameters
     ----------
     steps
         Steps of a round.
-    found
+    bound
         Growth of the orbit.
     iterations
         Number of rounds.
@@ -275,20 +275,20 @@ def arguments(steps: Round, found: Growth, iterations: int) -> dict[str, object]
         Values by name.
     """
     own: dict[str, object] = {"iterations": iterations}
-    if not found.by_power:
-        stops = {f"stop{k}": (STOP[False] * max(e, found.escape)) ** 2 for k, e in enumerate(found.escapes)}
-        return {**own, **stops, "bailout": found.escape}
-    counted = min(iterations, int(30 / math.log10(found.power)))
-    scales = found.scales if found.scaled else (1.0,) * len(steps)
-    radius = max(found.escape * scales[-1], 1.1)
+    if not bound.by_power:
+        stops = {f"stop{k}": (STOP[False] * max(e, bound.escape)) ** 2 for k, e in enumerate(bound.escapes)}
+        return {**own, **stops, "bailout": bound.escape}
+    counted = min(iterations, int(30 / math.log10(bound.power)))
+    scales = bound.scales if bound.scaled else (1.0,) * len(steps)
+    radius = max(bound.escape * scales[-1], 1.1)
     last = 2 * math.log(radius)
     least = radius**2 * math.exp(-max(0.2 / radius, 1e-4))
-    own["levels"] = (last / found.power**counted, last, least)
-    escapes = (*found.escapes[:-1], radius / scales[-1])
-    for k, (escape, following, scale) in enumerate(zip(escapes, found.following, scales, strict=True)):
+    own["levels"] = (last / bound.power**counted, last, least)
+    escapes = (*bound.escapes[:-1], radius / scales[-1])
+    for k, (escape, following, scale) in enumerate(zip(escapes, bound.following, scales, strict=True)):
         own[f"stop{k}"] = max(escape, STOP[True] ** (1 / following) / scale) ** 2
-        own[f"rate{k}"] = power = found.powers[k]
-        if found.scaled:
+        own[f"rate{k}"] = power = bound.powers[k]
+        if bound.scaled:
             own[f"scale{k}"] = scale
         if steps[k].julia:
             own[f"least{k}"] = power * CORE ** ((power - 1) / 2) if power > POWER else 0.0

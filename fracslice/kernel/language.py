@@ -84,8 +84,8 @@ def _text(function: Callable[..., Any], _: object) -> str:
     place = f"{function.__code__.co_filename}:{{}}: formula {function.__name__}: "
     if not isinstance(tree, ast.FunctionDef):
         raise KernelError(place.format(first) + "expected a def")
-    found = _Language(function, tree, place, first).visit(tree)
-    return ast.unparse(found)
+    rewritten = _Language(function, tree, place, first).visit(tree)
+    return ast.unparse(rewritten)
 
 
 def intrinsic(value: Any) -> str | None:
@@ -207,8 +207,8 @@ class _Language(ast.NodeTransformer):
                 pass
             case _:
                 self.refuse(node, "for over a range or a tuple of numbers")
-        for found in _breaks(node.body):
-            self.refuse(found, "a loop over a range to leave")
+        for statement in _breaks(node.body):
+            self.refuse(statement, "a loop over a range to leave")
         return self.generic_visit(node)
 
     def of_numbers(self, node: ast.expr, op: ast.AST) -> ast.AST:

@@ -158,22 +158,22 @@ class _Resolver(Folding):
 
     def resolved(self, node: ast.Name | ast.Attribute) -> ast.AST:
         value = self.known(node)
-        found: ast.expr
+        expression: ast.expr
         if isinstance(value, (bool, float)):
-            found = ast.Constant(value)
+            expression = ast.Constant(value)
         elif isinstance(value, int):
-            found = ast.Constant(int(value))
+            expression = ast.Constant(int(value))
         elif isinstance(node, ast.Name) and value is getattr(builtins, node.id, _UNKNOWN):
-            found = ast.Name(node.id, ast.Load())
+            expression = ast.Name(node.id, ast.Load())
         elif name := language.intrinsic(value):
-            found = ast.Name(name, ast.Load())
+            expression = ast.Name(name, ast.Load())
         elif is_intrinsic(value):
-            found = ast.Name(value.__name__, ast.Load())
+            expression = ast.Name(value.__name__, ast.Load())
         elif isinstance(value, FunctionType):
-            found = ast.Name(self.linker.linked(value, (), OF_LOOPS + value.__name__), ast.Load())
+            expression = ast.Name(self.linker.linked(value, (), OF_LOOPS + value.__name__), ast.Load())
         else:
             self.fail(node, f"{ast.unparse(node)!r} has no value here")
-        return ast.copy_location(found, node)
+        return ast.copy_location(expression, node)
 
     # --- calls ---
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -208,9 +208,9 @@ class _Resolver(Folding):
 
     def element(self, element: ast.expr, counter: str, k: int) -> ast.expr:
         outer, self.fixed = self.fixed, {**self.fixed, counter: k}
-        found: ast.expr = self.visit(copy.deepcopy(element))
+        expression: ast.expr = self.visit(copy.deepcopy(element))
         self.fixed = outer
-        return found
+        return expression
 
 
 def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
@@ -228,8 +228,8 @@ def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
 @lru_cache(maxsize=32)
 def _functions(text: str) -> dict[int, int]:
     """First and last line of each function of a file, decorators included."""
-    found = {}
+    ends = {}
     for node in parse(text).body:
         if isinstance(node, ast.FunctionDef):
-            found[min([node.lineno, *(mark.lineno for mark in node.decorator_list)])] = node.end_lineno or 0
-    return found
+            ends[min([node.lineno, *(mark.lineno for mark in node.decorator_list)])] = node.end_lineno or 0
+    return ends

@@ -16,7 +16,7 @@ class Folding(ast.NodeTransformer):
     def statements(self, body: Sequence[ast.stmt]) -> list[ast.stmt]:
         """Visit statements, each of which may become several."""
         visited = (self.visit(statement) for statement in body)
-        return [part for found in visited for part in (found if isinstance(found, list) else [found])]
+        return [part for one in visited for part in (one if isinstance(one, list) else [one])]
 
     def visit_If(self, node: ast.If) -> Any:
         node.test = self.visit(node.test)
@@ -82,7 +82,7 @@ def point_names(tree: ast.FunctionDef, first: set[str]) -> set[str]:
     set of str
         These names, and those computed from them.
     """
-    found = set(first)
+    known = set(first)
     assigned = [
         (target, node.value)
         for node in ast.walk(tree)
@@ -93,12 +93,12 @@ def point_names(tree: ast.FunctionDef, first: set[str]) -> set[str]:
         more = {
             name.id
             for target, value in assigned
-            if depends_on_points(value, found)
-            for name in _assigned_points(target, value, found)
+            if depends_on_points(value, known)
+            for name in _assigned_points(target, value, known)
         }
-        if more <= found:
-            return found
-        found |= more
+        if more <= known:
+            return known
+        known |= more
 
 
 def _assigned_points(target: ast.expr, value: ast.expr, points: set[str]) -> Iterator[ast.Name]:

@@ -41,8 +41,8 @@ def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
     return cuda.compile_scene(root, precision)
 
 
-def loops(root: Node, loops: Sequence[Loop], precision: Precision) -> Loops:
-    """Compile loops over a tree for the CPU.
+def loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Device = "cpu") -> Loops:
+    """Compile loops over a tree.
 
     Parameters
     ----------
@@ -52,6 +52,8 @@ def loops(root: Node, loops: Sequence[Loop], precision: Precision) -> Loops:
         Loops to compile.
     precision
         "float32" or "float64".
+    device
+        "cpu" or "cuda".
 
     Returns
     -------
@@ -61,9 +63,13 @@ def loops(root: Node, loops: Sequence[Loop], precision: Precision) -> Loops:
     Raises
     ------
     KernelError
-        If the scene or a loop cannot be compiled.
+        If the scene or a loop cannot be compiled or the device is not available.
     """
-    return cpu.compile_loops(link(root), tuple(loops), precision)
+    if device == "cpu":
+        return cpu.compile_loops(link(root), tuple(loops), precision)
+    from . import cuda
+
+    return cuda.compile_loops(link(root), tuple(loops), precision)
 
 
 def key(root: Node) -> str:

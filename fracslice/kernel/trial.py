@@ -97,8 +97,8 @@ def _sample(formula: Formula) -> Node:
 
 def _parity(root: Node, points: np.ndarray, expected: np.ndarray, precision: str) -> tuple[bool, str]:
     """Comparison with the reference; creases of float32 orbits are few points with other values."""
-    found = compile_scene(root, precision).points(*points)  # type: ignore[arg-type]
-    error = np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)
+    values = compile_scene(root, precision).points(*points)  # type: ignore[arg-type]
+    error = np.abs(values - expected) / np.maximum(np.abs(expected), 1.0)
     typical = float(np.quantile(error, 0.99))
-    good = bool(np.isfinite(found).all()) and typical < TOLERANCE[precision]
+    good = bool(np.isfinite(values).all()) and typical < TOLERANCE[precision]
     return good, f"{precision}: 99% of the values within {typical:.1e} of the reference"

@@ -93,8 +93,8 @@ class MeshReport:
             (self.degenerate_triangles, "triangles without area"),
             (self.duplicate_triangles, "triangles that repeat another"),
         )
-        found = tuple(f"{count} {what}" for count, what in counts if count)
-        return found if found or self.volume_mm3 > 0 else ("it encloses no volume",)
+        problems = tuple(f"{count} {what}" for count, what in counts if count)
+        return problems if problems or self.volume_mm3 > 0 else ("it encloses no volume",)
 
     @property
     def printable(self) -> bool:

@@ -95,7 +95,7 @@ class Collapse:
                 pass
         self._stages = STAGES[-1:]
 
-    def found(self) -> Collapsed:
+    def state(self) -> Collapsed:
         """Current state.
 
         Returns

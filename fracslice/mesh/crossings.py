@@ -67,12 +67,13 @@ class Refiner:
         voxel: float,
         work: Work | None = None,
     ) -> None:
-        fast, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
+        work = work or Work()
+        fast, exact = (Roots(root, precision, voxel, work.device) for precision in ("float32", "float64"))
         loops = fast.native("find"), exact.native("find"), exact.native("polish")
-        entry = root.kernel("cpu", "float64").entry
+        entry = root.kernel(work.device, "float64").entry
         self._loops = RootLoops(fast.width, fast.batch, *loops, entry, (QUICK, MOST), SURE)
         self._placement = origin, voxel
-        self._cells, self._work = cells, work or Work()
+        self._cells, self._work = cells, work
         self._memory: tuple[np.ndarray, np.ndarray] = np.empty(0), np.empty((3, 0), np.float32)
         self._first, self._end = 0, 0  # computed intersections: first in memory, one past the last
 

@@ -90,7 +90,7 @@ def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) 
         (piece,) = contour_pieces(root, signs, work, len(bricks))
         return {"vertices": piece.mesh.vertices, "triangles": piece.mesh.triangles}
 
-    parts = ("surface", bricks.origin, bricks.voxel, bricks.index, bricks.ijk, signs.signs)
+    parts = ("surface", work.device, bricks.origin, bricks.voxel, bricks.index, bricks.ijk, signs.signs)
     return Mesh(**stored(work.store, parts, root, made))
 
 

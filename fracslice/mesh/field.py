@@ -83,12 +83,12 @@ class _MeshKernel(Kernel):
         """`Kernel.points`."""
         axes = [np.asarray(a, np.float64).ravel() for a in (x, y, z)]
         known = np.isfinite(axes[0] + axes[1] + axes[2])
-        these, found = np.stack([a[known] for a in axes], 1), np.full(len(known), np.nan)
+        these, values = np.stack([a[known] for a in axes], 1), np.full(len(known), np.nan)
         inside = np.empty(len(these), np.bool_)
         _inside(these, *self._field.columns, inside)
         away = self._field.nearest.points(these, threads=1)
-        found[known] = np.where(inside, -away, away)
-        return found.reshape(np.shape(x)).astype(self.dtype, copy=False)
+        values[known] = np.where(inside, -away, away)
+        return values.reshape(np.shape(x)).astype(self.dtype, copy=False)
 
 
 @compiled

@@ -67,8 +67,8 @@ def surface_samples(planned: Plan, work: Work) -> NDArray[np.float64]:
     """
     tips = planned.tips.T  # only extreme points that are still on the surface
     tips = tips[surface_error(planned.root, tips, planned.voxel, work) < NEAR * planned.voxel]
-    found = surface_points(planned.root, planned.outer, planned.voxel, POINTS, work)
-    return np.concatenate([tips, found])
+    samples = surface_points(planned.root, planned.outer, planned.voxel, POINTS, work)
+    return np.concatenate([tips, samples])
 
 
 def distances(
@@ -99,13 +99,13 @@ def distances(
     Cancelled
         If the work is cancelled.
     """
-    found, far, reach = np.full(len(points), np.inf), np.arange(len(points)), NEARBY * voxel
+    result, far, reach = np.full(len(points), np.inf), np.arange(len(points)), NEARBY * voxel
     while len(far):
-        found[far] = nearest(pieces(), points[far], reach, work)
+        result[far] = nearest(pieces(), points[far], reach, work)
         # Triangles lie within a grid cell: any nearer one has its corners in reach.
-        far = far[found[far] > reach - np.sqrt(3) * voxel]
+        far = far[result[far] > reach - np.sqrt(3) * voxel]
         reach *= FARTHER
-    return found
+    return result
 
 
 def nearest(
@@ -141,8 +141,8 @@ def _near(mesh: Mesh, points: NDArray[np.float64], reach: float, work: Work) -> 
 def _least(meshes: Iterable[Mesh], points: NDArray[np.float64], work: Work) -> NDArray[np.float64]:
     """Distance from each point to the nearest of several meshes; infinite without triangles."""
     numbers = np.arange(len(points), dtype=np.int32)
-    spots, found = Mesh(points, np.stack([numbers] * 3, 1)), np.full(len(points), np.inf)
+    spots, least = Mesh(points, np.stack([numbers] * 3, 1)), np.full(len(points), np.inf)
     for mesh in meshes:
         if len(mesh.triangles):
-            found = np.minimum(found, Nearest(mesh).samples(spots, 1.0, work))
-    return found
+            least = np.minimum(least, Nearest(mesh).samples(spots, 1.0, work))
+    return least

@@ -55,8 +55,8 @@ class Mesh(Exchange):
     @property
     def is_watertight(self) -> bool:
         """True if every edge joins exactly two triangles."""
-        found = edge_topology(self.triangles, len(self.vertices))
-        return len(self.triangles) > 0 and not (found.open_edges or found.non_manifold_edges)
+        topology = edge_topology(self.triangles, len(self.vertices))
+        return len(self.triangles) > 0 and not (topology.open_edges or topology.non_manifold_edges)
 
     @property
     def corners(self) -> NDArray[np.float64]:
@@ -165,8 +165,8 @@ class Mesh(Exchange):
         """
         from fracslice._native import selected
 
-        found = selected(self.vertices, self.triangles, keep, threads)
-        return Mesh(*found) if found else self
+        kept = selected(self.vertices, self.triangles, keep, threads)
+        return Mesh(*kept) if kept else self
 
     def in_order(self) -> Mesh:
         """Sort the vertices by their first use, so that the triangles alone determine the arrays.

@@ -69,14 +69,14 @@ class Nearest:
         Cancelled
             If the work is cancelled.
         """
-        found, beyond = np.empty(len(mesh.triangles)), [UNKNOWN[:, :2]]
-        for part in chunks(len(found), CHUNK):
+        bounds, beyond = np.empty(len(mesh.triangles)), [UNKNOWN[:, :2]]
+        for part in chunks(len(bounds), CHUNK):
             work.check()
-            found[part], pairs = self._native.bounds(
+            bounds[part], pairs = self._native.bounds(
                 mesh.vertices, mesh.triangles[part], hints[part], tolerance, work.threads
             )
             beyond.append(pairs + np.array([part.start, 0], np.int32))
-        return found, np.concatenate(beyond)
+        return bounds, np.concatenate(beyond)
 
     def points(self, points: NDArray[np.float64], threads: int = 0) -> NDArray[np.float64]:
         """Distances of points from this mesh; fast where consecutive points lie close together.
@@ -122,10 +122,10 @@ class Nearest:
         Cancelled
             If the work is cancelled.
         """
-        found = np.empty(len(mesh.triangles))
-        for part in chunks(len(found), CHUNK):
+        distances = np.empty(len(mesh.triangles))
+        for part in chunks(len(distances), CHUNK):
             work.check()
-            found[part] = self._native.samples(
+            distances[part] = self._native.samples(
                 mesh.vertices, mesh.triangles[part], spacing, enough, work.threads
             )
-        return found
+        return distances

@@ -11,7 +11,7 @@ from ..kernel import Field
 from ..work import Work, chunks
 from .roots import Roots
 
-NEAR, FOUND = 1e-9, 1e-8
+NEAR, CONVERGED = 1e-9, 1e-8
 """Values of |f| in voxels: below `NEAR` a point needs no projection (a corner has no gradient to follow); a
 projected point should be below `FOUND`.
 """
@@ -76,8 +76,9 @@ def project(
     Cancelled
         If the job was cancelled.
     """
-    kernel, work = root.kernel("cpu", "float64"), work or Work()
-    guess, exact = Roots(root, "float32", voxel), Roots(root, "float64", voxel)
+    work = work or Work()
+    kernel = root.kernel(work.device, "float64")
+    guess, exact = (Roots(root, precision, voxel, work.device) for precision in ("float32", "float64"))
 
     def task(part: slice) -> tuple[np.ndarray, np.ndarray]:
         values = kernel.points(*points[part].T)
@@ -90,16 +91,16 @@ def project(
     def brought(which: np.ndarray, f: np.ndarray) -> np.ndarray:
         p, region = np.ascontiguousarray(points[which].T), trust_regions(which, f < 0)
         rays = np.concatenate([p, guess.lead(_relative(p, region))])
-        t, miss = exact.aimed(rays, guess.found(rays.astype(np.float32)))
-        left = np.flatnonzero(miss > FOUND)
+        t, miss = exact.aimed(rays, guess.find(rays.astype(np.float32)))
+        left = np.flatnonzero(miss > CONVERGED)
         if len(left):
             left = exact.padded(left)
             slow = rays.take(left, 1)
-            t[left], miss[left] = exact.aimed(slow, exact.found(slow))
+            t[left], miss[left] = exact.aimed(slow, exact.find(slow))
         there = np.clip(p + t * rays[3:], region.low, region.high)
         return np.where(miss * voxel < np.abs(f), there, p)
 
-    result = work.collect(task, chunks(len(points), 1 << 14))
+    result = work.collect(task, chunks(len(points), kernel.batch >> 3))
     if not result:
         return np.empty(0, np.int64), np.empty((0, 3))
     numbers, places = zip(*result, strict=True)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..formulas.field import Field, Precision
+from ..formulas.field import Device, Field, Precision
 from ..kernel.machine import constant
 from .root_loops import aim, find, lead, polish
 
@@ -38,9 +38,13 @@ class Roots:
         "float32" or "float64".
     voxel
         Voxel size, scene units.
+    device
+        "cpu" or "cuda".
 
     Attributes
     ----------
+    frame
+        FRAME of the loops.
     dtype
         Floating-point type.
     width
@@ -49,12 +53,12 @@ class Roots:
         Segments per call that amortise its overhead.
     """
 
-    def __init__(self, root: Field, precision: Precision, voxel: float) -> None:
+    def __init__(self, root: Field, precision: Precision, voxel: float, device: Device = "cpu") -> None:
         self.dtype = np.dtype(precision)
         small, near, reach, tight, close = FRAMES[precision]
         frame = np.array([1 / voxel, small, near, reach * voxel, tight * voxel, close])
-        self._frame = constant(frame, self.dtype)
-        loops = root.loops(LOOPS[precision], precision)
+        self.frame = constant(frame, self.dtype)
+        loops = root.loops(LOOPS[precision], precision, device)
         self.width, self.batch, self._runs = loops.width, loops.batch, loops.runs
 
     def padded(self, index: np.ndarray) -> np.ndarray:
@@ -72,7 +76,7 @@ class Roots:
         """
         return np.concatenate([index, np.repeat(index[-1:], -len(index) % self.width)])
 
-    def found(self, segments: np.ndarray) -> np.ndarray:
+    def find(self, segments: np.ndarray) -> np.ndarray:
         """Find the roots on segments.
 
         Parameters
@@ -97,7 +101,7 @@ class Roots:
     def _stepped(self, segments: np.ndarray, steps: int) -> np.ndarray:
         """Run `find` with a limit of steps."""
         roots = np.empty((1, segments.shape[1]), self.dtype)
-        self._runs["find"](self._frame, segments, roots, steps)
+        self._runs["find"](self.frame, segments, roots, steps)
         result: np.ndarray = roots[0]
         return result
 
@@ -114,7 +118,7 @@ class Roots:
         tuple or Callable
             Machine code and its constant arguments, or a Python function.
         """
-        return self._runs[name].native(self._frame)
+        return self._runs[name].native(self.frame)
 
     def aimed(self, segments: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Refine roots by one step.
@@ -135,7 +139,7 @@ class Roots:
         """
         out = np.empty((2, len(roots)), self.dtype)
         out[0] = roots
-        self._runs["aim"](self._frame, segments, out)
+        self._runs["aim"](self.frame, segments, out)
         return out[0], out[1]
 
     def lead(self, trust_regions: np.ndarray) -> np.ndarray:
@@ -153,5 +157,5 @@ class Roots:
             Directions, [3, n].
         """
         rays = np.empty((3, trust_regions.shape[1]), self.dtype)
-        self._runs["lead"](self._frame, trust_regions, rays)
+        self._runs["lead"](self.frame, trust_regions, rays)
         return rays

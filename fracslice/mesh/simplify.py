@@ -90,7 +90,7 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
         if number < PATIENT:
             collapse.run(work)
         work.progress("simplifying", 1 - (1 - FIRST) * 0.6**number)
-        result = collapse.found()
+        result = collapse.state()
         faulty = examination.faults(result)
         if not faulty.any():
             done = Simplified(tolerance, len(mesh.triangles), *examination.distances(result))

@@ -39,8 +39,8 @@ def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
     """
     joined, start = Survey(), -np.inf
     for number, mesh in enumerate(pieces.meshes()):
-        labels, found = components(mesh, start, start := pieces.ends[number], voxel, threads)
-        pieces.label(number, labels + np.int32(joined.add(found)))
+        labels, sums = components(mesh, start, start := pieces.ends[number], voxel, threads)
+        pieces.label(number, labels + np.int32(joined.add(sums)))
     return joined.shells()
 
 
@@ -298,8 +298,8 @@ class WholeShells:
         ndarray of bool, shape (s,)
         """
         hollow = self.volumes < 0
-        found: NDArray[np.bool_] = hollow | (bodies and len(hollow) > 1)
-        return found
+        searched: NDArray[np.bool_] = hollow | (bodies and len(hollow) > 1)
+        return searched
 
     def rays(
         self,
@@ -334,14 +334,14 @@ class WholeShells:
         first = np.where(searched & (self.piece == number), self.first, -1)
         return nesting(mesh, self.of_label[labels], self.volumes, first, threads)
 
-    def nested_by(self, searched: NDArray[np.bool_], found: Mapping[int, Nesting]) -> tuple[Shells, int]:
+    def nested_by(self, searched: NDArray[np.bool_], nestings: Mapping[int, Nesting]) -> tuple[Shells, int]:
         """Join the results of `rays` of all pieces; see `nested`.
 
         Parameters
         ----------
         searched : ndarray of bool, shape (s,)
             Searched shells.
-        found : mapping
+        nestings : mapping
             Results by index of the piece.
 
         Returns
@@ -356,7 +356,7 @@ class WholeShells:
         """
         count, hollow = len(self.volumes), self.volumes < 0
         parent, winding = np.full(count, -1, np.int64), np.zeros(count, np.int64)
-        for number, one in found.items():
+        for number, one in nestings.items():
             own = searched & (self.piece == number)
             parent[own], winding[own] = one.parent[own], one.winding[own]
         if (parent[hollow] < 0).any() or hollow[parent[hollow]].any():

@@ -127,8 +127,8 @@ class Pointed:
             Pieces, by ascending x.
         """
         if not self.rough:
-            found = pointed_in(piece.mesh, self._seam, piece.end, self._voxel, self._threads)
-            self.join(found, piece.end)
+            pointed = pointed_in(piece.mesh, self._seam, piece.end, self._voxel, self._threads)
+            self.join(pointed, piece.end)
 
     def join(self, piece: PointedPiece, end: float) -> None:
         """Add the pointed vertices of a piece, and those at its seam with the piece before.
@@ -158,8 +158,8 @@ class Pointed:
     @property
     def points(self) -> NDArray[np.float64]:
         """Pointed vertices, float64 [n, 3]; none for a rough surface."""
-        found = np.concatenate(self._points)
-        return found[:0] if self.rough else found
+        points = np.concatenate(self._points)
+        return points[:0] if self.rough else points
 
 
 def with_tips(
@@ -211,17 +211,17 @@ def with_tips(
 def _caps(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work) -> list[Cap]:
     """Caps of all tips; triangle indices count from the first piece on."""
     root, voxel = planned.root, planned.voxel
-    tips = _found(planned, pieces, points, work)
+    tips = _tips_beyond(planned, pieces, points, work)
     if not tips:
         return []
     ends, places = (np.array(rows) for rows in list(zip(*tips, strict=True))[1:])
     mesh, numbers = pieces.near(_between(ends, places, REACH * voxel), REACH * voxel)
     rings, fit = Rings(mesh), Fit(root, STEP * voxel, voxel, work)
-    found = [
+    caps_of_tips = [
         best(rings.caps(vertex, tip.place), tip.gain, mesh, fit, voxel)
         for vertex, tip in zip(rings.at(ends), tips, strict=True)
     ]
-    caps = disjoint([cap for cap in found if cap], len(mesh.triangles))
+    caps = disjoint([cap for cap in caps_of_tips if cap], len(mesh.triangles))
     while caps:
         work.check()
         wrong = _crossing(mesh, caps, work)
@@ -272,18 +272,18 @@ class Tip(NamedTuple):
     place: NDArray[np.float64]
 
 
-def _found(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work) -> list[Tip]:
+def _tips_beyond(planned: Plan, pieces: Pieces, points: NDArray[np.float64], work: Work) -> list[Tip]:
     """Tips beyond pointed vertices, the highest one first."""
     kernel, voxel = planned.root.kernel("cpu", "float64"), planned.voxel
     exact = EXACT * max(planned.box.size)
 
     def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        found: NDArray[np.bool_] = values_at(kernel, np.ascontiguousarray(points), work) < 0
-        return found
+        inside: NDArray[np.bool_] = values_at(kernel, np.ascontiguousarray(points), work) < 0
+        return inside
 
     def climbed(starts: NDArray[np.float64], ups: NDArray[np.float64], last: float) -> NDArray[np.float64]:
-        ways = np.einsum("nij,jw->inw", _frames(_unit(ups)), SLANTS)
-        return climb(kernel, starts.T[..., None], ways, STEP * voxel, last, work)[..., 0].T
+        steps = np.einsum("nij,jw->inw", _frames(_unit(ups)), SLANTS)
+        return climb(kernel, starts.T[..., None], steps, STEP * voxel, last, work)[..., 0].T
 
     ends, starts, ups = _above(pieces, points, voxel)
     on = inside(starts.T)
@@ -323,8 +323,8 @@ def _nearest(
     """
     mesh, _ = pieces.near(_between(ends, tips, REACH * voxel), REACH * voxel)
     rings = Rings(mesh)
-    found = rings.nearest(rings.at(ends), tips)
-    once, tips, ups = _highest(found, tips, tips - rings.middles(found))
+    nearest = rings.nearest(rings.at(ends), tips)
+    once, tips, ups = _highest(nearest, tips, tips - rings.middles(nearest))
     return mesh.vertices[once], tips, ups
 
 
@@ -349,8 +349,8 @@ def _highest(
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Normalised vectors."""
-    found: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None]
-    return found
+    unit: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None]
+    return unit
 
 
 def _frames(ups: NDArray[np.float64]) -> NDArray[np.float64]:

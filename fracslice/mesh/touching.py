@@ -3,65 +3,96 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .model import Mesh
-from .topology import component_sizes, connected_components
+from .._native import near_bodies
+from .survey import WholeShells
+
+REACH = 2
+"""Edge length of the cubes in which bodies meet, voxels."""
 
 
-def near_bodies(mesh: Mesh, reach: float, threads: int = 0) -> int:
-    """Count the bodies of a mesh that have another within reach.
+class NearBodies:
+    """Bodies of a surface in pieces that have another one within reach.
 
     Vertices are sorted into the cubes of two lattices; bodies with vertices in one cube are near. Bodies that
     are nearer than half the reach share one, but for a few.
 
     Parameters
     ----------
-    mesh : Mesh
-        Closed mesh.
-    reach : float
-        Edge length of the cubes.
+    shells : WholeShells
+        Shells of the surface.
+    stays : ndarray of bool, shape (s,)
+        Shells that stay.
+    voxel : float
+        Voxel, in the units of the shells.
     threads : int, optional
         Threads; 0 for all cores.
-
-    Returns
-    -------
-    int
-        Number of bodies; cavities are none.
     """
-    labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
-    sizes = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)
-    body = (labels >= 0) & (sizes.volumes > 0)[labels]
-    near = np.zeros(count, bool)
-    for shift in (0.0, 0.5):
-        cells = np.floor(mesh.vertices[body] / reach + shift).astype(np.int64)
-        rows = np.unique(np.column_stack([cells, labels[body]]), axis=0)
-        same = (rows[1:, :3] == rows[:-1, :3]).all(axis=1)
-        near[rows[1:, 3][same]] = near[rows[:-1, 3][same]] = True
-    return int(near.sum())
+
+    def __init__(self, shells: WholeShells, stays: NDArray[np.bool_], voxel: float, threads: int = 0) -> None:
+        body = stays & (shells.volumes > 0)
+        self._several = body.sum() > 1
+        self._body = np.where(body, np.arange(len(body)), -1).astype(np.int32)[shells.of_label]
+        self._largest = int(np.argmax(np.where(body, shells.areas, 0)))
+        x, y, z = shells.bounds()[0].tolist()
+        self._origin, self._edge, self._threads = (x, y, z), REACH * voxel, threads
+        self._near = np.zeros(len(body), bool)
+        self._end = -np.inf
+        self._before = np.empty((0, 3)), np.empty(0, np.int32)
+
+    @property
+    def count(self) -> int:
+        """Number of near bodies of the pieces so far; cavities are none."""
+        return int(self._near.sum())
+
+    def add(self, points: NDArray[np.float64], labels: NDArray[np.int32], end: float) -> None:
+        """Add the next piece.
+
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 3)
+            Vertices of the piece.
+        labels : ndarray of int32, shape (n,)
+            Their labels.
+        end : float
+            x at which the piece ends; infinite for the last one.
+        """
+        if not self._several:
+            return
+        self._meet(points, labels)
+        if np.isfinite(self._end):
+            first = points[:, 0] < self._end + self._edge
+            others, theirs = self._before
+            self._meet(np.concatenate([others, points[first]]), np.concatenate([theirs, labels[first]]))
+        if np.isfinite(end):
+            last = points[:, 0] > end - self._edge
+            self._end, self._before = end, (points[last], labels[last])
+
+    def _meet(self, points: NDArray[np.float64], labels: NDArray[np.int32]) -> None:
+        at = self._origin, self._edge, self._threads
+        self._near[near_bodies(points, labels, self._body, len(self._near), self._largest, *at)] = True
 
 
-def touching_note(mesh: Mesh, voxel: float, threads: int = 0) -> tuple[str, ...]:
+def touching_note(near: int, voxel: float) -> tuple[str, ...]:
     """Describe the bodies that touch at points or edges only, and the option that joins them.
 
     Parameters
     ----------
-    mesh : Mesh
-        Mesh of several bodies, mm.
+    near : int
+        Number of these bodies.
     voxel : float
         Voxel size, mm.
-    threads : int, optional
-        Threads; 0 for all cores.
 
     Returns
     -------
     tuple of str
         One note, or none.
     """
-    near = near_bodies(mesh, 2 * voxel, threads)
     if not near:
         return ()
     return (
         f"{near} bodies come within two voxels of another: solids that touch at points or edges only are not "
         f"joined, and tips thinner than a voxel come off; --thickness {3 * voxel:.2g}mm joins them, --bridge "
-        f"adds struts between bodies that are apart, --keep largest leaves one, a smaller voxel keeps tips",
+        f"adds struts between separate bodies, --keep largest leaves one, a smaller voxel keeps tips",
     )

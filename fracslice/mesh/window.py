@@ -204,8 +204,8 @@ class Tally:
         if len(piece.suspects):
             among = np.zeros(len(mesh.triangles), bool)
             among[piece.suspects] = True
-            found = self_intersecting_triangles(mesh, threads=self.threads, among=among)
-            crossing = np.flatnonzero(found[: piece.done])
+            crosses = self_intersecting_triangles(mesh, threads=self.threads, among=among)
+            crossing = np.flatnonzero(crosses[: piece.done])
         sizes = passed.sizes(self.threads)
         apex = passed.vertices[sizes.outermost[0, 0]] if len(passed.triangles) else np.zeros(3)
         self.triangles += len(passed.triangles)
@@ -325,8 +325,8 @@ def at_tips(mesh: Mesh, tips: NDArray[np.float64]) -> NDArray[np.int64]:
     near = np.flatnonzero(np.isin(mesh.vertices[:, 0], [tip[0] for tip in places]))
     of_vertex = np.full(len(mesh.vertices), -1)
     of_vertex[near] = [places.get(tuple(point), -1) for point in mesh.vertices[near].tolist()]
-    found: NDArray[np.int64] = of_vertex[mesh.triangles].max(axis=1, initial=-1)
-    return found
+    of_triangle: NDArray[np.int64] = of_vertex[mesh.triangles].max(axis=1, initial=-1)
+    return of_triangle
 
 
 def by_tip(triangles: list[tuple[int, NDArray[np.float64]]]) -> Mesh:

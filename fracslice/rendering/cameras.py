@@ -54,8 +54,8 @@ def _perspective(camera: Camera, size: tuple[int, int]) -> Unit:
     focus = camera.focus or math.dist(camera.eye, camera.target)
     if camera.stereo:
         half = size[0] // 2
-        apart = {"apart": tuple(right * camera.stereo / 2), "half": float(half), "focus": focus}
-        return units.stereo, _flat(camera, (half, size[1]), pixel) | apart
+        eyes = {"offset": tuple(right * camera.stereo / 2), "half": float(half), "focus": focus}
+        return units.stereo, _flat(camera, (half, size[1]), pixel) | eyes
     values = _flat(camera, size, pixel)
     if camera.aperture == 0:
         return units.pinhole, values

@@ -109,9 +109,9 @@ def _items(parent: Tree.Element, kind: Vector, count: int) -> None:
         _data(parent, "integer" if kind.whole else "double", kind)
 
 
-def _words(parent: Tree.Element, kind: Choice) -> None:
-    values = Tree.SubElement(parent, "choice") if len(kind.words) > 1 else parent
-    for word in kind.words:
+def _choices(parent: Tree.Element, kind: Choice) -> None:
+    values = Tree.SubElement(parent, "choice") if len(kind.choices) > 1 else parent
+    for word in kind.choices:
         Tree.SubElement(values, "value").text = word
 
 
@@ -127,8 +127,8 @@ _PATTERNS: dict[type, Any] = {
     Number: _number,
     Count: _count,
     Vector: _vector,
-    Axis: _words,
-    Choice: _words,
+    Axis: _choices,
+    Choice: _choices,
     Length: _length,
     Seconds: _text,
     Target: _text,

@@ -179,16 +179,16 @@ def _relit(view: View, override: Override) -> View:
     missing = all(part.element != section.name for part in (*view.parts, *always))
     if section.part and missing and not section.many:
         always.append(section.part())
-    found, counted = [], 0
+    parts, counted = [], 0
     for part in (*view.parts, *always):
         counted += part.element == section.name
         meant = part.element == section.name and override.number in (None, counted)
-        found.append(replace(part, **{override.attribute: override.value(section)}) if meant else part)
+        parts.append(replace(part, **{override.attribute: override.value(section)}) if meant else part)
     if not counted or not 1 <= (override.number or 1) <= counted:
         raise override.fail(
             f"the scene has {counted or 'no'} <{section.name}>{', counted from 1' if counted else ''}"
         )
-    return View.of(found)
+    return View.of(parts)
 
 
 def _rebuilt(node: Node, override: Override, seen: Counter[str]) -> Node:

@@ -192,8 +192,8 @@ class _Collector:
         volume = sum(area * height for area, height in zip(areas, stack.heights.tolist(), strict=True))
         unfit = misfit(stack, self.printer)
         overhang = np.array(overhangs)
-        islands = self.found(solid, solid.islands())
-        bodies = self.found(solid, np.ones(solid.count, bool))
+        islands = self.groups(solid, solid.islands())
+        bodies = self.groups(solid, np.ones(solid.count, bool))
         cups = [c for c in self.shut(empty, False) if self.height(c) >= self.limits.deep]
         traps = self.shut(empty, True)
         real = [i for i in islands if i.area >= self.limits.speck]
@@ -213,7 +213,7 @@ class _Collector:
             largest_overhang=float(overhang.max(initial=0)),
             cups=cups,
             traps=traps,
-            cavities=[c for c in self.found(empty, empty.sealed()) if c.area >= self.limits.speck],
+            cavities=[c for c in self.groups(empty, empty.sealed()) if c.area >= self.limits.speck],
             walls=widths_of(*np.concatenate(walls).T),
             gaps=widths_of(*np.concatenate(gaps).T),
             overhang=max(far, key=lambda o: o.reach, default=None),
@@ -224,13 +224,13 @@ class _Collector:
         report.problems.extend([*([unfit] if unfit else []), *problems_of(report, stack, self.limits)])
         return report
 
-    def found(self, graph: Graph, chosen: np.ndarray) -> list[Feature]:
+    def groups(self, graph: Graph, chosen: np.ndarray) -> list[Feature]:
         """Chosen nodes as connected groups."""
         return graph.groups(chosen, self.stack.heights, self.stack.pixel, self.stack.shape)
 
     def shut(self, hollows: Graph, backwards: bool) -> list[Feature]:
         """Large groups of shut nodes, see `Graph.shut`."""
-        return [p for p in self.found(hollows, hollows.shut(backwards)) if p.area >= self.limits.cup]
+        return [p for p in self.groups(hollows, hollows.shut(backwards)) if p.area >= self.limits.cup]
 
     def height(self, part: Feature) -> float:
         """Height of a group, mm."""

@@ -85,7 +85,7 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
         at = (*far.at, _bottom(stack, far.layer))
         problems.append(Problem("overhangs", text, far.layer, at, advice=f"--up, or {SUPPORTS}"))
     if report.neck and report.neck.ratio > limits.neck:
-        problems.append(_weak(report.neck, stack, limits))
+        problems.append(_narrow_neck(report.neck, stack, limits))
     if report.cavities:
         sealed = counted(report.cavities, "sealed cavity", "sealed cavities")
         text = f"{sealed} with {sum(c.volume for c in report.cavities):.3g} mm3 of resin"
@@ -100,7 +100,7 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
     return [*problems, *report.solid.thin]
 
 
-def _weak(neck: Neck, stack: Stack, limits: Limits) -> Problem:
+def _narrow_neck(neck: Neck, stack: Stack, limits: Limits) -> Problem:
     """Problem of a cross-section that is too small for what it carries."""
     at = (*neck.at, _bottom(stack, neck.layer))
     if neck.layer == 0:

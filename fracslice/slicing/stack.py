@@ -172,17 +172,17 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     upright = oriented(root, job.up, job.sizing.stretch, work)
     planned = plan(upright, job.sizing.longest / min(job.pixel), work)
     planned, scale = printable(planned, job.sizing, job.printing, work)
-    found, outer = planned.box, planned.outer
-    mm = tuple(s * scale for s in found.size)
+    box, outer = planned.box, planned.outer
+    mm = tuple(s * scale for s in box.size)
     shape, corner = [0, 0], [0.0, 0.0]
     for axis in range(2):
         step = job.pixel[axis] / scale
         shape[1 - axis] = 2 * math.ceil(outer.size[axis] / step / 2 + 1)
-        corner[axis] = found.centre[axis] - step * shape[1 - axis] / 2
+        corner[axis] = box.centre[axis] - step * shape[1 - axis] / 2
     tops = _tops(mm[2], job.layer)
     if max(shape) > MOST_PIXELS:
         raise SliceError(f"{shape[1]} x {shape[0]} pixels: at most {MOST_PIXELS} along a side")
-    z = found.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
+    z = box.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
     pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounded(mm[2], float(tops[-1])))
     return Stack(planned.root, scale, at, job.pixel, pixels, z, tops, size, outer, notes, planned.drains)

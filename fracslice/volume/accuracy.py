@@ -108,7 +108,8 @@ def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | No
     Cancelled
         If the job was cancelled.
     """
-    kernel, h = root.kernel("cpu", "float64"), REACH * voxel
+    work = work or Work()
+    kernel, h = root.kernel(work.device, "float64"), REACH * voxel
     error = np.empty(len(points))
 
     def task(part: slice) -> None:
@@ -131,5 +132,5 @@ def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | No
             steep[flat] = np.maximum(steep[flat], slopes(flat, way))
         error[part] = np.minimum(np.abs(f) / np.maximum(steep, 1e-30), voxel)
 
-    (work or Work()).map(task, chunks(len(points), 1 << 14))
+    work.map(task, chunks(len(points), kernel.batch >> 3))
     return error

@@ -138,15 +138,15 @@ def _part(
         share[part] = inside.mean(axis=1)
         return points[:, inside]
 
-    found = work.collect(task, chunks(count, max(AT_ONCE // each, 1)))
+    pieces = work.collect(task, chunks(count, max(AT_ONCE // each, 1)))
     error = math.sqrt(float((share * (1 - share)).sum()) / (each - 1))
-    inside = np.concatenate([np.empty((3, 0)), *found], axis=1)
+    inside = np.concatenate([np.empty((3, 0)), *pieces], axis=1)
     return VolumeEstimate(cell * (whole + float(share.sum())), cell * error, inside)
 
 
 def finer(
     root: Field,
-    found: VolumeEstimate,
+    estimate: VolumeEstimate,
     off: float,
     origin: tuple[float, float, float],
     spacing: tuple[float, float, float],
@@ -162,7 +162,7 @@ def finer(
     ----------
     root
         Field.
-    found
+    estimate
         Volume estimate of the object.
     off
         Relative volume error of the samples.
@@ -177,7 +177,7 @@ def finer(
         Factor from `FINER`; None if none suffices.
     """
     kernel, rng = root.kernel(), np.random.default_rng(1)
-    points = found.inside[:, rng.integers(found.inside.shape[1], size=SEEN)]
+    points = estimate.inside[:, rng.integers(estimate.inside.shape[1], size=SEEN)]
 
     def lost(times: float) -> float:
         step = np.array(spacing)[:, None, None] / times

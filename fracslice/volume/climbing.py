@@ -13,7 +13,7 @@ SLANTS = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), 0.1 ** np.arange(0, 3.5, 0
 
 
 def climb(
-    kernel: Kernel, starts: np.ndarray, ways: np.ndarray, first: float, exact: float, work: Work
+    kernel: Kernel, starts: np.ndarray, steps: np.ndarray, first: float, exact: float, work: Work
 ) -> np.ndarray:
     """Move interior points outwards as far as possible.
 
@@ -26,7 +26,7 @@ def climb(
         Kernel of the field.
     starts
         Interior points for each of n directions, float64 [3, n, k].
-    ways
+    steps
         `SLANTS` rotated to each direction, [3, n, w].
     first, exact
         First and last step length.
@@ -44,5 +44,5 @@ def climb(
         If the job was cancelled.
     """
     work.check()
-    starts, ways = np.ascontiguousarray(starts), np.ascontiguousarray(ways)
-    return climbed(kernel.entry, starts, ways, SLANTS[2], first, exact, work.threads)
+    starts, steps = np.ascontiguousarray(starts), np.ascontiguousarray(steps)
+    return climbed(kernel.entry, starts, steps, SLANTS[2], first, exact, work.threads)

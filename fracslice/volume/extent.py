@@ -45,7 +45,7 @@ EXACT = 2.5e-7
 SIGNS = np.repeat([-1, 1], 3)
 """Outward signs of the sides -x, -y, -z, x, y and z."""
 
-WAYS = np.stack([sign * np.roll(SLANTS, side % 3 - 2, 0) for side, sign in enumerate(SIGNS)], 1)
+STEPS = np.stack([sign * np.roll(SLANTS, side % 3 - 2, 0) for side, sign in enumerate(SIGNS)], 1)
 """Steps of the sides, [3, 6, w]."""
 
 BENEATH = np.array([0.0, 1e-3, 0.01, 0.1, 0.5])
@@ -101,7 +101,7 @@ def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
     Cancelled
         If the job was cancelled.
     """
-    box, found = root.bounds.box, None
+    box, result = root.bounds.box, None
     if box.empty:
         raise VolumeError("the scene is empty: its elements have no point in common")
     if not box.finite:
@@ -111,13 +111,13 @@ def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
         raise VolumeError(f"the scene has no end along {along}; put <bounds> around it{state}")
     search = _Search(root, work or Work())
     for _ in range(TURNS):
-        found = search.extent(box, resolution)
-        if found and max(found.outer.size) > max(box.size) / 2:
-            return found
-        box = found.outer if found else box.grown(max(box.size) / 2)
-    if not found:
+        result = search.extent(box, resolution)
+        if result and max(result.outer.size) > max(box.size) / 2:
+            return result
+        box = result.outer if result else box.grown(max(box.size) / 2)
+    if not result:
         raise VolumeError("the object has no end that could be found; put <bounds> around it")
-    return found
+    return result
 
 
 def reached(root: Field, points: np.ndarray, voxel: float, work: Work | None = None) -> Box:
@@ -181,7 +181,7 @@ class _Search:
 
     def climb(self, sides: Sides, first: float, exact: float) -> None:
         """Move the tips of all sides outwards."""
-        sides.learn(climb(self.kernel, sides.best, WAYS, first, exact, self.work))
+        sides.learn(climb(self.kernel, sides.best, STEPS, first, exact, self.work))
 
     def extent(self, box: Box, resolution: float) -> Extent | None:
         """Extent of the object if `box` contains it, else None."""
@@ -209,9 +209,9 @@ class _Search:
         outwards = SIGNS.reshape(2, 3)
         if (outwards * (reach - limits) > longest_out).any():
             return None
-        found = _box(np.where(np.abs(reach - limits) <= 2 * exact, limits, reach + outwards * exact / 2))
-        outer = _box(above) | found.grown(exact)
-        return Extent(found, outer.about(found.centre), np.ascontiguousarray(sides.best[:, :, 0]))
+        inner = _box(np.where(np.abs(reach - limits) <= 2 * exact, limits, reach + outwards * exact / 2))
+        outer = _box(above) | inner.grown(exact)
+        return Extent(inner, outer.about(inner.centre), np.ascontiguousarray(sides.best[:, :, 0]))
 
 
 def _learn(sides: Sides, points: np.ndarray) -> None:

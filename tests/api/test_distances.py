@@ -16,10 +16,10 @@ SHAPE = (box() - sphere(0.6)).twist(40) + (0.1, 0, 0)
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_it_is_the_reference_in_the_points_own_precision(dtype: type) -> None:
     points = np.random.default_rng(1).uniform(-1, 1, (7, 11, 3)).astype(dtype)
-    found = SHAPE.distance(points)
-    assert (found.dtype, found.shape) == (points.dtype, (7, 11))
+    result = SHAPE.distance(points)
+    assert (result.dtype, result.shape) == (points.dtype, (7, 11))
     limit = 1e-6 if dtype == np.float32 else 1e-13
-    np.testing.assert_allclose(found, reference(SHAPE)(*np.moveaxis(points, -1, 0)), rtol=0, atol=limit)
+    np.testing.assert_allclose(result, reference(SHAPE)(*np.moveaxis(points, -1, 0)), rtol=0, atol=limit)
 
 
 def test_any_numbers_are_points() -> None:

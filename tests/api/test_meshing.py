@@ -108,11 +108,11 @@ def test_the_signature_lists_every_keyword() -> None:
     assert set(WorkOptions.__annotations__) <= {f.name for f in fields(Work)} & names
 
 
-def test_progress_is_told_and_work_is_cancelled() -> None:
-    told: list[tuple[str, float]] = []
-    make_mesh(SHAPE, resolution=12, progress=lambda stage, share: told.append((stage, share)))
-    assert {"planning", "sampling", "meshing", "checking"} <= {stage for stage, _ in told}
-    assert all(0 <= share <= 1 for _, share in told)
+def test_progress_is_reported_and_work_is_cancelled() -> None:
+    reported: list[tuple[str, float]] = []
+    make_mesh(SHAPE, resolution=12, progress=lambda stage, share: reported.append((stage, share)))
+    assert {"planning", "sampling", "meshing", "checking"} <= {stage for stage, _ in reported}
+    assert all(0 <= share <= 1 for _, share in reported)
     stop = threading.Event()
     stop.set()
     with pytest.raises(Cancelled):

@@ -45,7 +45,7 @@ def test_the_scene_and_the_keywords_say_how() -> None:
     assert np.array_equal(by_scene, render(SHAPE, size=(20, 10), samples=1, camera=view.camera, device="cpu"))
 
 
-def test_progress_is_told_and_work_is_cancelled() -> None:
+def test_progress_is_reported_and_work_is_cancelled() -> None:
     reported: list[tuple[str, float]] = []
     render(SHAPE, size=(16, 16), samples=2, progress=lambda stage, share: reported.append((stage, share)))
     assert reported[-1] == ("rendering", 1.0)

@@ -38,9 +38,9 @@ def test_the_signature_is_the_registrys(name: str) -> None:
     elements = [] if formula.kind == "shape" and name != "orbit" else ["elements"]
     assert {*signature.parameters} == {*elements, *map(python_name, formula.parameters)}
     for parameter, kind in formula.parameters.items():
-        found = signature.parameters[python_name(parameter)]
-        assert found.default == (inspect.Parameter.empty if kind.default is REQUIRED else kind.default)
-        assert found.kind is (found.KEYWORD_ONLY if elements else found.POSITIONAL_OR_KEYWORD)
+        result = signature.parameters[python_name(parameter)]
+        assert result.default == (inspect.Parameter.empty if kind.default is REQUIRED else kind.default)
+        assert result.kind is (result.KEYWORD_ONLY if elements else result.POSITIONAL_OR_KEYWORD)
         assert kind.doc in formula.__doc__
     assert signature.return_annotation is formulas.Node
     assert formula.doc.splitlines()[0] in pydoc.render_doc(formula)

@@ -111,7 +111,7 @@ def test_values_that_cannot_be_are_named(options: dict, error: type, message: st
         slice_layers(box(), **options)
 
 
-def test_progress_is_told() -> None:
+def test_progress_is_reported() -> None:
     reported: list[tuple[str, float]] = []
     slices = slice_layers(box(), layer=0.1, progress=lambda stage, share: reported.append((stage, share)))
     list(slices)

@@ -32,9 +32,9 @@ def peer(tmp_path: Path) -> str:
 
 
 def test_errors_are_those_of_the_mesh():
-    found = errors(shapes.sphere(1.01, level=5), WORKLOADS["sphere"], 240)
-    assert found["error_voxels"] == pytest.approx(1, rel=0.03), "a voxel is 0.01 there"
-    assert found["volume"] == pytest.approx(1.01**3 - 1, abs=0.003)
+    result = errors(shapes.sphere(1.01, level=5), WORKLOADS["sphere"], 240)
+    assert result["error_voxels"] == pytest.approx(1, rel=0.03), "a voxel is 0.01 there"
+    assert result["volume"] == pytest.approx(1.01**3 - 1, abs=0.003)
 
 
 def test_samples_lie_evenly_on_the_mesh():
@@ -73,16 +73,16 @@ def test_the_command_writes_page_numbers_and_plots(tmp_path, peer, capfd):
     assert "report.md: 5 measurements" in capfd.readouterr().out
 
 
-def test_a_peer_that_fails_is_told_and_the_rest_goes_on():
+def test_a_peer_that_fails_is_reported_and_the_rest_goes_on():
     broken = Peer.read(f"broken={sys.executable} -c 1/0 {{workload}} {{resolution}} {{output}}")
     missing = Peer.read("missing=/no/such/program {workload} {resolution} {output}")
-    found = measure(Task(("sphere",), (16,), (broken, missing), repeats=1), Work())
-    failed = {one.method: one.failed for one in found if one.failed}
+    result = measure(Task(("sphere",), (16,), (broken, missing), repeats=1), Work())
+    failed = {one.method: one.failed for one in result if one.failed}
     assert failed == {
         "broken": "ZeroDivisionError: division by zero",
         "missing": "/no/such/program: No such file or directory",
     }
-    assert any(one.method == "exact" and one.numbers for one in found)
+    assert any(one.method == "exact" and one.numbers for one in result)
 
 
 @pytest.mark.parametrize(

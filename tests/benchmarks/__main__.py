@@ -25,13 +25,13 @@ FOLDER = Path(__file__).parent
 
 def summaries() -> dict[str, str]:
     """The first line of every benchmark's docstring, by its name; modules with `rows` are benchmarks."""
-    found = {}
+    result = {}
     for path in sorted(FOLDER.glob("*/*.py")):
         text = path.read_text(encoding="utf-8")
         if "\ndef rows(" in text:
             lines = (ast.get_docstring(ast.parse(text)) or "").splitlines()
-            found[f"{path.parent.name}.{path.stem}"] = lines[0]
-    return found
+            result[f"{path.parent.name}.{path.stem}"] = lines[0]
+    return result
 
 
 def load(name: str) -> ModuleType:
@@ -80,12 +80,12 @@ def machine() -> dict[str, Any]:
 
 def measure(module: ModuleType, run: Run, given: dict[str, Any]) -> list[Row]:
     """All rows of a benchmark, counted on standard error while they come."""
-    found: list[Row] = []
+    result: list[Row] = []
     with Console(stderr=True).status(module.__name__) as status:
         for row in module.rows(run, **given):
-            found.append(row)
-            status.update(f"{module.__name__}: {len(found)} rows")
-    return found
+            result.append(row)
+            status.update(f"{module.__name__}: {len(result)} rows")
+    return result
 
 
 def shown(name: str, rows: list[Row]) -> Table:

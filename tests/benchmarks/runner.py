@@ -86,13 +86,13 @@ class Run:
         warm : bool
             Whether each runs once before.
         """
-        found = Measured({name: [] for name in acts})
+        result = Measured({name: [] for name in acts})
         for turn in range(-int(warm), self.runs):
             for name, act in acts.items():
                 figures = timed(act)
                 if turn >= 0:
-                    found[name].append(figures)
-        return found
+                    result[name].append(figures)
+        return result
 
 
 def timed(act: Callable[[], Any]) -> Figures:

@@ -22,12 +22,12 @@ CAMERA = Camera(eye=(1.9, -2.3, 1.2), fov=50)
 
 def evaluations() -> dict[str, float]:
     """By workload: evaluations per kept sample, per pixel that a contour cuts, and per ray that hits."""
-    found = {}
+    result = {}
     for name, root in WORKLOADS.items():
-        found[f"{name}: evaluations per kept sample, {VOXELS} voxels"] = per_sample(root)
-        found[f"{name}: evaluations per cut pixel, {PIXELS} pixels"] = per_pixel(root)
-        found[f"{name}: steps per ray that hits"] = per_ray(root)
-    return found
+        result[f"{name}: evaluations per kept sample, {VOXELS} voxels"] = per_sample(root)
+        result[f"{name}: evaluations per cut pixel, {PIXELS} pixels"] = per_pixel(root)
+        result[f"{name}: steps per ray that hits"] = per_ray(root)
+    return result
 
 
 def per_sample(root: Node) -> float:

@@ -24,13 +24,13 @@ _JUMP = re.compile(r"^\tj\w+\t(\.\w+)")
 
 def instructions() -> dict[str, int]:
     """By workload and float width: instructions of the kernel's hot loop and of all of it."""
-    found = {}
+    result = {}
     for name, root in WORKLOADS.items():
         for bits in LANES:
             hot, whole = sizes(assembly(link(root), bits))
-            found[f"{name}: instructions of the hot loop, float{bits}"] = hot
-            found[f"{name}: instructions of the kernel, float{bits}"] = whole
-    return found
+            result[f"{name}: instructions of the hot loop, float{bits}"] = hot
+            result[f"{name}: instructions of the kernel, float{bits}"] = whole
+    return result
 
 
 def assembly(linked: Linked, bits: int, loops: Sequence[Loop] = (points,)) -> list[str]:

@@ -16,8 +16,8 @@ TOLERANCE = 0.03
 
 def budgets() -> dict[str, float]:
     """The recorded counts."""
-    found: dict[str, float] = json.loads(PATH.read_text())
-    return found
+    result: dict[str, float] = json.loads(PATH.read_text())
+    return result
 
 
 def counts() -> dict[str, float]:
@@ -25,10 +25,10 @@ def counts() -> dict[str, float]:
     return {**evaluations(), **instructions()}
 
 
-def exceeded(found: Mapping[str, float], allowed: Mapping[str, float]) -> list[str]:
+def exceeded(result: Mapping[str, float], allowed: Mapping[str, float]) -> list[str]:
     """A line for every count that is more than its budget and the tolerance, or has no budget."""
     return [
         f"{name}: {count:g}, budget {allowed.get(name, 0):g}"
-        for name, count in found.items()
+        for name, count in result.items()
         if not count <= allowed.get(name, 0) * (1 + TOLERANCE)
     ]

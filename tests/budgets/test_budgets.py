@@ -18,19 +18,19 @@ X86 = platform.machine() in ("x86_64", "AMD64")
 
 
 def test_evaluations() -> None:
-    found = evaluations()
-    assert exceeded(found, budgets()) == []
-    assert set(found) == {name for name in budgets() if "instructions" not in name}
+    result = evaluations()
+    assert exceeded(result, budgets()) == []
+    assert set(result) == {name for name in budgets() if "instructions" not in name}
 
 
 @pytest.mark.skipif(not X86, reason="the code is compiled for x86-64")
 def test_instructions() -> None:
-    found = instructions()
-    assert exceeded(found, budgets()) == []
-    assert set(found) == {name for name in budgets() if "instructions" in name}
+    result = instructions()
+    assert exceeded(result, budgets()) == []
+    assert set(result) == {name for name in budgets() if "instructions" in name}
 
 
-def test_more_than_a_budget_is_told() -> None:
+def test_more_than_a_budget_is_reported() -> None:
     allowed = {"a": 2.0, "b": 100}
     assert exceeded({"a": 2.05, "b": 103}, allowed) == []
     assert exceeded({"a": 2.1, "b": 104, "c": 1}, allowed) == [

@@ -36,7 +36,7 @@ def test_a_small_job_imports_what_it_needs(job: str, tmp_path: Path) -> None:
     (tmp_path / "ball.xml").write_text(BALL)
     words = [sys.executable, "-c", MODULES, *JOBS[job]]
     run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
-    found = run.stdout.splitlines()[-1].split()
+    result = run.stdout.splitlines()[-1].split()
     for package in UNUSED[job]:
-        assert not [name for name in found if name == package or name.startswith(package + ".")], package
-    assert len(found) <= MOST[job]
+        assert not [name for name in result if name == package or name.startswith(package + ".")], package
+    assert len(result) <= MOST[job]

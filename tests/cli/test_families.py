@@ -19,9 +19,9 @@ def scene(tmp_path: Path) -> str:
 
 
 def test_values_of_ranges() -> None:
-    found = members(["a.p=2..3:0.5", "a.q=7", "b[2].r=1..-1:-1"])
-    assert [member.suffix for member in found][:4] == ["-p2-r1", "-p2-r0", "-p2-r-1", "-p2.5-r1"]
-    assert found[-1].settings == ("a.p=3", "a.q=7", "b[2].r=-1")
+    result = members(["a.p=2..3:0.5", "a.q=7", "b[2].r=1..-1:-1"])
+    assert [member.suffix for member in result][:4] == ["-p2-r1", "-p2-r0", "-p2-r-1", "-p2.5-r1"]
+    assert result[-1].settings == ("a.p=3", "a.q=7", "b[2].r=-1")
     assert [member.settings for member in members(["a.p=1..3"])] == [("a.p=1",), ("a.p=2",), ("a.p=3",)]
     assert len(members(["a.p=0..1:0.1"])) == 11
 

@@ -256,8 +256,8 @@ def test_a_memory_file_system(name: str, expected: dict[str, bytes], tmp_path: P
 
 def test_local_workers_are_processes(tmp_path: Path) -> None:
     with connected("local:2", str(tmp_path / "pieces"), 2) as pool:
-        found = pool.client.scheduler_info(n_workers=-1)["workers"].values()
-    assert [worker["nthreads"] for worker in found] == [1, 1]
+        result = pool.client.scheduler_info(n_workers=-1)["workers"].values()
+    assert [worker["nthreads"] for worker in result] == [1, 1]
 
 
 def test_a_client_of_dask_is_a_cluster(

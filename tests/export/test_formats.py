@@ -76,13 +76,13 @@ def test_3mf_passes_lib3mf_in_strict_mode(tmp_path: Path, mesh: Mesh) -> None:
     assert objects.GetCurrentMeshObject().IsManifoldAndOriented()
     assert objects.GetCurrentMeshObject().GetTriangleCount() == len(mesh.triangles)
     group = model.GetMetaDataGroup()
-    found = {
+    result = {
         group.GetMetaData(i).GetName(): group.GetMetaData(i).GetValue()
         for i in range(group.GetMetaDataCount())
     }
-    assert found["Title"] == METADATA["Title"]
-    assert found["scene_hash"] == "ab12"
-    assert found["Application"] == application()
+    assert result["Title"] == METADATA["Title"]
+    assert result["scene_hash"] == "ab12"
+    assert result["Application"] == application()
 
 
 def test_3mf_members_carry_no_time(tmp_path: Path) -> None:

@@ -33,9 +33,9 @@ def test_png_of_16_bits_reads_back(tmp_path: Path) -> None:
     reader = vtk.vtkPNGReader()
     reader.SetFileName(str(tmp_path / "a.png"))
     reader.Update()
-    found = vtk_to_numpy(reader.GetOutput().GetPointData().GetScalars())
-    assert found.dtype == np.uint16
-    assert (found.reshape(SHOWN.shape)[::-1] == np.round(SHOWN * np.float64(65535))).all()
+    result = vtk_to_numpy(reader.GetOutput().GetPointData().GetScalars())
+    assert result.dtype == np.uint16
+    assert (result.reshape(SHOWN.shape)[::-1] == np.round(SHOWN * np.float64(65535))).all()
 
 
 @pytest.mark.parametrize("ending", ["jpg", "jpeg", "webp"])
@@ -68,9 +68,9 @@ def test_tiff_holds_the_light_as_floats(tmp_path: Path) -> None:
     tifffile = pytest.importorskip("tifffile")
     light = SHOWN * 1000
     write_image(tmp_path / "a.tif", SHOWN, light, text={"Title": "a"})
-    found = tifffile.imread(tmp_path / "a.tif")
-    assert found.dtype == np.float32
-    assert (found == light).all()
+    result = tifffile.imread(tmp_path / "a.tif")
+    assert result.dtype == np.float32
+    assert (result == light).all()
 
 
 def test_exr_holds_the_light_as_floats_and_the_text(tmp_path: Path) -> None:

@@ -67,28 +67,28 @@ def picture() -> np.ndarray:
 def test_every_pixel_height_and_exposure_comes_back(case: str, most: float | None, tmp_path: Path) -> None:
     name, read, level = CASES[case]
     job = run(int((case.split() + ["1"])[1]), most)
-    found = read(write_slices(job, tmp_path / name).read_bytes())
+    result = read(write_slices(job, tmp_path / name).read_bytes())
     expected = list(Slicer(job.stack).map(job.screen.picture))
-    assert len(found.pictures) == job.layers
+    assert len(result.pictures) == job.layers
     assert job.layers < 24 if most else job.layers == 24
-    for one, other in zip(found.pictures, expected, strict=True):
+    for one, other in zip(result.pictures, expected, strict=True):
         assert (one == level(other)).all()
-    np.testing.assert_allclose(found.tops, job.stack.tops, rtol=1e-5)
-    np.testing.assert_allclose(found.exposures, RESIN.exposures(job.layers), rtol=1e-6)
-    assert found.exposures[:3] == pytest.approx([30, 30, 30 - 27.5 / 4])
-    for preview in found.previews:  # rendered: neither empty nor of one colour
+    np.testing.assert_allclose(result.tops, job.stack.tops, rtol=1e-5)
+    np.testing.assert_allclose(result.exposures, RESIN.exposures(job.layers), rtol=1e-6)
+    assert result.exposures[:3] == pytest.approx([30, 30, 30 - 27.5 / 4])
+    for preview in result.previews:  # rendered: neither empty nor of one colour
         assert len(np.unique(preview.reshape(-1, 3), axis=0)) > 50
     unit = 1000 if name.endswith(("goo", "prz")) else 1
     area = sum(image.sum() / 255 * h for image, h in zip(expected, job.stack.heights, strict=True))
-    assert found.about["volume"] * 1000 / unit == pytest.approx(area * 0.25**2, rel=1e-3)
+    assert result.about["volume"] * 1000 / unit == pytest.approx(area * 0.25**2, rel=1e-3)
 
 
 def test_pictures_that_are_compensated(tmp_path: Path) -> None:
     job = run(compensation=0.1)
     for name, read, level in (CASES["goo"], CASES["cbddlp"]):
-        found = read(write_slices(job, tmp_path / name).read_bytes())
+        result = read(write_slices(job, tmp_path / name).read_bytes())
         expected = list(Slicer(job.stack).map(job.screen.picture))
-        assert all((a == level(b)).all() for a, b in zip(found.pictures, expected, strict=True))
+        assert all((a == level(b)).all() for a, b in zip(result.pictures, expected, strict=True))
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -127,5 +127,5 @@ def test_goo_by_the_crate_goo(tmp_path: Path) -> None:
     path = write_slices(job, tmp_path / "part.goo")
     subprocess.run([crate / "target/release/layers", path, tmp_path / "pixels"], check=True)
     rows, columns = job.screen.shape
-    found = np.fromfile(tmp_path / "pixels", np.uint8).reshape(-1, rows, columns)
-    assert (found == list(Slicer(job.stack).map(job.screen.picture))).all()
+    result = np.fromfile(tmp_path / "pixels", np.uint8).reshape(-1, rows, columns)
+    assert (result == list(Slicer(job.stack).map(job.screen.picture))).all()

@@ -65,8 +65,8 @@ def test_which_file_a_printer_reads(name: str, output: str, expected: str) -> No
 
 
 def test_exposures_are_the_resins_and_the_layers() -> None:
-    found = [default_resin(printer(name), layer) for name in ("sl1", "sl1s") for layer in (0.025, 0.05, 0.1)]
-    assert [(r.exposure, r.bottom_exposure) for r in found if r] == [
+    result = [default_resin(printer(name), layer) for name in ("sl1", "sl1s") for layer in (0.025, 0.05, 0.1)]
+    assert [(r.exposure, r.bottom_exposure) for r in result if r] == [
         *((6, 35), (7.5, 35), (13, 45)),
         *((1.8, 25), (2, 25), (2.6, 25)),
     ]
@@ -84,10 +84,10 @@ def test_a_printer_of_ones_own(tmp_path: Path) -> None:
     machine = printer(str(path))
     assert (machine.name, machine.title, machine.pixels) == ("mine", "Mine", (1440, 2560))
     assert machine.pixel == pytest.approx((0.04725, 0.04725))
-    found = default_resin(machine, 0.05)
-    assert found is not None
-    assert (found.exposure, found.bottom_exposure) == (8, 60.5)
-    assert (found.lift, found.lift_speed, found.retract_speed, found.wait) == (6, 80, 210, 1.5)
+    result = default_resin(machine, 0.05)
+    assert result is not None
+    assert (result.exposure, result.bottom_exposure) == (8, 60.5)
+    assert (result.lift, result.lift_speed, result.retract_speed, result.wait) == (6, 80, 210, 1.5)
 
 
 @pytest.mark.parametrize(
@@ -133,8 +133,8 @@ def test_a_resin_profile_of_prusaslicer(tmp_path: Path) -> None:
         "bottle_cost = 0\nexposure_time = 2.4\nfaded_layers = 8\ninitial_exposure_time = 28\n"
         "material_density = 1.15\nmaterial_notes = LIFT_DISTANCE=8.0\\nLIFT_SPEED=2.5\\nRETRACT_SPEED=3\n"
     )
-    found = resin(str(path), printer("mars-5"), 0.05)
-    assert found == Resin(
+    result = resin(str(path), printer("mars-5"), 0.05)
+    assert result == Resin(
         2.4, 28, "Fast Grey", transition_layers=8, density=1.15, lift=8, lift_speed=150, retract_speed=180
     )
     path.write_text("exposure_time = fast\n")

@@ -50,8 +50,8 @@ def test_cli_by_colain(run: SliceRun, layers: np.ndarray, tmp_path: Path) -> Non
     reported = subprocess.run(
         [crate / "target/release/layers", path], check=True, capture_output=True, text=True
     )
-    found = np.array([line.split() for line in reported.stdout.splitlines()], float) * (1, 1e-6)
-    np.testing.assert_allclose(found, layers, rtol=1e-5)
+    result = np.array([line.split() for line in reported.stdout.splitlines()], float) * (1, 1e-6)
+    np.testing.assert_allclose(result, layers, rtol=1e-5)
 
 
 def drawn(data: bytes, background: str) -> np.ndarray:
@@ -73,5 +73,5 @@ def test_svg_by_librsvg(run: SliceRun, layers: np.ndarray, tmp_path: Path) -> No
         group = ET.Element(SVG, root.attrib)
         group.append(root[k])
         layered = drawn(ET.tostring(group), "black")
-        found = [alone.mean() * window, layered.mean() * window]
-        np.testing.assert_allclose(found, layers[k, 1], rtol=2e-3)
+        result = [alone.mean() * window, layered.mean() * window]
+        np.testing.assert_allclose(result, layers[k, 1], rtol=2e-3)

@@ -112,30 +112,30 @@ def test_3mf_by_lib3mf(tmp_path: Path, areas: np.ndarray) -> None:
     stacks = model.GetSliceStacks()
     assert stacks.MoveNext()
     stack = stacks.GetCurrentSliceStack()
-    found = []
+    result = []
     for k in range(stack.GetSliceCount()):
         layer = stack.GetSlice(k)
         points = np.array([tuple(v.Coordinates) for v in layer.GetVertices()])
         rings = [list(layer.GetPolygonIndices(i)) for i in range(layer.GetPolygonCount())]
         assert all(ring[0] == ring[-1] for ring in rings)
-        found.append(sum(shoelace(points[ring[:-1]]) for ring in rings))
+        result.append(sum(shoelace(points[ring[:-1]]) for ring in rings))
         assert layer.GetZTop() == pytest.approx(0.5 * (k + 1))
-    np.testing.assert_allclose(found, areas, rtol=1e-5)
+    np.testing.assert_allclose(result, areas, rtol=1e-5)
 
 
 def test_3mf_holds_the_object_itself(tmp_path: Path, areas: np.ndarray) -> None:
     """For programs that do not read slices: its mesh, of the same volume, where the slices are."""
     with zipfile.ZipFile(write_slices(run(), tmp_path / "part.3mf")) as archive:
         model = ET.fromstring(archive.read("3D/3dmodel.model"))
-    found = model.find(".//{*}object")
-    assert found is not None
+    result = model.find(".//{*}object")
+    assert result is not None
     assert (
-        found.attrib["{http://schemas.microsoft.com/3dmanufacturing/slice/2015/07}meshresolution"]
+        result.attrib["{http://schemas.microsoft.com/3dmanufacturing/slice/2015/07}meshresolution"]
         == "fullres"
     )
-    points = np.array([[float(v.attrib[a]) for a in "xyz"] for v in found.iterfind(".//{*}vertex")])
+    points = np.array([[float(v.attrib[a]) for a in "xyz"] for v in result.iterfind(".//{*}vertex")])
     corners = points[
-        [[int(t.attrib[v]) for v in ("v1", "v2", "v3")] for t in found.iterfind(".//{*}triangle")]
+        [[int(t.attrib[v]) for v in ("v1", "v2", "v3")] for t in result.iterfind(".//{*}triangle")]
     ]
     volume = np.linalg.det(corners).sum() / 6
     assert volume == pytest.approx(0.5 * areas.sum(), rel=0.01)
@@ -179,39 +179,39 @@ def test_cli_as_text(tmp_path: Path, areas: np.ndarray) -> None:
     assert lines[:2] == ["$$HEADERSTART", "$$ASCII"]
     assert lines[-1] == "$$GEOMETRYEND"
     assert "$$LAYERS/000024" in lines
-    found: list[float] = []
+    result: list[float] = []
     for line in lines:
         if line.startswith("$$LAYER/"):
-            found.append(0.0)
-            assert float(line[8:]) * 1e-3 == pytest.approx(0.5 * len(found))
+            result.append(0.0)
+            assert float(line[8:]) * 1e-3 == pytest.approx(0.5 * len(result))
         if line.startswith("$$POLYLINE/"):
             _, direction, count, *numbers = line[11:].split(",")
             ring = np.array(numbers, float).reshape(-1, 2) * 1e-3
             assert len(ring) == int(count)
             assert (ring[0] == ring[-1]).all()
             assert (shoelace(ring[:-1]) > 0) == (direction == "1")
-            found[-1] += shoelace(ring[:-1])
-    np.testing.assert_allclose(found, areas, rtol=1e-4)
+            result[-1] += shoelace(ring[:-1])
+    np.testing.assert_allclose(result, areas, rtol=1e-4)
 
 
 def test_cli_in_binary(tmp_path: Path, areas: np.ndarray) -> None:
     data = write_slices(run(), tmp_path / "part.cli", "cli-binary").read_bytes()
     at = data.index(b"$$HEADEREND") + len(b"$$HEADEREND")
-    found: list[float] = []
+    result: list[float] = []
     while at < len(data):
         (command,) = struct.unpack_from("<H", data, at)
         if command == 127:
-            assert struct.unpack_from("<f", data, at + 2)[0] * 1e-3 == pytest.approx(0.5 * len(found) + 0.5)
-            found.append(0.0)
+            assert struct.unpack_from("<f", data, at + 2)[0] * 1e-3 == pytest.approx(0.5 * len(result) + 0.5)
+            result.append(0.0)
             at += 6
         else:
             assert command == 130
             _, direction, count = struct.unpack_from("<iii", data, at + 2)
             ring = np.frombuffer(data, "<f4", 2 * count, at + 14).reshape(-1, 2) * 1e-3
             assert (shoelace(ring[:-1]) > 0) == (direction == 1)
-            found[-1] += shoelace(ring[:-1])
+            result[-1] += shoelace(ring[:-1])
             at += 14 + 8 * count
-    np.testing.assert_allclose(found, areas, rtol=1e-4)
+    np.testing.assert_allclose(result, areas, rtol=1e-4)
 
 
 def test_json(tmp_path: Path, areas: np.ndarray) -> None:

@@ -86,7 +86,7 @@ def test_inside_is_inside_for_large_bailouts(root: Node, precision: Precision) -
 
 @pytest.mark.parametrize("power", [2, 3, 8, 7.5, 12])
 def test_a_sure_distance_is_sure(power: float) -> None:
-    """Two steps of z^p + c in the complex plane: no point nearer than that is moved by `apart`."""
+    """Two steps of z^p + c in the complex plane: no point nearer than that is moved by `margin`."""
     rng = np.random.default_rng(1)
     start = rng.uniform(0.5, 1.1, 2000) * np.exp(1j * rng.uniform(-0.2, 0.2, 2000))
     c = rng.uniform(0, 1, 2000) + 0.2j
@@ -95,14 +95,14 @@ def test_a_sure_distance_is_sure(power: float) -> None:
         bend = bend + slope * (power - 1) / (2 * np.abs(w))
         slope = slope * power * np.abs(w) ** (power - 1)
         w = _step(w, power, c)
-    apart = np.abs(w) * 10 ** rng.uniform(-3, 3, len(start))
-    sure = sure_distance(apart, slope, bend)
+    margin = np.abs(w) * 10 ** rng.uniform(-3, 3, len(start))
+    sure = sure_distance(margin, slope, bend)
     direction = np.exp(2j * np.pi * rng.uniform(size=(200, len(start))))
     near = start + 0.999 * sure * direction
     moved = np.abs(_step(_step(near, power, c), power, c) - w)
-    assert (moved < apart).all() and (moved > 0.8 * apart).any()
+    assert (moved < margin).all() and (moved > 0.8 * margin).any()
 
 
 def _step(w: np.ndarray, power: float, c: np.ndarray) -> np.ndarray:
-    found: np.ndarray = w**power + c
-    return found
+    result: np.ndarray = w**power + c
+    return result

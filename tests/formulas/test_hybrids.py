@@ -34,8 +34,8 @@ SCENE = """<scene version="1">
 
 
 def inside(root: Node, points: np.ndarray) -> np.ndarray:
-    found: np.ndarray = reference(root)(*points) < 0
-    return found
+    result: np.ndarray = reference(root)(*points) < 0
+    return result
 
 
 @pytest.mark.parametrize(
@@ -77,9 +77,9 @@ def test_rounds_take_every_step_in_turn() -> None:
         r, theta, phi = np.sqrt((w**2).sum(0)), np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
         s = r * r * np.sin(2 * theta)
         x, y, z = s * np.cos(2 * phi) + 0.1, s * np.sin(2 * phi) + 0.2, r * r * np.cos(2 * theta)
-    found = np.sqrt(x * x + y * y + z * z) <= grown(root).escape
-    assert found.sum() > 50
-    assert (found == inside(root, points)).all()
+    result = np.sqrt(x * x + y * y + z * z) <= grown(root).escape
+    assert result.sum() > 50
+    assert (result == inside(root, points)).all()
 
 
 def test_numbers_compile_nothing() -> None:

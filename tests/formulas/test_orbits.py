@@ -157,15 +157,15 @@ def test_growth_is_found() -> None:
     "root", [mandelbox(iterations=9), mandelbox(scale=-1.5, iterations=9), bristorbrot(iterations=9)]
 )
 def test_orbits_do_not_come_back(root) -> None:  # type: ignore[no-untyped-def]
-    found, p = grown(root), RNG.uniform(-0.57, 0.57, (3, 20000)) * root.bounds.box.hi[0]
+    result, p = grown(root), RNG.uniform(-0.57, 0.57, (3, 20000)) * root.bounds.box.hi[0]
     taken, values = steps(root)
     step = image(taken, 0, values)
     w, gone = p, np.zeros(20000, bool)
     for _ in range(12):
         w = step(w, p)
         size = np.linalg.norm(w, axis=0)
-        assert (size[gone] > found.escape).all()
-        gone |= size > found.escape
+        assert (size[gone] > result.escape).all()
+        gone |= size > result.escape
 
 
 def test_orbits_that_stay_are_refused() -> None:

@@ -19,7 +19,7 @@ def test_tracebacks_name_the_formula_and_the_hook() -> None:
         if function.__module__.startswith("fracslice.")
     ]
     assert len(hooks) > 50
-    assert not [found for found, name in hooks if not found.strip("_").endswith(f"_{name}")]
+    assert not [result for result, name in hooks if not result.strip("_").endswith(f"_{name}")]
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

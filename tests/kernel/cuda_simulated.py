@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fracslice.kernel import cuda, reference
+from fracslice.mesh.roots import LOOPS, Roots
 from tests.examples import EXAMPLES
 
 TOLERANCE = {"float32": 2e-5, "float64": 1e-13}
@@ -19,6 +20,7 @@ def main() -> None:
             for precision in ("float32", "float64"):
                 points(name, cuda.compile_scene(root, precision), reference(root))
         bricks()
+        roots()
 
 
 def points(name: str, kernel: cuda.CudaKernel, expected: Callable[..., np.ndarray]) -> None:
@@ -40,6 +42,29 @@ def bricks() -> None:
     assert (alone == out).all()
     assert kernel.points(*np.empty((3, 0))).shape == (0,)
     kernel.bricks(corners[:0], (0, 0, 0), 1.0, out[:0])
+
+
+def roots() -> None:
+    """Loops over lanes, with a thread per lane, find the roots and normals of the lanes."""
+    root = EXAMPLES["mandelbulb"]
+    width = Roots(root, "float32", 0.02).width
+    directions = np.random.default_rng(5).normal(size=(3, width))
+    directions /= np.linalg.norm(directions, axis=0)
+    segments = np.concatenate([0.1 * directions, 2.0 * directions])
+    for precision, tolerance in (("float32", 1e-4), ("float64", 1e-9)):
+        rows = segments.astype(precision)
+        lanes, threads = (Roots(root, precision, 0.02, device) for device in ("cpu", "cuda"))
+        expected, computed = lanes.found(rows), threads.found(rows)
+        assert ((expected > 0) & (expected < 1)).all()
+        np.testing.assert_allclose(computed, expected, atol=tolerance)
+    polished = [np.tile(expected, (5, 1)) for _ in range(2)]
+    for out, device in zip(polished, ("cpu", "cuda"), strict=True):
+        root.loops(LOOPS["float64"], "float64", device).runs["polish"](lanes.frame, rows, out)
+    np.testing.assert_allclose(*polished, atol=1e-5)
+    regions = np.full((15, width), np.nan)
+    regions[:3], regions[3:9] = directions, 0.1
+    guesses = [Roots(root, "float32", 0.02, d).lead(regions.astype(np.float32)) for d in ("cpu", "cuda")]
+    np.testing.assert_allclose(*guesses, atol=1e-3)
 
 
 if __name__ == "__main__":

@@ -38,10 +38,10 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-
         path.write_text(text)
         spec = importlib.util.spec_from_file_location(name, path)
         assert spec and spec.loader
-        found = importlib.util.module_from_spec(spec)
-        monkeypatch.setitem(sys.modules, name, found)
-        spec.loader.exec_module(found)
-        return found
+        result = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, name, result)
+        spec.loader.exec_module(result)
+        return result
 
     yield run
     _REGISTRY.clear()

@@ -33,7 +33,7 @@ class Place(IntEnum):
 
 
 @dataclass(frozen=True)
-class Told:
+class Setup:
     deep: bool
     count: int
 
@@ -42,35 +42,35 @@ def doubled(v):  # type: ignore[no-untyped-def]
     return 2.0 * v
 
 
-def applied(v, function, told):  # type: ignore[no-untyped-def]
+def applied(v, function, setup):  # type: ignore[no-untyped-def]
     """A docstring."""
-    return function(v) if told.deep else v
+    return function(v) if setup.deep else v
 
 
 @loop("rn")
-def example(A, n, told):  # type: ignore[no-untyped-def]
-    A[Place.FIRST] = applied(A[0], doubled, told)
-    if not told.count:
+def example(A, n, setup):  # type: ignore[no-untyped-def]
+    A[Place.FIRST] = applied(A[0], doubled, setup)
+    if not setup.count:
         A[n] = STEP
-    parts = tuple(A[k] for k in range(told.count))
-    if told.count:
+    parts = tuple(A[k] for k in range(setup.count))
+    if setup.count:
         A[n] = parts[1]
 
 
 def test_what_a_loop_sees_is_constants_and_functions() -> None:
-    assert loop_source([example.fix(told=Told(True, 2))]) == (
+    assert loop_source([example.fix(setup=Setup(True, 2))]) == (
         "def l_doubled(v):\n    return 2.0 * v\n\n\n"
         "def l_applied(v):\n    return l_doubled(v)\n\n\n"
         "def example(A, n):\n    A[4] = l_applied(A[0])\n    parts = (A[0], A[1])\n    A[n] = parts[1]"
     )
-    assert loop_source([example.fix(told=Told(False, 0))]) == (
+    assert loop_source([example.fix(setup=Setup(False, 0))]) == (
         "def l_applied(v):\n    return v\n\n\n"
         "def example(A, n):\n    A[4] = l_applied(A[0])\n    A[n] = 3\n    parts = ()"
     )
 
 
 def test_copies_for_other_fixed_arguments_have_other_names() -> None:
-    deep, flat = (example.fix(told=Told(deep, 2)) for deep in (True, False))
+    deep, flat = (example.fix(setup=Setup(deep, 2)) for deep in (True, False))
     text = loop_source([deep, Loop(applied_flat, "r")])
     assert "def l_applied(v):" in text and "def l_applied_(v):" in text
     assert flat.name == "example"
@@ -80,7 +80,7 @@ def applied_flat(A):  # type: ignore[no-untyped-def]
     A[0] = applied(A[1], doubled, FLAT)
 
 
-FLAT = Told(False, 0)
+FLAT = Setup(False, 0)
 
 
 def wrong_keyword(A):  # type: ignore[no-untyped-def]
@@ -122,14 +122,14 @@ def test_packets_followed_by_python_are_those_of_the_machine_code(monkeypatch: p
     compiled = load_functions(NOTHING, 64, width, [follow])["follow"]
     for module in (intrinsics, lanes):
         monkeypatch.setattr(module, "WIDTH", width)
-    found = []
+    result = []
     for run, last in ((compiled, ()), (lanes.follow, (to_the_floor,))):
         own = rows.copy()
         packet, rays = np.zeros(len(lanes.Lane) * width), np.zeros(width, np.int32)
         run(own.ravel(), packet, rays, n, m, 20, np.ones(1), *last)
-        found.append(own)
-    np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
-    assert set(found[0][lanes.Row.status, :n]) == {1.0, 2.0, 3.0}
+        result.append(own)
+    np.testing.assert_allclose(result[0], result[1], rtol=1e-12)
+    assert set(result[0][lanes.Row.status, :n]) == {1.0, 2.0, 3.0}
 
 
 def test_roots_of_a_field_that_is_not_linked_move_as_the_compiled_ones_do() -> None:
@@ -143,17 +143,17 @@ def test_roots_of_a_field_that_is_not_linked_move_as_the_compiled_ones_do() -> N
         def kernel(self, device: str, precision: Precision) -> Kernel:  # type: ignore[override]
             return root.kernel(device, precision)  # type: ignore[arg-type]
 
-    ways = roots.Roots(root, "float64", voxel), roots.Roots(Plain(), "float64", voxel)  # type: ignore[abstract]
-    n = ways[0].width
+    finders = roots.Roots(root, "float64", voxel), roots.Roots(Plain(), "float64", voxel)  # type: ignore[abstract]
+    n = finders[0].width
     segments = np.zeros((6, n))
     segments[0], segments[1], segments[3] = 0.45, np.linspace(-0.3, 0.3, n), voxel
-    found = []
-    for way in ways:
+    result = []
+    for finder in finders:
         out = np.full((5, n), 0.25)
-        way._runs["polish"](way._frame, segments, out)
-        found.append(out)
-    np.testing.assert_allclose(found[1], found[0], atol=1e-9)
-    assert found[0][4].min() > 0.01
+        finder._runs["polish"](finder.frame, segments, out)
+        result.append(out)
+    np.testing.assert_allclose(result[1], result[0], atol=1e-9)
+    assert result[0][4].min() > 0.01
 
 
 def test_lanes_that_were_loaded_are_values() -> None:

@@ -66,7 +66,7 @@ def test_native_objects_refuse_other_loops() -> None:
 def test_arrays_become_addresses_in_one_place() -> None:
     package = Path(fracslice.__file__).parent
     address = re.compile(r"\.ctypes\b|c_void_p|__array_interface__|\bbyref\b|addressof|from_buffer")
-    found = {
+    result = {
         str(path.relative_to(package)) for path in package.rglob("*.py") if address.search(path.read_text())
     }
-    assert found == {"kernel/machine.py", "viewer/screen.py"}  # the latter names X11's result type
+    assert result == {"kernel/machine.py", "viewer/screen.py"}  # the latter names X11's result type

@@ -138,7 +138,7 @@ def test_threads_may_make_the_same_at_once(folder: Path) -> None:
     assert code() in made
 
 
-def test_planted_code_does_not_run_and_is_told_of_once(folder: Path, tmp_path: Path) -> None:
+def test_planted_code_does_not_run_and_is_reported_once(folder: Path, tmp_path: Path) -> None:
     """In a folder that all can write: a box under the name of a sphere."""
 
     def values(*shapes: str) -> subprocess.CompletedProcess[str]:
@@ -156,6 +156,6 @@ def test_planted_code_does_not_run_and_is_told_of_once(folder: Path, tmp_path: P
     (tmp_path / "planted").rename(kept)
     assert values("sphere()").stdout != right  # it would run
     folder.chmod(0o1777)
-    found = values("sphere()", "sphere(radius=0.5)", "box()")
-    assert found.stdout.startswith(right)
-    assert found.stderr.count("FracsliceWarning: ") == 1
+    result = values("sphere()", "sphere(radius=0.5)", "box()")
+    assert result.stdout.startswith(right)
+    assert result.stderr.count("FracsliceWarning: ") == 1

@@ -73,8 +73,8 @@ def test_report_is_json_with_the_verdict() -> None:
 
 
 def test_unwelded_copies_are_seen_as_a_slicer_sees_them() -> None:
-    apart = cube().corners.reshape(-1, 3)
-    report = check_mesh(Mesh(apart, np.arange(len(apart), dtype=np.int32).reshape(-1, 3)))
+    soup = cube().corners.reshape(-1, 3)
+    report = check_mesh(Mesh(soup, np.arange(len(soup), dtype=np.int32).reshape(-1, 3)))
     assert report.printable
     assert report.vertices == 8
 
@@ -119,7 +119,7 @@ def test_arrays_that_contradict_each_other_are_refused() -> None:
             call()
 
 
-def apart(p: np.ndarray, q: np.ndarray) -> bool:
+def separated(p: np.ndarray, q: np.ndarray) -> bool:
     """Whether two segments or triangles of integer points miss each other: some axis separates them."""
     edges = np.array([a - b for points in (p, q) for a, b in combinations(points, 2)])
     normals = np.cross(edges[:, None], edges).reshape(-1, 3)
@@ -132,9 +132,9 @@ def meet(points: np.ndarray, shared: int) -> bool:
     """Whether the triangles of the first three and the last three points meet beyond what they share."""
     s, t = points[:3], points[3 - shared :]
     if shared == 0:
-        return not apart(s, t)
+        return not separated(s, t)
     if shared == 1:  # what they share beyond the corner ends on a side opposite to it
-        return not (apart(s[:2], t) and apart(s, t[1:]))
+        return not (separated(s[:2], t) and separated(s, t[1:]))
     m, n = np.cross(s[2] - s[1], s[0] - s[1]), np.cross(s[2] - s[1], t[2] - s[1])
     return not np.cross(m, n).any() and m @ n > 0
 
@@ -142,15 +142,15 @@ def meet(points: np.ndarray, shared: int) -> bool:
 @pytest.mark.parametrize("shared", [0, 1, 2])
 def test_pairs_of_triangles_meet_as_integers_say(shared: int) -> None:
     """On a small grid, where most pairs touch, lie in one plane or miss each other narrowly."""
-    random, found = np.random.default_rng(shared), []
+    random, result = np.random.default_rng(shared), []
     for _ in range(1000):
         points = random.integers(-2, 3, (6 - shared, 3))
         triangles = np.array([[0, 1, 2], random.permutation(np.arange(3 - shared, 6 - shared))], np.int32)
         mesh = Mesh(points * 0.5, triangles)
         if len(np.unique(points, axis=0)) == len(points) and np.linalg.norm(mesh.normals, axis=1).all():
-            found.append(meet(points, shared))
-            assert self_intersecting_triangles(mesh).tolist() == [found[-1]] * 2, points.tolist()
-    assert 10 < sum(found) < len(found) - 10
+            result.append(meet(points, shared))
+            assert self_intersecting_triangles(mesh).tolist() == [result[-1]] * 2, points.tolist()
+    assert 10 < sum(result) < len(result) - 10
 
 
 def test_self_intersections_agree_with_meshlab() -> None:

@@ -60,9 +60,9 @@ def test_everything_stays_by_default() -> None:
 
 
 def test_cavities_belong_to_the_smallest_body_around_them() -> None:
-    found = shells(hollow_and_dust())
-    assert found.body.tolist() == [1, 1, 2, 2, 4, 5]
-    assert found.solid_volumes == pytest.approx([0, 992, 124, 0, 0.125, 0.001])
+    result = shells(hollow_and_dust())
+    assert result.body.tolist() == [1, 1, 2, 2, 4, 5]
+    assert result.solid_volumes == pytest.approx([0, 992, 124, 0, 0.125, 0.001])
 
 
 def test_the_largest_keeps_its_cavity() -> None:

@@ -48,7 +48,7 @@ def test_crossings_layer_by_layer_are_those_of_all_at_once() -> None:
 
 
 @pytest.mark.parametrize("step", [1e-9, 1e-6, 1e-3])
-def test_planes_almost_in_one_are_told_apart(step: float) -> None:
+def test_planes_almost_in_one_are_distinguished(step: float) -> None:
     """A brick's faces lie in planes less than a voxel apart and look both ways."""
     high = transform(box(size=(2, 1, 1)), translate=(0.5, 0, step))
     root = union(high, transform(box(size=(2, 1, 1)), translate=(-0.5, 0.2, 1 + step / 2)))

@@ -39,8 +39,8 @@ def test_bodies_that_overlap_are_united_and_shells_inside_are_cavities() -> None
 
 def test_a_mesh_is_planned_like_a_formula_and_its_key_is_its_triangles() -> None:
     field = field_of(trimesh.creation.icosphere(4, 1.0))
-    found, exact = plan(field, 64), plan(sphere(radius=1.0), 64)
-    assert found.box.size == pytest.approx(exact.box.size, abs=1e-5)
+    result, exact = plan(field, 64), plan(sphere(radius=1.0), 64)
+    assert result.box.size == pytest.approx(exact.box.size, abs=1e-5)
     assert field.key != field_of(trimesh.creation.icosphere(3, 1.0)).key
     assert np.isnan(field.kernel().points(np.array([np.nan]), np.zeros(1), np.zeros(1))).all()
 
@@ -50,10 +50,10 @@ def test_runs_of_points_far_near_and_scattered_have_the_distances_of_single_poin
     line = np.linspace(-9, 9, 70)
     spread = np.random.default_rng(0).uniform(-9, 9, (3, 200))
     points = np.ascontiguousarray(np.concatenate([np.stack([line, line / 3, 0 * line + 1], 1), spread.T]))
-    found = field.nearest.points(points)
+    result = field.nearest.points(points)
     alone = np.array([field.nearest.points(p[None])[0] for p in points])
     exact = trimesh.proximity.closest_point_naive(field.mesh.to_trimesh(), points)[1]
-    assert found == pytest.approx(alone, abs=1e-12) and found == pytest.approx(exact, abs=1e-9)
+    assert result == pytest.approx(alone, abs=1e-12) and result == pytest.approx(exact, abs=1e-9)
 
 
 def test_points_above_each_other_share_the_crossings_of_their_line() -> None:

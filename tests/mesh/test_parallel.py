@@ -42,21 +42,21 @@ def test_connected_components(threads: int) -> None:
 
 def test_sizes_of_components() -> None:
     labels, count = connected_components(LOOSE.triangles, N)
-    found = [component_sizes(LOOSE.vertices, LOOSE.triangles, labels, count, k) for k in THREADS]
+    result = [component_sizes(LOOSE.vertices, LOOSE.triangles, labels, count, k) for k in THREADS]
     of = labels[LOOSE.triangles[:, 0]]
     a, b, c = (LOOSE.vertices[LOOSE.triangles[:, k]] for k in range(3))
-    origin = LOOSE.vertices[found[0].outermost[of, 0]]
+    origin = LOOSE.vertices[result[0].outermost[of, 0]]
     expected = np.bincount(of, (np.cross(a - origin, b - origin) * (c - origin)).sum(1)) / 6
     for side in range(6):
         heights = (1 if side < 3 else -1) * LOOSE.vertices[:, side % 3]
         order = np.lexsort([heights, labels])
-        assert (found[0].outermost[:, side] == order[np.searchsorted(labels[order], np.arange(count))]).all()
-    for volumes, areas, vectors, _, flat in found:
+        assert (result[0].outermost[:, side] == order[np.searchsorted(labels[order], np.arange(count))]).all()
+    for volumes, areas, vectors, _, flat in result:
         assert np.allclose(volumes, expected, rtol=1e-9, atol=1e-9)
         assert np.allclose(areas, np.bincount(of, np.linalg.norm(LOOSE.normals, axis=1)) / 2)
         assert np.allclose(vectors[:, 2], np.bincount(of, LOOSE.normals[:, 2]) / 2)
         assert flat.sum() == (LOOSE.normals == 0).all(axis=1).sum()
-    assert len({b"".join(array.tobytes() for array in sizes) for sizes in found}) == 1
+    assert len({b"".join(array.tobytes() for array in sizes) for sizes in result}) == 1
 
 
 @pytest.mark.parametrize("threads", THREADS)
@@ -68,11 +68,11 @@ def test_corners_by_vertex(threads: int) -> None:
 
 @pytest.mark.parametrize("threads", THREADS)
 def test_selected(threads: int) -> None:
-    found = selected(LOOSE.vertices, LOOSE.triangles, SOME, threads)
-    assert found is not None
+    result = selected(LOOSE.vertices, LOOSE.triangles, SOME, threads)
+    assert result is not None
     used = np.unique(LOOSE.triangles[SOME])
-    assert (found[0] == LOOSE.vertices[used]).all()
-    assert (found[1] == np.searchsorted(used, LOOSE.triangles[SOME])).all()
+    assert (result[0] == LOOSE.vertices[used]).all()
+    assert (result[1] == np.searchsorted(used, LOOSE.triangles[SOME])).all()
     assert LOOSE.selected(SOME, threads).selected(np.ones(SOME.sum(), bool)).triangles is not None
     whole = cube()
     assert whole.selected(np.ones(12, bool)) is whole
@@ -81,17 +81,17 @@ def test_selected(threads: int) -> None:
 @pytest.mark.parametrize("threads", THREADS)
 def test_touching(threads: int) -> None:
     marked = RNG.random(N) < 0.01
-    found = touching(LOOSE.triangles, marked, threads)
-    assert (found == np.flatnonzero(marked[LOOSE.triangles].any(axis=1))).all()
+    result = touching(LOOSE.triangles, marked, threads)
+    assert (result == np.flatnonzero(marked[LOOSE.triangles].any(axis=1))).all()
 
 
 @pytest.mark.parametrize("threads", THREADS)
 def test_all_triangles_near_points_are_found_and_few_others(threads: int) -> None:
     points = np.random.default_rng(12).normal(size=(20, 3))
-    found = near(LOOSE.vertices, LOOSE.triangles, points, 0.1, threads)
+    result = near(LOOSE.vertices, LOOSE.triangles, points, 0.1, threads)
     off = np.abs(LOOSE.vertices[:, None] - points).max(axis=2).min(axis=1)
-    assert set(np.flatnonzero((off < 0.1)[LOOSE.triangles].any(axis=1))) <= set(found)
-    assert (off[LOOSE.triangles[found]].min(axis=1) < 0.21).all()
+    assert set(np.flatnonzero((off < 0.1)[LOOSE.triangles].any(axis=1))) <= set(result)
+    assert (off[LOOSE.triangles[result]].min(axis=1) < 0.21).all()
 
 
 def test_pointed_vertices_are_all_found_unless_there_are_too_many() -> None:
@@ -115,8 +115,8 @@ def test_the_surroundings_of_triangles_hold_all_that_they_meet() -> None:
     near = surroundings(mesh.vertices, mesh.triangles, among)
     assert among[near].sum() == among.sum() and len(near) < 1000
     whole = self_intersecting_triangles(mesh)
-    found = self_intersecting_triangles(mesh, among=among)
-    assert 0 < (found & among).sum() == (whole & among).sum()
+    result = self_intersecting_triangles(mesh, among=among)
+    assert 0 < (result & among).sum() == (whole & among).sum()
     assert not self_intersecting_triangles(mesh, among=~among & among).any()
 
 
@@ -128,11 +128,11 @@ def test_quantised_coordinates_and_what_is_displaced(threads: int) -> None:
     points[1000:2000] = -0.0
     mesh, keep = Mesh(points, LOOSE.triangles), np.ones(N, bool)
     quantised, displaced, _ = quantise(mesh, keep, planes=planes, threads=threads)
-    found = quantised.vertices
-    assert (found == points.astype(np.float32)).all() and not np.signbit(found[1000:2000]).any()
+    result = quantised.vertices
+    assert (result == points.astype(np.float32)).all() and not np.signbit(result[1000:2000]).any()
     low = planes[np.searchsorted(planes[:, 0], points, "right") - 1, 0].astype(np.float32)
     high = planes[np.searchsorted(planes[:, 0], points, "left"), 0].astype(np.float32)
-    kept = np.where(low == high, found == low, (low < found) & (found < high)).all(axis=1)
+    kept = np.where(low == high, result == low, (low < result) & (result < high)).all(axis=1)
     assert 0 < displaced.sum() < N / 2 and (displaced == ~kept).all()
     assert quantise(mesh, keep, threads=threads).displaced.all()
     far = quantise(mesh, keep, planes=planes, frame=(10, (0, 0, 0), -np.inf), threads=threads)
@@ -147,15 +147,15 @@ def test_quantised_are_the_triangles_that_stay_with_their_edits(threads: int) ->
     rows = np.sort(np.random.default_rng(3).choice(M, 1000, replace=False))
     corners = LOOSE.triangles[rows][:, [1, 2, 0]].copy()
     corners[::3] = -1
-    found = quantise(LOOSE, keep, edits=(rows, corners), frame=(2, (1, 2, 3), 0.5), threads=threads)
+    result = quantise(LOOSE, keep, edits=(rows, corners), frame=(2, (1, 2, 3), 0.5), threads=threads)
     edited = LOOSE.triangles.copy()
     edited[rows] = corners
     stay = np.flatnonzero((edited[:, 0] >= 0) & (of % 2 == 0))
     number = np.cumsum(keep) - 1
-    assert (found.mesh.triangles == number[edited[stay]]).all()
-    assert (found.mesh.vertices == placed(LOOSE.vertices[keep], (2, (1, 2, 3), 0.5))).all()
+    assert (result.mesh.triangles == number[edited[stay]]).all()
+    assert (result.mesh.vertices == placed(LOOSE.vertices[keep], (2, (1, 2, 3), 0.5))).all()
     there = np.flatnonzero(np.isin(rows, stay))
-    assert (stay[found.places[there]] == rows[there]).all() and (np.delete(found.places, there) == -1).all()
+    assert (stay[result.places[there]] == rows[there]).all() and (np.delete(result.places, there) == -1).all()
 
 
 def test_shells_in_shells() -> None:
@@ -183,9 +183,9 @@ def test_shells_in_shells() -> None:
 def test_stl_records() -> None:
     kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     flat = Mesh(LOOSE.vertices, np.concatenate([LOOSE.triangles, [[5, 5, 7]]]).astype(np.int32))
-    found = [stl(flat.vertices, flat.triangles, threads) for threads in THREADS]
-    assert all((other == found[0]).all() for other in found)
-    records = found[0].view(kind)[:, 0]
+    result = [stl(flat.vertices, flat.triangles, threads) for threads in THREADS]
+    assert all((other == result[0]).all() for other in result)
+    records = result[0].view(kind)[:, 0]
     corners = flat.vertices.astype(np.float32)[flat.triangles]
     assert (records["corners"] == corners).all() and not records["attribute"].any()
     lengths = np.linalg.norm(records["normal"].astype(float), axis=1)

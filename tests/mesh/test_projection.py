@@ -109,17 +109,17 @@ def test_trust_regions_are_the_interiors_of_cells_and_faces() -> None:
     features, cases = origin + voxel * grid, rng.integers(1, 255, 500).astype(np.uint8)
     to_means = rng.normal(0, 0.2, (500, 3)).astype(np.float32)
     which, inside = rng.permutation(500)[:200], rng.random(200) < 0.5
-    found = trust_regions(features, cases, to_means, which, inside, tuple(origin.tolist()), voxel, margin)
+    result = trust_regions(features, cases, to_means, which, inside, tuple(origin.tolist()), voxel, margin)
     flat = np.arange(3) == face[:, None]
     cell = np.floor(np.round(grid, 9))
     expected = origin + voxel * (cell + np.where(flat, 0, margin))
-    assert np.allclose(found[0].T, expected[which])
+    assert np.allclose(result[0].T, expected[which])
     expected = origin + voxel * (cell + np.where(flat, 0, 1 - margin))
-    assert np.allclose(found[1].T, expected[which])
-    middle = np.clip((features + voxel * to_means)[which], found[0].T, found[1].T)
-    assert np.allclose(found[3].T, middle)
+    assert np.allclose(result[1].T, expected[which])
+    middle = np.clip((features + voxel * to_means)[which], result[0].T, result[1].T)
+    assert np.allclose(result[3].T, middle)
     for k, row in enumerate(which):
-        corner = np.round((found[2][:, k] - origin) / voxel - cell[row]).astype(int)
+        corner = np.round((result[2][:, k] - origin) / voxel - cell[row]).astype(int)
         corners = [c for c in np.ndindex(2, 2, 2) if face[row] == 3 or c[face[row]] == 0]
         signs = {c: bool(cases[row] >> (c[0] + 2 * c[1] + 4 * c[2]) & 1) for c in corners}
         other = [c for c in corners if signs[c] != inside[k]]

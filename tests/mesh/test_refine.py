@@ -118,7 +118,7 @@ def test_curved_sharp_edges_are_followed() -> None:
     assert check_mesh(fine).printable
 
 
-def test_what_is_left_is_told() -> None:
+def test_what_is_left_is_reported() -> None:
     bulb = scene(mandelbulb(iterations=4), size="20mm", name="bulb")
     report = make_mesh(bulb, MeshJob(resolution=24, chord_mm=0.02)).report
     assert report.refined is not None and report.refined.left > 0 and report.refined.off_mm > 0.02

@@ -133,9 +133,9 @@ def test_samples_are_as_far_as_each_triangle_says():
         np.repeat(places, 3, axis=0) + 1e-9 * rng.uniform(size=(180, 3)),
         np.arange(180, dtype=np.int32).reshape(-1, 3),
     )
-    found = Nearest(other).samples(specks, 1.0, Work())
+    result = Nearest(other).samples(specks, 1.0, Work())
     naive = [min(naive_distance(p, *corners) for corners in other.corners) for p in places]
-    assert found == pytest.approx(naive, abs=1e-8)
+    assert result == pytest.approx(naive, abs=1e-8)
     assert Nearest(shapes.torus(), closed=True).samples(specks, 1.0, Work()) == pytest.approx(
         Nearest(shapes.torus()).samples(specks, 1.0, Work()), abs=1e-12
     )
@@ -145,17 +145,19 @@ def test_what_is_taken_out_can_be_put_back_in_any_order():
     ball = shapes.torus()
     collapse = Collapse(ball, 0.5)
     collapse.run(Work())
-    found, rng, rounds = collapse.found(), np.random.default_rng(2), 0
-    assert found.gone.mean() > 0.5
-    while found.changed.any():
-        collapse.undo(found.changed & (rng.uniform(size=len(found.gone)) < 0.1))
-        found, rounds = collapse.found(), rounds + 1
-        left = found.triangles[~found.gone]
+    result, rng, rounds = collapse.state(), np.random.default_rng(2), 0
+    assert result.gone.mean() > 0.5
+    while result.changed.any():
+        collapse.undo(result.changed & (rng.uniform(size=len(result.gone)) < 0.1))
+        result, rounds = collapse.state(), rounds + 1
+        left = result.triangles[~result.gone]
         _, *defects = edge_topology(left, len(ball.vertices))
         assert not any(defects) and len(np.unique(left)) == len(left) // 2, "a torus"
     assert rounds > 3, "not all at once"
-    assert np.array_equal(found.triangles, ball.triangles)
-    distances = [naive_distance(v, *ball.corners[t]) for v, t in zip(ball.vertices, found.owner, strict=True)]
+    assert np.array_equal(result.triangles, ball.triangles)
+    distances = [
+        naive_distance(v, *ball.corners[t]) for v, t in zip(ball.vertices, result.owner, strict=True)
+    ]
     assert max(distances) < 1e-12, "each vertex is near one of its own triangles again"
 
 

@@ -40,9 +40,9 @@ def both(
     mesh: Mesh, planes: np.ndarray, fresh: np.ndarray = NOTHING, threads: int = 2
 ) -> tuple[MeshReport, MeshReport]:
     """The report on a cleaned mesh by a search of its suspects, and by a search of all of it."""
-    found = cleaned(mesh, np.ones(len(mesh.vertices), bool), fresh, planes=planes, threads=threads)
-    whole, tally = check_mesh(found.mesh), Tally(threads)
-    tally.add(Finished.whole(found.mesh, found.suspects))
+    result = cleaned(mesh, np.ones(len(mesh.vertices), bool), fresh, planes=planes, threads=threads)
+    whole, tally = check_mesh(result.mesh), Tally(threads)
+    tally.add(Finished.whole(result.mesh, result.suspects))
     report = tally.report(whole.components, whole.cavities, whole.misplaced_shells)
     assert (report.volume_mm3, report.area_mm2) == pytest.approx((whole.volume_mm3, whole.area_mm2), rel=1e-3)
     return replace(report, volume_mm3=whole.volume_mm3, area_mm2=whole.area_mm2), whole

@@ -29,12 +29,12 @@ std::set<Segment> border(int number) {
     for (int t = 0; t < type.triangles; ++t) {
         for (int k = 0; k < 3; ++k) ++count[{type.corners[3 * t + k], type.corners[3 * t + (k + 1) % 3]}];
     }
-    std::set<Segment> found;
+    std::set<Segment> border;
     for (auto [segment, n] : count) {
         CHECK(n == 1);
-        if (!count.count({segment.second, segment.first})) found.insert(segment);
+        if (!count.count({segment.second, segment.first})) border.insert(segment);
     }
-    return found;
+    return border;
 }
 
 // The signs of a face's corners as those of the cell on its other side, where it is the opposite face.

@@ -62,16 +62,16 @@ TEST_CASE("a box that is not aligned with pixels: their exact shares") {
     CHECK(painted.partly == cut);
 
     // Solid runs are the pixels of at least half of which is inside.
-    const SolidRuns found = solid_runs(layer.slab, 40, 40);
-    REQUIRE(found.rows.size() == 41);
+    const SolidRuns solid_rows = solid_runs(layer.slab, 40, 40);
+    REQUIRE(solid_rows.rows.size() == 41);
     std::vector<uint8_t> solid(1600, 0);
     for (size_t y = 0; y < 40; ++y) {
-        for (int32_t r = found.rows[y]; r < found.rows[y + 1]; ++r) {
-            for (int32_t x = found.runs[size_t(r)][0]; x < found.runs[size_t(r)][1]; ++x) solid[40 * y + size_t(x)] = 1;
+        for (int32_t r = solid_rows.rows[y]; r < solid_rows.rows[y + 1]; ++r) {
+            for (int32_t x = solid_rows.runs[size_t(r)][0]; x < solid_rows.runs[size_t(r)][1]; ++x) solid[40 * y + size_t(x)] = 1;
         }
     }
     for (size_t i = 0; i < solid.size(); ++i) CHECK(bool(solid[i]) == (image[i] >= 128));
-    CHECK(found.painted.area == doctest::Approx(painted.area));
+    CHECK(solid_rows.painted.area == doctest::Approx(painted.area));
 }
 
 TEST_CASE("discs of many radii: the area, and each pixel's share") {

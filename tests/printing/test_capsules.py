@@ -27,8 +27,8 @@ def distance(start: np.ndarray, end: np.ndarray, points: np.ndarray) -> np.ndarr
 
 
 def on_sphere(radius: float, count: int) -> np.ndarray:
-    ways = np.random.default_rng(0).normal(size=(count, 3))
-    return np.asarray(radius * ways / np.linalg.norm(ways, axis=1)[:, None])
+    directions = np.random.default_rng(0).normal(size=(count, 3))
+    return np.asarray(radius * directions / np.linalg.norm(directions, axis=1)[:, None])
 
 
 @pytest.mark.parametrize(

@@ -38,8 +38,8 @@ def inside(made: Plan, points: np.ndarray) -> np.ndarray:
 
 
 def on_sphere(radius: float) -> np.ndarray:
-    ways = np.random.default_rng(0).normal(size=(5000, 3))
-    return np.asarray(radius * ways / np.linalg.norm(ways, axis=1)[:, None])
+    directions = np.random.default_rng(0).normal(size=(5000, 3))
+    return np.asarray(radius * directions / np.linalg.norm(directions, axis=1)[:, None])
 
 
 def components(made: Plan, voxels: float) -> tuple[Components, float]:
@@ -88,7 +88,7 @@ def test_what_floats_in_a_cavity_is_of_the_body_around_it() -> None:
 
 
 @pytest.mark.parametrize("then", [{"keep": "largest"}, {"bridge": 1}], ids=str)
-def test_cavities_and_bodies_are_told_by_the_same_samples(
+def test_cavities_and_bodies_are_distinguished_by_the_same_samples(
     then: dict[str, float | str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     looks = []

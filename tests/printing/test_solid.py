@@ -89,8 +89,8 @@ TWO = union(at(box(size=(0.45, 1, 1)), -0.275, 0, 0), at(box(size=(0.45, 1, 1)),
 def test_walls_of_known_thickness(root: Node, thick: float, longest: float | None) -> None:
     planned = plan(root, 100)
     solid = distances(planned)
-    found = walls(solid, 0.3, Work())
-    assert np.quantile(found.width, (0.05, 0.5)) == pytest.approx([thick] * 2, abs=planned.voxel)
+    result = walls(solid, 0.3, Work())
+    assert np.quantile(result.width, (0.05, 0.5)) == pytest.approx([thick] * 2, abs=planned.voxel)
 
 
 def test_a_cube_has_no_thin_walls_at_its_edges() -> None:
@@ -187,15 +187,15 @@ def checked(root: Node, size: float = SIZE) -> SolidReport:
     ],
 )
 def test_seeded_defects_are_found_and_clean_solids_not_blamed(root: Node, problem: str | None) -> None:
-    found = checked(root).problems
-    assert found == [] if problem is None else any(problem in str(p) for p in found)
+    result = checked(root).problems
+    assert result == [] if problem is None else any(problem in str(p) for p in result)
 
 
 TUBE = difference(cylinder(radius=0.8, height=1.6), cylinder(radius=0.7, height=2))
 
 
 @pytest.mark.parametrize(
-    ("root", "told", "width"),
+    ("root", "measured", "width"),
     [
         (shell(sphere(), thickness=0.1), "walls", 0.1),
         (transform(TUBE, rotate=(1, 2, 3, 37)), "walls", 0.1),
@@ -205,20 +205,20 @@ TUBE = difference(cylinder(radius=0.8, height=1.6), cylinder(radius=0.7, height=
     ],
     ids=["shell", "tube", "steep", "squeezed", "gap"],
 )
-def test_what_is_some_samples_thick_is_measured_on_the_field(root: Node, told: str, width: float) -> None:
+def test_what_is_some_samples_thick_is_measured_on_the_field(root: Node, measured: str, width: float) -> None:
     """Eight samples, about, of fields steeper than distances and flatter, too."""
     scale = SIZE / max(plan(root, 100).box.size)
-    found: Widths = getattr(checked(root), told)
-    assert found.thinnest_hundredth == pytest.approx(width * scale, rel=2e-3)
-    assert found.median == pytest.approx(width * scale, rel=1e-4)
+    result: Widths = getattr(checked(root), measured)
+    assert result.thinnest_hundredth == pytest.approx(width * scale, rel=2e-3)
+    assert result.median == pytest.approx(width * scale, rel=1e-4)
 
 
 def test_holes_of_a_sponge_are_measured() -> None:
     """Walls and gaps are a 27th wide, or two of them; counted in cells of the sponge."""
     report = checked(menger(level=3))
-    for found, area in ((report.walls, 4635.4), (report.gaps, 5267.5)):
-        assert found and found.thinnest_hundredth == pytest.approx(SIZE / 27, rel=0.02)
-        assert area * 0.55 < found.counts[14] < area  # from 0.70 to 0.75 mm
+    for result, area in ((report.walls, 4635.4), (report.gaps, 5267.5)):
+        assert result and result.thinnest_hundredth == pytest.approx(SIZE / 27, rel=0.02)
+        assert area * 0.55 < result.counts[14] < area  # from 0.70 to 0.75 mm
 
 
 def fin(width: float) -> tuple[Node, float]:
@@ -234,18 +234,18 @@ def slot(width: float) -> tuple[Node, float]:
 
 @pytest.mark.parametrize("tilt", [0.0, 17.0])
 @pytest.mark.parametrize("voxels", [0.3, 0.6, 1.0, 2.0, 2.9])
-@pytest.mark.parametrize(("made", "told"), [(fin, "walls"), (slot, "gaps")], ids=["wall", "gap"])
+@pytest.mark.parametrize(("made", "measured"), [(fin, "walls"), (slot, "gaps")], ids=["wall", "gap"])
 def test_what_is_thinner_than_the_samples_is_found(
-    made: Callable[[float], tuple[Node, float]], told: str, voxels: float, tilt: float
+    made: Callable[[float], tuple[Node, float]], measured: str, voxels: float, tilt: float
 ) -> None:
     """Its width, in voxels of the check, and its area."""
     width = voxels * 2.1 / 96
     root, area = made(width)
     report, scale = tilted(root, tilt)
-    found: Widths = getattr(report, told)
-    assert found.median == pytest.approx(width * scale, rel=0.02)
-    assert sum(found.counts) == pytest.approx(area * scale**2, rel=0.15)
-    assert told == "gaps" or report.thin_walls == pytest.approx(area * scale**2, rel=0.15)
+    result: Widths = getattr(report, measured)
+    assert result.median == pytest.approx(width * scale, rel=0.02)
+    assert sum(result.counts) == pytest.approx(area * scale**2, rel=0.15)
+    assert measured == "gaps" or report.thin_walls == pytest.approx(area * scale**2, rel=0.15)
 
 
 def tilted(root: Node, degrees: float) -> tuple[SolidReport, float]:
@@ -274,8 +274,8 @@ def test_walls_of_many_samples_are_thickened_alike() -> None:
 
 def test_gaps_thinner_than_the_samples_are_closed() -> None:
     """A gap of 0.1 mm where samples are 0.2 mm apart."""
-    apart = union(at(box(size=(1, 1, 0.995)), 0, 0, 0.5025), at(box(size=(1, 1, 0.995)), 0, 0, -0.5025))
-    thing, _ = printable(plan(apart, 96), Sizing(SIZE), Print(gap=0.5))
+    boxes = union(at(box(size=(1, 1, 0.995)), 0, 0, 0.5025), at(box(size=(1, 1, 0.995)), 0, 0, -0.5025))
+    thing, _ = printable(plan(boxes, 96), Sizing(SIZE), Print(gap=0.5))
     middle = thing.root.kernel("cpu", "float64").points(
         *np.array([[0.0, 0.2, -0.4], [0, 0.3, 0.1], [0, 0, 0]])
     )
@@ -383,8 +383,8 @@ from fracslice.formulas import sphere
 from fracslice.scene import Print, scene
 make_mesh(scene(sphere(), size="20mm", printing=Print(base=1, raft=1)), MeshJob(resolution=32))
 print("numba" in sys.modules)"""
-    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert said.stdout == "False\n"
+    printed = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert printed.stdout == "False\n"
 
 
 def test_a_raft_that_no_voxel_holds_is_refused() -> None:

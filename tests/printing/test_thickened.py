@@ -59,8 +59,8 @@ def test_crumbs_that_thickening_shows_are_joined() -> None:
 def test_a_strut_is_no_thinner_than_the_least_thickness() -> None:
     planned = made(union(box(size=(2, 2, 2)), at(sphere(radius=0.3), 0, 0, 1.8)), thickness=1.6, bridge=0.8)
     across = np.linspace(-1, 1, 2001) * 0.3
-    found = sample_points(planned, across, 0 * across, 1.25 + 0 * across) < 0
-    assert found.sum() * 0.3e-3 * SIZE / 3.1 == pytest.approx(1.6, abs=0.1)
+    result = sample_points(planned, across, 0 * across, 1.25 + 0 * across) < 0
+    assert result.sum() * 0.3e-3 * SIZE / 3.1 == pytest.approx(1.6, abs=0.1)
 
 
 def sample_points(planned: Plan, *points: np.ndarray) -> np.ndarray:
@@ -81,18 +81,18 @@ def test_thin_walls_of_a_fractal_are_found_by_coarse_samples_as_by_fine_ones() -
     root, areas = julia(iterations=6), []
     limit = 3 * plan(root, 48).voxel
     for resolution in (96, 192):
-        found = walls(Samples(sample_scene(plan(root, resolution))), limit, Work())
-        areas.append(found.area.sum())
+        result = walls(Samples(sample_scene(plan(root, resolution))), limit, Work())
+        areas.append(result.area.sum())
     assert areas[0] == pytest.approx(areas[1], rel=0.08)
 
 
 def test_walls_of_a_fractal_become_as_thick_as_asked() -> None:
     root = shell(julia(iterations=6), thickness=0.03)
     after, scale = printable(plan(root, 100), Sizing(SIZE), Print(thickness=1.2))
-    found = walls(Samples(sample_scene(after)), 3 / scale, Work())
-    order = np.argsort(found.width)
-    share = np.cumsum(found.area[order]) / found.area.sum()
-    assert found.width[order][np.searchsorted(share, 0.05)] * scale > 1.2 - 0.2
+    result = walls(Samples(sample_scene(after)), 3 / scale, Work())
+    order = np.argsort(result.width)
+    share = np.cumsum(result.area[order]) / result.area.sum()
+    assert result.width[order][np.searchsorted(share, 0.05)] * scale > 1.2 - 0.2
 
 
 def test_samples_of_a_union_are_those_of_both() -> None:

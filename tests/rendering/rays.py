@@ -41,8 +41,8 @@ def hits_sphere(eye: np.ndarray, d: np.ndarray, radius: float) -> np.ndarray:
 
 def hits_torus(eye: np.ndarray, d: np.ndarray, radius: float, tube: float) -> np.ndarray:
     """The least positive root of the quartic of each ray."""
-    found = np.full(d.shape[:2], np.nan)
-    for place in np.ndindex(found.shape):
+    result = np.full(d.shape[:2], np.nan)
+    for place in np.ndindex(result.shape):
         v = d[place]
         a, b, c = v @ v, 2 * eye @ v, eye @ eye + radius**2 - tube**2
         quartic = np.polymul([a, b, c], [a, b, c]) - np.pad(
@@ -51,20 +51,20 @@ def hits_torus(eye: np.ndarray, d: np.ndarray, radius: float, tube: float) -> np
         roots = np.roots(quartic)
         real = roots.real[(abs(roots.imag) < 1e-7) & (roots.real > 0)]
         if len(real):
-            found[place] = real.min()
-    return found
+            result[place] = real.min()
+    return result
 
 
 def hits_sponge(eye: np.ndarray, d: np.ndarray, level: int) -> np.ndarray:
     """The nearest entry into any of the 20^level cubes of a Menger sponge."""
-    found = np.full(d.shape[:2], np.inf)
+    result = np.full(d.shape[:2], np.inf)
     for centre in sponge(level):
         half = 3.0**-level
         with np.errstate(divide="ignore"):
             a, b = (centre - half - eye) / d, (centre + half - eye) / d
         enter, leave = np.minimum(a, b).max(2), np.maximum(a, b).min(2)
-        found = np.where((enter < leave) & (enter > 0), np.minimum(found, enter), found)
-    return np.where(np.isfinite(found), found, np.nan)
+        result = np.where((enter < leave) & (enter > 0), np.minimum(result, enter), result)
+    return np.where(np.isfinite(result), result, np.nan)
 
 
 def sponge(level: int) -> np.ndarray:

@@ -30,13 +30,13 @@ CLOSED = {
 @pytest.mark.parametrize("name", CLOSED)
 def test_depth_and_silhouette_are_those_of_the_closed_form(name: str) -> None:
     root, exact = CLOSED[name]
-    found = distances(root, CAMERA, SIZE)
+    result = distances(root, CAMERA, SIZE)
     wanted = exact(np.array(CAMERA.eye), directions(CAMERA, SIZE))
-    wrong = np.isnan(found) != np.isnan(wanted)
-    assert not (np.isnan(found) & ~np.isnan(wanted)).any(), "a ray that hits was missed"
+    wrong = np.isnan(result) != np.isnan(wanted)
+    assert not (np.isnan(result) & ~np.isnan(wanted)).any(), "a ray that hits was missed"
     assert wrong.mean() < 0.002, "the silhouette is too wide"
-    both = ~np.isnan(found) & ~np.isnan(wanted)
-    error = abs(wanted - found)[both] / (PIXEL * wanted[both])
+    both = ~np.isnan(result) & ~np.isnan(wanted)
+    error = abs(wanted - result)[both] / (PIXEL * wanted[both])
     assert np.median(error) < 0.2
     assert np.quantile(error, 0.99) < 0.5
 
@@ -64,13 +64,13 @@ def test_depth_is_within_half_a_pixel_of_the_root(name: str) -> None:
     else:
         root, camera = seen_from(name)
     size = (21, 15) if name == "abyss" else SIZE  # its rays take hundreds of steps
-    found, wanted = distances(root, camera, size), first_root(root, camera, size)
-    found[found > FAR] = np.nan
-    assert (np.isnan(found) != np.isnan(wanted)).mean() < 0.003
-    both = ~np.isnan(found) & ~np.isnan(wanted)
+    result, wanted = distances(root, camera, size), first_root(root, camera, size)
+    result[result > FAR] = np.nan
+    assert (np.isnan(result) != np.isnan(wanted)).mean() < 0.003
+    both = ~np.isnan(result) & ~np.isnan(wanted)
     pixel = 2 * np.tan(np.radians(camera.fov) / 2) / size[1] * wanted[both]
     assert both.mean() > 0.05
-    assert (abs(found - wanted)[both] < 0.5 * pixel).mean() >= 0.99
+    assert (abs(result - wanted)[both] < 0.5 * pixel).mean() >= 0.99
 
 
 def first_root(root: Node, camera: Camera, size: tuple[int, int]) -> np.ndarray:
@@ -81,14 +81,14 @@ def first_root(root: Node, camera: Camera, size: tuple[int, int]) -> np.ndarray:
     with np.errstate(divide="ignore"):
         a, b = (np.array(box.lo) - eye) / d, (np.array(box.hi) - eye) / d
     t, leave = np.maximum(np.minimum(a, b).max(1), 0), np.maximum(a, b).min(1)
-    found, left = np.full(len(d), np.nan), np.flatnonzero(t < leave)
+    result, left = np.full(len(d), np.nan), np.flatnonzero(t < leave)
     while left.size:
         clear = kernel.points(*(eye + t[left, None] * d[left]).T) / root.bounds.lipschitz
         least = 3e-5 * pixel * t[left]
-        found[left] = np.where(clear < least, t[left], np.nan)
+        result[left] = np.where(clear < least, t[left], np.nan)
         t[left] += np.maximum(clear, least)
         left = left[(clear >= least) & (t[left] < np.minimum(leave[left], FAR))]
-    return found.reshape(size[::-1])
+    return result.reshape(size[::-1])
 
 
 def test_a_wire_covers_its_own_width() -> None:
@@ -150,13 +150,13 @@ def test_glass_casts_no_opaque_shadow() -> None:
 def test_no_ray_passes_what_dense_sampling_finds(name: str) -> None:
     root = EXAMPLES[name]
     camera = Camera(eye=(2.1, -1.6, 1.3), fov=55)
-    found = distances(root, camera, SIZE)
+    result = distances(root, camera, SIZE)
     first = first_inside(root, np.array(camera.eye), directions(camera, SIZE))
     hit = np.isfinite(first)
     assert hit.mean() > 0.02
-    assert not np.isnan(found[hit]).any(), "a ray that hits was missed"
+    assert not np.isnan(result[hit]).any(), "a ray that hits was missed"
     pixel = 2 * np.tan(np.radians(camera.fov) / 2) / SIZE[1] * first[hit]
-    assert ((found - first)[hit] < pixel).all(), "a ray went through the surface"
+    assert ((result - first)[hit] < pixel).all(), "a ray went through the surface"
 
 
 def first_inside(root: Node, eye: np.ndarray, d: np.ndarray, step: float = 0.004) -> np.ndarray:

@@ -13,11 +13,11 @@ SCENE = scene(
 
 
 def test_every_element_of_the_name():
-    assert [n["power"] for n in found("mandelbulb", "mandelbulb.power=6")] == [6, 6]
+    assert [n["power"] for n in matching("mandelbulb", "mandelbulb.power=6")] == [6, 6]
 
 
 def test_the_nth_element_in_the_order_of_the_file():
-    changed = found("box", "box[2].round=0.25")
+    changed = matching("box", "box[2].round=0.25")
     assert [n["round"] for n in changed] == [0, 0.25]
     assert changed[1]["size"] == (2, 2, 2)
 
@@ -80,5 +80,5 @@ def test_bad_settings_say_what_is_expected(override, message):
     assert "\n" not in str(caught.value)
 
 
-def found(name, *settings):
+def matching(name, *settings):
     return [node for node in SCENE.with_values(settings).root.walk() if node.formula.name == name]

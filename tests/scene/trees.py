@@ -47,7 +47,7 @@ _POSSIBLE: dict[type, Any] = {
     Number: _number,
     Count: _count,
     Vector: _vector,
-    Choice: lambda kind: st.sampled_from(kind.words),
+    Choice: lambda kind: st.sampled_from(kind.choices),
     Axis: lambda kind: st.sampled_from("xyz"),
 }
 

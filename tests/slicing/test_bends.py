@@ -96,13 +96,13 @@ def meetings(contours: Contours) -> int:
     a, b = contours.points[order], contours.points[after[order]]
     low, high = np.minimum(a, b), np.maximum(a, b)
     last = np.searchsorted(low[:, 0], high[:, 0], side="right")
-    found = 0
+    result = 0
     for i, end in enumerate(last.tolist()):
         j = np.arange(i + 1, end)
         beside = (low[j, 1] <= high[i, 1]) & (high[j, 1] >= low[i, 1])
         j = j[beside & (after[order[j]] != order[i]) & (after[order[i]] != order[j])]
-        found += int((_parted(a[i], b[i], a[j], b[j]) & _parted(a[j], b[j], a[i], b[i])).sum())
-    return found
+        result += int((_parted(a[i], b[i], a[j], b[j]) & _parted(a[j], b[j], a[i], b[i])).sum())
+    return result
 
 
 def _parted(a: np.ndarray, b: np.ndarray, p: np.ndarray, q: np.ndarray) -> np.ndarray:

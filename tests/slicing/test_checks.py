@@ -86,13 +86,13 @@ def test_cup_that_is_open_above_and_trap_that_is_open_below() -> None:
     assert trap.traps[0].area == pytest.approx(25, rel=0.03)
 
 
-@pytest.mark.parametrize(("depth", "found"), [(0.4, 0), (0.6, 1)])
-def test_cups_on_the_plate_count_when_they_are_deep(depth: float, found: int) -> None:
+@pytest.mark.parametrize(("depth", "count"), [(0.4, 0), (0.6, 1)])
+def test_cups_on_the_plate_count_when_they_are_deep(depth: float, count: int) -> None:
     """A hole through all, with a way out to the sides `depth` mm above the plate."""
     hole, way = box(size=(0.5, 0.5, 3)), box(size=(2, 0.1, 0.1))
     limits = Limits(deep=0.5)
     report = checked(difference(CUBE, hole, at(way, 0, 0, -0.45 + depth / 10)), limits=limits)
-    assert len(report.cups) == len(report.problems) == found
+    assert len(report.cups) == len(report.problems) == count
 
 
 def test_a_drain_hole_ends_the_cup() -> None:

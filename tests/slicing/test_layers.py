@@ -53,11 +53,11 @@ def sampler_of(stack: Stack, bounds: Bounds | None = None) -> Sampler:
 
 def signs(sampler: Sampler, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Inside and known, bool [layers, y, x], of all samples."""
-    slab, found = sampler.slab(z), []
+    slab, result = sampler.slab(z), []
     for layer in range(len(z)):
         sampler.sample(slab, layer)
-        found.append(slab.signs())
-    inside, known = (np.stack(signs) > 0 for signs in zip(*found, strict=True))
+        result.append(slab.signs())
+    inside, known = (np.stack(signs) > 0 for signs in zip(*result, strict=True))
     return inside, known
 
 
@@ -174,12 +174,12 @@ def test_runs_are_those_of_the_pixels(name: str) -> None:
         runs, area = layer.runs, layer.area
         assert area == pytest.approx(layer.coverage.sum() / 255 * 0.04, rel=1e-2, abs=0.05)
         row = np.repeat(np.arange(runs.height), np.diff(runs.rows))
-        found = zip(row.tolist(), runs.begin.tolist(), runs.end.tolist(), strict=True)
+        result = zip(row.tolist(), runs.begin.tolist(), runs.end.tolist(), strict=True)
         ends = zip(rows[::2].tolist(), columns[::2].tolist(), columns[1::2].tolist(), strict=True)
-        return list(found), list(ends)
+        return list(result), list(ends)
 
-    for found, expected in all_of(stack, both):
-        assert found == expected
+    for result, expected in all_of(stack, both):
+        assert result == expected
 
 
 def disc(stack: Stack) -> np.ndarray:
@@ -205,8 +205,10 @@ def test_areas_of_every_layer(root: Node, area: Callable[[Stack], np.ndarray]) -
     """Contours, pixels and pictures: within 0.05 % of the closed form at 1024 pixels."""
     stack = stack_of(root, 1024, 8.3)
     pixel = stack.pixel[0] * stack.pixel[1]
-    found = all_of(stack, lambda layer: (layer.contours.area, layer.area, layer.coverage.sum() / 255 * pixel))
-    np.testing.assert_allclose(np.transpose(found), [area(stack)] * 3, rtol=5e-4)
+    result = all_of(
+        stack, lambda layer: (layer.contours.area, layer.area, layer.coverage.sum() / 255 * pixel)
+    )
+    np.testing.assert_allclose(np.transpose(result), [area(stack)] * 3, rtol=5e-4)
 
 
 @pytest.mark.parametrize("pixels", [128, 256])
@@ -401,7 +403,7 @@ def test_a_large_bailout_takes_nothing_off_the_outline(bailout: float, mixed: bo
     assert areas.sum() == pytest.approx(truth.sum(), rel=0.005)
 
 
-def test_whole_layers_of_another_height_are_told() -> None:
+def test_whole_layers_of_another_height_are_reported() -> None:
     """A cylinder 17.4 layers high is cut into 17, and that is 2 % of it."""
     of = cylinder(radius=0.75, height=0.5431)
     low, fine = (plan_stack(of, SliceJob(50, layer, (0.5, 0.5))) for layer in (1.04, 0.01))

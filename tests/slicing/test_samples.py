@@ -32,6 +32,6 @@ def layers(**environment: str) -> str:
 
 
 def test_the_portable_way_gives_the_same_layers() -> None:
-    found = layers()
-    assert len(found.splitlines()) > 20
-    assert layers(FRACSLICE_PORTABLE="1") == found
+    result = layers()
+    assert len(result.splitlines()) > 20
+    assert layers(FRACSLICE_PORTABLE="1") == result

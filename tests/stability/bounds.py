@@ -49,14 +49,14 @@ def verdict(root: Node, count: int, seed: int = 0, bound: float | None = None) -
     """
     conservative, rng = root.conservative(), np.random.default_rng(seed)
     field, is_conservative = (compile_scene(r, "float64").points for r in (root, conservative))
-    bound, found = bound or conservative.bounds.lipschitz, Verdict()
+    bound, result = bound or conservative.bounds.lipschitz, Verdict()
     for start in range(0, count, CHUNK):
         p = points(root, min(CHUNK, count - start), rng)
         if root.bounds.exterior_only:
-            found = found | _free_ball(field, is_conservative, p, bound, rng)
+            result = result | _free_ball(field, is_conservative, p, bound, rng)
         else:
-            found = found | _slopes(field, p, bound, rng)
-    return found
+            result = result | _slopes(field, p, bound, rng)
+    return result
 
 
 def _slopes(field: Field, a: np.ndarray, bound: float, rng: np.random.Generator) -> Verdict:
@@ -66,10 +66,10 @@ def _slopes(field: Field, a: np.ndarray, bound: float, rng: np.random.Generator)
     steepest = np.zeros(a.shape[1])
     for direction in (_unit(rng.normal(size=a.shape)), _gradient(field, a, fa, 1e-6 * size)):
         b = a + direction * step
-        apart = np.linalg.norm(b - a, axis=0)
-        rounding = 1e-13 * size / apart
-        slope = np.abs(field(*b) - fa) / np.maximum(apart, 1e-300) - rounding
-        steepest = np.maximum(steepest, np.where(apart > 0, slope, 0) / bound)
+        distance = np.linalg.norm(b - a, axis=0)
+        rounding = 1e-13 * size / distance
+        slope = np.abs(field(*b) - fa) / np.maximum(distance, 1e-300) - rounding
+        steepest = np.maximum(steepest, np.where(distance > 0, slope, 0) / bound)
     return _judged(a, steepest)
 
 

@@ -26,9 +26,9 @@ def drawn(root: Node, rng: np.random.Generator, spread: float = 1.0) -> Node:
     """
     for _ in range(TRIES):
         try:
-            found = _drawn(root, rng, spread)
-            _ = [(node.bounds, node.changed(**_known(node)).arguments) for node in found.walk()]
-            return found
+            result = _drawn(root, rng, spread)
+            _ = [(node.bounds, node.changed(**_known(node)).arguments) for node in result.walk()]
+            return result
         except (FracsliceError, ArithmeticError):
             continue
     raise AssertionError(f"{root}: no other parameters are possible")

@@ -11,7 +11,7 @@ from fracslice.formulas.field import Precision
 from fracslice.kernel import compile_scene, reference
 
 from .extremes import extreme_versions, hostile_points
-from .scaling import WAYS
+from .scaling import SCALINGS
 
 DECADES = range(-5, 6)
 DEPTHS = (1, 10, 100, 1000)
@@ -38,7 +38,7 @@ def scale_error(root: Node, precision: Precision, count: int = 4000) -> float:
     for factor in (10.0**k for k in DECADES):
         p = _representable(points * factor)
         expected = truth(*(p / factor))
-        for way in WAYS.values():
+        for way in SCALINGS.values():
             got = compile_scene(way(root, factor), precision).points(*p) / factor
             worst = max(worst, _error(got, expected))
     return worst

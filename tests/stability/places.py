@@ -20,15 +20,15 @@ def _frame(box: Box) -> tuple[np.ndarray, np.ndarray]:
 
 def borders(root: Node) -> np.ndarray:
     """Coordinates where fields fold: zero, the faces of boxes, Menger's cells, borders between copies."""
-    found = [0.0]
+    result = [0.0]
     for node in root.walk():
         ends = [v for v in (*node.bounds.box.lo, *node.bounds.box.hi) if np.isfinite(v)]
-        found += ends
+        result += ends
         if node.formula.name == "menger":
-            found += (np.arange(-27, 28) / 27).tolist()
+            result += (np.arange(-27, 28) / 27).tolist()
         if node.formula.name == "repeat":
-            found += [k * p / 2 for p in node["period"] for k in range(-4, 5)]
-    return np.unique(found)
+            result += [k * p / 2 for p in node["period"] for k in range(-4, 5)]
+    return np.unique(result)
 
 
 def points(root: Node, count: int, rng: np.random.Generator) -> np.ndarray:

@@ -68,7 +68,7 @@ def _value(rng: np.random.Generator, kind: object) -> object:
     if isinstance(kind, Count):
         return int(rng.integers(1, 3)) if kind is not ITERATIONS else kind.default
     if isinstance(kind, Choice):
-        return kind.words[rng.integers(len(kind.words))]
+        return kind.choices[rng.integers(len(kind.choices))]
     assert isinstance(kind, (Number, Vector)) and kind.default is not REQUIRED
     if isinstance(kind, Number):
         return float(round(number(kind, kind.default, rng, 1.0)))

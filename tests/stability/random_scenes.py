@@ -113,13 +113,13 @@ def _value(name: str, kind: Any, dice: _Dice) -> Any:
     if isinstance(kind, Axis):
         return "xyz"[dice.tree.integers(3)]
     if isinstance(kind, Choice):
-        return kind.words[dice.tree.integers(len(kind.words))]
+        return kind.choices[dice.tree.integers(len(kind.choices))]
     if kind.default is REQUIRED or kind.default is None:
         return None
     if isinstance(kind, Number):
         random = dice.tree if name == "power" else dice.numbers
-        found = number(kind, kind.default, random, 1.0)
-        return float(round(found)) if name == "power" and dice.tree.uniform() < 0.7 else found
+        result = number(kind, kind.default, random, 1.0)
+        return float(round(result)) if name == "power" and dice.tree.uniform() < 0.7 else result
     assert isinstance(kind, Vector)
     return tuple(number(kind, v, dice.numbers, 1.0) for v in kind.default)
 

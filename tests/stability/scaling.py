@@ -56,10 +56,12 @@ def _others(root: Node, factor: float) -> dict[str, object]:
     if root.formula.name in ("twist", "bend"):
         return {"degrees": root["degrees"] / factor}
     if root.formula.name == "transform":
-        found: dict[str, object] = {"translate": _times(root["translate"], factor)}
+        result: dict[str, object] = {"translate": _times(root["translate"], factor)}
         if root["matrix"]:
-            found["matrix"] = tuple(v * (factor if i % 4 == 3 else 1.0) for i, v in enumerate(root["matrix"]))
-        return found
+            result["matrix"] = tuple(
+                v * (factor if i % 4 == 3 else 1.0) for i, v in enumerate(root["matrix"])
+            )
+        return result
     return {}
 
 
@@ -72,4 +74,4 @@ def placed(root: Node, factor: float) -> Node:
     return transform(root, scale=(factor,))
 
 
-WAYS: dict[str, Callable[[Node, float], Node]] = {"parameters": scaled, "transform": placed}
+SCALINGS: dict[str, Callable[[Node, float], Node]] = {"parameters": scaled, "transform": placed}

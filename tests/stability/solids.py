@@ -29,11 +29,11 @@ def outcome(root: Node, resolution: float, threads: int = 1) -> Outcome:
         result = make_mesh(scene(root, size="50mm"), MeshJob(resolution=resolution), Work(threads=threads))
     except FracsliceError as error:
         return Outcome(refused=str(error))
-    report, found = result.report.mesh, list(result.report.problems)
+    report, actual = result.report.mesh, list(result.report.problems)
     for name in ("watertight", "manifold", "oriented"):
         if not getattr(report, name):
-            found.append(f"not {name}")
+            actual.append(f"not {name}")
     status = to_manifold(result.mesh).status().name
     if status != "NoError":
-        found.append(f"manifold3d: {status}")
-    return Outcome(tuple(found), result.bricks.repaired)
+        actual.append(f"manifold3d: {status}")
+    return Outcome(tuple(actual), result.bricks.repaired)

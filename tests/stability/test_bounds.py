@@ -71,14 +71,14 @@ def test_the_bound_holds_with_other_numbers(name: str) -> None:
 
 @pytest.mark.parametrize("name", SEAMS)
 def test_seams_cuts_walls_and_folds_of_fractals(name: str) -> None:
-    found = verdict(SEAMS[name], 100_000)
-    assert found.violations == 0 and found.points > 50_000
+    result = verdict(SEAMS[name], 100_000)
+    assert result.violations == 0 and result.points > 50_000
 
 
 @pytest.mark.parametrize("name", HARD)
 def test_the_bound_holds_where_it_did_not(name: str) -> None:
-    found = verdict(HARD[name], 200_000, seed=1)
-    assert found.violations == 0 and found.points > 100_000
+    result = verdict(HARD[name], 200_000, seed=1)
+    assert result.violations == 0 and result.points > 100_000
 
 
 @pytest.mark.parametrize(
@@ -99,8 +99,8 @@ def test_many_steps_near_the_poles(power: float, bailout: float, point: tuple[fl
 
 def test_a_bound_that_is_too_small_is_found() -> None:
     for root, bound in ((sphere(), 0.999), (julia(iterations=10), 0.6)):
-        found = verdict(root, 200_000, bound=bound)
-        assert found.violations > 0 and found.worst > 1 and len(found.where) == 3
+        result = verdict(root, 200_000, bound=bound)
+        assert result.violations > 0 and result.worst > 1 and len(result.where) == 3
 
 
 def test_every_formula_says_where_its_bound_is_from() -> None:

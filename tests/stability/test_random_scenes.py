@@ -18,8 +18,8 @@ RESOLUTION = 48
 
 @pytest.mark.parametrize("tree", TREES)
 def test_a_random_scene_is_a_solid_of_its_own_volume(tree: int) -> None:
-    found = {numbers: volumes(random_scene(tree, numbers), RESOLUTION) for numbers in range(EACH)}
-    assert {numbers: one.faults for numbers, one in found.items() if one.faults} == {}
+    result = {numbers: volumes(random_scene(tree, numbers), RESOLUTION) for numbers in range(EACH)}
+    assert {numbers: one.faults for numbers, one in result.items() if one.faults} == {}
 
 
 def test_the_same_seeds_make_the_same_scene() -> None:

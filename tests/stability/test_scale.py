@@ -10,7 +10,7 @@ from fracslice.mesh.extract import contour
 from fracslice.scene import library, read
 from fracslice.volume import plan, sample_scene
 
-from .scaling import WAYS
+from .scaling import SCALINGS
 
 VOXELS = 40.0
 
@@ -19,7 +19,7 @@ VOXELS = 40.0
 @pytest.mark.parametrize("name", library.names())
 def test_same_bricks(name: str, way: str, factor: float) -> None:
     root = read(library.path(name)).root
-    own, other = (plan(r, VOXELS) for r in (root, WAYS[way](root, factor)))
+    own, other = (plan(r, VOXELS) for r in (root, SCALINGS[way](root, factor)))
     a, b = sample_scene(own), sample_scene(other)
     assert np.array_equal(a.index, b.index) and np.array_equal(a.ijk, b.ijk)
     differ = (a.values < 0) != (b.values < 0)
@@ -32,7 +32,7 @@ def test_same_bricks(name: str, way: str, factor: float) -> None:
 @pytest.mark.parametrize("name", ["mandelbulb", "quaternion-julia", "menger-ball"])
 def test_same_mesh(name: str, factor: float) -> None:
     root = read(library.path(name)).root
-    a, b = (mesh_of(r) for r in (root, WAYS["parameters"](root, factor)))
+    a, b = (mesh_of(r) for r in (root, SCALINGS["parameters"](root, factor)))
     assert np.array_equal(a[1], b[1])
     voxel = np.ptp(a[0], axis=0).max() / VOXELS
     off = np.abs(b[0] / factor - a[0]).max(axis=1) / voxel

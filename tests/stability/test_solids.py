@@ -15,8 +15,8 @@ from .solids import Outcome, outcome
 @pytest.mark.parametrize("name", sorted({*library.names()} - {"hybrid"}))  # its steps are no solids
 def test_other_numbers_make_a_solid(name: str) -> None:
     root = drawn_settings(name, 1)[1]
-    found = outcome(root, 24, threads=2)
-    assert found == Outcome() or "there is no surface" in found.refused
+    result = outcome(root, 24, threads=2)
+    assert result == Outcome() or "there is no surface" in result.refused
 
 
 @pytest.mark.parametrize(("name", "setup"), [("raspberry", 20), ("spinning-top", 7), ("spinning-top", 12)])
@@ -28,5 +28,5 @@ def test_nothing_to_repair_where_there_was(name: str, setup: int) -> None:
 
 
 def test_what_is_nothing_is_refused() -> None:
-    apart = intersection(sphere(), transform(sphere(), translate=(3, 0, 0)))
-    assert outcome(apart, 32).refused.startswith("the scene is empty")
+    disjoint = intersection(sphere(), transform(sphere(), translate=(3, 0, 0)))
+    assert outcome(disjoint, 32).refused.startswith("the scene is empty")

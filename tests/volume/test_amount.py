@@ -30,8 +30,8 @@ def of(root: Node) -> VolumeEstimate:
     ],
 )
 def test_the_volume_of_what_is_known(root, volume):
-    found = of(root)
-    assert abs(found.volume - volume) < 4 * found.error and found.error < 0.01 * volume
+    result = of(root)
+    assert abs(result.volume - volume) < 4 * result.error and result.error < 0.01 * volume
 
 
 def test_the_volume_is_always_the_same_and_that_of_its_parts():
@@ -41,10 +41,10 @@ def test_the_volume_is_always_the_same_and_that_of_its_parts():
     assert abs(halves.volume - BALL) < 4 * halves.error
 
 
-def test_a_difference_is_told_where_it_is_sure_and_a_hundredth():
-    found = VolumeEstimate(2.0, 0.01, of(sphere()).inside)
-    assert found.off(1.9) == pytest.approx(-0.05) and found.off(2.2) == pytest.approx(0.1)
-    assert found.off(1.985) == found.off(2.015) == VolumeEstimate(2.0, 0.05, found.inside).off(1.9) == 0
+def test_a_difference_is_reported_where_it_is_sure_and_a_hundredth():
+    result = VolumeEstimate(2.0, 0.01, of(sphere()).inside)
+    assert result.off(1.9) == pytest.approx(-0.05) and result.off(2.2) == pytest.approx(0.1)
+    assert result.off(1.985) == result.off(2.015) == VolumeEstimate(2.0, 0.05, result.inside).off(1.9) == 0
 
 
 @pytest.mark.parametrize(("spacing", "times"), [(0.1, 8), (0.039, 4), (2.0, None)])

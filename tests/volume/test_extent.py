@@ -48,22 +48,22 @@ def thing(seed: int) -> Node:
     return union(PLATE, transform(shapes[seed % 3], rotate=turn, translate=tuple(rng.uniform(-20, 20, 3))))
 
 
-def errors(found: Box, true: Box) -> np.ndarray:
-    return np.abs(np.subtract([found.lo, found.hi], [true.lo, true.hi]))
+def errors(result: Box, true: Box) -> np.ndarray:
+    return np.abs(np.subtract([result.lo, result.hi], [true.lo, true.hi]))
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_walls_rods_and_plates_at_random_places(seed: int) -> None:
     root = thing(seed)
-    found = extent(root, VOXELS)
-    longest = max(found.box.size)
+    result = extent(root, VOXELS)
+    longest = max(result.box.size)
     if seed % 3 != 1:  # of boxes, the box that formulas promise is exact, however they are turned
-        assert errors(found.box, root.bounds.box).max() < 2e-5 * longest
-    assert (np.array(found.outer.lo) <= found.box.lo).all() and (
-        np.array(found.outer.hi) >= found.box.hi
+        assert errors(result.box, root.bounds.box).max() < 2e-5 * longest
+    assert (np.array(result.outer.lo) <= result.box.lo).all() and (
+        np.array(result.outer.hi) >= result.box.hi
     ).all()
-    assert errors(found.outer, found.box).max() < 0.5 * longest / VOXELS
-    assert (compile_scene(root, "float64").points(*found.tips) < 1e-4).all()
+    assert errors(result.outer, result.box).max() < 0.5 * longest / VOXELS
+    assert (compile_scene(root, "float64").points(*result.tips) < 1e-4).all()
 
 
 @pytest.mark.parametrize("x", [0.0, 13.0, 29.0])
@@ -88,26 +88,26 @@ def test_what_is_thinner_than_can_be_found_is_within_the_outer_box() -> None:
 @pytest.mark.parametrize("turn", [0.0, 31.0])
 def test_tips_are_found_exactly(root: Node, turn: float) -> None:
     turned = transform(root, rotate=(1, 2, 0.5, turn))
-    found, field = extent(turned, 100), compile_scene(turned, "float64")
-    assert errors(found.outer, found.box).max() < 1e-3
-    assert (np.abs(field.points(*found.tips)) < 2e-5).all()
+    result, field = extent(turned, 100), compile_scene(turned, "float64")
+    assert errors(result.outer, result.box).max() < 1e-3
+    assert (np.abs(field.points(*result.tips)) < 2e-5).all()
     if not turn:
-        assert errors(found.box, root.bounds.box).max() < 1e-5
+        assert errors(result.box, root.bounds.box).max() < 1e-5
 
 
 def test_an_offset_of_a_fractal_is_found_beyond_the_box_that_is_promised() -> None:
     root = offset(mandelbulb(iterations=4), distance=0.2)
-    found, points = extent(root, 64), np.random.default_rng(0).uniform(-2, 2, (3, 200_000))
+    result, points = extent(root, 64), np.random.default_rng(0).uniform(-2, 2, (3, 200_000))
     inside = points[:, compile_scene(root).points(*points.astype(np.float32)) < 0]
-    assert (inside.min(1) >= found.box.lo).all() and (inside.max(1) <= found.box.hi).all()
+    assert (inside.min(1) >= result.box.lo).all() and (inside.max(1) <= result.box.hi).all()
 
 
 def test_what_is_much_smaller_than_promised_is_as_exact() -> None:
     """A corner of a large box: the tolerance is the corner's own."""
     root = difference(box(size=(200, 200, 200)), plane(normal=(1, 1, 1), offset=172))
-    found = extent(root, VOXELS)
-    assert max(found.box.size) < 5
-    assert errors(found.outer, found.box).max() < 0.5 * max(found.box.size) / VOXELS
+    result = extent(root, VOXELS)
+    assert max(result.box.size) < 5
+    assert errors(result.outer, result.box).max() < 0.5 * max(result.box.size) / VOXELS
 
 
 def test_an_object_that_ends_nowhere_says_so() -> None:
@@ -151,7 +151,7 @@ def test_a_base_is_cut_from_the_tip_of_the_field() -> None:
     assert np.ptp(flat[:, 0]) == pytest.approx(20, abs=1e-3)
 
 
-def test_a_tip_that_was_lost_is_told() -> None:
+def test_a_tip_that_was_lost_is_reported() -> None:
     """A wire of half a voxel on a ball: no sample is in it."""
     wire = capsule(**{"from": (0, 0, 0), "to": (0, 0, 2), "radius": 0.002})
     lost = make_mesh(scene(union(sphere(radius=0.5), wire), size="100mm"), MeshJob(resolution=64)).report

@@ -108,7 +108,7 @@ def test_offset_moves_the_surface(distance: float) -> None:
     assert extract(moved).volume == pytest.approx(4 / 3 * np.pi * (1 + distance) ** 3, rel=0.02)
 
 
-def test_surfaces_are_told_apart() -> None:
+def test_surfaces_are_distinguished() -> None:
     x, y, z, origin, voxel = grid_points(64, 2.0)
     large = np.sqrt((x + 0.8) ** 2 + y**2 + z**2) - 0.8
     small = np.sqrt((x - 1) ** 2 + y**2 + z**2) - 0.4

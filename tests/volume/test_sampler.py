@@ -180,7 +180,7 @@ def test_cancelled() -> None:
         sample_scene(plan(sphere(), 64), work)
 
 
-def test_progress_is_told() -> None:
+def test_progress_is_reported() -> None:
     reported: list[tuple[str, float]] = []
     sample_scene(plan(sphere(), 64), Work(progress=lambda stage, done: reported.append((stage, done))))
     assert reported and all(0 <= done <= 1 for _, done in reported) and reported[-1][1] == 1.0

@@ -13,31 +13,31 @@ def states() -> States:
     return States.within(np.random.default_rng(2).integers(0, 4, SHAPE).astype(np.uint8))
 
 
-def inner(found: States) -> np.ndarray:
-    return np.flatnonzero(found.flat != BORDER)
+def inner(result: States) -> np.ndarray:
+    return np.flatnonzero(result.flat != BORDER)
 
 
 def test_numbers_are_in_the_order_of_places() -> None:
-    found = states()
-    np.testing.assert_array_equal(found.places(inner(found)), np.indices(SHAPE).reshape(3, -1))
-    np.testing.assert_array_equal(found.inner(found.flat).ravel(), found.flat[inner(found)])
+    result = states()
+    np.testing.assert_array_equal(result.places(inner(result)), np.indices(SHAPE).reshape(3, -1))
+    np.testing.assert_array_equal(result.inner(result.flat).ravel(), result.flat[inner(result)])
 
 
 def test_a_step_leads_to_the_brick_beside() -> None:
-    found = states()
+    result = states()
     for axis in range(3):
         for step in (-1, 1):
-            moved = found.places(inner(found) + found.step(axis, step)) - found.places(inner(found))
+            moved = result.places(inner(result) + result.step(axis, step)) - result.places(inner(result))
             assert (moved == np.eye(3, dtype=int)[axis][:, None] * step).all()
 
 
 def test_beside_looks_through_the_six_faces() -> None:
-    found = states()
-    grid = np.pad(found.inner(found.flat) == 1, 1)
+    result = states()
+    grid = np.pad(result.inner(result.flat) == 1, 1)
     expected = np.zeros_like(grid)
     for axis in range(3):
         expected |= np.roll(grid, 1, axis) | np.roll(grid, -1, axis)
-    seen = found.inner(found.beside(found.flat == 1))
+    seen = result.inner(result.beside(result.flat == 1))
     np.testing.assert_array_equal(seen, expected[1:-1, 1:-1, 1:-1])
 
 

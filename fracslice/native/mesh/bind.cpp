@@ -9,6 +9,7 @@
 #include "measures.h"
 #include "nesting.h"
 #include "predicates.h"
+#include "proximity.h"
 #include "quantise.h"
 #include "selection.h"
 #include "self_intersections.h"
@@ -131,6 +132,17 @@ nb::object bind_near(const Rows<double>& vertices, const Rows<int32_t>& triangle
     return numbers(unlocked(threads, [&] { return near(mesh_of(vertices, triangles), points.data(), points.shape(0), reach); }));
 }
 
+nb::object bind_near_bodies(const Rows<double>& points, const Vector<int32_t>& labels, const Vector<int32_t>& bodies, size_t count,
+                            int32_t largest, const Point& origin, double edge, int threads) {
+    return numbers(unlocked(threads, [&] {
+        if (labels.size() != points.shape(0)) throw std::invalid_argument("points and labels differ in length");
+        require_below(labels.data(), labels.size(), bodies.size(), "a label names no body");
+        require_below(bodies.data(), bodies.size(), count, "a body does not exist", -1);
+        LabelledPoints all{points.data(), span_of(labels), span_of(bodies)};
+        return near_bodies(all, count, largest, {origin, edge});
+    }));
+}
+
 nb::object bind_surroundings(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<bool>& of, int threads) {
     return numbers(unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
@@ -203,6 +215,8 @@ void bind_mesh(nb::module_& module) {
     module.def("selected", &bind_selected, "vertices"_a, "triangles"_a, "keep"_a, "threads"_a = 0);
     module.def("touching", &bind_touching, "triangles"_a, "vertices"_a, "threads"_a = 0);
     module.def("near", &bind_near, "vertices"_a, "triangles"_a, "points"_a, "reach"_a, "threads"_a = 0);
+    module.def("near_bodies", &bind_near_bodies, "points"_a, "labels"_a, "bodies"_a, "count"_a, "largest"_a, "origin"_a, "edge"_a,
+               "threads"_a = 0);
     module.def("surroundings", &bind_surroundings, "vertices"_a, "triangles"_a, "of"_a, "threads"_a = 0);
     module.def("stl", &bind_stl, "vertices"_a, "triangles"_a, "threads"_a = 0);
     module.def("weld", &bind_weld, "points"_a);

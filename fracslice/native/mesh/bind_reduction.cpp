@@ -52,28 +52,28 @@ class BoundNearest {
     nb::tuple bounds(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<int32_t>& hints, double tolerance,
                      int threads) const {
         size_t count = triangles.shape(0);
-        Array<double> found(count, 1);
+        Array<double> distances(count, 1);
         auto beyond = unlocked(threads, [&] {
             MeshView mesh = mesh_of(vertices, triangles);
             bool hinted = hints.shape(0) > 0;
             if (hinted && hints.shape(0) != mesh.count) throw std::invalid_argument("triangles and hints differ in length");
             require_below(hints.data(), hints.size(), triangles_.shape(0), "a hint names a triangle that does not exist");
-            return nearest_.bounds(mesh, hinted ? hints.data() : nullptr, tolerance, found.data.get());
+            return nearest_.bounds(mesh, hinted ? hints.data() : nullptr, tolerance, distances.data.get());
         });
-        return nb::make_tuple(to_numpy(std::move(found), {count}), to_numpy<int32_t>(beyond));
+        return nb::make_tuple(to_numpy(std::move(distances), {count}), to_numpy<int32_t>(beyond));
     }
 
     nb::object points(const Rows<double>& points, int threads) const {
-        Array<double> found(points.shape(0), 1);
-        unlocked(threads, [&] { nearest_.points(points.data(), points.shape(0), found.data.get()); });
-        return to_numpy(std::move(found), {points.shape(0)});
+        Array<double> distances(points.shape(0), 1);
+        unlocked(threads, [&] { nearest_.points(points.data(), points.shape(0), distances.data.get()); });
+        return to_numpy(std::move(distances), {points.shape(0)});
     }
 
     nb::object samples(const Rows<double>& vertices, const Rows<int32_t>& triangles, double spacing, double enough,
                        int threads) const {
-        Array<double> found(triangles.shape(0), 1);
-        unlocked(threads, [&] { nearest_.samples(mesh_of(vertices, triangles), spacing, enough, found.data.get()); });
-        return to_numpy(std::move(found), {triangles.shape(0)});
+        Array<double> distances(triangles.shape(0), 1);
+        unlocked(threads, [&] { nearest_.samples(mesh_of(vertices, triangles), spacing, enough, distances.data.get()); });
+        return to_numpy(std::move(distances), {triangles.shape(0)});
     }
 
   private:

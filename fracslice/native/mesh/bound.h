@@ -12,8 +12,8 @@ namespace fracslice::mesh {
 // though that of a neighbour is near, or what lies over a triangle is taken from what does not.
 constexpr int kDepth = 32, kTrusting = 12, kPatient = 8;
 
-// What is nearest to a point, beginning with a guess.
-struct Found {
+// A triangle near a point, and its squared distance.
+struct Neighbour {
     size_t triangle;
     double square;
 };
@@ -35,11 +35,11 @@ class Bound {
         beyond_.clear();
         for (size_t k = 0; k < 3; ++k) {
             std::copy_n(corners[k], 3, whole.corner[k].data());
-            Found found = {near[k], others_.distance(near[k]).square(corners[k])};
-            if (found.square > limit_) found = search(corners[k], near[k]);
-            if (found.square > limit_) return kInfinity;
-            whole.near[k] = near[k] = found.triangle;
-            most = std::max(most, found.square);
+            Neighbour neighbour = {near[k], others_.distance(near[k]).square(corners[k])};
+            if (neighbour.square > limit_) neighbour = search(corners[k], near[k]);
+            if (neighbour.square > limit_) return kInfinity;
+            whole.near[k] = near[k] = neighbour.triangle;
+            most = std::max(most, neighbour.square);
         }
         while (!pieces_.empty()) {
             Piece piece = pieces_.back(), other;
@@ -70,11 +70,11 @@ class Bound {
     };
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-    Found search(const double* p, size_t guess) {
-        Found found = others_(p, guess);
-        auto known = [&](const auto& these) { return std::find(these.begin(), these.end(), found.triangle) != these.end(); };
-        if (!known(hints_) && !known(beyond_)) beyond_.push_back(found.triangle);
-        return found;
+    Neighbour search(const double* p, size_t guess) {
+        Neighbour neighbour = others_(p, guess);
+        auto known = [&](const auto& these) { return std::find(these.begin(), these.end(), neighbour.triangle) != these.end(); };
+        if (!known(hints_) && !known(beyond_)) beyond_.push_back(neighbour.triangle);
+        return neighbour;
     }
 
     // The distance to one triangle is a convex function: where all corners are near the same one, so is the whole piece.
@@ -106,9 +106,9 @@ class Bound {
             for (size_t i = 2; i < polygon.size(); ++i) {
                 Piece part{{polygon[0], polygon[i - 1], polygon[i]}, {}, piece.depth + 1};
                 for (size_t k = 0; k < 3; ++k) {
-                    Found found = search(part.corner[k].data(), nearest);
-                    if (found.square > limit_) return kInfinity;
-                    part.near[k] = found.triangle;
+                    Neighbour neighbour = search(part.corner[k].data(), nearest);
+                    if (neighbour.square > limit_) return kInfinity;
+                    part.near[k] = neighbour.triangle;
                 }
                 pieces_.push_back(part);
             }
@@ -151,13 +151,13 @@ class Bound {
             d = one.square(point.data()), e = two.square(point.data());
             (d < e ? low : high) = t;
         }
-        Found found{piece.near[d < e ? k : next], std::min(d, e)};
-        if (found.square > limit_ || piece.depth >= kTrusting) found = search(point.data(), found.triangle);
-        if (found.square > limit_) return false;
+        Neighbour neighbour{piece.near[d < e ? k : next], std::min(d, e)};
+        if (neighbour.square > limit_ || piece.depth >= kTrusting) neighbour = search(point.data(), neighbour.triangle);
+        if (neighbour.square > limit_) return false;
         ++piece.depth;
         other = piece;
         piece.corner[next] = other.corner[k] = point;
-        piece.near[next] = other.near[k] = found.triangle;
+        piece.near[next] = other.near[k] = neighbour.triangle;
         return true;
     }
 

@@ -55,13 +55,13 @@ def loops(case: int) -> list[Loop]:
                 last += 1
             entering = edge_between(ring[i - 1], ring[i])
             following[edge_between(ring[last % 4], ring[(last + 1) % 4])] = entering
-    found = []
+    closed = []
     while following:
         loop = [min(following)]
         while loop[-1] in following:
             loop.append(following.pop(loop[-1]))
-        found.append(tuple(reversed(loop[:-1])))
-    return found
+        closed.append(tuple(reversed(loop[:-1])))
+    return closed
 
 
 def triangulations(loop: Loop) -> Iterator[list[Triangle]]:

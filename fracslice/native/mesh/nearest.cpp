@@ -38,12 +38,12 @@ double Nearest::to_box(const double* p, size_t node) const {
     return total;
 }
 
-Found Nearest::operator()(const double* p, size_t guess) const {
+Neighbour Nearest::operator()(const double* p, size_t guess) const {
     struct Open {
         size_t node;
         double square;
     } open[128];
-    Found best{guess, distance(guess).square(p)};
+    Neighbour best{guess, distance(guess).square(p)};
     open[0] = {1, 0};
     for (int height = 1; height > 0;) {
         auto [node, square] = open[--height];
@@ -64,8 +64,8 @@ Found Nearest::operator()(const double* p, size_t guess) const {
 }
 
 // From neighbour to neighbour as long as that comes nearer: mostly all the way.
-Found Nearest::within(double limit, const double* p, size_t guess) const {
-    Found best{guess, distance(guess).square(p)};
+Neighbour Nearest::within(double limit, const double* p, size_t guess) const {
+    Neighbour best{guess, distance(guess).square(p)};
     bool nearer = !across_.empty();
     for (int step = 0; nearer && step < kSteps; ++step) {
         nearer = false;
@@ -77,14 +77,14 @@ Found Nearest::within(double limit, const double* p, size_t guess) const {
     return best.square <= limit ? best : (*this)(p, best.triangle);
 }
 
-std::vector<Nearest::Pair> Nearest::bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* found) const {
+std::vector<Nearest::Pair> Nearest::bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* distances) const {
     std::vector<std::vector<Pair>> beyond((triangles.count + kTurn - 1) / kTurn);
     in_turns(triangles.count, [&](size_t first, size_t last) {
         Bound<Nearest> bound(*this, tolerance);
         size_t near[3] = {0, 0, 0};
         for (size_t t = first; t < last; ++t) {
             if (hints) std::copy_n(hints + 3 * t, 3, near);
-            found[t] = std::sqrt(bound({triangles.corner(t, 0), triangles.corner(t, 1), triangles.corner(t, 2)}, near));
+            distances[t] = std::sqrt(bound({triangles.corner(t, 0), triangles.corner(t, 1), triangles.corner(t, 2)}, near));
             for (size_t other : bound.beyond()) beyond[first / kTurn].push_back({int32_t(t), int32_t(other)});
         }
     });
@@ -93,22 +93,22 @@ std::vector<Nearest::Pair> Nearest::bounds(const MeshView& triangles, const int3
     return pairs;
 }
 
-void Nearest::points(const double* points, size_t count, double* found) const {
+void Nearest::points(const double* points, size_t count, double* distances) const {
     in_turns(count, [&](size_t first, size_t last) {
         size_t guess = 0;
-        for (size_t i = first; i < last; i += kRun) run(points + 3 * i, std::min(kRun, last - i), guess, found + i);
+        for (size_t i = first; i < last; i += kRun) run(points + 3 * i, std::min(kRun, last - i), guess, distances + i);
     });
 }
 
 // What is nearest to a point of a ball is at most the ball's diameter farther from its centre than what is nearest to that.
-void Nearest::run(const double* points, size_t count, size_t& guess, double* found) const {
+void Nearest::run(const double* points, size_t count, size_t& guess, double* distances) const {
     double centre[3], radius = 0;
     for (size_t x = 0; x < 3; ++x) {
         double low = points[x], high = points[x];
         for (size_t i = 1; i < count; ++i) low = std::min(low, points[3 * i + x]), high = std::max(high, points[3 * i + x]);
         centre[x] = (low + high) / 2, radius += (high - low) * (high - low) / 4;
     }
-    Found nearest = (*this)(centre, guess);
+    Neighbour nearest = (*this)(centre, guess);
     guess = nearest.triangle;
     TriangleDistance near[kMost + 1];
     size_t known = around(centre, (std::sqrt(nearest.square) + 2 * std::sqrt(radius)) * (1 + 1e-9), near);
@@ -116,11 +116,11 @@ void Nearest::run(const double* points, size_t count, size_t& guess, double* fou
         const double* p = points + 3 * i;
         double best = std::numeric_limits<double>::infinity();
         if (known > kMost) {
-            Found one = (*this)(p, guess);
+            Neighbour one = (*this)(p, guess);
             guess = one.triangle, best = one.square;
         }
         for (size_t t = 0; known <= kMost && t < known; ++t) best = std::min(best, near[t].square(p));
-        found[i] = std::sqrt(best);
+        distances[i] = std::sqrt(best);
     }
 }
 
@@ -142,10 +142,10 @@ size_t Nearest::around(const double* p, double reach, TriangleDistance* triangle
     return count;
 }
 
-void Nearest::samples(const MeshView& triangles, double spacing, double enough, double* found) const {
+void Nearest::samples(const MeshView& triangles, double spacing, double enough, double* distances) const {
     in_turns(triangles.count, [&](size_t first, size_t last) {
         size_t guess = 0;
-        for (size_t t = first; t < last; ++t) found[t] = sampled(triangles, t, spacing, enough * enough, guess);
+        for (size_t t = first; t < last; ++t) distances[t] = sampled(triangles, t, spacing, enough * enough, guess);
     });
 }
 
@@ -162,10 +162,10 @@ double Nearest::sampled(const MeshView& triangles, size_t t, double spacing, dou
         for (int j = 0; j <= n - i; ++j) {
             double p[3];
             for (int x = 0; x < 3; ++x) p[x] = a[x] + (b[x] - a[x]) * i / n + (c[x] - a[x]) * j / n;
-            Found found = within(limit, p, guess);
-            guess = found.triangle;
+            Neighbour neighbour = within(limit, p, guess);
+            guess = neighbour.triangle;
             if (j == 0) begin = guess;
-            most = std::max(most, found.square);
+            most = std::max(most, neighbour.square);
         }
         guess = begin;
     }

@@ -8,31 +8,31 @@ namespace fracslice::mesh {
 
 class Nearest {
   public:
-    // Of a mesh and its tree, which outlive this. closed: whether it is a closed, oriented 2-manifold, in which ways are shorter.
+    // A mesh and its tree outlive this. closed: whether it is a closed, oriented 2-manifold, in which walks are shorter.
     Nearest(const MeshView& mesh, const TreeView& tree, bool closed);
 
     TriangleDistance distance(size_t t) const { return {mesh_, t}; }
     // What is nearest to a point; the search begins with a guess.
-    Found operator()(const double* p, size_t guess) const;
+    Neighbour operator()(const double* p, size_t guess) const;
     // The same, or something whose distance has a square within a limit.
-    Found within(double limit, const double* p, size_t guess) const;
+    Neighbour within(double limit, const double* p, size_t guess) const;
 
     // For each triangle a bound on how far its points are; infinite where one is farther than the tolerance, or that could not be
     // excluded. hints: of each corner a triangle here that may be near it, [count, 3], or none. Returns what bounds depend on
     // besides: a triangle, and one here.
     using Pair = std::array<int32_t, 2>;
-    std::vector<Pair> bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* found) const;
+    std::vector<Pair> bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* distances) const;
     // The distance of each point. Runs of points that lie close together are fast.
-    void points(const double* points, size_t count, double* found) const;
+    void points(const double* points, size_t count, double* distances) const;
     // For each triangle how far its samples are at most: exactly, but for distances below `enough`. Samples are at most `spacing`
     // apart along its edges.
-    void samples(const MeshView& triangles, double spacing, double enough, double* found) const;
+    void samples(const MeshView& triangles, double spacing, double enough, double* distances) const;
 
   private:
     double to_box(const double* p, size_t node) const;
     // The triangles at most `reach` from a point, up to kMost.
     size_t around(const double* p, double reach, TriangleDistance* triangles) const;
-    void run(const double* points, size_t count, size_t& guess, double* found) const;
+    void run(const double* points, size_t count, size_t& guess, double* distances) const;
     double sampled(const MeshView& triangles, size_t t, double spacing, double limit, size_t& guess) const;
 
     MeshView mesh_;

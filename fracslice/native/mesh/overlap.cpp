@@ -110,7 +110,7 @@ class Corner {
 };
 
 // Whether a line along an edge at a is seen to separate s and t, but for their shared corner a; sure if true.
-bool apart_at_corner(const Triangle& s, const Triangle& t) {
+bool separated_at_corner(const Triangle& s, const Triangle& t) {
     Corner at(s.a, s.aspect.axis);
     Corner::Seen b = at.see(s.b), c = at.see(s.c), e = at.see(t.b), f = at.see(t.c);
     unsigned be = at.side(b, e), bf = at.side(b, f), ce = at.side(c, e), cf = at.side(c, f);
@@ -171,11 +171,11 @@ bool strangers_overlap(const Triangle& s, const Triangle& t) {
 
 // s and t share the corner a.
 bool overlap_at_corner(const Triangle& s, const Triangle& t) {
-    if (apart_at_corner(s, t)) return false;
+    if (separated_at_corner(s, t)) return false;
     Sides of_t = Plane(s).sides(t.b, t.c);
     if (of_t.lie() == Lie::kAside) return false;
     Sides of_s = Plane(t).sides(s.b, s.c);
-    if (of_s.lie() == Lie::kAside || apart_at_corner(t, s)) return false;
+    if (of_s.lie() == Lie::kAside || separated_at_corner(t, s)) return false;
     // What they share beyond the corner ends on one of the edges opposite to it.
     return edge_meets(s.b, s.c, of_s.e, of_s.f, t) || edge_meets(t.b, t.c, of_t.e, of_t.f, s);
 }

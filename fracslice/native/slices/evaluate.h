@@ -43,7 +43,7 @@ void Slab::evaluate(size_t n, const Where& where, const Take& take) {
     }
 }
 
-// Of samples; keeps the values. take(ask, found) for each tile.
+// Of samples; keeps the values. take(ask, signs) for each tile.
 template <class Take>
 void Slab::evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take) {
     Batch batch;

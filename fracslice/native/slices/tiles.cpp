@@ -13,9 +13,9 @@ void Tiles::push(const Place& at, uint64_t signs) {
 void Tiles::grow(size_t n) {
     const size_t more = count() + n;
     if (more > place.capacity()) {
-        const size_t room = more + more / 2;
-        place.reserve(room), beside.reserve(room), inside.reserve(room), known.reserve(room);
-        sharp.reserve(room), values.reserve(room);
+        const size_t capacity = more + more / 2;
+        place.reserve(capacity), beside.reserve(capacity), inside.reserve(capacity), known.reserve(capacity);
+        sharp.reserve(capacity), values.reserve(capacity);
     }
     place.resize(more), beside.resize(more), inside.resize(more), known.resize(more), sharp.resize(more);
     values.resize(more);

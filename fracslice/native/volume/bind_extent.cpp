@@ -106,19 +106,19 @@ class Sides {
     std::vector<Side> sides_;
 };
 
-nb::object climbed(nb::object entry, const Rows3& starts, const Rows3& ways, const Row& gain, double first, double exact,
+nb::object climbed(nb::object entry, const Rows3& starts, const Rows3& steps, const Row& gain, double first, double exact,
                    int threads) {
-    const size_t n = starts.shape(1), each = starts.shape(2), steps = gain.shape(0), row = n * each, way = n * steps;
-    if (starts.shape(0) != 3 || ways.shape(0) != 3 || ways.shape(1) != n || ways.shape(2) != steps) {
-        throw nb::value_error("expected starts and ways of as many directions, and gains of as many steps");
+    const size_t n = starts.shape(1), each = starts.shape(2), count = gain.shape(0), row = n * each, all = n * count;
+    if (starts.shape(0) != 3 || steps.shape(0) != 3 || steps.shape(1) != n || steps.shape(2) != count) {
+        throw nb::value_error("expected starts and steps of as many directions, and gains of as many steps");
     }
     FieldValues field = field_values(entry);
     Array<double> points(3, row);
     double* p = points.data.get();
     std::copy_n(starts.data(), 3 * row, p);
-    const double* w = ways.data();
+    const double* w = steps.data();
     unlocked(threads, [&] {
-        climb(field, {p, p + row, p + 2 * row}, n, each, {w, w + way, w + 2 * way, gain.data(), steps}, first, exact);
+        climb(field, {p, p + row, p + 2 * row}, n, each, {w, w + all, w + 2 * all, gain.data(), count}, first, exact);
         return 0;
     });
     return to_numpy(std::move(points), {3, n, each});
@@ -138,7 +138,7 @@ void bind_extent(nb::module_& module) {
         .def_prop_ro("known", &Sides::known)
         .def_prop_ro("above", &Sides::above)
         .def_prop_ro("spent", &Sides::spent);
-    module.def("climb", &climbed, "field"_a, "starts"_a, "ways"_a, "gain"_a, "first"_a, "exact"_a, "threads"_a = 0);
+    module.def("climb", &climbed, "field"_a, "starts"_a, "steps"_a, "gain"_a, "first"_a, "exact"_a, "threads"_a = 0);
 }
 
 }  // namespace fracslice::volume

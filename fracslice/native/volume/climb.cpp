@@ -21,7 +21,7 @@ void evaluate(const FieldValues& field, Points& points) {
 
 }  // namespace
 
-void climb(const FieldValues& field, const std::array<double*, 3>& points, size_t directions, size_t starts, const Ways& ways,
+void climb(const FieldValues& field, const std::array<double*, 3>& points, size_t directions, size_t starts, const Steps& steps,
            double first, double exact) {
     std::vector<double> step(directions, first);
     std::vector<size_t> going(directions);
@@ -30,11 +30,11 @@ void climb(const FieldValues& field, const std::array<double*, 3>& points, size_
     for (int round = 0; round < kRounds && !going.empty() && starts; ++round) {
         tried.clear();
         for (size_t d : going) {
-            const size_t way = d * ways.steps;
+            const size_t first_step = d * steps.count;
             for (size_t i = d * starts; i < (d + 1) * starts; ++i) {
-                for (size_t w = way; w < way + ways.steps; ++w) {
-                    tried.push({points[0][i] + step[d] * ways.x[w], points[1][i] + step[d] * ways.y[w],
-                                points[2][i] + step[d] * ways.z[w]});
+                for (size_t w = first_step; w < first_step + steps.count; ++w) {
+                    tried.push({points[0][i] + step[d] * steps.x[w], points[1][i] + step[d] * steps.y[w],
+                                points[2][i] + step[d] * steps.z[w]});
                 }
             }
         }
@@ -43,11 +43,11 @@ void climb(const FieldValues& field, const std::array<double*, 3>& points, size_
         size_t here = 0;
         for (size_t d : going) {
             bool moved = false;
-            for (size_t i = d * starts; i < (d + 1) * starts; ++i, here += ways.steps) {
+            for (size_t i = d * starts; i < (d + 1) * starts; ++i, here += steps.count) {
                 size_t best = 0;
                 double gain = 0;
-                for (size_t w = 0; w < ways.steps; ++w) {
-                    if (tried.f[here + w] < 0 && ways.gain[w] > gain) best = w, gain = ways.gain[w];
+                for (size_t w = 0; w < steps.count; ++w) {
+                    if (tried.f[here + w] < 0 && steps.gain[w] > gain) best = w, gain = steps.gain[w];
                 }
                 if (gain > 0) {
                     const auto to = tried[here + best];

@@ -100,7 +100,7 @@ def beside(px, width):
     return second, px - maximum(second, 0.0) * width
 
 
-def stereo(px, py, lens_u, lens_v, eye, corner, across, down, apart, half, focus):
+def stereo(px, py, lens_u, lens_v, eye, corner, across, down, offset, half, focus):
     """Return the ray of one of two eyes: of the left one in the left half of the film.
 
     Both pictures agree at the distance `focus`: the axes are parallel and the films shifted.
@@ -115,7 +115,7 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, apart, half, focus
         Point between the eyes.
     corner, across, down : tuple of float
         As for `pinhole`, of one picture.
-    apart : tuple of float
+    offset : tuple of float
         From that point to the right eye.
     half : float
         Width of one picture, pixels.
@@ -131,7 +131,7 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, apart, half, focus
     cx, cy, cz = corner
     ax, ay, az = across
     bx, by, bz = down
-    rx, ry, rz = apart
+    rx, ry, rz = offset
     second, column = beside(px, half)
     sx = second * rx
     sy = second * ry
@@ -262,8 +262,8 @@ def equirectangular(px, py, lens_u, lens_v, eye, right, up, forward, width, heig
     dx, dy, dz = normalised(
         a * fx + b * rx + rise * ux, a * fy + b * ry + rise * uy, a * fz + b * rz + rise * uz
     )
-    apart = second * radius
-    ox = ex + apart * (c * rx - s * fx)
-    oy = ey + apart * (c * ry - s * fy)
-    oz = ez + apart * (c * rz - s * fz)
+    offset = second * radius
+    ox = ex + offset * (c * rx - s * fx)
+    oy = ey + offset * (c * ry - s * fy)
+    oz = ez + offset * (c * rz - s * fz)
     return ox, oy, oz, dx, dy, dz

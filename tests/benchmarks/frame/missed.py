@@ -24,11 +24,11 @@ SMALLEST = {"formulas": ("sphere",), "rays": 100, "side": 16}
 
 def missed(root: Node, camera: Camera, side: int) -> tuple[int, int]:
     """How many rays were missed, and how many hit anything."""
-    found, d = distances(root, camera, (side, side)), directions(camera, (side, side))
+    result, d = distances(root, camera, (side, side)), directions(camera, (side, side))
     first = first_inside(root, np.array(camera.eye), d)
     hit = np.isfinite(first)
     pixel = 2 * np.tan(np.radians(25)) / side * first[hit]
-    return int((np.isnan(found[hit]) | (found[hit] > first[hit] + pixel)).sum()), int(hit.sum())
+    return int((np.isnan(result[hit]) | (result[hit] > first[hit] + pixel)).sum()), int(hit.sum())
 
 
 def first_inside(root: Node, eye: np.ndarray, d: np.ndarray) -> np.ndarray:

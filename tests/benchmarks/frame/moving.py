@@ -38,8 +38,8 @@ def rows(run: Run, cameras: int = 40, width: int = 640, height: int = 360) -> It
         _ = last.shown
 
     for name, show in {"coarse": coarse, "full": full}.items():
-        found = [moved(of, show, start.orbited(360 * k / cameras)) for k in range(cameras)]
-        spread = {key: Spread.of([figures[key] for figures in found]) for key in found[0]}
+        result = [moved(of, show, start.orbited(360 * k / cameras)) for k in range(cameras)]
+        spread = {key: Spread.of([figures[key] for figures in result]) for key in result[0]}
         row = {"": name, "ms": spread["wall_ms"], "CPU ms": spread["cpu_ms"], "rays": spread["rays"]}
         yield {**row, "of tracing the rays": spread["of the bound"]}
 

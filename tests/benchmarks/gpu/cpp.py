@@ -98,7 +98,7 @@ def _function(node: ast.FunctionDef) -> str:
 
 def _assigned(node: ast.FunctionDef) -> dict[str, str]:
     """The C++ type of each name that a function assigns: bool for what is compared, else float."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for inner in ast.walk(node):
         if isinstance(inner, ast.Assign) and not _makes_tuple(inner):
             target = inner.targets[0]
@@ -107,8 +107,8 @@ def _assigned(node: ast.FunctionDef) -> dict[str, str]:
                 mask = isinstance(inner.value, ast.Compare) or (
                     isinstance(inner.value, ast.BinOp) and isinstance(inner.value.op, (ast.BitAnd, ast.BitOr))
                 )
-                found[name.id] = "bool" if mask else "float"
-    return found
+                result[name.id] = "bool" if mask else "float"
+    return result
 
 
 def _makes_tuple(node: ast.Assign) -> bool:

@@ -69,15 +69,15 @@ def rows(run: Run, names: tuple[str, ...] = tuple(EXAMPLES)) -> Iterator[Row]:
     for name in names:
         for precision in TOLERANCE:
             with np.errstate(all="ignore"):
-                found = dict(checks(EXAMPLES[name], precision))
+                result = dict(checks(EXAMPLES[name], precision))
             wrong = [
                 f"{name}, {precision}, {check}: {share:.2g}"
-                for check, share in found.items()
+                for check, share in result.items()
                 if not share <= 1
             ]
             run.faults.extend(wrong)
             yield {
                 "": name,
                 "precision": precision,
-                **{check: f"{share:.2g}" for check, share in found.items()},
+                **{check: f"{share:.2g}" for check, share in result.items()},
             }

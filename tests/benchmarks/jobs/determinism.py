@@ -36,8 +36,8 @@ def rows(run: Run, scene: str = "mandelbulb", files: tuple[str, ...] = tuple(JOB
     for name in files:
         hashes: Counter[str] = Counter()
         for threads in run.threads:
-            found = Counter(file_hash(scene, name, threads) for _ in range(run.runs))
-            hashes += found
-            yield {"file": name, "threads": threads, **{key: found[key] for key in hashes}}
+            result = Counter(file_hash(scene, name, threads) for _ in range(run.runs))
+            hashes += result
+            yield {"file": name, "threads": threads, **{key: result[key] for key in hashes}}
         if len(hashes) > 1:
             run.faults.append(f"{name}: {len(hashes)} different files")

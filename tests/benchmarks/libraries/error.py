@@ -50,10 +50,10 @@ def rows(
     limit: float = 20.0,
     plot: str = "",
 ) -> Iterator[Row]:
-    found = measure(
+    result = measure(
         Task(workloads, resolutions, tuple(commands(peers)), run.runs, limit), Work(run.threads[0])
     )
-    finest = {(one.workload, one.method): one for one in found}
+    finest = {(one.workload, one.method): one for one in result}
     for (workload, method), one in finest.items():
         n, row = one.numbers, {"": workload, "voxels": one.resolution, "by": method}
         for key, title in {"error_voxels": "error, voxels", "volume": "volume", "area": "area"}.items():
@@ -68,5 +68,5 @@ def rows(
         yield row
     if plot:
         with tempfile.TemporaryDirectory() as folder:
-            write_report(found, Path(folder))
+            write_report(result, Path(folder))
             Path(plot).write_bytes(Path(folder, "error.png").read_bytes())

@@ -78,8 +78,8 @@ def by_vtk(what: Workload, resolution: int) -> Result:
     values = grid(what, resolution, Work())
     image = pyvista.ImageData(dimensions=values.shape)
     image["f"] = values.ravel(order="F")
-    found = image.contour([0.0], "f", method="flying_edges", compute_normals=False, compute_scalars=False)
-    return _placed(found.points, found.faces.reshape(-1, 4)[:, 1:], what, resolution), values.size
+    result = image.contour([0.0], "f", method="flying_edges", compute_normals=False, compute_scalars=False)
+    return _placed(result.points, result.faces.reshape(-1, 4)[:, 1:], what, resolution), values.size
 
 
 def _placed(points: np.ndarray, triangles: np.ndarray, what: Workload, resolution: int) -> Mesh:

@@ -40,14 +40,14 @@ def tried(name: str, tries: int) -> Verdict:
 
 def rows(run: Run, points: int = 10**7, names: tuple[str, ...] = tuple(SCENES)) -> Iterator[Row]:
     for name in names:
-        root, found = SCENES[name], tried(name, points)
+        root, result = SCENES[name], tried(name, points)
         kind = "free ball" if root.bounds.exterior_only else "slope"
-        tries = f"{found.points:.2g}".replace("e+0", "e")
+        tries = f"{result.points:.2g}".replace("e+0", "e")
         row = {
             "": name,
             "bound on": kind,
             "L": f"{root.conservative().bounds.lipschitz:.3g}",
             "points": tries,
         }
-        worst = f"{found.worst:.6f}" if found.worst else "< 0.5"
-        yield {**row, "violations": found.violations, "worst, in units of L": worst}
+        worst = f"{result.worst:.6f}" if result.worst else "< 0.5"
+        yield {**row, "violations": result.violations, "worst, in units of L": worst}

@@ -27,16 +27,16 @@ def sampled(root: Node, voxels: int) -> Bricks:
     return sample(compile_scene(root), root.bounds, Lattice.around(box, max(box.size) / voxels))
 
 
-def orbit_steps(root: Node, found: Bricks, most: int = 400) -> tuple[float, float]:
+def orbit_steps(root: Node, result: Bricks, most: int = 400) -> tuple[float, float]:
     """Steps per sample until it leaves, and until all of its vector have left; the reference counts them."""
     linked, alive = link(root), []
     scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
     scope[CALLED] = lambda function: function
     scope["any_of"] = lambda mask: alive.append(mask) or bool(np.any(mask))
     exec(compile(linked.source, "<linked scene>", "exec"), scope)
-    picked = found.ijk[:: max(1, len(found) // most)]
+    picked = result.ijk[:: max(1, len(result) // most)]
     index = picked[:, None] + np.indices((8, 8, 8)).reshape(3, -1).T
-    points = np.asarray(found.origin) + found.voxel * index.reshape(-1, 3)
+    points = np.asarray(result.origin) + result.voxel * index.reshape(-1, 3)
     with np.errstate(all="ignore"):
         scope[FIELD](*points.T, linked.parameters)
     masks = np.array(alive)
@@ -46,13 +46,13 @@ def orbit_steps(root: Node, found: Bricks, most: int = 400) -> tuple[float, floa
 def rows(run: Run, voxels: int = 256, solids: tuple[str, ...] = tuple(WORKLOADS)) -> Iterator[Row]:
     for name in solids:
         root = WORKLOADS[name]
-        found = sampled(root, voxels)
-        inside, whole = int((found.index == INSIDE).sum()), found.index.size
-        row = {"": name, "bricks in the box": whole, "sampled": len(found), "inside, never sampled": inside}
-        row["evaluations of dense"] = f"{found.evaluations / (512 * whole):.1%}"
-        row["per kept sample"] = f"{found.evaluations / found.values.size:.2f}"
+        result = sampled(root, voxels)
+        inside, whole = int((result.index == INSIDE).sum()), result.index.size
+        row = {"": name, "bricks in the box": whole, "sampled": len(result), "inside, never sampled": inside}
+        row["evaluations of dense"] = f"{result.evaluations / (512 * whole):.1%}"
+        row["per kept sample"] = f"{result.evaluations / result.values.size:.2f}"
         if "iterations" in root.values:
-            own, vector = orbit_steps(root, found)
+            own, vector = orbit_steps(root, result)
             steps = {"until its vector has left": f"{vector:.2f}", "until it has left": f"{own:.2f}"}
             row = {**row, "iterations": root["iterations"], **steps}
         yield row

@@ -14,9 +14,9 @@ SMALLEST = {"count": 1, "resolution": 16.0}
 def rows(run: Run, count: int = 200, first: int = 0, resolution: float = 64.0) -> Iterator[Row]:
     faulty = 0
     for seed in range(first, first + count):
-        found = lost(random_hybrid(seed), resolution)
-        if found:
+        result = lost(random_hybrid(seed), resolution)
+        if result:
             faulty += 1
-            run.faults.append(f"{seed}: {found} samples lost\n    {random_hybrid(seed)}")
-            yield {"": str(seed), "lost": str(found)}
+            run.faults.append(f"{seed}: {result} samples lost\n    {random_hybrid(seed)}")
+            yield {"": str(seed), "lost": str(result)}
     yield {"": "all", "hybrids": str(count), "faults": str(faulty)}

@@ -20,14 +20,14 @@ SMALLEST = {"count": 1, "resolution": 12.0}
 def rows(run: Run, count: int = 500, first: int = 0, resolution: float = 48.0) -> Iterator[Row]:
     faulty, reported, off = 0, 0, []
     for tree in range(first, first + count):
-        found = volumes(random_scene(tree, 0), resolution)
-        faulty, reported = faulty + bool(found.faults), reported + bool(found.reported)
-        off.append(max(abs(found.off), abs(found.layers)))
-        if found.faults:
-            run.faults.append(f"{tree}: {'; '.join(found.faults)}\n    {random_scene(tree, 0)}")
-        if found.faults or found.reported:
-            row = {"": tree, "mesh": f"{found.off:+.2%}", "layers": f"{found.layers:+.2%}"}
-            yield {**row, "faults": "; ".join(found.faults), "reported": "; ".join(found.reported)}
+        result = volumes(random_scene(tree, 0), resolution)
+        faulty, reported = faulty + bool(result.faults), reported + bool(result.reported)
+        off.append(max(abs(result.off), abs(result.layers)))
+        if result.faults:
+            run.faults.append(f"{tree}: {'; '.join(result.faults)}\n    {random_scene(tree, 0)}")
+        if result.faults or result.reported:
+            row = {"": tree, "mesh": f"{result.off:+.2%}", "layers": f"{result.layers:+.2%}"}
+            yield {**row, "faults": "; ".join(result.faults), "reported": "; ".join(result.reported)}
     good = float(np.mean(np.array(off) <= TOLERANCE))
     yield {
         "": "all",

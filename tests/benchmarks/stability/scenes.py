@@ -29,12 +29,12 @@ def drawn_settings(name: str, count: int) -> list[Node]:
     return [root, *(drawn(root, rng, SPREAD) for _ in range(count))]
 
 
-def kind(found: Outcome) -> str:
-    if found.refused:
+def kind(result: Outcome) -> str:
+    if result.refused:
         return "refused"
-    if found.faults:
+    if result.faults:
         return "violations"
-    return "repaired" if found.repaired else "solid"
+    return "repaired" if result.repaired else "solid"
 
 
 def rows(
@@ -47,10 +47,10 @@ def rows(
         total: Counter[str] = Counter()
         for name in names:
             for number, root in enumerate(drawn_settings(name, settings)):
-                found = outcome(root, resolution)
-                total[kind(found)] += 1
-                if found.faults:
-                    text = f"{name} setting {number} at {resolution:g}: {', '.join(found.faults)}"
+                result = outcome(root, resolution)
+                total[kind(result)] += 1
+                if result.faults:
+                    text = f"{name} setting {number} at {resolution:g}: {', '.join(result.faults)}"
                     run.faults.append(f"{text}\n    {root!r}")
         solid = total["solid"] + total["repaired"]
         counts = {"solid": solid, **{key: total[key] for key in ("repaired", "refused", "violations")}}
