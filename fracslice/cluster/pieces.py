@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import platform
 import posixpath
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
@@ -15,8 +14,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ..errors import ClusterError
 from ..extras import lacking
-from ..keys import program
-from ..version import __version__
 
 if TYPE_CHECKING:
     from ..work import Work
@@ -139,7 +136,7 @@ class Pieces:
             raise ClusterError(f"{self.url}: {job}/{name}: {error}") from None
 
     def write(self, job: str, name: str, data: bytes) -> None:
-        """Write a file of a job atomically.
+        """Write a file of a job atomically: beside and moved, or by a conditional put of an object store.
 
         Parameters
         ----------
@@ -156,11 +153,15 @@ class Pieces:
             If it cannot be written.
         """
         system, root = self._place
-        part = f"{root}/{job}/.{name}.{token_hex(8)}.part"
+        path, part = f"{root}/{job}/{name}", f"{root}/{job}/.{name}.{token_hex(8)}.part"
         try:
             system.makedirs(f"{root}/{job}", exist_ok=True)
-            system.pipe_file(part, data)
-            system.mv(part, f"{root}/{job}/{name}")
+            if "://" in self.url:
+                with suppress(FileExistsError):  # the same bytes
+                    system.pipe_file(path, data, mode="create")
+            else:
+                system.pipe_file(part, data)
+                system.mv(part, path)
         except OSError as error:
             raise ClusterError(f"{self.url}: {error}") from None
 
@@ -183,52 +184,6 @@ class Pieces:
         system, root = self._place
         with suppress(OSError):
             system.rmdir(root)
-
-
-@dataclass(frozen=True)
-class Identity:
-    """What two processes must share to make the same bytes.
-
-    Attributes
-    ----------
-    version, python, program, processor : str
-        Version of fracslice and of Python; keys of the program's text and of the processor's instructions.
-    """
-
-    version: str
-    python: str
-    program: str
-    processor: str
-
-    @classmethod
-    def here(cls) -> Identity:
-        """Identity of this process."""
-        from ..kernel.objects import toolchain
-
-        return cls(__version__, platform.python_version(), program(), toolchain())
-
-    def difference(self, expected: Identity) -> str:
-        """Describe the first difference; "" if there is none.
-
-        Parameters
-        ----------
-        expected : Identity
-            Identity of the process that started the job.
-
-        Returns
-        -------
-        str
-            Such as "Python 3.12.1, expected 3.11.7".
-        """
-        for name, own, other in (
-            ("fracslice", self.version, expected.version),
-            ("Python", self.python, expected.python),
-            ("program text", self.program[:8], expected.program[:8]),
-            ("processor", self.processor[:8], expected.processor[:8]),
-        ):
-            if own != other:
-                return f"{name} {own}, expected {other}"
-        return ""
 
 
 def run(task: Task, pieces: Pieces, work: Work) -> None:

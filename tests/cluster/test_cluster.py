@@ -16,7 +16,7 @@ from fracslice.cli.main import run as command
 from fracslice import meshsampling, meshtasks
 from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import Pieces, Workers, connected, workers
-from fracslice.cluster.pieces import Identity
+from fracslice.cluster.identity import Identity
 from fracslice.errors import Cancelled, ClusterError
 from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb, sphere
@@ -198,7 +198,7 @@ def test_a_worker_of_another_version_is_not_used(
     cluster: Cluster, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
     old = tmp_path / "old.py"
-    old.write_text('from fracslice.cluster import pieces\npieces.__version__ = "0.0.9"\n')
+    old.write_text('from fracslice.cluster import identity\nidentity.__version__ = "0.0.9"\n')
     cluster.worker("--preload", str(old))
     good = cluster.worker()
     with (
@@ -252,6 +252,14 @@ def test_a_memory_file_system(name: str, expected: dict[str, bytes], tmp_path: P
     with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=":0") as client:
         pool = Workers(client, Pieces(f"memory://{tmp_path.name}"))
         assert JOBS[name](Work(1, cluster=pool), tmp_path) == expected[name]
+
+
+def test_an_object_store_keeps_the_first_of_two_results(tmp_path: Path) -> None:
+    pieces = Pieces(f"memory://{tmp_path.name}")
+    for data in (b"first", b"second"):
+        pieces.write("job", "piece", data)
+    assert pieces.read("job", "piece") == b"first"
+    assert pieces.read("job", "piece", 1, 3) == b"ir"
 
 
 def test_local_workers_are_processes(tmp_path: Path) -> None:
