@@ -281,7 +281,8 @@ class _Job:
         """
         from .export import FORMATS
         from .export.stl import write_pieces
-        from .mesh.window import Finished, tips_last
+        from .mesh.halo import Finished
+        from .mesh.tip_triangles import tips_last
 
         finished, simplified, mesh = finish.finished(), None, None
         if self.what.simplify_mm is not None:

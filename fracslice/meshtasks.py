@@ -11,11 +11,12 @@ import numpy as np
 from .cluster import Pieces
 from .finishing import off_surface, on_the_plate, placing
 from .mesh.extract import layers
-from .mesh.halo import Kept, finished_alone
+from .mesh.halo import Kept, finished_piece
 from .mesh.missed import NEARBY, nearest
 from .mesh.survey import WholeShells, components
+from .mesh.tally import Tally
+from .mesh.tip_triangles import at_tips
 from .mesh.tips import pointed_in
-from .mesh.window import Tally, at_tips
 from .meshfiles import Choice, StoredPieces, packed, read_choice, unpacked
 from .meshrecipe import MeshRecipe, sampled
 from .volume import SignBricks
@@ -141,7 +142,7 @@ class FinishTask(MeshTask):
         own, before, after = (self.kept(choice, n) for n in (number, number - 1, number + 1))
         assert own is not None
         ends = choice.ends[number - 1] if number else -np.inf, choice.ends[number]
-        made = finished_alone(own, before, after, ends, voxel, planes, frame, threads)
+        made = finished_piece(own, before, after, ends, voxel, planes, frame, threads)
         tally = Tally(threads)
         tally.add(made)
         passed, late = made.passed, at_tips(made.passed, choice.tips)

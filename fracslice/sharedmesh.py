@@ -18,8 +18,9 @@ from .mesh.missed import NEARBY, distances, surface_samples
 from .mesh.model import Mesh
 from .mesh.nesting import Nesting
 from .mesh.survey import Survey, survey
+from .mesh.tally import Tally
+from .mesh.tip_triangles import by_tip
 from .mesh.tips import Pointed, PointedPiece, with_tips
-from .mesh.window import Tally, by_tip
 from .meshfiles import CHOICE, Files, StoredPieces, packed, read_components, read_mesh, unpacked
 from .meshrecipe import SAMPLES, MeshRecipe, samples_key
 from .meshtasks import SHELLS, ContourTask, FinishTask, MeshTask, NestTask, cuts
