@@ -45,8 +45,8 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
     type=NAME,
     required=True,
     metavar="OUT",
-    help="A film (.mp4, .webm, .mov, .gif, .apng), a contact sheet (.png), the first frame's scene (.xml), "
-    "or a folder of frames.",
+    help="A film (.mp4, .webm, .mkv, .mov, .gif, .apng), a contact sheet (.png), the first frame's "
+    "scene (.xml), or a folder of frames.",
 )
 @click.option(
     "--frames", callback=numbers, metavar="N[..N]", help="These frames, counted from 0; all by default."

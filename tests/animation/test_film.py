@@ -151,7 +151,7 @@ def test_pictures_that_move_and_contact_sheets(path: Path, tmp_path: Path) -> No
     assert Image.open(tmp_path / "film.preview.frames" / "frame00000.png").size == (10, 6)
 
 
-@pytest.mark.parametrize("ending", [".mp4", ".webm", ".mov"])
+@pytest.mark.parametrize("ending", [".mp4", ".webm", ".mov", ".mkv"])
 def test_films(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     frames = []

@@ -7,7 +7,8 @@ itself; kernels are cached on disk by a small job before.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 from fracslice.cluster import connected
@@ -26,27 +27,32 @@ def rows(
 ) -> Iterator[Row]:
     each, sizes = run.threads[0], (64, 8, voxels, width, frames)
     large, small = jobs(*sizes), jobs(64, 8, 64, 64, 2)
-    for kind in KINDS:
-        alone = [measured(large[kind], small[kind], 1, each) for _ in range(run.runs)]
-        many = [measured(large[kind], small[kind], workers, each) for _ in range(run.runs)]
-        one, all_ = (Spread.of([figures["wall_s"] for figures in found]) for found in (alone, many))
+    pairs = [(large[kind], small[kind]) for kind in KINDS]
+    alone, many = ([measured(pairs, count, each) for _ in range(run.runs)] for count in (1, workers))
+    for number, kind in enumerate(KINDS):
+        one, all_ = (Spread.of([turn[number]["wall_s"] for turn in turns]) for turns in (alone, many))
         yield {
             "": kind,
             f"1 worker of {each} threads, s": one.median,
             f"{workers} workers, s": all_.median,
             "times faster": one.median / all_.median,
-            "CPU s": alone[0]["cpu_s"],
-            "CPU s of all": many[0]["cpu_s"],
+            "CPU s": alone[0][number]["cpu_s"],
+            "CPU s of all": many[0][number]["cpu_s"],
         }
 
 
-def measured(job: Job, small: Job, workers: int, threads: int) -> Figures:
-    """Figures of a job by fresh workers, after a small one."""
+def measured(pairs: Sequence[tuple[Job, Job]], workers: int, threads: int) -> list[Figures]:
+    """Figures of large jobs by fresh workers, each after a small one."""
+    found = []
     with (
         tempfile.TemporaryDirectory() as name,
         connected(f"local:{workers}", f"{name}/pieces", workers * threads) as pool,
     ):
-        work, folder = Work(threads, cluster=pool), Path(name)
-        small(work, folder)
-        (folder / "large").mkdir()
-        return cpu_of(lambda: job(work, folder / "large"), pool)
+        work = Work(threads, cluster=pool)
+        for number, (large, small) in enumerate(pairs):
+            folders = [Path(name, f"{number}-{size}") for size in ("small", "large")]
+            for folder in folders:
+                folder.mkdir()
+            small(work, folders[0])
+            found.append(cpu_of(partial(large, work, folders[1]), pool))
+    return found
