@@ -10,15 +10,13 @@ import click
 from .cluster import cluster_options, pooled
 from .inputs import check_folder, check_targets, load_scene
 from .options import (
-    NAME,
     Positive,
-    Whole,
     device_option,
     moment,
-    quiet_option,
-    set_option,
+    output_option,
+    run_options,
+    samples_option,
     source_argument,
-    threads_option,
 )
 from .render import pixels
 from .working import StoppedError, working
@@ -39,13 +37,9 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
 
 @click.command(short_help="Render a film of SCENE.")
 @source_argument("SCENE")
-@click.option(
-    "-o",
-    "--output",
-    type=NAME,
-    required=True,
-    metavar="OUT",
-    help="A film (.mp4, .webm, .mkv, .mov, .gif, .apng), a contact sheet (.png), the first frame's "
+@output_option(
+    "OUT",
+    "A film (.mp4, .webm, .mkv, .mov, .gif, .apng), a contact sheet (.png), the first frame's "
     "scene (.xml), or a folder of frames.",
 )
 @click.option(
@@ -55,12 +49,7 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
 @click.option(
     "--size", callback=pixels, metavar="WxH", help="Pixels across and down; the scene's by default."
 )
-@click.option(
-    "--samples",
-    type=Whole(1, 1_000_000),
-    metavar="N",
-    help="Maximum number of samples per pixel; the scene's by default, or 64.",
-)
+@samples_option
 @click.option(
     "--fly",
     callback=moment,
@@ -76,9 +65,7 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
 )
 @device_option
 @cluster_options
-@set_option
-@threads_option
-@quiet_option
+@run_options
 def animate(
     source: str,
     output: str,

@@ -81,13 +81,14 @@ def bench(
     """
     from fracslice.bench.peers import Peer
     from fracslice.bench.report import require_plots, write_report
-    from fracslice.bench.runs import Task, measure
+    from fracslice.bench.runs import BenchmarkTask, measure
     from fracslice.work import Work
 
     require_plots()
     chosen = {"workloads": workloads, "resolutions": resolutions}
     given = {name: values for name, values in chosen.items() if values}
-    task = Task(**given, peers=tuple(Peer.read(text) for text in peers), repeats=repeat, limit_s=limit)  # type: ignore[arg-type]
+    others = tuple(Peer.read(text) for text in peers)
+    task = BenchmarkTask(**given, peers=others, repeats=repeat, limit_s=limit)  # type: ignore[arg-type]
     folder = Path(output)
     check_folder(folder)
     with (

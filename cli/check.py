@@ -27,10 +27,8 @@ from .options import (
     length,
     print_options,
     printing_of,
-    quiet_option,
-    set_option,
+    run_options,
     source_argument,
-    threads_option,
 )
 from .summary import figures, summary
 from .working import working
@@ -83,9 +81,7 @@ def limit(name: str, text: str) -> Callable[..., Any]:
 @limit("floor", "floors and roofs")
 @print_options
 @job_options
-@set_option
-@threads_option
-@quiet_option
+@run_options
 @click.pass_context
 def check(
     context: click.Context, /, source: str, as_json: bool, threads: int, quiet: bool, **options: Any

@@ -20,6 +20,9 @@ DENSITIES = {"resin": 1.1, "pla": 1.24, "petg": 1.27, "abs": 1.04, "asa": 1.07, 
 FLAT = 50.0
 """Mean cross-section per area on the plate from which an object does not stand flat, as in the checks."""
 
+SEALED = 1000
+"""Volume of the solid per volume of sealed cavities above which they are not mentioned."""
+
 CELLS, FINEST = 128, 256
 """Usual and maximum number of cells along the longest side in the search for cavities."""
 
@@ -71,7 +74,10 @@ class Closing:
     def lines(self) -> Iterator[str]:
         """Iterate over the lines, each with the option that mends what it names."""
         ml = self.volume / 1000
-        amount = [f"{ml:.3g} ml", f"{ml * self.density:.3g} g of {self.material} ({self.density:g} g/ml)"]
+        amount = [
+            millilitres(self.volume),
+            f"{ml * self.density:.3g} g of {self.material} ({self.density:g} g/ml)",
+        ]
         if self.layers is not None:
             amount.append(f"{self.layers} layers")
         if self.seconds is not None:
@@ -82,15 +88,20 @@ class Closing:
         if self.drains:
             places = " and ".join(" ".join(f"{x:.1f}" for x in place) for place in self.drains)
             yield f"drain holes of {self.drain:g} mm leave the hollow at {places} mm"
-        if self.cavities:
+        if self.cavities and self.trapped * SEALED > self.volume:
             sealed = "a sealed cavity" if self.cavities == 1 else f"{self.cavities} sealed cavities"
             mend = "--cavities fill, or --drain 3mm for a hollow"
-            yield f"{self.trapped / 1000:.3g} ml trapped in {sealed}: {mend}"
+            yield f"{millilitres(self.trapped)} trapped in {sealed}: {mend}"
         if self.bodies > 1:
             yield f"{self.bodies} loose bodies: --bridge 1mm, or --keep largest"
         if self.contact * FLAT < self.volume / self.height:
             base = max(self.height / 50, 0.5)
             yield f"does not stand flat, {self.contact:.2g} mm2 on the plate: --base {base:.2g}mm"
+
+
+def millilitres(volume: float) -> str:
+    """Volume in millilitres, mm3 given; in mm3 below a hundredth of one."""
+    return f"{volume / 1000:.3g} ml" if volume >= 10 else f"{volume:.2g} mm3"
 
 
 def duration(seconds: float) -> str:
@@ -161,7 +172,7 @@ def of_layers(run: SliceRun, price: float | None) -> Closing:
         cost=None if of is None else volume / 1e6 * of,
         drains=[tuple(p) for p in places.tolist()],
         drain=2 * stack.scale * max((d.radius for d in stack.drains), default=0.0),
-        cavities=count if hollow > volume / 1000 else 0,
+        cavities=count,
         trapped=hollow,
     )
 
@@ -174,7 +185,7 @@ def starts(drains: Sequence[Drain]) -> np.ndarray:
 
 
 def trapped(run: SliceRun) -> tuple[int, float]:
-    """Number and volume, mm3, of the cavities of a stack; none below a thousandth of the solid."""
+    """Number and volume, mm3, of the cavities of a stack."""
     from fracslice.printing.sealed import sealed
 
     stack = run.stack

@@ -54,14 +54,14 @@ def pooled(
             raise click.UsageError("--store: needs --cluster or --shard")
         yield None
         return
-    from fracslice.cluster import HIDDEN, Pieces, Shard, connected
+    from fracslice.cluster import HIDDEN, ResultFolder, Shard, connected
 
     place = store or os.path.join(os.path.dirname(os.path.abspath(output)), HIDDEN)
     place = place if "://" in place else os.path.abspath(place)
     with ExitStack() as stack:
         try:
             pool: Pool = (
-                Shard.read(shard, Pieces(place))
+                Shard.read(shard, ResultFolder(place))
                 if shard
                 else stack.enter_context(connected(str(cluster), place, threads))
             )

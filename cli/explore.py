@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .inputs import check_folder, check_targets, load_scene
-from .options import NAME, Whole, quiet_option, set_option, source_argument, threads_option
+from .options import Whole, output_option, run_options, source_argument
 from .render import pixels
 from .working import working
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Show variations of SCENE on a contact sheet.")
 @source_argument("SCENE")
-@click.option("-o", "--output", type=NAME, required=True, metavar="FILE.png", help="The contact sheet.")
+@output_option("FILE.png", "The contact sheet.")
 @click.option("--count", type=Whole(1, 400), default=16, show_default=True, metavar="N", help="Pictures.")
 @click.option(
     "--seed",
@@ -47,9 +47,7 @@ if TYPE_CHECKING:
     "--size", callback=pixels, default="240x180", show_default=True, metavar="WxH", help="Of a picture."
 )
 @click.option("--samples", type=Whole(1, 1000), default=8, show_default=True, metavar="N", help="Per pixel.")
-@set_option
-@threads_option
-@quiet_option
+@run_options
 def explore(
     source: str,
     output: str,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from .inputs import scene_path
-from .options import device_option, quiet_option, set_option, source_argument, threads_option
+from .options import device_option, run_options, source_argument
 from .render import pixels
 from .working import working
 
@@ -20,9 +20,7 @@ from .working import working
     help="Pixels across and down; 960x540 by default.",
 )
 @device_option
-@set_option
-@threads_option
-@quiet_option
+@run_options
 def fly(
     source: str, size: tuple[int, int], device: str, settings: tuple[str, ...], threads: int, quiet: bool
 ) -> None:

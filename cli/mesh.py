@@ -18,6 +18,7 @@ from .options import (
     job_of,
     job_options,
     moment,
+    output_option,
     price_option,
     print_options,
     quiet_option,
@@ -41,13 +42,9 @@ GRID = ".vdb"
 
 @click.command()
 @source_argument("SCENE")
-@click.option(
-    "-o",
-    "--output",
-    type=NAME,
-    required=True,
-    metavar="FILE",
-    help="An .stl, .3mf, .ply, .obj or .glb file; or .vdb, for the samples of the field.",
+@output_option(
+    "FILE",
+    "An .stl, .3mf, .ply, .obj or .glb file; or .vdb, for the samples of the field.",
 )
 @print_options
 @job_options
@@ -67,6 +64,11 @@ GRID = ".vdb"
 )
 @click.option("--report", type=NAME, metavar="FILE.json", help="Write the figures that prove the mesh.")
 @click.option("--picture", type=NAME, metavar="FILE.png", help="Write a shaded picture of the mesh.")
+@click.option(
+    "--implicit",
+    is_flag=True,
+    help="Write the formula instead of triangles: an .3mf file for programs with the implicit extension.",
+)
 @click.option(
     "--cache",
     type=NAME,
@@ -101,6 +103,7 @@ def mesh(
     every: float | None,
     report: str | None,
     picture: str | None,
+    implicit: bool,
     cache: str | None,
     device: str,
     cluster: str | None,
@@ -124,6 +127,8 @@ def mesh(
     if Path(output).suffix.lower() == GRID:
         names = {"chord", "simplify", "cluster", "shard", "store"}
         refuse_options(context, names, "only for meshes, and a .vdb file holds samples")
+    if implicit:
+        refuse_what_needs_triangles(context, output)
     scenes = moments(load_scene(source, settings), seconds, every)
     how = Work(threads, store=store_in(cache), device=chosen(device))
     problems = False
@@ -134,6 +139,9 @@ def mesh(
         for suffix, scene in scenes:
             file, *others = (path and suffixed(path, suffix) for path in (output, picture, report))
             with going_on(str(file)):
+                if implicit:
+                    write_formula(scene, job_of(scene, **options), str(file), work, quiet)
+                    continue
                 result = made(scene, job_of(scene, **options), str(file), others[0], work)
                 if others[1] is not None:
                     write_report(result.report, others[1])
@@ -160,6 +168,29 @@ def moments(scene: Scene, seconds: float | None, every: float | None) -> list[tu
         raise click.UsageError(f"--every: expected at most {MOST} outputs, and this makes {count}")
     times = [float(f"{k * every:.6g}") for k in range(count)]
     return [(f"-{time:g}s", timeline.at(time)) for time in times]
+
+
+def refuse_what_needs_triangles(context: click.Context, output: str) -> None:
+    """Raise a usage error for a file other than .3mf, or an option without effect on a formula."""
+    if Path(output).suffix.lower() != ".3mf":
+        raise click.UsageError(f"{output}: expected a file name that ends in .3mf, for --implicit")
+    names = {"chord", "simplify", "dust", "report", "picture", "cache", "device", "material", "price"}
+    refuse_options(
+        context, names | {"cluster", "shard", "store"}, "only for meshes, and --implicit makes none"
+    )
+
+
+def write_formula(scene: Scene, job: MeshJob, output: str, work: Work, quiet: bool) -> None:
+    """Write the formula of a scene, and print its size."""
+    from fracslice.implicit import make_implicit
+
+    made = make_implicit(scene, job, output, work)
+    for note in made.notes:
+        click.echo(note, err=True)
+    if not quiet:
+        size = " x ".join(f"{side:.2f}" for side in made.box.size)
+        kilobytes = made.path.stat().st_size / 1e3
+        click.echo(f"{output}: a formula of {made.operations} operations, {kilobytes:.1f} kB, {size} mm")
 
 
 def store_in(folder: str | None) -> Store | None:

@@ -62,6 +62,11 @@ def source_argument(metavar: str) -> Callable[..., Any]:
     return click.argument("source", type=NAME, metavar=metavar)
 
 
+def output_option(metavar: str, text: str) -> Callable[..., Any]:
+    """Decorator that adds the file or folder that the command writes."""
+    return click.option("-o", "--output", type=NAME, required=True, metavar=metavar, help=text)
+
+
 def length(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
     """Parse a length into mm."""
     if value is None:
@@ -236,7 +241,18 @@ device_option = click.option(
     default="auto",
     help="The device that computes; auto by default: the GPU, if there is one.",
 )
+samples_option = click.option(
+    "--samples",
+    type=Whole(1, 1_000_000),
+    metavar="N",
+    help="Maximum number of samples per pixel; the scene's by default, or 64.",
+)
 quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress, no summary.")
+
+
+def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator that adds the options of every command that runs a scene."""
+    return set_option(threads_option(quiet_option(command)))
 
 
 def job_of(

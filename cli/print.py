@@ -10,16 +10,7 @@ import click
 
 from .closing import duration
 from .inputs import check_targets, load_scene
-from .options import (
-    NAME,
-    job_of,
-    job_options,
-    print_options,
-    quiet_option,
-    set_option,
-    source_argument,
-    threads_option,
-)
+from .options import NAME, job_of, job_options, output_option, print_options, run_options, source_argument
 from .working import working
 
 TOLERANCE = 0.02
@@ -31,9 +22,7 @@ MOST = 1_000_000
 
 @click.command("print")
 @source_argument("SCENE")
-@click.option(
-    "-o", "--output", type=NAME, required=True, metavar="OUT", help="A .gcode file; .3mf for orca and bambu."
-)
+@output_option("OUT", "A .gcode file; .3mf for orca and bambu.")
 @click.option(
     "--slicer",
     type=click.Choice(["prusa", "orca", "bambu", "cura"]),
@@ -46,16 +35,15 @@ MOST = 1_000_000
     type=NAME,
     multiple=True,
     metavar="FILE",
-    help="A profile of the slicer: .ini of PrusaSlicer, .json of the others. Repeatable.",
+    help="A profile of the slicer: .ini of PrusaSlicer, .json of the others (machine, process, filament). "
+    "Repeatable.",
 )
 @click.option(
     "--send", "address", metavar="ADDRESS", help="Upload the file: prusalink://HOST. Nothing is started."
 )
 @print_options
 @job_options
-@set_option
-@threads_option
-@quiet_option
+@run_options
 def print_(
     source: str,
     output: str,
@@ -85,7 +73,7 @@ def print_(
         raise click.UsageError(f"{missing[0]}: no such file")
     if address is not None:
         printer_address(address)
-    _ = chosen.program  # before the mesh, which may take minutes
+    chosen.check(profiles)  # before the mesh, which may take minutes
     scene = load_scene(source, settings)
     job = job_of(scene, **{**options, "simplify": options["simplify"] or TOLERANCE})
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, working(threads, quiet) as work:

@@ -16,7 +16,7 @@ from fracslice.errors import Cancelled, SharedError
 from .cluster import cluster_options, pooled
 from .families import families
 from .inputs import check_folder, check_targets, load_scene
-from .options import NAME, Whole, device_option, quiet_option, set_option, source_argument, threads_option
+from .options import NAME, Whole, device_option, output_option, run_options, samples_option, source_argument
 from .working import KeptError, working
 
 if TYPE_CHECKING:
@@ -63,20 +63,11 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 
 @click.command(short_help="Render a picture of SCENE.")
 @source_argument("SCENE")
-@click.option(
-    "-o",
-    "--output",
-    type=NAME,
-    required=True,
-    metavar="FILE",
-    help="A .png, .jpg or .webp file, or .exr or .tif for linear floats.",
+@output_option(
+    "FILE",
+    "A .png, .jpg or .webp file, or .exr or .tif for linear floats.",
 )
-@click.option(
-    "--samples",
-    type=Whole(1, 1_000_000),
-    metavar="N",
-    help="Maximum number of samples per pixel; the scene's by default, or 64.",
-)
+@samples_option
 @click.option(
     "--size",
     callback=pixels,
@@ -99,6 +90,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
 @click.option(
     "--layers", is_flag=True, help="Add depth, normal, position, albedo and samples to the .exr file."
 )
+@click.option("--denoise", is_flag=True, help="Remove the noise that is left.")
 @device_option
 @click.option(
     "--time",
@@ -121,9 +113,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     help="Resume from this file if it exists, and save to it after every pass.",
 )
 @cluster_options
-@set_option
-@threads_option
-@quiet_option
+@run_options
 @families("output", "state", "pass_images")
 def render(
     source: str,
@@ -133,6 +123,7 @@ def render(
     crop: tuple[int, int, int, int] | None,
     seed: int,
     layers: bool,
+    denoise: bool,
     device: str,
     limit: float | None,
     bits: str,
@@ -149,7 +140,7 @@ def render(
     from fracslice.export.images import check_image
     from fracslice.rendering import Renderer
     from fracslice.rendering.layers import layers as rendered_layers
-    from fracslice.rendering.sequence import Samples
+    from fracslice.rendering.sequence import SampleRange
     from fracslice.work import Work
 
     if check_image(output) != ".exr" and layers:
@@ -158,11 +149,13 @@ def render(
     if pass_images:
         check_folder(Path(pass_images))
     scene, start = load_scene(source, settings), time.monotonic()
+    if denoise and scene.view.shading.mode != "light":
+        raise click.BadParameter('expected a scene with shading mode="light"', param_hint="--denoise")
     with (
         pooled(output, threads, cluster, shard, store) as pool,
         working(Work(threads, cluster=pool), quiet) as work,
     ):
-        renderer = Renderer(scene.root, scene.view, size, work, device, Samples(seed=seed), crop)
+        renderer = Renderer(scene.root, scene.view, size, work, device, SampleRange(seed=seed), crop)
         aside = None if pool is None or state else pool.pieces.path(f"{renderer.key}.npz")
         state = state or aside
         if state and Path(state).exists():
@@ -191,7 +184,7 @@ def render(
     if not first:
         raise SharedError("the samples are made; shard 1 writes the file")
     more = rendered_layers(renderer) if layers else None
-    save(output, renderer.seen(), scene, bits, threads, more)
+    save(output, without_noise(renderer) if denoise else renderer.seen(), scene, bits, threads, more)
     if aside:
         Path(aside).unlink(missing_ok=True)
     if not quiet:
@@ -199,6 +192,15 @@ def render(
         click.echo(
             f"{described(output, renderer)}, {renderer.setup.precision}, {renderer.device}, {took:.1f} s"
         )
+
+
+def without_noise(renderer: Renderer) -> Pass:
+    """Picture of a renderer without noise; note if Open Image Denoise is not installed."""
+    from fracslice.rendering.denoising import advice, denoised
+
+    if missing := advice():
+        click.echo(f"--denoise: {missing}", err=True)
+    return denoised(renderer)
 
 
 def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:

@@ -7,15 +7,7 @@ from typing import Any
 import click
 
 from .inputs import is_model, load_model, load_scene, refuse_scene_options
-from .options import (
-    job_of,
-    job_options,
-    print_options,
-    quiet_option,
-    set_option,
-    source_argument,
-    threads_option,
-)
+from .options import job_of, job_options, print_options, run_options, source_argument
 from .working import working
 
 
@@ -23,9 +15,7 @@ from .working import working
 @source_argument("MODEL|SCENE")
 @print_options
 @job_options
-@set_option
-@threads_option
-@quiet_option
+@run_options
 @click.pass_context
 def show(
     context: click.Context,

@@ -19,15 +19,14 @@ from .options import (
     NAME,
     NUMBER,
     length,
+    output_option,
     price_option,
     print_options,
     printing_of,
-    quiet_option,
+    run_options,
     scale_option,
-    set_option,
     size_option,
     source_argument,
-    threads_option,
     up_option,
 )
 from .working import working
@@ -41,13 +40,9 @@ if TYPE_CHECKING:
 
 @click.command("slice")
 @source_argument("SCENE")
-@click.option(
-    "-o",
-    "--output",
-    type=NAME,
-    required=True,
-    metavar="OUT",
-    help="A printer's file (.sl1, .goo, .ctb, .cbddlp, .pwmx, .nanodlp, ...), an .svg, .3mf, .cli or .json "
+@output_option(
+    "OUT",
+    "A printer's file (.sl1, .goo, .ctb, .cbddlp, .pwmx, .nanodlp, ...), an .svg, .3mf, .cli or .json "
     "file, or a folder of PNG pictures.",
 )
 @click.option(
@@ -118,9 +113,7 @@ if TYPE_CHECKING:
 @price_option("litre of resin; the resin's by default")
 @cluster_options
 @print_options
-@set_option
-@threads_option
-@quiet_option
+@run_options
 @families("output", "preview")
 def slice_(
     source: str,

@@ -5,13 +5,14 @@ from pathlib import Path
 from fracslice import _WHERE
 from fracslice.formulas.signatures import package_stub, stub
 from fracslice.scene.manual import markdown
-from fracslice.scene.schema import relaxng
+from fracslice.scene.schema import OPEN, PATH, open_relaxng, relaxng
 
 ROOT = Path(__file__).parents[1]
 
 if __name__ == "__main__":
     head = (ROOT / "docs/reference/elements.head").read_text(encoding="utf-8")
     (ROOT / "docs/reference/elements.md").write_text(f"{head}\n{markdown()}", encoding="utf-8")
-    (ROOT / "fracslice/scene/scene.rng").write_text(relaxng(), encoding="utf-8")
+    PATH.write_text(relaxng(), encoding="utf-8")
+    OPEN.write_text(open_relaxng(), encoding="utf-8")
     (ROOT / "fracslice/formulas/__init__.pyi").write_text(stub(), encoding="utf-8")
     (ROOT / "fracslice/__init__.pyi").write_text(package_stub(_WHERE), encoding="utf-8")

@@ -96,6 +96,8 @@ register(
     orbits="fracslice.kernel.orbits",
     growth="fracslice.kernel.growth",
     distances="fracslice.api.distances",
+    parsing="fracslice.kernel.parsing",
+    reference="fracslice.kernel.reference",
     files="fracslice.export",
 )
 

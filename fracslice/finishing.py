@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .mesh.check import MeshReport
     from .mesh.components import Removed
-    from .mesh.halo import Finished, Kept
+    from .mesh.halo import Finished, SelectedPiece
     from .mesh.quantisation import Frame
     from .mesh.tally import Tally
     from .surfaces import Surface
@@ -257,14 +257,14 @@ class Finish:
             work.progress("finishing", (number + 1) / count)
             yield made
 
-    def _kept(self, number: int) -> Kept:
+    def _kept(self, number: int) -> SelectedPiece:
         """The next piece, with the choice of its bodies."""
-        from .mesh.halo import Kept
+        from .mesh.halo import SelectedPiece
 
         mesh, labels = self.pieces.mesh(number), self.pieces.labels(number)
         self.near.add(mesh.vertices, labels, self.pieces.ends[number])
         fresh = np.arange(len(mesh.triangles) - self.pieces.fresh[number], len(mesh.triangles))
-        return Kept(mesh, self.stays[self.shells.of_label][labels], fresh)
+        return SelectedPiece(mesh, self.stays[self.shells.of_label][labels], fresh)
 
 
 class Check:
@@ -304,7 +304,7 @@ class Check:
             yield piece.passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
                 self._tally.add(piece)
-                self.contact += on_the_plate(piece.passed)
+                self.contact += on_the_plate(piece.passed, self._finish.clock.work.threads)
                 finish = self._finish
                 vertices = piece.points[:: self._stride]
                 self._errors.append(off_surface(finish.planned, finish.place, vertices, finish.clock.work))
@@ -320,20 +320,25 @@ class Check:
         return np.concatenate(self._errors)
 
 
-def on_the_plate(mesh: Mesh) -> float:
+def on_the_plate(mesh: Mesh, threads: int = 0) -> float:
     """Return the area of the triangles at z = 0.
 
     Parameters
     ----------
     mesh : Mesh
         Finished triangles, mm.
+    threads : int, optional
+        Threads; 0 for all cores.
 
     Returns
     -------
     float
         Area, mm2.
     """
-    lying = (mesh.vertices[:, 2] == 0)[mesh.triangles].all(1)
-    x, y = np.moveaxis(mesh.vertices[mesh.triangles[lying], :2], 2, 0)
+    from ._native import touching
+
+    low = mesh.vertices[:, 2] == 0
+    near = mesh.triangles[touching(mesh.triangles, low, threads)]
+    x, y = np.moveaxis(mesh.vertices[near[low[near].all(1)], :2], 2, 0)
     double = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     return float(np.abs(double).sum()) / 2

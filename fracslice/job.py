@@ -168,9 +168,9 @@ class _Job:
         sized, signs, again = self.sampled()
         if (pool := self.clock.work.cluster) is not None:
             if not any(self.needing_all()):
-                from .sharedmesh import made
+                from .sharedmesh import shared_surface
 
-                return sized, made(self.recipe(again), sized.planned, signs, pool, self.clock)
+                return sized, shared_surface(self.recipe(again), sized.planned, signs, pool, self.clock)
             if not pool.first:
                 raise SharedError("the samples are made; shard 1 makes the mesh of them and writes the file")
         most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
@@ -183,7 +183,7 @@ class _Job:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
         folder = aside() if aside and most < len(signs) else None
-        return sized, surfaces.made(sized.planned, signs, most, folder, self.clock)
+        return sized, surfaces.surface_of(sized.planned, signs, most, folder, self.clock)
 
     def result(self, sized: Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .cluster import Pieces
+from .cluster import ResultFolder
 from .finishing import Placement
 from .mesh.model import Mesh
 from .mesh.pieces import Pieces as MeshPieces
-from .mesh.survey import Components
+from .mesh.survey import PieceComponents
 from .store import Arrays
 
 Files = dict[str, NDArray[Any]]
@@ -77,7 +77,7 @@ class StoredPieces(MeshPieces):
 
     Parameters
     ----------
-    store : Pieces
+    store : ResultFolder
         Files.
     job : str
         Key of the job.
@@ -85,7 +85,7 @@ class StoredPieces(MeshPieces):
         Begin of their names.
     """
 
-    def __init__(self, store: Pieces, job: str, prefix: str = "") -> None:
+    def __init__(self, store: ResultFolder, job: str, prefix: str = "") -> None:
         super().__init__()
         self.store, self.job, self.prefix = store, job, prefix
         self.first_labels = list[int]()
@@ -118,7 +118,7 @@ class StoredPieces(MeshPieces):
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class Selection:
     """What stays of a surface, and where it is placed.
 
     Attributes
@@ -156,26 +156,26 @@ class Choice:
         return Placement(scale, (x, y, z))
 
 
-def read_choice(pieces: Pieces, job: str) -> Choice:
-    """Choice of a job from its file.
+def read_choice(pieces: ResultFolder, job: str) -> Selection:
+    """Selection of the bodies of a job from its file.
 
     Parameters
     ----------
-    pieces : Pieces
+    pieces : ResultFolder
         Folder with the files of the job.
     job : str
         Key of the job.
 
     Returns
     -------
-    Choice
+    Selection
     """
     files = unpacked(pieces.read(job, CHOICE))
     prefix, stride = str(files.pop("prefix")), int(files.pop("stride"))
-    return Choice(prefix=prefix, stride=stride, **files)
+    return Selection(prefix=prefix, stride=stride, **files)
 
 
-def read_components(files: Files) -> Components:
+def read_components(files: Files) -> PieceComponents:
     """Components of a piece from the result of its `ContourTask`.
 
     Parameters
@@ -185,13 +185,13 @@ def read_components(files: Files) -> Components:
 
     Returns
     -------
-    Components
+    PieceComponents
         The components.
     """
-    return Components(**{name: files[name] for name in Components.__dataclass_fields__})
+    return PieceComponents(**{name: files[name] for name in PieceComponents.__dataclass_fields__})
 
 
-def read_mesh(files: Files, name: str) -> Mesh:
+def read_seam(files: Files, name: str) -> Mesh:
     """Triangles at a seam from the result of a `ContourTask`.
 
     Parameters

@@ -6,10 +6,10 @@ import threading
 from dataclasses import dataclass
 from functools import lru_cache
 
-from .cluster import Pieces
+from .cluster import ResultFolder
 from .errors import ClusterError
 from .keys import key, program
-from .mesh.extract import Contours
+from .mesh.extract import SurfaceContours
 from .meshfiles import unpacked
 from .meshjob import MeshJob
 from .planning import edited, planned
@@ -65,13 +65,13 @@ class Sampled:
         The field.
     signs : SignBricks
         Its samples.
-    contours : Contours
-        Pieces of its surface.
+    contours : SurfaceContours
+        ResultFolder of its surface.
     """
 
     planned: Plan
     signs: SignBricks
-    contours: Contours
+    contours: SurfaceContours
 
 
 def samples_key(recipe: MeshRecipe, root_key: str, signs: SignBricks) -> str:
@@ -114,14 +114,14 @@ def plan_of(recipe: MeshRecipe) -> Plan:
         return _planned(recipe)
 
 
-def sampled(recipe: MeshRecipe, pieces: Pieces, job: str) -> Sampled:
+def sampled(recipe: MeshRecipe, pieces: ResultFolder, job: str) -> Sampled:
     """Field and samples of a job, planned and read once in a process.
 
     Parameters
     ----------
     recipe : MeshRecipe
         The mesh.
-    pieces : Pieces
+    pieces : ResultFolder
         Folder with the files of the job.
     job : str
         Key of the job.
@@ -140,10 +140,10 @@ def sampled(recipe: MeshRecipe, pieces: Pieces, job: str) -> Sampled:
 
 
 @lru_cache(maxsize=1)
-def _sampled(recipe: MeshRecipe, pieces: Pieces, job: str) -> Sampled:
+def _sampled(recipe: MeshRecipe, pieces: ResultFolder, job: str) -> Sampled:
     made, files = _planned(recipe), unpacked(pieces.read(job, SAMPLES))
     lattice = made.lattice
     signs = SignBricks(lattice.origin, lattice.voxel, files["ijk"], files["signs"], files["index"])
     if samples_key(recipe, made.root.key, signs) != str(files["key"]):
         raise ClusterError("the field planned here is another than that of the job")
-    return Sampled(made, signs, Contours(made.root, signs, threads=1))
+    return Sampled(made, signs, SurfaceContours(made.root, signs, threads=1))

@@ -8,7 +8,7 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
-from .cluster import Pieces, Pool
+from .cluster import Pool, ResultFolder
 from .errors import ClusterError
 from .keys import key, program
 from .meshrecipe import MeshRecipe, plan_of
@@ -29,7 +29,7 @@ class SampleTask:
     ----------
     recipe : MeshRecipe
         The mesh.
-    pieces : Pieces
+    pieces : ResultFolder
         Folder with the corners of the bricks.
     job : str
         Key of the sampling.
@@ -42,7 +42,7 @@ class SampleTask:
     """
 
     recipe: MeshRecipe
-    pieces: Pieces
+    pieces: ResultFolder
     job: str
     field: str
     step: int

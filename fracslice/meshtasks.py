@@ -8,16 +8,16 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from .cluster import Pieces
+from .cluster import ResultFolder
 from .finishing import off_surface, on_the_plate, placing
 from .mesh.extract import layers
-from .mesh.halo import Kept, finished_piece
+from .mesh.halo import SelectedPiece, finished_piece
 from .mesh.missed import NEARBY, nearest
 from .mesh.survey import WholeShells, components
 from .mesh.tally import Tally
 from .mesh.tip_triangles import at_tips
 from .mesh.tips import pointed_in
-from .meshfiles import Choice, StoredPieces, packed, read_choice, unpacked
+from .meshfiles import Selection, StoredPieces, packed, read_choice, unpacked
 from .meshrecipe import MeshRecipe, sampled
 from .volume import SignBricks
 from .volume.lattice import BRICK
@@ -38,7 +38,7 @@ class MeshTask(ABC):
     ----------
     recipe : MeshRecipe
         The mesh.
-    pieces : Pieces
+    pieces : ResultFolder
         Folder with the files of the job.
     job : str
         Key of the mesh and its samples.
@@ -47,7 +47,7 @@ class MeshTask(ABC):
     """
 
     recipe: MeshRecipe
-    pieces: Pieces
+    pieces: ResultFolder
     job: str
     number: int
 
@@ -152,13 +152,13 @@ class FinishTask(MeshTask):
             stl=np.frombuffer(stl(plain.vertices, plain.triangles).data, np.uint8),
             late=late[at],
             corners=passed.vertices[passed.triangles[at]],
-            contact=np.array(on_the_plate(passed)),
+            contact=np.array(on_the_plate(passed, threads)),
             tally=np.array(json.dumps(asdict(tally))),
             errors=off_surface(of.planned, choice.place, made.points[:: choice.stride], work),
             distances=nearest([own.mesh], choice.points, NEARBY * voxel, work),
         )
 
-    def kept(self, choice: Choice, number: int) -> Kept | None:
+    def kept(self, choice: Selection, number: int) -> SelectedPiece | None:
         """A piece with the choice of its bodies; None beyond the ends of the surface."""
         if not 0 <= number < len(choice.ends):
             return None
@@ -166,7 +166,7 @@ class FinishTask(MeshTask):
         mesh, count = stored.mesh(number), int(choice.fresh[number])
         labels = stored.labels(number) + choice.first_labels[number]
         fresh = np.arange(len(mesh.triangles) - count, len(mesh.triangles))
-        return Kept(mesh, choice.stays[labels], fresh)
+        return SelectedPiece(mesh, choice.stays[labels], fresh)
 
 
 def cuts(signs: SignBricks) -> list[tuple[int, int]]:

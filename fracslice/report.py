@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .quantiles import quantile
+
 if TYPE_CHECKING:
     from .mesh.check import MeshReport
     from .mesh.components import Removed
@@ -45,7 +47,7 @@ class SurfaceError:
         SurfaceError
             Summary.
         """
-        return cls(float(mm.mean()), float(np.quantile(mm, 0.99)), float(mm.max()))
+        return cls(float(mm.mean()), quantile(mm, 0.99), float(mm.max()))
 
 
 @dataclass(frozen=True)

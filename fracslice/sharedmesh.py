@@ -21,7 +21,7 @@ from .mesh.survey import Survey, survey
 from .mesh.tally import Tally
 from .mesh.tip_triangles import by_tip
 from .mesh.tips import Pointed, PointedPiece, with_tips
-from .meshfiles import CHOICE, Files, StoredPieces, packed, read_components, read_mesh, unpacked
+from .meshfiles import CHOICE, Files, StoredPieces, packed, read_components, read_seam, unpacked
 from .meshrecipe import SAMPLES, MeshRecipe, samples_key
 from .meshtasks import SHELLS, ContourTask, FinishTask, MeshTask, NestTask, cuts
 from .surfaces import Surface
@@ -97,7 +97,9 @@ def results(
     yield from map(unpacked, pool.results(tasks, clock.work, stage))
 
 
-def made(recipe: MeshRecipe, planned: Plan, signs: SignBricks, pool: Pool, clock: Clock) -> SharedSurface:
+def shared_surface(
+    recipe: MeshRecipe, planned: Plan, signs: SignBricks, pool: Pool, clock: Clock
+) -> SharedSurface:
     """Mesh the surface of samples in pieces; join their components.
 
     Parameters
@@ -130,7 +132,7 @@ def made(recipe: MeshRecipe, planned: Plan, signs: SignBricks, pool: Pool, clock
             end, triangles = files["counts"].tolist()
             stored.count(end, int(triangles))
             stored.first_labels.append(joined.add(read_components(files)))
-            sharp = PointedPiece(files["pointed"], read_mesh(files, "head"), read_mesh(files, "tail"))
+            sharp = PointedPiece(files["pointed"], read_seam(files, "head"), read_seam(files, "tail"))
             pointed.join(sharp, end)
         tipped, tips = with_tips(planned, stored, pointed.points, work)
         shells = joined.shells() if tipped is stored else survey(tipped, planned.voxel, work.threads)

@@ -22,7 +22,7 @@ from .work import Work
 
 LARGEST = 800, 480
 """Width and height of the largest preview of a format, pixels."""
-SAMPLES = 4
+SAMPLES = 2
 """Samples per pixel of pictures."""
 
 

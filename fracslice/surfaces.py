@@ -148,7 +148,7 @@ def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:
     )
 
 
-def made(planned: Plan, signs: SignBricks, most: int, folder: Path | None, clock: Clock) -> Surface:
+def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None, clock: Clock) -> Surface:
     """Mesh the surface of samples, in pieces of about `most` bricks.
 
     Parameters

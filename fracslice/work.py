@@ -233,7 +233,7 @@ class Work:
 
 
 @contextmanager
-def beside(task: Callable[[], R], threads: int) -> Iterator[Callable[[], R]]:
+def in_background(task: Callable[[], R], threads: int) -> Iterator[Callable[[], R]]:
     """Run a task in another thread during a block; without other threads, when its result is asked for.
 
     Parameters

@@ -72,6 +72,8 @@ from fracslice.formulas import (
     union,
     voronoi,
 )
+from fracslice.formulas.definitions import Definition, formula
+from fracslice.formulas.parameters import Number
 
 
 def cut(endless: Node) -> Node:
@@ -212,3 +214,11 @@ EXAMPLES: dict[str, Node] = {
         smooth=0.05,
     ),
 }
+
+_TURNED = "return scale * turn(fold(w, 1), (0, 0, 1), 20) + c"
+_EGG = "return sqrt(x**2 + y**2 + (flat * z)**2) - 1"
+DEFINED = {
+    "a step": formula(Definition("own", (("scale", Number(-1.7, "")),), _TURNED))(iterations=3),
+    "a distance": formula(Definition("egg", (("flat", Number(0.7, "")),), _EGG, "distance"))(),
+}
+"""Formulas as a scene defines them; they are not registered."""

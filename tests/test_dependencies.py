@@ -31,7 +31,7 @@ WITHIN = {"vtkmodules": "pyvista"}
 
 BLOCKED = (
     "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx "
-    "hypothesis shapely imageio_ffmpeg distributed dask fsspec"
+    "hypothesis shapely imageio_ffmpeg pyoidn distributed dask fsspec"
 )
 
 

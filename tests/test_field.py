@@ -12,7 +12,7 @@ from fracslice.formulas import mandelbulb, sphere, transform, union
 from fracslice.formulas.field import Field, Precision
 from fracslice.kernel import reference
 from fracslice.kernel.loops import points as points_loop
-from fracslice.printing.edits import Does, EditedField, edited
+from fracslice.printing.edits import Does, EditedField, edited_field
 from fracslice.printing.offset_field import OffsetField
 from fracslice.printing.samples import Samples
 from fracslice.volume import Bricks, Lattice, sample
@@ -167,7 +167,7 @@ def test_the_key_is_of_all_that_matters(name: str) -> None:
 
 
 def test_formulas_beside_formulas_are_one_tree() -> None:
-    whole = edited(edited(BALL, "add", ASIDE), "cut", TORN)
+    whole = edited_field(edited_field(BALL, "add", ASIDE), "cut", TORN)
     assert whole.tree is whole and not whole.escape_time_only and TORN.escape_time_only
-    mixed = edited(edited(BALL, "cut", Samples(NEAR)), "add", ASIDE)
+    mixed = edited_field(edited_field(BALL, "cut", Samples(NEAR)), "add", ASIDE)
     assert mixed.tree is None and not mixed.escape_time_only

@@ -103,6 +103,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) -> None:
     for work in (
         "job.make_mesh",
+        "implicit.make_implicit",
         "slicing.plan_stack",
         "rendering.Renderer",
         "animation.Timeline",

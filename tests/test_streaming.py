@@ -131,7 +131,7 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
     """Triangles taken out of every piece: each open edge is counted once, wherever the pieces end."""
     from fracslice.mesh.check import check_mesh
     from fracslice.mesh.extract import contour_pieces
-    from fracslice.mesh.halo import Kept, finished_piece
+    from fracslice.mesh.halo import SelectedPiece, finished_piece
     from fracslice.mesh.tally import Tally
     from fracslice.volume import plan, sample_scene_signs
 
@@ -140,12 +140,12 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
     whole = next(p.mesh for p in contour_pieces(planned.root, signs, most=10**6))
     lost = np.random.default_rng(1).random(len(whole.triangles)) < 0.01
     centres = {tuple(c) for c in whole.corners[lost].mean(axis=1).tolist()}
-    tally, passed, kept = Tally(), 0, list[Kept | None]()
+    tally, passed, kept = Tally(), 0, list[SelectedPiece | None]()
     pieces = list(contour_pieces(planned.root, signs, most=1))
     for piece in pieces:
         keep = np.array([tuple(c) not in centres for c in piece.mesh.corners.mean(axis=1).tolist()])
         mesh = piece.mesh.selected(keep)
-        kept.append(Kept(mesh, np.ones(len(mesh.vertices), bool), np.empty(0, np.int64)))
+        kept.append(SelectedPiece(mesh, np.ones(len(mesh.vertices), bool), np.empty(0, np.int64)))
     ends = [-np.inf, *(piece.end for piece in pieces)]
     for n, (before, own, after) in enumerate(zip([None, *kept], kept, [*kept[1:], None], strict=False)):
         assert own

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fracslice import MeshJob, Work
-from fracslice.bench.runs import Task
+from fracslice.bench.runs import BenchmarkTask
 from fracslice.errors import FracsliceError
 from fracslice.export.resins import Resin
 from fracslice.formulas import Node, names, sphere
@@ -80,9 +80,9 @@ NUMBERS: dict[str, Callable[[Any], Any]] = {
     "Limits.density": lambda v: Limits(density=v),
     "Work.threads": lambda v: Work(threads=v),
     "Work.device": chosen,
-    "Task.resolutions": lambda v: Task(resolutions=(v,)),
-    "Task.repeats": lambda v: Task(repeats=v),
-    "Task.limit_s": lambda v: Task(limit_s=v),
+    "BenchmarkTask.resolutions": lambda v: BenchmarkTask(resolutions=(v,)),
+    "BenchmarkTask.repeats": lambda v: BenchmarkTask(repeats=v),
+    "BenchmarkTask.limit_s": lambda v: BenchmarkTask(limit_s=v),
     "Renderer.size": lambda v: Renderer(sphere(), View(), (v, 9), device="cpu"),
     "Renderer.size, all": lambda v: Renderer(sphere(), View(), v, device="cpu"),
     "Renderer.device": lambda v: Renderer(sphere(), View(), (8, 8), device=v),

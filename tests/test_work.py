@@ -11,7 +11,7 @@ from contextlib import suppress
 import pytest
 
 from fracslice.errors import Cancelled
-from fracslice.work import Work, ahead, beside
+from fracslice.work import Work, ahead, in_background
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7])
@@ -164,7 +164,7 @@ def test_a_task_beside_is_computed_once(threads: int) -> None:
         calls.append(threading.current_thread())
         return 7
 
-    with beside(task, threads) as result:
+    with in_background(task, threads) as result:
         assert result() == result() == 7
     assert len(calls) == 1 and (calls[0] is threading.current_thread()) == (threads == 1)
 
@@ -176,12 +176,12 @@ def test_a_task_beside_ends_before_its_block_does() -> None:
         time.sleep(0.05)
         ended.set()
 
-    with suppress(ZeroDivisionError), beside(task, 2):
+    with suppress(ZeroDivisionError), in_background(task, 2):
         time.sleep(0.01)
         raise ZeroDivisionError
     assert ended.is_set()
 
 
 def test_errors_of_a_task_beside_are_raised_where_its_result_is_wanted() -> None:
-    with beside(lambda: [0][1], 2) as result, pytest.raises(IndexError):
+    with in_background(lambda: [0][1], 2) as result, pytest.raises(IndexError):
         result()

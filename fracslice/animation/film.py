@@ -16,7 +16,7 @@ from ..formulas.registry import Node
 from ..keys import key, program
 from ..rendering import Renderer, develop, picture
 from ..rendering.layers import layers
-from ..rendering.sequence import Samples
+from ..rendering.sequence import SampleRange
 from ..rendering.setup import default_lights
 from ..scene.model import Scene
 from ..work import Work
@@ -131,7 +131,7 @@ class FilmJob:
         counts = np.zeros(self.size[::-1], np.float32)
         for scene, same in groupby(moments):
             count = len(list(same))
-            part = Samples(begin, shift)
+            part = SampleRange(begin, shift)
             renderer = Renderer(scene.root, scene.view, self.size, work, self.device, part)
             *_, done = renderer.passes(count * share)
             mean += done.mean * np.float32(count / len(moments))

@@ -13,7 +13,7 @@ from ..formulas import Node
 from ..rendering import Renderer
 from ..scene.view import Camera, Film, Light, View
 from .options import WorkOptions, keywords, work_of
-from .sources import Source, resolved
+from .sources import Source, resolve
 
 FILM = Film(width=640, height=480, samples=16)
 """Film of a shape without a scene, for a quick picture."""
@@ -86,7 +86,7 @@ def render(
     >>> picture.shape, picture.dtype.name
     ((48, 64, 3), 'uint8')
     """
-    what, work = resolved(shape), work_of(options)
+    what, work = resolve(shape), work_of(options)
     root, view = (what, View(film=FILM)) if isinstance(what, Node) else (what.root, what.view)
     given: dict[str, Any] = {"camera": camera, "lights": None if lights is None else tuple(lights)}
     view = replace(view, **{name: value for name, value in given.items() if value is not None})

@@ -18,7 +18,7 @@ from .options import Length
 Source: TypeAlias = Node | Scene | str | os.PathLike[str]
 
 
-def resolved(source: Source) -> Node | Scene:
+def resolve(source: Source) -> Node | Scene:
     """Resolve a source to a shape or scene.
 
     Parameters
@@ -76,9 +76,9 @@ def as_scene(source: Source, size: Length | None = None) -> Scene:
     Raises
     ------
     SceneError
-        As `resolved`.
+        As `resolve`.
     """
-    what = resolved(source)
+    what = resolve(source)
     if isinstance(what, Scene):
         return what
     return scene(what, unit=1.0) if size is None else scene(what, size=size)

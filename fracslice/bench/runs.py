@@ -30,7 +30,7 @@ FIGURES = ("wall_s", "cpu_s", "peak_mb", "evaluations")
 
 
 @dataclass(frozen=True)
-class Task:
+class BenchmarkTask:
     """Benchmark task.
 
     Attributes
@@ -99,12 +99,12 @@ class Measurement:
     failed: str = ""
 
 
-def measure(task: Task, work: Work) -> list[Measurement]:
+def measure(task: BenchmarkTask, work: Work) -> list[Measurement]:
     """Run a benchmark. A failed method is reported, and the others continue.
 
     Parameters
     ----------
-    task : Task
+    task : BenchmarkTask
         The task.
     work : Work
         Threads or pool, progress and cancellation. A worker measures with one thread.

@@ -46,7 +46,7 @@ class Task(Protocol):
 
 
 @dataclass(frozen=True)
-class Pieces:
+class ResultFolder:
     """Results of tasks in a folder, written beside and moved, so that each is whole or absent.
 
     Attributes
@@ -186,14 +186,14 @@ class Pieces:
             system.rmdir(root)
 
 
-def run(task: Task, pieces: Pieces, work: Work) -> None:
+def run(task: Task, pieces: ResultFolder, work: Work) -> None:
     """Make the result of a task, unless it is there.
 
     Parameters
     ----------
     task : Task
         The task.
-    pieces : Pieces
+    pieces : ResultFolder
         Where its result belongs.
     work : Work
         Threads.
@@ -208,13 +208,13 @@ class Pool(ABC):
 
     Attributes
     ----------
-    pieces : Pieces
+    pieces : ResultFolder
         Results.
     first : bool
         True for the process that writes the output; False for the other shards of a job.
     """
 
-    pieces: Pieces
+    pieces: ResultFolder
     first: bool = True
 
     def finished(self, job: str) -> None:

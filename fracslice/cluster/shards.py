@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ..errors import ClusterError
-from .pieces import Pieces, Pool, Task, run
+from .pieces import Pool, ResultFolder, Task, run
 
 if TYPE_CHECKING:
     from ..work import Work
@@ -27,7 +27,7 @@ class Shard(Pool):
 
     Attributes
     ----------
-    pieces : Pieces
+    pieces : ResultFolder
         Results, in a folder that all shards reach.
     number, count : int
         1 to count; shard 1 writes the output.
@@ -37,7 +37,7 @@ class Shard(Pool):
         The job that ended last.
     """
 
-    pieces: Pieces
+    pieces: ResultFolder
     number: int
     count: int
     patience: float = PATIENCE
@@ -49,14 +49,14 @@ class Shard(Pool):
         return self.number == 1
 
     @classmethod
-    def read(cls, text: str, pieces: Pieces) -> Shard:
+    def read(cls, text: str, pieces: ResultFolder) -> Shard:
         """Parse "3/64".
 
         Parameters
         ----------
         text : str
             Number and count.
-        pieces : Pieces
+        pieces : ResultFolder
             Results.
 
         Returns

@@ -14,7 +14,7 @@ from ..errors import ClusterError
 from ..extras import lacking
 from ..files import warn
 from .identity import Identity
-from .pieces import Pieces, Pool, Task, run
+from .pieces import Pool, ResultFolder, Task, run
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -39,7 +39,7 @@ class UnfitWorkerError(ClusterError):
     """Worker that would make other bytes: its address, and the difference."""
 
 
-def on_worker(task: Task, pieces: Pieces, expected: Identity) -> None:
+def on_worker(task: Task, pieces: ResultFolder, expected: Identity) -> None:
     """Make the result of a task on a worker, in one thread.
 
     Nothing is returned: a value would have to be fetched from a worker that may be gone. Exceptions travel
@@ -49,7 +49,7 @@ def on_worker(task: Task, pieces: Pieces, expected: Identity) -> None:
     ----------
     task : Task
         The task.
-    pieces : Pieces
+    pieces : ResultFolder
         Where its result belongs.
     expected : Identity
         Identity of the process that started the job.
@@ -79,7 +79,7 @@ class Workers(Pool):
     ----------
     client : distributed.Client
         Connection to the scheduler.
-    pieces : Pieces
+    pieces : ResultFolder
         Results.
     patience : float
         Seconds without a result until missing tasks are submitted once more; doubled every time.
@@ -88,7 +88,7 @@ class Workers(Pool):
     """
 
     client: Client
-    pieces: Pieces
+    pieces: ResultFolder
     patience: float = 60.0
     limit: float = 1800.0
 
@@ -106,7 +106,7 @@ class Workers(Pool):
         Workers
 
         """
-        return cls(client, Pieces(os.path.abspath(HIDDEN)))
+        return cls(client, ResultFolder(os.path.abspath(HIDDEN)))
 
     def made(self, tasks: Sequence[Task], work: Work) -> Iterator[int]:
         """Submit tasks and yield them as they end; see `Pool.made`."""
@@ -258,7 +258,7 @@ def connected(where: str, store: str, threads: int = 1) -> Iterator[Workers]:
             client = Client(scheduler, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ClusterError(f"{where}: no scheduler answers: {error}") from None
-        yield Workers(stack.enter_context(client), Pieces(store))
+        yield Workers(stack.enter_context(client), ResultFolder(store))
 
 
 @contextmanager

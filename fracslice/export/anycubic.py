@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fracslice._slices import Encoding
 from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import Print, printing, rgb565
+from fracslice.export.prints import PrintData, printing, rgb565
 from fracslice.files import replacing
 
 PREVIEW = 224, 168
@@ -60,7 +60,7 @@ def write_photon(run: SliceRun, path: str | Path) -> Path:
     return Path(path)
 
 
-def _before_pictures(job: Print) -> bytes:
+def _before_pictures(job: PrintData) -> bytes:
     """All sections before the pictures, after their offsets."""
     wide = job.printer.version == 516
     version = 516 if wide else 1
@@ -84,7 +84,7 @@ def _section(name: str, contents: bytes, counted: int = 0) -> bytes:
     return name.encode().ljust(12, b"\0") + struct.pack("<I", len(contents) + counted) + contents
 
 
-def _settings(job: Print) -> bytes:
+def _settings(job: PrintData) -> bytes:
     resin, (rows, columns) = job.resin, job.run.screen.shape
     return _HEADER.pack(
         *(1000 * max(job.printer.pixel), float(job.heights.max()), resin.exposure, resin.wait),
@@ -94,13 +94,13 @@ def _settings(job: Print) -> bytes:
     )
 
 
-def _preview(job: Print, wide: bool) -> bytes:
+def _preview(job: PrintData, wide: bool) -> bytes:
     width, height = PREVIEW
     pixels = rgb565(job.preview(width, height)).astype("<u2").tobytes()
     return _section("PREVIEW", struct.pack("<3I", width, DPI, height) + pixels, 16 * wide)
 
 
-def _layers(job: Print, first: int) -> bytes:
+def _layers(job: PrintData, first: int) -> bytes:
     places = accumulate(job.sizes, initial=first)
     how = job.resin.lift, job.resin.lift_speed / 60
     return b"".join(
@@ -109,7 +109,7 @@ def _layers(job: Print, first: int) -> bytes:
     )
 
 
-def _motion(job: Print) -> bytes:
+def _motion(job: PrintData) -> bytes:
     """Version 516: motion in two steps, of bottom layers and of others."""
     resin = job.resin
     step = resin.lift / 2, resin.lift_speed / 60, resin.retract_speed / 60
@@ -117,7 +117,7 @@ def _motion(job: Print) -> bytes:
     return b"EXTRA".ljust(12, b"\0") + struct.pack("<I", 24) + steps + steps
 
 
-def _machine(job: Print) -> bytes:
+def _machine(job: PrintData) -> bytes:
     size, name = (*job.printer.screen, job.printer.height), job.title
     contents = _MACHINE.pack(name[:95], b"pw0Img", *size, 516, BOARD)
     return _section("MACHINE", contents, 16)

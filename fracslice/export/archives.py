@@ -17,7 +17,7 @@ from PIL import Image
 from fracslice.errors import ExportError
 from fracslice.export import png
 from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import Print, one_height, printing
+from fracslice.export.prints import PrintData, one_height, printing
 from fracslice.files import replacing
 from fracslice.version import __version__
 
@@ -94,7 +94,7 @@ def write_nanodlp(run: SliceRun, path: str | Path) -> Path:
         return _archive(path, chain(about.items(), layers))
 
 
-def _pictures(run: SliceRun, path: str | Path) -> AbstractContextManager[Print]:
+def _pictures(run: SliceRun, path: str | Path) -> AbstractContextManager[PrintData]:
     if run.layers + 100 > MOST_MEMBERS:
         raise ExportError(f"{path}: {run.layers} layers are too many for an archive")
     return printing(run, path, "png", partial(png.encode_layer, run.screen))
@@ -108,9 +108,9 @@ def _archive(path: str | Path, members: Members) -> Path:
     return Path(path)
 
 
-def _preview(job: Print, width: int, height: int) -> bytes:
+def _preview(job: PrintData, width: int, height: int) -> bytes:
     file = io.BytesIO()
-    Image.fromarray(job.preview(width, height)).save(file, "PNG")
+    Image.fromarray(job.preview(width, height)).save(file, "PNG", compress_level=1)
     return file.getvalue()
 
 
@@ -122,7 +122,7 @@ def _json(values: object) -> bytes:
     return json.dumps(values, indent=1).encode()
 
 
-def _config(job: Print, name: str) -> dict[str, object]:
+def _config(job: PrintData, name: str) -> dict[str, object]:
     """Settings for the printer, with the keys of PrusaSlicer 2.5."""
     printer, resin = job.printer, job.resin
     return {
@@ -148,7 +148,7 @@ def _config(job: Print, name: str) -> dict[str, object]:
     }
 
 
-def _settings(job: Print) -> dict[str, object]:
+def _settings(job: PrintData) -> dict[str, object]:
     """Settings with which PrusaSlicer can import the layers."""
     printer, resin = job.printer, job.resin
     (width, depth), (across, along) = printer.screen, printer.pixels
@@ -174,7 +174,7 @@ def _settings(job: Print) -> dict[str, object]:
     }
 
 
-def _plate(job: Print) -> dict[str, object]:
+def _plate(job: PrintData) -> dict[str, object]:
     """Contents of the JSON files of a .nanodlp archive. Heights are in micrometres."""
     resin, (rows, columns), heights = job.resin, job.run.screen.shape, 1000 * job.heights
     (x, y, z), (width, height) = job.run.stack.size, job.printer.pixel

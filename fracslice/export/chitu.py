@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fracslice._slices import Encoding
 from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import Print, printing, rgb565
+from fracslice.export.prints import PrintData, printing, rgb565
 from fracslice.files import replacing
 from fracslice.slicing import Layer
 from fracslice.slicing.raster import Screen
@@ -100,7 +100,12 @@ def _level_sets(screen: Screen, layer: Layer) -> bytes:
 
 
 def _write(
-    job: Print, path: str | Path, magic: int, version: int, sizes: NDArray[np.int64], data: Iterable[bytes]
+    job: PrintData,
+    path: str | Path,
+    magic: int,
+    version: int,
+    sizes: NDArray[np.int64],
+    data: Iterable[bytes],
 ) -> Path:
     """Write header, previews, settings, layer table and layers. sizes: of the pictures, [levels, layers]."""
     previews = [_preview(job.preview(*size)) for size in (LARGE, SMALL)]
@@ -134,7 +139,7 @@ def _write(
     return Path(path)
 
 
-def _header(job: Print, magic: int, version: int, levels: int, places: tuple[int, ...]) -> bytes:
+def _header(job: PrintData, magic: int, version: int, levels: int, places: tuple[int, ...]) -> bytes:
     resin, (rows, columns), (large, small, motion, slicer, table) = job.resin, job.run.screen.shape, places
     return _HEADER.pack(
         *(magic, version, *job.printer.screen, job.printer.height, float(job.tops[-1])),
@@ -144,7 +149,7 @@ def _header(job: Print, magic: int, version: int, levels: int, places: tuple[int
     )
 
 
-def _motion(job: Print) -> bytes:
+def _motion(job: PrintData) -> bytes:
     resin = job.resin
     return _MOTION.pack(
         *((resin.lift, resin.lift_speed) * 2 + (resin.retract_speed,)),
@@ -152,17 +157,17 @@ def _motion(job: Print) -> bytes:
     )
 
 
-def _slicer(job: Print, magic: int, version: int, levels: int, machine: int, size: int) -> bytes:
+def _slicer(job: PrintData, magic: int, version: int, levels: int, machine: int, size: int) -> bytes:
     mode = 8 if magic == CBDDLP else 0x2000000F if version == 3 else 0xF
     return _SLICER.pack(machine, size, mode, 0, levels, SOFTWARE, 0, 0, job.resin.transition_layers)
 
 
-def _timing(job: Print, layer: int) -> tuple[float, float, float]:
+def _timing(job: PrintData, layer: int) -> tuple[float, float, float]:
     """Height of the platform, exposure and time without light."""
     return float(job.tops[layer]), float(job.exposures[layer]), job.resin.wait
 
 
-def _layer_motion(job: Print, size: int) -> bytes:
+def _layer_motion(job: PrintData, size: int) -> bytes:
     resin = job.resin
     return _LAYER_MOTION.pack(size, resin.lift, resin.lift_speed, 0, 0, resin.retract_speed, *(0,) * 5, 255)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fracslice._slices import Encoding
 from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import Print, printing, rgb565
+from fracslice.export.prints import PrintData, printing, rgb565
 from fracslice.files import replacing
 from fracslice.version import __version__
 
@@ -59,7 +59,7 @@ def write_goo(run: SliceRun, path: str | Path) -> Path:
     return Path(path)
 
 
-def _header(job: Print) -> bytes:
+def _header(job: PrintData) -> bytes:
     created = f"{job.run.created:%Y-%m-%d %H:%M:%S}"
     texts = [("fracslice", 32), (__version__, 24), (created, 24), (job.printer.title, 32)]
     texts += [("Default", 32), (job.resin.name, 32)]
@@ -71,7 +71,7 @@ def _header(job: Print) -> bytes:
     return b"V3.0" + MAGIC + named + levels + previews + _settings(job)
 
 
-def _settings(job: Print) -> bytes:
+def _settings(job: PrintData) -> bytes:
     resin, (rows, columns) = job.resin, job.run.screen.shape
     lift, up, down = resin.lift, resin.lift_speed, resin.retract_speed
     return _SETTINGS.pack(
@@ -86,7 +86,7 @@ def _settings(job: Print) -> bytes:
     )
 
 
-def _layer(job: Print, index: int, size: int) -> bytes:
+def _layer(job: PrintData, index: int, size: int) -> bytes:
     resin = job.resin
     return _LAYER.pack(
         *(0, 0, float(job.tops[index]), float(job.exposures[index]), 0, 0, 0, resin.wait),

@@ -25,7 +25,8 @@ LAYERS = {
     "normal": ("Normal.X", "Normal.Y", "Normal.Z"),
     "position": ("Position.X", "Position.Y", "Position.Z"),
     "albedo": ("Albedo.R", "Albedo.G", "Albedo.B"),
-    "samples": ("Samples.X",),
+    "trap": ("Trap.V",),
+    "samples": ("Samples.V",),
 }
 """Channels of the layers of an OpenEXR file, by the names that Blender and Nuke know."""
 STRIP, LEVEL = 64, 6

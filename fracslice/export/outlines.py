@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from isal.isal_zlib import crc32
 
 from fracslice.export.jobs import SliceRun
 from fracslice.slicing import Contours, Layer
@@ -75,9 +76,21 @@ def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
         rings = layer.contours
         d = " ".join("M" + _pairs(_down(run, rings[i]), "%.4f,%.4f", " ") + "z" for i in range(len(rings)))
         title = f"<title>top {layer.top:.6g} mm, height {layer.height:.6g} mm</title>"
-        return f'{_head(run)}{title}\n<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
+        data = f'{_head(run)}{title}\n<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
+        return data + _checksum(data)
 
-    return run.into_folder(path, "svg", make, lambda data: data.endswith(b"</svg>\n"), {})
+    return run.into_folder(path, "svg", make, _is_whole, {})
+
+
+def _checksum(data: bytes) -> bytes:
+    """Comment with the CRC-32 of what precedes it, by which a damaged layer is recognised."""
+    return b"<!-- crc32 %08x -->\n" % crc32(data)
+
+
+def _is_whole(data: bytes) -> bool:
+    """True if the bytes are a complete layer, undamaged."""
+    end = len(_checksum(b""))
+    return data[-end:] == _checksum(data[:-end])
 
 
 def write_svg_layers(run: SliceRun, path: str | Path) -> Path:

@@ -56,6 +56,12 @@ def _chunk(kind: bytes, data: bytes) -> tuple[bytes, bytes, bytes, bytes]:
 
 
 def is_whole(data: bytes) -> bool:
-    """True if the bytes are a complete file of `encode`: its last chunk is there, its image undamaged."""
-    image = data[len(SIGNATURE) + 25 : -12]  # after IHDR, before IEND
-    return data.endswith(b"IEND\xaeB`\x82") and crc32(image[4:-4]) == int.from_bytes(image[-4:])
+    """True if the bytes are a complete, undamaged file of `encode`."""
+    if len(data) < _BEFORE + _AFTER:
+        return False
+    columns, rows = struct.unpack_from(">II", data, len(SIGNATURE) + 8)
+    return data == _file((rows, columns), data[_BEFORE:-_AFTER])
+
+
+_BEFORE, _AFTER = len(SIGNATURE) + 33, 16
+"""Bytes before and after the encoded rows."""

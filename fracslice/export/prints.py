@@ -19,14 +19,14 @@ from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal
 from fracslice.slicing import Layer
 from fracslice.slicing.printers import Printer
-from fracslice.work import beside
+from fracslice.work import in_background
 
 _AREA = struct.Struct("<d")
 """Area before the picture in a record, mm^2."""
 
 
 @dataclass(frozen=True, eq=False)
-class Print:
+class PrintData:
     """A print job whose layers are encoded.
 
     Attributes
@@ -140,7 +140,9 @@ class Print:
 
 
 @contextmanager
-def printing(run: SliceRun, path: str | Path, form: str, encode: Callable[[Layer], bytes]) -> Iterator[Print]:
+def printing(
+    run: SliceRun, path: str | Path, form: str, encode: Callable[[Layer], bytes]
+) -> Iterator[PrintData]:
     """Encode the pictures of all layers; an interrupted job resumes.
 
     Parameters
@@ -173,9 +175,9 @@ def printing(run: SliceRun, path: str | Path, form: str, encode: Callable[[Layer
         data = encode(layer)
         return _AREA.pack(layer.area) + data
 
-    drawn = nullcontext(None) if run.picture is None else beside(run.picture, run.work.threads)
+    drawn = nullcontext(None) if run.picture is None else in_background(run.picture, run.work.threads)
     with drawn as picture, run.encoded(path, form, record) as journal:
-        yield Print(run, run.screen.printer, run.resin, journal, picture)
+        yield PrintData(run, run.screen.printer, run.resin, journal, picture)
 
 
 def one_height(run: SliceRun, path: str | Path, form: str) -> None:

@@ -144,6 +144,8 @@ def _prusalink(
     status = _answered(connection.getresponse()).status
     if status in (401, 403):
         raise ExportError("the printer refuses the key")
+    if status == 404:
+        raise ExportError(f"the printer has no storage {storage}; expected another, such as /local or /usb")
     if status == 409:
         raise ExportError(f"the printer has a file {name}, or is busy")
     if status not in (200, 201):

@@ -1,7 +1,13 @@
-"""Command lines of slicers for filament printers: PrusaSlicer, OrcaSlicer, Bambu Studio and CuraEngine."""
+"""Command lines of slicers for filament printers: PrusaSlicer, OrcaSlicer, Bambu Studio and CuraEngine.
+
+Arguments as documented: PrusaSlicer and CuraEngine (CommandLine.cpp) by their sources, OrcaSlicer by
+github.com/OrcaSlicer/OrcaSlicer/wiki (cli_actions, cli_misc), Bambu Studio by
+github.com/bambulab/BambuStudio/wiki/Command-Line-Usage.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -66,6 +72,21 @@ class FilamentSlicer:
         raise ExportError(
             f"{self.title} is not installed: no program {' or '.join(self.programs)} on the path"
         )
+
+    def check(self, profiles: Sequence[str]) -> None:
+        """Check that the program is installed and its profiles can be passed to it.
+
+        Parameters
+        ----------
+        profiles : sequence of str
+            Profiles of the slicer.
+
+        Raises
+        ------
+        ExportError
+            If the program is missing, or a profile is of no known type.
+        """
+        self.command(self.program, profiles, Path(self.model), Path(self.output))
 
     def slice(self, model: Path, profiles: Sequence[str], path: Path, work: Work) -> list[str]:
         """Slice a model.
@@ -141,8 +162,25 @@ def _prusa(program: str, profiles: Sequence[str], model: Path, path: Path) -> li
 
 
 def _orca(program: str, profiles: Sequence[str], model: Path, path: Path) -> list[str]:
-    loads = ["--load-settings", ";".join(profiles)] if profiles else []
-    return [program, *loads, "--slice", "0", "--export-3mf", str(path), str(model)]
+    """Printer and process are one list, filaments another; result.json goes to the output folder, too."""
+    filaments = [profile for profile in profiles if _kind(profile) == "filament"]
+    settings = [profile for profile in profiles if profile not in filaments]
+    lists = ("--load-settings", settings), ("--load-filaments", filaments)
+    loads = [text for option, files in lists if files for text in (option, ";".join(files))]
+    output = ["--outputdir", str(path.parent), "--export-3mf", path.name]
+    return [program, *loads, "--arrange", "1", "--slice", "0", *output, str(model)]
+
+
+def _kind(profile: str) -> object:
+    """Type of a profile of OrcaSlicer or Bambu Studio: machine, process or filament."""
+    try:
+        values = json.loads(Path(profile).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ExportError(f"{profile}: expected a .json profile: {error}") from None
+    kind = values.get("type") if isinstance(values, dict) else None
+    if kind not in ("machine", "process", "filament"):
+        raise ExportError(f"{profile}: type {kind!r}: expected machine, process or filament")
+    return kind
 
 
 def _cura(program: str, profiles: Sequence[str], model: Path, path: Path) -> list[str]:

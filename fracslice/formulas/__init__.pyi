@@ -85,9 +85,9 @@ def apollonian(level: int = 4, swell: float = 1.02) -> Node:
     """Apollonian packing of balls in the unit ball (Soddy 1936, "The kiss precise"; Boyd 1973).
 
     Inversions in the five spheres at right angles to four of the five first ones, the four balls and the
-    outside, make all others. A ball of radius d around an image
-    point comes from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured: balls of
-    further levels are left out.
+    outside, make all others. A ball of radius d around an image point, all outside or all in one ball, comes
+    from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured, on both sides: balls
+    of further levels are left out.
 
     Parameters
     ----------
@@ -745,7 +745,7 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     Node
     """
 
-def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, roughness: float = 0.0, metallic: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', texture: float | None = None, tile: float = 1.0, repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, roughness: float = 0.0, vary: float = 0.0, coat: float = 0.0, metallic: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """The appearance of the element in pictures. A material nested deeper takes precedence.
 
     The field is that of the element: L = the element's.
@@ -760,6 +760,10 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette
         a palette by name in place of the colours
     trap : point, axes, planes, sphere, steps or direction, default 'point'
         property of the orbit that the palette shows: its smallest distance to the origin, to the axes, to the coordinate planes or the unit sphere, its number of steps, or its last angle about the z axis
+    texture : the name of a file
+        a picture that multiplies the colour, seen along the three axes
+    tile : a number > 0, default 1.0
+        width of that picture, in scene units
     repeats : a number > 0 and <= 1000, default 1.0
         how often the palette is run through
     shift : a number >= 0 and <= 1, default 0.0
@@ -774,6 +778,10 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette
         the part of light that is mirrored head on; more is at grazing angles
     roughness : a number >= 0 and <= 1, default 0.0
         roughness of the reflection: 0 is a mirror, 1 is dull
+    vary : a number >= -1 and <= 1, default 0.0
+        how much rougher it is in the middle of the palette, by the orbit
+    coat : a number >= 0 and <= 1, default 0.0
+        strength of a clear, smooth lacquer over it
     metallic : a number >= 0 and <= 1, default 0.0
         1 for a metal, which reflects in its colour and has no other light
     clear : a number >= 0 and <= 1, default 0.0

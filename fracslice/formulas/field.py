@@ -102,7 +102,7 @@ class Kernel(Protocol):
         return evaluate
 
 
-class CompiledLoop(Protocol):
+class FieldLoop(Protocol):
     """A loop over a field."""
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
@@ -151,7 +151,29 @@ class Loops:
 
     width: int
     batch: int
-    runs: Mapping[str, CompiledLoop]
+    runs: Mapping[str, FieldLoop]
+
+
+class Cells(Protocol):
+    """Proofs that a field has one sign on cells, by enclosures of its values; many threads may call it."""
+
+    def __call__(self, centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
+        """Prove cells to be empty or full.
+
+        Parameters
+        ----------
+        centres
+            Centres of the cells, [3, n], scene units.
+        half
+            Half the size of the cells, scene units.
+
+        Returns
+        -------
+        (ndarray, ndarray)
+            Masks of the cells that are proved to be empty, and of those proved to be full, bool [n]. The
+            others are unknown.
+        """
+        ...
 
 
 class Field(Protocol):
@@ -212,6 +234,26 @@ class Field(Protocol):
         KernelError
             If the field cannot be compiled.
         """
+
+    def cells(self, precision: Precision = "float32") -> Cells | None:
+        """Proofs that the field has one sign on cells.
+
+        Parameters
+        ----------
+        precision : {"float32", "float64"}
+            Type of the values; a proof holds for the exact field and for its kernel of this precision.
+
+        Returns
+        -------
+        Cells or None
+            None if nothing can be proved.
+
+        Raises
+        ------
+        KernelError
+            If the field cannot be compiled.
+        """
+        return None
 
     def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
         """Compiled loops (`kernel.loops`) over the field.

@@ -30,7 +30,6 @@ MIRRORS = ((0.0, 0.0, 0.0, MIDDLE), *((*(-3.0 * v for v in axis), 8.0) for axis 
 
 @shape(
     lipschitz=2.0,
-    exterior_only=True,
     level=Count(4, "how often the gaps are filled", most=12),
     swell=Number(1.02, "radius of the balls in units of that at which they touch", least=0.5, most=1.1),
 )
@@ -38,9 +37,9 @@ def apollonian(x, y, z, level, swell):  # type: ignore[no-untyped-def]
     """Apollonian packing of balls in the unit ball (Soddy 1936, "The kiss precise"; Boyd 1973).
 
     Inversions in the five spheres at right angles to four of the five first ones, the four balls and the
-    outside, make all others. A ball of radius d around an image
-    point comes from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured: balls of
-    further levels are left out.
+    outside, make all others. A ball of radius d around an image point, all outside or all in one ball, comes
+    from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured, on both sides: balls
+    of further levels are left out.
     """
     a, b = 1.0 + 0.0 * x, 0.0 * x
     within = 0.0 * x
@@ -64,17 +63,12 @@ def apollonian(x, y, z, level, swell):  # type: ignore[no-untyped-def]
     for cx, cy, cz, radius in BALLS:
         px, py, pz = x - cx, y - cy, z - cz
         d = minimum(d, sqrt(px * px + py * py + pz * pz) - swell * radius)
-    return d / (minimum(a, 1e30) + minimum(b, 1e30) * maximum(d, 0.0))
+    return d / (minimum(a, 1e30) + minimum(b, 1e30) * absolute(d))
 
 
 @apollonian.bounds
 def apollonian_bounds(node: Node) -> Box:
     return Box.centred(max(node["swell"], 1.0))
-
-
-@apollonian.potential
-def apollonian_potential(node: Node) -> bool:
-    return False
 
 
 @shape(

@@ -32,33 +32,32 @@ TETRAHEDRON_AXIS, OCTAHEDRON_AXIS, DODECAHEDRON_AXIS, ICOSAHEDRON_AXIS = (
 """Directions of the corners, which are on the unit sphere."""
 
 
+def kaleidoscope(w, mirrors, axis, scale, angle):  # type: ignore[no-untyped-def]
+    """Fold by mirrors with these normals, rotate about an axis, and enlarge about its point at distance 1."""
+    for a, b, d in mirrors:
+        w = mirror(w, (a, b, d))
+    return scale * turn(w, axis, angle) - (scale - 1.0) * axis
+
+
 @orbit(**turned(2.0))
 def kifs_tetrahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
     """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 2 is measured."""
-    for a, b, d in TETRAHEDRON:
-        w = mirror(w, (a, b, d))
-    return scale * turn(w, TETRAHEDRON_AXIS, angle) - (scale - 1.0) * TETRAHEDRON_AXIS
+    return kaleidoscope(w, TETRAHEDRON, TETRAHEDRON_AXIS, scale, angle)
 
 
 @orbit(**turned(2.0))
 def kifs_octahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
     """The octahedron in a kaleidoscope (Knighty 2010). L = 2 is measured."""
-    for a, b, d in OCTAHEDRON:
-        w = mirror(w, (a, b, d))
-    return scale * turn(w, OCTAHEDRON_AXIS, angle) - (scale - 1.0) * OCTAHEDRON_AXIS
+    return kaleidoscope(w, OCTAHEDRON, OCTAHEDRON_AXIS, scale, angle)
 
 
 @orbit(**turned(2.0))
 def kifs_dodecahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
     """The dodecahedron in a kaleidoscope (Knighty 2010). L = 2 is measured."""
-    for a, b, d in DODECAHEDRON:
-        w = mirror(w, (a, b, d))
-    return scale * turn(w, DODECAHEDRON_AXIS, angle) - (scale - 1.0) * DODECAHEDRON_AXIS
+    return kaleidoscope(w, DODECAHEDRON, DODECAHEDRON_AXIS, scale, angle)
 
 
 @orbit(**turned(2.0))
 def kifs_icosahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
     """The icosahedron in a kaleidoscope (Knighty 2010). L = 2 is measured."""
-    for a, b, d in ICOSAHEDRON:
-        w = mirror(w, (a, b, d))
-    return scale * turn(w, ICOSAHEDRON_AXIS, angle) - (scale - 1.0) * ICOSAHEDRON_AXIS
+    return kaleidoscope(w, ICOSAHEDRON, ICOSAHEDRON_AXIS, scale, angle)

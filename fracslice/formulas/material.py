@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .box import Box
 from .palettes import OWN, PALETTES
-from .parameters import Choice, Number, Vector
+from .parameters import Choice, File, Number, Vector
 from .registry import Node, domain_operator
 
 TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
@@ -26,6 +26,8 @@ TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
         "the coordinate planes or the unit sphere, its number of steps, or its last angle about the z axis",
         TRAPS,
     ),
+    texture=File(None, "a picture that multiplies the colour, seen along the three axes"),
+    tile=Number(1.0, "width of that picture, in scene units", above=0),
     repeats=Number(1.0, "how often the palette is run through", above=0, most=1000),
     shift=Number(0.0, "where in the palette it starts, from 0 to 1", least=0, most=1),
     specular=Number(0.2, "strength of the highlight", least=0, most=100),
@@ -35,6 +37,8 @@ TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
         0.0, "the part of light that is mirrored head on; more is at grazing angles", least=0, most=1
     ),
     roughness=Number(0.0, "roughness of the reflection: 0 is a mirror, 1 is dull", least=0, most=1),
+    vary=Number(0.0, "how much rougher it is in the middle of the palette, by the orbit", least=-1, most=1),
+    coat=Number(0.0, "strength of a clear, smooth lacquer over it", least=0, most=1),
     metallic=Number(
         0.0, "1 for a metal, which reflects in its colour and has no other light", least=0, most=1
     ),

@@ -12,7 +12,7 @@ from ..errors import SceneError
 from ..providers import provider
 from . import signatures
 from .box import Box
-from .field import Bounds, Device, Field, Kernel, Loops, Precision
+from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
 from .operators import Operators
 
 if TYPE_CHECKING:
@@ -174,6 +174,11 @@ class Node(Operators, Field):
         """See `Field.kernel`."""
         kernel: Kernel = provider("compiler").kernel(self, device, precision)
         return kernel
+
+    def cells(self, precision: Precision = "float32") -> Cells | None:
+        """See `Field.cells`."""
+        cells: Cells = provider("compiler").cells(self, precision)
+        return cells
 
     def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
         """See `Field.loops`."""

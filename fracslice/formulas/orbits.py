@@ -32,6 +32,9 @@ ITERATIONS = Count(
 JULIA = Vector(
     None, "adds this point in each step instead of the start point: a Julia set", least=-100, most=100
 )
+LIPSCHITZ = 2.0
+"""Lipschitz bound of orbits of one step."""
+
 OWN = {"iterations": ITERATIONS, "julia": JULIA, "repeat": REPEAT}
 """Parameters of every orbit."""
 
@@ -75,7 +78,7 @@ class _Orbit(Formula):
 
 def _registered(parameters: dict[str, Any]) -> Callable[[Callable[..., Any]], Formula]:
     def decorate(step: Callable[..., Any]) -> Formula:
-        formula = shape(lipschitz=2.0, exterior_only=True, **parameters, **OWN)(step)
+        formula = shape(lipschitz=LIPSCHITZ, exterior_only=True, **parameters, **OWN)(step)
         formula.hooks.update(HOOKS, step=orbit_step)
         return formula
 

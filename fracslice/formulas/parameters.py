@@ -73,7 +73,7 @@ class Parameter(ABC):
 
 
 @dataclass(frozen=True)
-class Limits(Parameter):
+class Bounded(Parameter):
     """Kind of finite numbers within limits.
 
     Attributes
@@ -114,7 +114,7 @@ class Limits(Parameter):
 
 
 @dataclass(frozen=True)
-class Number(Limits):
+class Number(Bounded):
     """One finite number."""
 
     @property
@@ -167,7 +167,7 @@ class Count(Parameter):
 
 
 @dataclass(frozen=True)
-class Vector(Limits):
+class Vector(Bounded):
     """Several finite numbers, separated by spaces; the limits hold for each.
 
     Attributes
@@ -235,6 +235,20 @@ class Axis(Choice):
     """One of the letters x, y and z."""
 
     choices: tuple[str, ...] = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class File(Parameter):
+    """Name of a file; in a scene file, relative to its folder."""
+
+    @property
+    def expects(self) -> str:
+        return "the name of a file"
+
+    def check(self, value: Any) -> Any:
+        if not isinstance(value, str) or not value.isprintable():
+            raise ValueError(self.expects)
+        return value.strip()
 
 
 def validate(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exception]) -> None:

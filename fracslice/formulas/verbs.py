@@ -31,6 +31,9 @@ OVER: dict[Callable[..., Any], Callable[..., Any]] = {}
 other arguments.
 """
 
+NAMES = ("ball", "fold", "fold_to", "inversion", "mirror", "modulo", "positive", "power", "turn")
+"""Verbs whose arguments are points and numbers."""
+
 Verb = Callable[..., Any]
 
 

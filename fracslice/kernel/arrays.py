@@ -42,7 +42,7 @@ class ArrayField(Field, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ArrayLoop:
-    """Python implementation of `formulas.field.CompiledLoop`.
+    """Python implementation of `formulas.field.FieldLoop`.
 
     Attributes
     ----------

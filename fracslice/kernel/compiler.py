@@ -91,7 +91,8 @@ def _text(linked: Linked, target: Target, loops: Sequence[Loop]) -> str:
     kinds = {"r": real.as_pointer(), "i": ir.IntType(32).as_pointer(), "n": WHOLE}
     for tree in trees:  # innermost elements first, so that the recursion is not as deep as the scene
         if [a.arg for a in tree.args.args] == PART:
-            emitter.function(tree.name, ("lanes", "lanes", "lanes", kinds["r"], WHOLE))
+            for points in sorted({loop.points for loop in loops}):
+                emitter.function(tree.name, (points, points, points, kinds["r"], WHOLE))
     for loop in loops:
         emitter.entry(loop.name, tuple(kinds[letter] for letter in loop.arguments))
     emitter.module.triple = llvm.get_process_triple()

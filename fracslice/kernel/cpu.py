@@ -124,7 +124,7 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
 
 @dataclass(frozen=True, eq=False)
 class CompiledLoop:
-    """Machine-code implementation of `formulas.field.CompiledLoop`.
+    """Machine-code implementation of `formulas.field.FieldLoop`.
 
     Attributes
     ----------

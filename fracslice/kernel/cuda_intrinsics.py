@@ -41,6 +41,12 @@ def thread():  # type: ignore[no-untyped-def]
     return cuda.grid(1)
 
 
+@device
+def gather(i, P):  # type: ignore[no-untyped-def]
+    """Load the element of P at a whole index, a real."""
+    return P[int32(i)]
+
+
 Instruction = str | Callable[..., Any]
 
 

@@ -51,6 +51,7 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
         CALLED,
         "device",
         "divide",
+        "gather",
         f"float{bits} as real",
         "int32 as whole",
         "kernel",

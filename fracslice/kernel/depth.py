@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -11,8 +12,10 @@ from ..formulas.algebra import stretches
 from ..formulas.parameters import AUTO
 from ..formulas.registry import Node
 from ..formulas.transforms import affine
+from ..quantiles import quantile
 from .cells import possible_cells
 from .cpu import compile_scene
+from .kept_texts import keep_text, kept_text
 
 DEEPEST = 60
 """Largest automatic depth."""
@@ -25,6 +28,9 @@ ENOUGH = 256
 
 CELLS = 1 << 13
 """Largest number of cells searched for the surface."""
+
+STEPS = "depths"
+"""Kind of text in the cache."""
 
 BISECTIONS = 24
 """Bisection steps per surface point."""
@@ -142,12 +148,12 @@ def _depth(node: Node, detail: float) -> int:
     Solids of successive depths need not be nested: steps of a Mandelbox add and take away in turns, and every
     other step is small. So two successive steps have to be.
     """
-    steps = _steps(Known(node.changed(iterations=1)))
+    steps = _steps(*(Known(node.changed(iterations=d)) for d in (1, DEEPEST)))
     for depth in range(1, DEEPEST):
-        for k in (depth, depth + 1):
-            if k not in steps:
-                steps[k] = _step(*(Known(node.changed(iterations=d)) for d in (k, k + 1)))
-        step, following = steps[depth], steps[depth + 1]
+        for k in range(len(steps) + 1, depth + 2):
+            steps.append(_step(*(Known(node.changed(iterations=d)) for d in (k, k + 1))))
+            keep_text(STEPS, steps.made_of, json.dumps(steps))
+        step, following = steps[depth - 1 : depth + 1]
         if step is None:
             return max(depth - 1, 1)
         if max(step, following or 0.0) < detail / 2:
@@ -155,10 +161,18 @@ def _depth(node: Node, detail: float) -> int:
     return DEEPEST
 
 
+class _Steps(list[float | None]):
+    """Results of `_step` for a formula from depth 1 on, and what they are made of."""
+
+    def __init__(self, *made_of: str) -> None:
+        self.made_of = made_of
+        super().__init__(json.loads(kept_text(STEPS, made_of, lambda: "[]")))
+
+
 @lru_cache(maxsize=64)
-def _steps(_: Known) -> dict[int, float | None]:
-    """Results of `_step` for a formula by depth, filled by `_depth`: a key per depth would take longer."""
-    return {}
+def _steps(first: Known, last: Known) -> _Steps:
+    """Steps of a formula so far; `_depth` adds more: a key per depth would take longer."""
+    return _Steps(np.__version__, first.key, last.key)
 
 
 def _step(before: Known, after: Known) -> float | None:
@@ -172,7 +186,7 @@ def _step(before: Known, after: Known) -> float | None:
     if not surfaces[0].shape[1]:
         return None
     moved = [
-        np.quantile(compile_scene(other.node, "float64").points(*surface), 0.9)
+        quantile(compile_scene(other.node, "float64").points(*surface), 0.9)
         for surface, other in zip(surfaces, (after, before), strict=True)
         if surface.shape[1]
     ]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from llvmlite import ir
 
 from . import lanes_math
+from .intervals import LANES, Interval, Possible
 from .registers import Vec
 from .scalars import BOOL, DOUBLE, WHOLE, MismatchError, common, compare, number, operate, truth, widened
 from .values import Kind, Lanes, Value, as_kind, is_mask, joined, kind_of, made_of, parts_of, types_of
@@ -33,7 +34,19 @@ _INTRINSICS = {
     )
     for name in names
 }
-_OWN = {"where": 3, "any_of": 1, "int": 1, "min": 2, "max": 2, "load": 2, "store": 3}
+_OWN = {
+    "where": 3,
+    "any_of": 1,
+    "int": 1,
+    "min": 2,
+    "max": 2,
+    "load": 2,
+    "store": 3,
+    "around": 2,
+    "lower": 1,
+    "upper": 1,
+    "gather": 2,
+}
 """Intrinsics with a method of their own, and their numbers of arguments."""
 
 _EXTREMES = {"min": ast.Lt(), "max": ast.Gt()}
@@ -106,32 +119,40 @@ class Expressions:
             return self.builder.not_(truth(self.builder, value))
         if isinstance(op, ast.Invert):
             if is_mask(value):
-                return value.each(self.builder.not_)
+                return ~value
             return self.builder.not_(truth(self.builder, value))
-        if isinstance(value, Vec):
-            return -self.lanes.vec(self.builder, value)
+        if isinstance(value, (Vec, Interval)):
+            return -self.numbers(value)[0]
         if isinstance(value.type, ir.IntType):
             return self.builder.neg(number(self.builder, value, WHOLE))
         return self.builder.fneg(value)
 
     def binary(self, op: ast.operator, a: Value, b: Value) -> Value:
         """Emit a binary operator."""
-        if isinstance(op, (ast.BitAnd, ast.BitOr)) and (is_mask(a) or is_mask(b)):
-            a, b = (self.lanes.condition(self.builder, v) for v in (a, b))
-            return a.each(self.builder.and_ if isinstance(op, ast.BitAnd) else self.builder.or_, b)
+        if isinstance(op, (ast.BitAnd, ast.BitOr)) and any(is_mask(v) for v in (a, b)):
+            cells = any(isinstance(v, Possible) for v in (a, b))
+            made = self.lanes.possible if cells else self.lanes.condition
+            a, b = (made(self.builder, v) for v in (a, b))
+            return a & b if isinstance(op, ast.BitAnd) else a | b
         return self.on_lanes(op, a, b) or operate(self.builder, op, a, b)
 
     def comparison(self, op: ast.cmpop, a: Value, b: Value) -> Value:
         """Emit a comparison."""
         return self.on_lanes(op, a, b) or compare(self.builder, op, a, b)
 
-    def on_lanes(self, op: ast.AST, a: Value, b: Value) -> Vec | None:
-        """Emit an operator with lanes as operands; None if both are scalars."""
-        if not any(isinstance(v, (Vec, tuple)) for v in (a, b)):
+    def on_lanes(self, op: ast.AST, a: Value, b: Value) -> Value | None:
+        """Emit an operator with lanes or intervals as operands; None if both are scalars."""
+        if not any(isinstance(v, (Vec, tuple, Interval, Possible)) for v in (a, b)):
             return None
         if type(op) not in _ON_LANES:
             raise MismatchError("this is for numbers that are the same everywhere")
-        return _ON_LANES[type(op)](self.lanes.vec(self.builder, a), self.lanes.vec(self.builder, b))
+        return _ON_LANES[type(op)](*self.numbers(a, b))
+
+    def numbers(self, *values: Value) -> list[Value]:
+        """Values as lanes; as intervals if one of them is an interval."""
+        cells = any(isinstance(v, (Interval, Possible)) for v in values)
+        made = self.lanes.interval if cells else self.lanes.vec
+        return [made(self.builder, value) for value in values]
 
     def short(self, op: ast.boolop, a: Any, node: ast.expr) -> Any:
         """Emit ``and`` or ``or``; evaluate the second operand only if the first does not decide."""
@@ -197,7 +218,10 @@ class Expressions:
         if name in self.emitter.functions:
             return self.called(name, given)
         if name in _INTRINSICS:
-            return _INTRINSICS[name][0](*(self.lanes.vec(self.builder, v) for v in given))
+            first, *others = self.numbers(*given)
+            if isinstance(first, Interval):
+                return getattr(first, name)(*others)
+            return _INTRINSICS[name][0](first, *others)
         value: Value = getattr(self, f"intrinsic_{name}")(*given)
         return value
 
@@ -210,13 +234,18 @@ class Expressions:
         return made_of(kind, parts, self.lanes, self.builder)
 
     # --- intrinsics that are not functions of lanes only ---
-    def intrinsic_where(self, mask: Value, yes: Value, no: Value) -> Vec:
+    def intrinsic_where(self, mask: Value, yes: Value, no: Value) -> Value:
         """Emit `where`."""
+        if any(isinstance(v, (Interval, Possible)) for v in (mask, yes, no)):
+            yes, no = (self.lanes.interval(self.builder, v) for v in (yes, no))
+            return self.lanes.possible(self.builder, mask).where(yes, no)
         yes, no = (self.lanes.vec(self.builder, v) for v in (yes, no))
         return self.lanes.condition(self.builder, mask).choose(yes, no)
 
     def intrinsic_any_of(self, mask: Value) -> Any:
         """Emit `any_of`: one bit test of the joined mask registers."""
+        if isinstance(mask, Possible):
+            return self.intrinsic_any_of(mask.may)
         if not isinstance(mask, Vec):
             return truth(self.builder, mask)
         parts = self.lanes.condition(self.builder, mask).parts
@@ -244,6 +273,22 @@ class Expressions:
         a, b = number(self.builder, a, kind), number(self.builder, b, kind)
         return self.builder.select(compare(self.builder, _EXTREMES[which], b, a), b, a)
 
+    def intrinsic_around(self, centre: Value, half: Value) -> Interval:
+        """Emit the interval around a centre."""
+        middle, reach = self.numbers(centre, half)
+        of = LANES[self.lanes.bits]
+        return Interval(middle - reach, middle + reach, of).outward()
+
+    def intrinsic_lower(self, value: Value) -> Vec:
+        """Emit the lower bound of an interval."""
+        found: Vec = self.lanes.interval(self.builder, value).lo
+        return found
+
+    def intrinsic_upper(self, value: Value) -> Vec:
+        """Emit the upper bound of an interval."""
+        found: Vec = self.lanes.interval(self.builder, value).hi
+        return found
+
     def intrinsic_load(self, place: Any, index: Value) -> Vec:
         """Load lanes from memory."""
         align = self.lanes.bits // 8
@@ -257,6 +302,19 @@ class Expressions:
         parts = self.lanes.vec(self.builder, value).parts
         for address, part in zip(self.registers(place, index), parts, strict=True):
             self.builder.store(part, address, align=self.lanes.bits // 8)
+
+    def intrinsic_gather(self, index: Value, place: Any) -> Vec:
+        """Load an element from memory for each lane."""
+        like = self.lanes.register
+        parts = []
+        for register in self.lanes.vec(self.builder, index).to_whole().parts:
+            loaded = ir.Constant(like, ir.Undefined)
+            for k in range(like.count):
+                lane = ir.Constant(ir.IntType(32), k)
+                address = self.builder.gep(place, [self.builder.extract_element(register, lane)])
+                loaded = self.builder.insert_element(loaded, self.builder.load(address), lane)
+            parts.append(loaded)
+        return Vec(self.builder, tuple(parts))
 
     def registers(self, place: Any, index: Value) -> list[Any]:
         """Addresses of the registers of lanes, starting at an array element."""

@@ -56,16 +56,16 @@ def fingerprint(function: Callable[..., Any]) -> Hashable:
         Fingerprint.
     """
     assert isinstance(function, FunctionType)
-    code, names = function.__code__, _names(function.__code__)
+    code, names = function.__code__, outer_names(function.__code__)
     cells = zip(code.co_freevars, function.__closure__ or (), strict=True)
     around = {name: cell.cell_contents for name, cell in cells}
     return code, tuple(_mark(around.get(n, function.__globals__.get(n)), names) for n in names)
 
 
 @lru_cache(maxsize=4096)
-def _names(code: CodeType) -> tuple[str, ...]:
-    """Names that a function uses from outside, and their attributes."""
-    inner = (_names(c) for c in code.co_consts if isinstance(c, CodeType))
+def outer_names(code: CodeType) -> tuple[str, ...]:
+    """Return the names that a function uses from outside, and their attributes."""
+    inner = (outer_names(c) for c in code.co_consts if isinstance(c, CodeType))
     return tuple(sorted({*code.co_names, *code.co_freevars, *(n for names in inner for n in names)}))
 
 

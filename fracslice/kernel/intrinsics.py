@@ -12,6 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from .intervals import ARRAYS, Interval
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 WIDTH = sys.maxsize
@@ -86,6 +88,78 @@ def store(array: np.ndarray, i: int, lanes: Any) -> None:
         Values, WIDTH of them.
     """
     array[i : i + WIDTH] = lanes
+
+
+@intrinsic
+def around(centre: Any, half: float) -> Interval:
+    """Interval around a centre.
+
+    Parameters
+    ----------
+    centre
+        Lanes.
+    half
+        Half its size.
+
+    Returns
+    -------
+    Interval
+        Interval that encloses all numbers that are not farther from the centre.
+    """
+    return Interval(centre - half, centre + half, ARRAYS).outward()
+
+
+@intrinsic
+def lower(interval: Interval) -> Any:
+    """Lower bound of an interval.
+
+    Parameters
+    ----------
+    interval
+        Interval.
+
+    Returns
+    -------
+    Any
+        Lanes.
+    """
+    return interval.lo
+
+
+@intrinsic
+def upper(interval: Interval) -> Any:
+    """Upper bound of an interval.
+
+    Parameters
+    ----------
+    interval
+        Interval.
+
+    Returns
+    -------
+    Any
+        Lanes.
+    """
+    return interval.hi
+
+
+@intrinsic
+def gather(i: Any, P: np.ndarray) -> Any:
+    """Load an element of P for each lane.
+
+    Parameters
+    ----------
+    i
+        Whole, possible indices, as reals.
+    P
+        Parameters of the scene.
+
+    Returns
+    -------
+    Any
+        Elements.
+    """
+    return P[np.asarray(i).astype(np.intp)]
 
 
 @intrinsic

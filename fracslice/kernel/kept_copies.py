@@ -1,23 +1,17 @@
-"""Copies of formulas as text, kept in the cache of kernels: making them is most of linking."""
+"""Copies of formulas as text, kept in the cache of kernels."""
 
 from __future__ import annotations
 
-import hashlib
 import linecache
 from collections.abc import Callable, Hashable
-from contextlib import suppress
 from types import FunctionType, ModuleType
-from typing import Any, BinaryIO
+from typing import Any
 
-from ..errors import ExportError
-from ..files import Kept
-from ..keys import key
 from . import functions
+from .kept_texts import kept_text
 
 Texts = tuple[str, str, list[str]]
 """Name and text of a copy, and the names of the functions that it calls."""
-
-DIGEST = hashlib.sha256().digest_size
 
 
 def kept(function: Callable[..., Any], made_of: tuple[object, ...], make: Callable[[], Texts]) -> Texts:
@@ -39,8 +33,6 @@ def kept(function: Callable[..., Any], made_of: tuple[object, ...], make: Callab
     tuple
         The texts.
     """
-    from .objects import cache_folder, toolchain
-
     code = function.__code__
     linecache.checkcache(code.co_filename)
     lines = "".join(linecache.getlines(code.co_filename, function.__globals__))
@@ -48,23 +40,12 @@ def kept(function: Callable[..., Any], made_of: tuple[object, ...], make: Callab
         return make()
     outside = _stable(functions.fingerprint(function))
     place = lines, code.co_firstlineno, function.__qualname__, outside
-    folder, name = Kept(cache_folder() / "copies"), f"{key('copy', *place, *made_of, toolchain())}.txt"
-    texts = folder.get(name, _read)
-    if texts is None:
-        texts = make()
-        copy, text, calls = texts
-        data = f"{copy}\n{' '.join(calls)}\n{text}".encode()
-        with suppress(ExportError):
-            folder.put(name, lambda file: file.write(hashlib.sha256(data).digest() + data))
-    return texts
 
+    def written() -> str:
+        copy, text, calls = make()
+        return f"{copy}\n{' '.join(calls)}\n{text}"
 
-def _read(file: BinaryIO) -> Texts | None:
-    """Texts in a file; None if it is incomplete."""
-    digest, data = file.read(DIGEST), file.read()
-    if hashlib.sha256(data).digest() != digest:
-        return None
-    name, calls, text = data.decode().split("\n", 2)
+    name, calls, text = kept_text("copies", (*place, *made_of), written).split("\n", 2)
     return name, text, calls.split()
 
 

@@ -47,6 +47,11 @@ def absolute(a: Vec) -> Vec:
     return a.call("fabs")
 
 
+def where(mask: Vec, yes: Vec, no: Vec) -> Vec:
+    """Return `yes` where the mask is set, else `no`."""
+    return mask.choose(yes, no)
+
+
 def minimum(a: Vec, b: Vec) -> Vec:
     """Return a where a < b, else b."""
     return _extreme(a, b, "min") if _is_avx512(a) else (a < b).choose(a, b)

@@ -88,7 +88,7 @@ def _text(function: Callable[..., Any], _: object) -> str:
     return ast.unparse(rewritten)
 
 
-def intrinsic(value: Any) -> str | None:
+def intrinsic_name(value: Any) -> str | None:
     """Return the name of the intrinsic that a value stands for, or None: ``np.sqrt`` is ``sqrt``."""
     return _INTRINSICS.get(id(value))
 
@@ -265,7 +265,7 @@ class _Language(ast.NodeTransformer):
         return self.known(node, self.scope.get(node.id), node.id)
 
     def known(self, node: ast.expr, value: Any, name: str) -> ast.AST:
-        meant = intrinsic(value) or (name if value is None and name in vocabulary.NAMES else None)
+        meant = intrinsic_name(value) or (name if value is None and name in vocabulary.NAMES else None)
         if meant:
             return ast.Name(meant, ast.Load())
         if isinstance(value, (int, float)) and isinstance(node, ast.Attribute):

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import KernelError
 from ..formulas.registry import Fixed, Node
 from . import functions, source
 from .arguments import read
@@ -28,6 +29,9 @@ from .structure import Subroutine, link_tree
 
 FIELD = "field"
 """Name of the field's function."""
+
+LARGEST = 1 << 24
+"""Largest number of parameters: a float32 holds every index."""
 
 CALLED = "called"
 """Decorator of functions that are called, not inlined."""
@@ -84,7 +88,7 @@ def link(root: Node) -> Linked:
     """
     linker = Linker()
     linker.field(root)
-    return Linked(linker.text(), np.array(linker.parameters or [0.0], dtype=np.float64))
+    return Linked(linker.text(), linker.numbers())
 
 
 @dataclass
@@ -101,12 +105,15 @@ class Linker:
         Texts of the functions by name.
     called
         Names of the functions that are called, not inlined.
+    tables
+        Arrays that stand behind the numbers in P, each with the index of the number that is its offset.
     """
 
     given: frozenset[str] = frozenset()
     parameters: list[float] = field(default_factory=list)
     functions: dict[str, str] = field(default_factory=dict)
     called: set[str] = field(default_factory=set)
+    tables: list[tuple[int, np.ndarray]] = field(default_factory=list)
     _parts: dict[Any, Subroutine] = field(default_factory=dict)
     _shared: dict[Any, str] = field(default_factory=dict)
 
@@ -153,14 +160,43 @@ class Linker:
         Parameters
         ----------
         value
-            Number or nested tuple of numbers.
+            Number or nested tuple of numbers, or an array for `intrinsics.gather`.
 
         Returns
         -------
         str
-            Expression that reads the value back.
+            Expression that reads the value back; of an array, the index of its first element in P.
         """
+        if isinstance(value, np.ndarray):
+            self.tables.append((len(self.parameters), value))
+            value = 0.0
         return read(value, self.parameters)
+
+    def numbers(self) -> np.ndarray:
+        """Return P: the numbers, then each array once.
+
+        Returns
+        -------
+        ndarray
+            Parameters, float64 [n].
+
+        Raises
+        ------
+        KernelError
+            If a float32 could not hold every index.
+        """
+        numbers, arrays = np.array(self.parameters or [0.0], np.float64), {}
+        end = len(numbers)
+        for place, array in self.tables:
+            if id(array) not in arrays:
+                arrays[id(array)] = end, array
+                end += array.size
+            numbers[place] = arrays[id(array)][0]
+        if end > LARGEST:
+            raise KernelError(
+                f"the pictures of a scene hold {end:,} numbers: expected at most {LARGEST:,} in all"
+            )
+        return np.concatenate([numbers, *(array.ravel() for _, array in arrays.values())])
 
     def share(
         self, function: Callable[..., Any], fixed: Sequence[tuple[str, Any]] = (), prefix: str = ""

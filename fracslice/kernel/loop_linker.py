@@ -11,6 +11,7 @@ import ast
 import builtins
 import copy
 import linecache
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -19,7 +20,9 @@ from typing import Any, NoReturn
 
 from ..errors import KernelError
 from . import functions, language
+from .identity import identity
 from .intrinsics import is_intrinsic
+from .kept_texts import kept_text
 from .loops import Loop
 from .parsing import parse
 from .syntax import Folding
@@ -72,7 +75,7 @@ def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
 
 
 def loop_source(loops: Sequence[Loop]) -> str:
-    """Return the text of loops and of the functions that they call.
+    """Return the text of loops and of the functions that they call: cached, or linked and cached.
 
     Parameters
     ----------
@@ -89,7 +92,12 @@ def loop_source(loops: Sequence[Loop]) -> str:
     KernelError
         If a loop is not in the language.
     """
-    return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
+
+    def linked() -> str:
+        return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
+
+    about = [identity(loop.function, *(value for pair in loop.fixed for value in pair)) for loop in loops]
+    return kept_text("linked", (sys.version, *about), linked)
 
 
 @dataclass
@@ -165,7 +173,7 @@ class _Resolver(Folding):
             expression = ast.Constant(int(value))
         elif isinstance(node, ast.Name) and value is getattr(builtins, node.id, _UNKNOWN):
             expression = ast.Name(node.id, ast.Load())
-        elif name := language.intrinsic(value):
+        elif name := language.intrinsic_name(value):
             expression = ast.Name(name, ast.Load())
         elif is_intrinsic(value):
             expression = ast.Name(value.__name__, ast.Load())
@@ -183,7 +191,7 @@ class _Resolver(Folding):
             case ast.Call(ast.Name("tuple"), [ast.GeneratorExp(element, [generator])]):
                 return self.unrolled(node, element, generator)
         called = self.known(node.func)
-        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.intrinsic(called):
+        if not isinstance(called, FunctionType) or is_intrinsic(called) or language.intrinsic_name(called):
             return self.generic_visit(node)
         fixed, passed = [], []
         for parameter, argument in zip(functions.parameters(called), node.args, strict=False):

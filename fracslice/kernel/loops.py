@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..formulas.vocabulary import where
-from .intrinsics import WIDTH, field, load, store
+from .intrinsics import WIDTH, around, field, load, lower, store, upper
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,14 @@ class Loop:
         first argument is P by convention.
     fixed
         Further arguments by name, constant at compile time: functions, and records of numbers.
+    points
+        Kind of the coordinates that it passes to the field: "lanes", or "interval" for cells.
     """
 
     function: Callable[..., None]
     arguments: str = ""
     fixed: tuple[tuple[str, Any], ...] = ()
+    points: str = "lanes"
 
     @property
     def name(self) -> str:
@@ -43,20 +46,22 @@ class Loop:
         return replace(self, fixed=tuple(fixed.items()))
 
 
-def loop(arguments: str) -> Callable[[Callable[..., None]], Loop]:
+def loop(arguments: str, points: str = "lanes") -> Callable[[Callable[..., None]], Loop]:
     """Return a decorator that makes a function a `Loop`.
 
     Parameters
     ----------
     arguments
         Arguments of the loop, one letter each.
+    points
+        Kind of the coordinates that it passes to the field.
 
     Returns
     -------
     Callable
         Decorator.
     """
-    return lambda function: Loop(function, arguments)
+    return lambda function: Loop(function, arguments, points=points)
 
 
 @loop("rrrrrn")
@@ -112,3 +117,30 @@ def bricks(P, FRAME, IX, IY, IZ, corners, F, n):
             y = (load(IY, s) + y0) * h + FRAME[1]
             z = (load(IZ, s) + z0) * h + FRAME[2]
             store(F, 512 * b + s, field(x, y, z, P))
+
+
+@loop("rrrrrrrn", points="interval")
+def enclosures(P, FRAME, X, Y, Z, LOW, HIGH, n):
+    """Enclose the values of the field on cells.
+
+    Parameters
+    ----------
+    P
+        Parameters of the scene.
+    FRAME
+        Half the size of the cells, [1], scene units.
+    X, Y, Z
+        Centres of the cells, [n] each, scene units.
+    LOW, HIGH
+        Receive the bounds, [n].
+    n
+        Number of cells, a multiple of WIDTH.
+    """
+    half = FRAME[0]
+    for i in range(0, n, WIDTH):
+        x = around(load(X, i), half)
+        y = around(load(Y, i), half)
+        z = around(load(Z, i), half)
+        f = field(x, y, z, P)
+        store(LOW, i, lower(f))
+        store(HIGH, i, upper(f))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ..formulas import vocabulary
 from ..formulas.registry import Node
+from .intervals import Interval, on_cells
 from .linker import CALLED, FIELD, link
 
 
@@ -29,15 +31,43 @@ def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.n
     KernelError
         If the scene cannot be linked.
     """
-    linked = link(root)
-    scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
-    scope[CALLED] = lambda function: function
-    exec(compile(linked.source, "<linked scene>", "exec"), scope)
-    function = scope[FIELD]
+    function = _field(root, {name: getattr(vocabulary, name) for name in vocabulary.NAMES})
 
     def evaluate(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        return np.asarray(function(*(np.asarray(a, dtype=np.float64) for a in (x, y, z))))
+
+    return evaluate
+
+
+def enclosure(root: Node) -> Callable[[Interval, Interval, Interval], Interval]:
+    """Return the field of a scene tree on cells.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+
+    Returns
+    -------
+    Callable
+        Function of the intervals of x, y and z, scene units; returns an interval of the values there.
+
+    Raises
+    ------
+    KernelError
+        If the scene cannot be linked.
+    """
+    return _field(root, {name: on_cells(name) for name in vocabulary.NAMES})
+
+
+def _field(root: Node, scope: dict[str, Any]) -> Callable[..., Any]:
+    """Field of a tree with given functions of the vocabulary."""
+    linked = link(root)
+    scope[CALLED] = lambda function: function
+    exec(compile(linked.source, "<linked scene>", "exec"), scope)
+
+    def evaluate(*points: Any) -> Any:
         with np.errstate(all="ignore"):
-            points = [np.asarray(a, dtype=np.float64) for a in (x, y, z)]
-            return np.asarray(function(*points, linked.parameters))
+            return scope[FIELD](*points, linked.parameters)
 
     return evaluate

@@ -131,6 +131,15 @@ class Vec:
     def __ne__(self, other: object) -> Vec:  # type: ignore[override]
         return self.each(partial(self.builder.fcmp_unordered, "!="), other)  # type: ignore[arg-type]
 
+    def __and__(self, other: Vec) -> Vec:
+        return self.each(self.builder.and_, other)
+
+    def __or__(self, other: Vec) -> Vec:
+        return self.each(self.builder.or_, other)
+
+    def __invert__(self) -> Vec:
+        return self.each(self.builder.not_)
+
     def choose(self, yes: Vec | float, no: Vec | float) -> Vec:
         """Select `yes` where the mask self is set, else `no`; at least one of them is a vector."""
         like = yes if isinstance(yes, Vec) else no

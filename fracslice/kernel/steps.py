@@ -17,7 +17,7 @@ from ..errors import KernelError
 from . import functions, language
 from .parsing import parse, parse_expression
 from .source import specialised
-from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector, as_number
+from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector3, as_number
 
 Value = Any
 """Scalar, Vector or tuple of these."""
@@ -93,7 +93,7 @@ def _argument(name: str, size: int) -> Value:
     if size == 1:
         return Scalar(name)
     parts = tuple(Scalar(f"{name}_{k}") for k in range(size))
-    return Vector(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
+    return Vector3(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
 
 
 def _used(lines: Sequence[str], wanted: set[str]) -> list[str]:
@@ -152,7 +152,7 @@ class _Reader:
         return None
 
     def elements(self, value: Value) -> tuple[Value, ...]:
-        return value.parts if isinstance(value, Vector) else value
+        return value.parts if isinstance(value, Vector3) else value
 
     def known(self, test: ast.expr) -> bool:
         """Truth of a condition that is known here."""
@@ -185,7 +185,7 @@ class _Reader:
                 return _constants(self.scope[name])
             case ast.Tuple(elements):
                 parts = tuple(map(self.value, elements))
-                return Vector(parts, _constant_stretch(parts)) if _is_triple(parts) else parts
+                return Vector3(parts, _constant_stretch(parts)) if _is_triple(parts) else parts
             case ast.UnaryOp(ast.USub(), operand):
                 return self.product(Scalar("-1.0"), self.value(operand), node)
             case ast.BinOp(left, op, right):
@@ -195,7 +195,7 @@ class _Reader:
                 return Scalar(str(self.tape.name(ast.unparse(ast.Compare(_n(a), [op], [_n(b)])))))
             case ast.Subscript(place, ast.Constant(int(k))):
                 value = self.value(place)
-                return (value.parts if isinstance(value, Vector) else value)[k]
+                return (value.parts if isinstance(value, Vector3) else value)[k]
             case ast.Call(ast.Name(name), arguments):
                 return self.call(name, [self.value(a) for a in arguments], node)
         self.fail(node, "it is not in the language of steps")
@@ -219,7 +219,7 @@ class _Reader:
             return Scalar(str(self.tape.name(f"{a.atom} {sign} {b.atom}")))
         if not isinstance(op, (ast.Add, ast.Sub)):
             self.fail(node, "expected +, -, * or /")
-        if isinstance(b, Vector) != isinstance(a, Vector):
+        if isinstance(b, Vector3) != isinstance(a, Vector3):
             self.fail(node, "expected two points or two numbers")
         sign = "+" if isinstance(op, ast.Add) else "-"
         if isinstance(a, Scalar):
@@ -227,9 +227,9 @@ class _Reader:
         return self.tape.vector_sum(a, b, sign)
 
     def product(self, a: Value, b: Value, node: ast.AST) -> Value:
-        if isinstance(a, Vector):
+        if isinstance(a, Vector3):
             a, b = b, a
-        if not isinstance(a, Scalar) or not isinstance(b, (Scalar, Vector)):
+        if not isinstance(a, Scalar) or not isinstance(b, (Scalar, Vector3)):
             self.fail(node, "expected a number as one of the factors")
         return self.tape.product(a, b) if isinstance(b, Scalar) else self.tape.scaled(a, b)
 
@@ -241,17 +241,17 @@ class _Reader:
             if len(names) != len(given):
                 self.fail(node, f"{name} takes {len(names)} values, found {len(given)}")
             value = _followed(function, {}, dict(zip(names, given, strict=True)), self.tape)
-            if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], Vector)):
+            if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], Vector3)):
                 return value
-            if not isinstance(given[0], Vector):
+            if not isinstance(given[0], Vector3):
                 self.fail(node, "expected a point first")
             (image, factor), before = value, given[0].stretch
-            return Vector(image.parts, before and tuple(self.tape.times(factor.atom, s) for s in before))  # type: ignore[arg-type]
+            return Vector3(image.parts, before and tuple(self.tape.times(factor.atom, s) for s in before))  # type: ignore[arg-type]
         if name not in DERIVATIVES and name != "where":
             self.fail(node, f"{name!r} is not in the language of steps")
-        if name == "where" and isinstance(given[1], Vector) and isinstance(given[2], Vector):
+        if name == "where" and isinstance(given[1], Vector3) and isinstance(given[2], Vector3):
             pairs = zip(given[1].parts, given[2].parts, strict=True)
-            return Vector(tuple(self.call(name, [given[0], p, q], node) for p, q in pairs))
+            return Vector3(tuple(self.call(name, [given[0], p, q], node) for p, q in pairs))
         if not all(isinstance(v, Scalar) for v in given):
             self.fail(node, "expected numbers, found a point")
         return self.tape.intrinsic(name, given)
@@ -261,14 +261,14 @@ def _n(value: Scalar) -> ast.expr:
     return parse_expression(value.atom)
 
 
-def _vector(value: Value, function: Callable[..., Any]) -> Vector:
+def _vector(value: Value, function: Callable[..., Any]) -> Vector3:
     """Vector that a step returns."""
-    if isinstance(value, Vector):
+    if isinstance(value, Vector3):
         return value
     if not _is_triple(value):
         place = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
         raise KernelError(f"{place}: step {function.__name__}: expected it to return a point")
-    return Vector(value)
+    return Vector3(value)
 
 
 def _is_triple(value: Value) -> bool:
@@ -284,4 +284,4 @@ def _constants(value: Any) -> Value:
     if not isinstance(value, tuple):
         return Scalar(repr(float(value)))
     parts = tuple(map(_constants, value))
-    return Vector(parts, (None, None)) if _is_triple(parts) else parts
+    return Vector3(parts, (None, None)) if _is_triple(parts) else parts

@@ -37,7 +37,7 @@ Stretch = tuple[str | None, str | None]
 
 
 @dataclass(frozen=True)
-class Vector:
+class Vector3:
     """Three scalars, and the stretch if it is known."""
 
     parts: tuple[Scalar, Scalar, Scalar]
@@ -62,13 +62,13 @@ class Tape:
     lines: list[str] = field(default_factory=list)
     names: dict[str, str] = field(default_factory=dict)
 
-    def variable(self, names: str, first: int) -> Vector:
+    def variable(self, names: str, first: int) -> Vector3:
         """Point of three names; its derivatives are those from the given index on."""
         parts = [
             Scalar(name, tuple("1.0" if i == first + k else None for i in range(6)))
             for k, name in enumerate(names.split())
         ]
-        return Vector(tuple(parts), (None, "1.0") if first else ("1.0", None))  # type: ignore[arg-type]
+        return Vector3(tuple(parts), (None, "1.0") if first else ("1.0", None))  # type: ignore[arg-type]
 
     def name(self, code: str | None) -> str | None:
         """Name of an expression; equal expressions have one."""
@@ -105,27 +105,27 @@ class Tape:
         slopes = [self.plus(x, y, sign) for x, y in zip(a.slopes, b.slopes, strict=True)]
         return Scalar(str(self.plus(a.atom, b.atom, sign)), tuple(slopes))
 
-    def vector_sum(self, a: Vector, b: Vector, sign: str) -> Vector:
+    def vector_sum(self, a: Vector3, b: Vector3, sign: str) -> Vector3:
         """Sum or difference of two vectors; the stretch of both is at most the sum."""
         stretch = None
         if a.stretch and b.stretch:
             stretch = self.plus(a.stretch[0], b.stretch[0]), self.plus(a.stretch[1], b.stretch[1])
         parts = tuple(self.sum(p, q, sign) for p, q in zip(a.parts, b.parts, strict=True))
-        return Vector(parts, stretch)  # type: ignore[arg-type]
+        return Vector3(parts, stretch)  # type: ignore[arg-type]
 
     def product(self, a: Scalar, b: Scalar) -> Scalar:
         """Product of two scalars."""
         product = str(self.times(a.atom, b.atom))
         return Scalar(product, self.scalar(product, (b.atom, a), (a.atom, b)).slopes)
 
-    def scaled(self, a: Scalar, b: Vector) -> Vector:
+    def scaled(self, a: Scalar, b: Vector3) -> Vector3:
         """Vector times a scalar."""
         stretch = None
         if a.constant and b.stretch:
             number = as_number(a.atom)
             size = self.name(f"absolute({a.atom})" if number is None else repr(abs(number)))
             stretch = self.times(size, b.stretch[0]), self.times(size, b.stretch[1])
-        return Vector(tuple(self.product(a, part) for part in b.parts), stretch)  # type: ignore[arg-type]
+        return Vector3(tuple(self.product(a, part) for part in b.parts), stretch)  # type: ignore[arg-type]
 
     def inverse(self, b: Scalar) -> Scalar:
         """Reciprocal of a scalar."""
@@ -157,7 +157,7 @@ class Tape:
         """Expression of a where a mask holds, else of b; None is zero."""
         return a if a == b else self.name(f"where({mask}, {a or '0.0'}, {b or '0.0'})")
 
-    def norms(self, vector: Vector) -> Stretch:
+    def norms(self, vector: Vector3) -> Stretch:
         """Bounds of the norms of the Jacobians by w and by c."""
         rows = [part.slopes for part in vector.parts]
         return self.norm([r[:3] for r in rows]), self.norm([r[3:] for r in rows])

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..formulas.field import Device, Kernel, Loops, Precision
+import numpy as np
+
+from ..formulas.field import Cells, Device, Kernel, Loops, Precision
 from ..formulas.registry import Node
 from ..keys import key as hashed
 from . import cpu
+from .enclosures import Enclosures
 from .linker import link
-from .loops import Loop
+from .loops import Loop, enclosures
 
 
 def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
@@ -70,6 +73,29 @@ def loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Devic
     from . import cuda
 
     return cuda.compile_loops(link(root), tuple(loops), precision)
+
+
+def cells(root: Node, precision: Precision) -> Cells:
+    """Compile proofs that a tree's field has one sign on cells.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    Cells
+        Proofs by intervals.
+
+    Raises
+    ------
+    KernelError
+        If the scene cannot be compiled.
+    """
+    return Enclosures(cpu.compile_loops(link(root), (enclosures,), precision), np.dtype(precision))
 
 
 def key(root: Node) -> str:

@@ -137,13 +137,13 @@ def contour_pieces(
         As `contour`.
     """
     work = work or Work()
-    made = Contours(root, bricks.signs if isinstance(bricks, Bricks) else bricks, work.threads)
+    made = SurfaceContours(root, bricks.signs if isinstance(bricks, Bricks) else bricks, work.threads)
     refiner = made.refiner(work)
     for first, last in layers(made.signs, most):
         yield made.piece(first, last, refiner, work)
 
 
-class Contours:
+class SurfaceContours:
     """Pieces of the exact surface of a scene, in any order.
 
     Parameters

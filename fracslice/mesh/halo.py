@@ -78,7 +78,7 @@ class Finished:
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class SelectedPiece:
     """A piece with the choice of its bodies.
 
     Attributes
@@ -95,7 +95,7 @@ class Kept:
     keep: NDArray[np.bool_]
     fresh: NDArray[np.int64]
 
-    def near(self, vertices: NDArray[np.bool_], threads: int) -> Kept:
+    def near(self, vertices: NDArray[np.bool_], threads: int) -> SelectedPiece:
         """Triangles that use some vertices.
 
         Parameters
@@ -107,7 +107,7 @@ class Kept:
 
         Returns
         -------
-        Kept
+        SelectedPiece
             The triangles, with all vertices of the piece; unused ones do not stay.
         """
         rows = touching(self.mesh.triangles, vertices, threads)
@@ -115,34 +115,34 @@ class Kept:
         used = np.zeros(len(self.keep), bool)
         used[triangles] = True
         fresh = np.flatnonzero(np.isin(rows, self.fresh))
-        return Kept(Mesh(self.mesh.vertices, triangles), self.keep & used, fresh)
+        return SelectedPiece(Mesh(self.mesh.vertices, triangles), self.keep & used, fresh)
 
-    def then(self, other: Kept, seam: float, near: float) -> Kept:
+    def then(self, other: SelectedPiece, seam: float, near: float) -> SelectedPiece:
         """Join the next piece; the triangles of this one come first.
 
         Parameters
         ----------
-        other : Kept
+        other : SelectedPiece
             The next piece.
         seam, near : float
             As for `seamed`.
 
         Returns
         -------
-        Kept
+        SelectedPiece
             Both.
         """
         mesh, number = seamed(self.mesh, other.mesh, seam, near)
         keep = np.concatenate([other.keep, self.keep])
         keep[number] |= keep  # a vertex of the seam may be unused in one of the pieces
         keep &= number == np.arange(len(number))
-        return Kept(mesh, keep, np.concatenate([self.fresh, other.fresh + len(self.mesh.triangles)]))
+        return SelectedPiece(mesh, keep, np.concatenate([self.fresh, other.fresh + len(self.mesh.triangles)]))
 
 
 def finished_piece(
-    piece: Kept,
-    before: Kept | None,
-    after: Kept | None,
+    piece: SelectedPiece,
+    before: SelectedPiece | None,
+    after: SelectedPiece | None,
     ends: tuple[float, float],
     voxel: float,
     planes: NDArray[np.float64] = NO_PLANES,
@@ -156,9 +156,9 @@ def finished_piece(
 
     Parameters
     ----------
-    piece : Kept
+    piece : SelectedPiece
         The piece, at least a brick thick.
-    before, after : Kept or None
+    before, after : SelectedPiece or None
         Its neighbours; None at the ends of the surface.
     ends : tuple of float
         x at which it begins and ends; infinite at the ends of the surface.

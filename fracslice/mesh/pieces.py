@@ -245,7 +245,7 @@ def seamed(one: Mesh, other: Mesh, seam: float, near: float) -> tuple[Mesh, NDAr
         The first vertex with the same position, for each vertex; those of `other` come first.
     """
     vertices = np.concatenate([other.vertices, one.vertices])
-    close = beside(vertices, seam, near)
+    close = near_plane(vertices, seam, near)
     _, first, which = np.unique(rows(vertices[close]), return_index=True, return_inverse=True)
     number = np.arange(len(vertices), dtype=np.int32)
     number[close] = close[first[which]]
@@ -253,7 +253,7 @@ def seamed(one: Mesh, other: Mesh, seam: float, near: float) -> tuple[Mesh, NDAr
     return Mesh(vertices, np.concatenate([corners, other.triangles])), number
 
 
-def beside(points: NDArray[np.float64], seam: float, near: float) -> NDArray[np.int64]:
+def near_plane(points: NDArray[np.float64], seam: float, near: float) -> NDArray[np.int64]:
     """Points near a plane x = `seam`.
 
     Parameters

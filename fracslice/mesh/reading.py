@@ -166,6 +166,8 @@ class _Package:
             case "object":
                 self.object = get["id"]
                 self.parts[self.object] = []
+            case "levelset":
+                raise MeshError("the 3MF file holds a formula (a level set), and no mesh")
             case "component":
                 self.parts[self.object].append((get["objectid"], _matrix(get.get("transform"))))
             case "item":

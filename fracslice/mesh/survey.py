@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from .components import PIECES, Shells
 from .model import Mesh
-from .pieces import Pieces, beside, rows
+from .pieces import Pieces, near_plane, rows
 
 if TYPE_CHECKING:
     from .nesting import Nesting
@@ -45,7 +45,7 @@ def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
 
 
 @dataclass(frozen=True, eq=False)
-class Components:
+class PieceComponents:
     """Connected components of a piece.
 
     Attributes
@@ -77,7 +77,7 @@ class Components:
 
 def components(
     mesh: Mesh, start: float, end: float, voxel: float, threads: int = 0
-) -> tuple[NDArray[np.int32], Components]:
+) -> tuple[NDArray[np.int32], PieceComponents]:
     """Find the connected components of a piece.
 
     Parameters
@@ -102,8 +102,8 @@ def components(
 
     labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
     sizes = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)
-    here, there = (beside(mesh.vertices, seam, voxel / 2) for seam in (start, end))
-    return labels, Components(
+    here, there = (near_plane(mesh.vertices, seam, voxel / 2) for seam in (start, end))
+    return labels, PieceComponents(
         sizes.volumes,
         sizes.areas,
         sizes.vectors,
@@ -122,7 +122,7 @@ NO_BORDER: dict[str, NDArray[Any]] = {
     "after": np.empty((0, 3)),
     "labels_after": np.empty(0, np.int32),
 }
-"""Fields of `Components` that only the next piece needs."""
+"""Fields of `PieceComponents` that only the next piece needs."""
 
 
 class Survey:
@@ -130,10 +130,10 @@ class Survey:
 
     def __init__(self) -> None:
         self.starts = [0]
-        self.pieces: list[Components] = []
+        self.pieces: list[PieceComponents] = []
         self.same: list[NDArray[np.int32]] = []
 
-    def add(self, piece: Components) -> int:
+    def add(self, piece: PieceComponents) -> int:
         """Add the next piece.
 
         Components that share a vertex with the piece before are united: no surface crosses a seam without
@@ -141,7 +141,7 @@ class Survey:
 
         Parameters
         ----------
-        piece : Components
+        piece : PieceComponents
             Its components.
 
         Returns

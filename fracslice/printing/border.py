@@ -85,7 +85,7 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
             for sign in (-1, 1):
                 there, to = row, s + (sign << shift)
                 if not 0 <= at + sign < 8:
-                    there, to = beside(index, ijk, row, axis, sign), to - (sign << (shift + 3))
+                    there, to = adjacent_row(index, ijk, row, axis, sign), to - (sign << (shift + 3))
                 if there >= 0 and steps[there, to] == FAR and steps[row, s] + 1 < FAR:
                     steps[there, to] = steps[row, s] + 1
                     queue[last] = 512 * there + to
@@ -94,7 +94,7 @@ def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def beside(index, ijk, row, axis, sign):  # type: ignore[no-untyped-def]
+def adjacent_row(index, ijk, row, axis, sign):  # type: ignore[no-untyped-def]
     """Row of the adjacent brick along an axis.
 
     Parameters

@@ -20,7 +20,7 @@ from .limits import Limits
 from .problems import Problem, counted
 from .samples import Samples
 from .thin_features import thin_features
-from .walls import Walls, walls
+from .walls import Measure, Walls, walls_of
 from .widths import BINS, Widths, widths_of
 
 COARSE, FINE = 96, 192
@@ -194,12 +194,11 @@ def check_solid(
     work.check()
     thin, tight = thin_features(root, solid, work)
 
-    def seen(**how: Any) -> Walls:
-        return projected(root, walls(solid, most, work, **how), bricks.voxel, work)
-
-    thick = thin.beside(seen(), most)
-    between = tight.beside(seen(gaps=True), most)
-    floors = thin.beside(seen(direction=UP), most, UP)
+    kinds = walls_of(solid, most, work, [Measure(), Measure(gaps=True), Measure(direction=UP)])
+    solid_walls, gaps, upright = (projected(root, kind, bricks.voxel, work) for kind in kinds)
+    thick = thin.beside(solid_walls, most)
+    between = tight.beside(gaps, most)
+    floors = thin.beside(upright, most, UP)
     bare, narrow = (
         _off_rims(_under(measured, limit, scale), drains, 2 * limit / scale)
         for measured, limit in ((floors, limits.floor), (thick, limits.wall))

@@ -78,7 +78,7 @@ class _Composite(Kernel):
         return changed
 
 
-def edited(root: Field, does: Does, shape: Field) -> Field:
+def edited_field(root: Field, does: Does, shape: Field) -> Field:
     """Apply an edit to a field.
 
     Parameters

@@ -20,7 +20,7 @@ from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
 from ..volume.sizing import Sizing
 from ..work import Work
-from .edits import edited
+from .edits import edited_field
 
 # Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ class _Preparation:
             return self.root
         components = self.connected()
         self.known = components.filled(cavities)
-        return edited(self.root, "add", nearer(components, cavities, np.array([0])))
+        return edited_field(self.root, "add", nearer(components, cavities, np.array([0])))
 
     def largest(self) -> Field:
         """Keep only the largest body."""
@@ -193,7 +193,9 @@ class _Preparation:
 
         components = self.connected()
         first, others = np.split(components.bodies, [1])
-        return edited(self.root, "keep", nearer(components, first, others)) if len(others) else self.root
+        if not len(others):
+            return self.root
+        return edited_field(self.root, "keep", nearer(components, first, others))
 
     def bridged(self) -> Field:
         """Join bodies by struts of minimum total length, and drop dust."""
@@ -206,7 +208,7 @@ class _Preparation:
         dust = np.setdiff1d(components.bodies, large)
         start, end = struts(components, large)
         if len(dust):
-            self.put(edited(self.root, "cut", nearer(components, dust, large)))
+            self.put(edited_field(self.root, "cut", nearer(components, dust, large)))
         if not len(start):
             return self.root
         width = max(self.how.bridge, self.how.thickness) / self.scale
@@ -259,7 +261,7 @@ class _Preparation:
         """Add capsules of a width in scene units. They may connect components, which are forgotten."""
         self.known = None
         self.planned = replace(self.planned, outer=self.planned.outer.grown(width))
-        return edited(self.root, "add", made)
+        return edited_field(self.root, "add", made)
 
     def hollowed(self) -> Field:
         """Remove everything deeper than the wall thickness, and drill drain holes."""
@@ -271,7 +273,7 @@ class _Preparation:
             raise VolumeError(f"walls of {how.hollow:g} mm leave nothing to hollow out")
         self.planned = replace(self.planned, drains=drains)
         for cut in cuts:
-            root = edited(root, "cut", cut)
+            root = edited_field(root, "cut", cut)
         return root
 
 
@@ -307,11 +309,11 @@ def _standing(made: Plan, how: Print, scale: float) -> Plan:
         z0 += base
         if z0 >= z1:
             raise VolumeError(f"a base of {base * scale:g} mm leaves nothing of the object")
-        root = edited(root, "keep", plane(normal=(0, 0, -1), offset=-z0))
+        root = edited_field(root, "keep", plane(normal=(0, 0, -1), offset=-z0))
         extents = Box((x0, y0, z0), (x1, y1, z1))
     if raft:
         rim = max(extents.size) / 10
         lying = Box((x0 - rim, y0 - rim, z0 - raft / 2), (x1 + rim, y1 + rim, z0 + raft / 2))
-        root = edited(root, "add", transform(box(size=lying.size), translate=lying.centre))
+        root = edited_field(root, "add", transform(box(size=lying.size), translate=lying.centre))
         extents, outer = extents | lying, (outer | lying).about(outer.centre)
     return replace(made, root=root, box=extents, outer=outer)

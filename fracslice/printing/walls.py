@@ -9,7 +9,7 @@ Rüegsegger 1997), and a plate is as thick at its rim as in its middle. This is 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -129,23 +129,71 @@ def walls(
     Cancelled
         When the work is cancelled.
     """
-    exact, towards = solid.kernel("cpu", "float64"), -1.0 if gaps else 1.0
+    (one,) = walls_of(solid, limit, work, [Measure(gaps, direction)])
+    return one
 
-    def look(rows: slice) -> Walls:
-        points, normals, area = crossed(solid, rows)
-        directions = -towards * normals
-        if direction is not None:
-            directions = np.copysign(1, (directions * direction).sum(1))[:, None] * np.array(direction)
-        width = np.empty(len(points))
-        _through(points, directions, limit, towards, solid.grid, solid.beside, width)
-        thin = (width < limit) & (np.abs((normals * directions).sum(1)) > -OPPOSITE)
-        ends = points + width[:, None] * directions
-        opposite = slopes(exact, ends[thin].T, solid.bricks.voxel / 2, work)[1].T
-        facing = np.ones(len(points))
-        facing[thin] = (opposite * normals[thin]).sum(1)
-        return Walls(points, ends, width, area, facing).chosen(facing < OPPOSITE)
 
-    return gathered(look, len(solid.bricks), AT_ONCE, work)
+@dataclass(frozen=True)
+class Measure:
+    """How walls are measured: `walls` has the attributes."""
+
+    gaps: bool = False
+    direction: Direction | None = None
+
+
+def walls_of(solid: Samples, limit: float, work: Work, kinds: Sequence[Measure]) -> list[Walls]:
+    """Measure several kinds of walls from the same crossings of grid edges.
+
+    Parameters
+    ----------
+    solid, limit, work
+        As for `walls`.
+    kinds : sequence of Measure
+        How each is measured.
+
+    Returns
+    -------
+    list of Walls
+        Walls of each kind.
+
+    Raises
+    ------
+    Cancelled
+        When the work is cancelled.
+    """
+
+    def look(rows: slice) -> list[Walls]:
+        crossings = crossed(solid, rows)
+        return [_measured(solid, limit, work, how, *crossings) for how in kinds]
+
+    blocks = work.collect(look, chunks(len(solid.bricks), AT_ONCE) or [slice(0, 0)])
+    return [Walls.joined(list(parts)) for parts in zip(*blocks, strict=True)]
+
+
+def _measured(
+    solid: Samples,
+    limit: float,
+    work: Work,
+    how: Measure,
+    points: np.ndarray,
+    normals: np.ndarray,
+    area: np.ndarray,
+) -> Walls:
+    """Walls at crossings of grid edges."""
+    towards = -1.0 if how.gaps else 1.0
+    directions = -towards * normals
+    if how.direction is not None:
+        upright = np.copysign(1, (directions * how.direction).sum(1))
+        directions = upright[:, None] * np.array(how.direction)
+    width = np.empty(len(points))
+    _through(points, directions, limit, towards, solid.grid, solid.beside, width)
+    thin = (width < limit) & (np.abs((normals * directions).sum(1)) > -OPPOSITE)
+    points, normals, directions, width = points[thin], normals[thin], directions[thin], width[thin]
+    ends = points + width[:, None] * directions
+    exact = solid.kernel("cpu", "float64")
+    opposite = slopes(exact, ends.T, solid.bricks.voxel / 2, work)[1].T
+    facing = (opposite * normals).sum(1)
+    return Walls(points, ends, width, area[thin], facing).chosen(facing < OPPOSITE)
 
 
 def gathered(look: Callable[[slice], R], count: int, size: int, work: Work) -> R:

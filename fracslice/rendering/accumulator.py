@@ -31,7 +31,7 @@ pixel."""
 
 
 @dataclass(frozen=True)
-class Plan:
+class PassPlan:
     """Pixels of a pass.
 
     Attributes
@@ -66,7 +66,7 @@ class Accumulator(Protocol):
     sums: Any
     passes: int
 
-    def plan(self, most: int, tolerance: float) -> Plan:
+    def plan(self, most: int, tolerance: float) -> PassPlan:
         """Set the goals of the next pass, or return the rest of an interrupted one.
 
         The first pass takes one sample on a grid of pixels, the second one of all other pixels. Later passes

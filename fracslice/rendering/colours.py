@@ -8,9 +8,14 @@ from ..formulas.material import material, stops
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
+from .pictures import load_picture
 from .tracing import TraceDialect, traps
 from .units import shade
 from .units.pixel import linear
+from .units.texture import triplanar
+
+TEXELS = 1024 * 1024
+"""Maximum number of pixels of a texture."""
 
 
 def opaque_part(node: Node) -> Node | None:
@@ -63,10 +68,14 @@ class Look:
         plain = material(self.root)
         self.all = self.nodes if covered else [plain, *self.nodes]
         self.paints = {id(n): self.all.index(n) if covered else k + 1 for k, n in enumerate(self.nodes)}
-        self.palettes = any(len(stops(n)) > 3 for n in self.all)
+        self.palettes = any(len(stops(n)) > 3 or n["vary"] for n in self.all)
+        self.textured = any(n["texture"] for n in self.all)
+        self.varies = any(n["vary"] for n in self.all)
+        self.coated = any(n["coat"] for n in self.all)
         self.glows = any(n["glow"] for n in self.all)
         self.inside = any(n["clear"] for n in self.all)
-        self.glossy = self.paths or any(n["roughness"] or n["metallic"] for n in self.all)
+        rough = any(n["roughness"] or n["vary"] or n["metallic"] for n in self.all)
+        self.glossy = self.paths or self.coated or rough
         self.bounces = self.inside or self.glossy or any(n["reflect"] for n in self.all)
 
     def lines(self) -> list[str]:
@@ -79,23 +88,31 @@ class Look:
         """
         lines = []
         if len(self.all) > 1 or self.palettes:
-            trace = link_tree(
-                self.linker,
-                self.root,
-                TraceDialect(self.linker, materials=self.paints, traps=traps(self.root)),
-            )
-            lines.append(f"_, paint, tone = {trace}")
+            lines += self.trap()
         lines += self.chosen([self.colour(k, n) for k, n in enumerate(self.all)], ("cr", "cg", "cb"))
         names = ["specular", "shininess"]
         names += ["glow"] * self.glows + ["reflect"] * self.bounces + ["clear", "index"] * self.inside
-        names += ["roughness", "metallic"] * self.glossy
+        names += ["roughness", "metallic"] * self.glossy + ["coat"] * self.coated
         for name in names:
             values = [[self.linker.argument(n[name])] for n in self.all]
             lines += self.chosen([([], v) for v in values], (name,))
+        if self.varies:
+            lines += self.varied()
         if self.inside:
             fading = [[self.linker.argument(a) for a in n["absorb"]] for n in self.all]
             lines += self.chosen([([], v) for v in fading], ("absorbr", "absorbg", "absorbb"))
         return lines
+
+    def trap(self) -> list[str]:
+        """Return the line that sets the material's number and the orbit trap.
+
+        Returns
+        -------
+        list of str
+            Kernel source lines.
+        """
+        dialect = TraceDialect(self.linker, materials=self.paints, traps=traps(self.root))
+        return [f"_, paint, tone = {link_tree(self.linker, self.root, dialect)}"]
 
     def colour(self, k: int, node: Node) -> tuple[list[str], list[str]]:
         """Return the colour of a material.
@@ -115,13 +132,35 @@ class Look:
             Expressions of red, green and blue.
         """
         colours = linear(stops(node))
+        lines, values = [], [f"p{k}{c}" for c in "rgb"]
         if len(colours) == 3:
-            return [], [self.linker.argument(c) for c in colours]
-        self.linker.bind(f"palette{k}", shade.palette, {"stops": colours, "count": Fixed(len(colours) // 3)})
-        repeats, shift = self.linker.argument(node["repeats"]), self.linker.argument(node["shift"])
-        turns = f"turns{k} = tone * {repeats} + {shift}"
-        names = [f"p{k}{c}" for c in "rgb"]
-        return [turns, f"{', '.join(names)} = palette{k}(turns{k} - floor(turns{k}), P)"], names
+            values = [self.linker.argument(c) for c in colours]
+        else:
+            count = Fixed(len(colours) // 3)
+            self.linker.bind(f"palette{k}", shade.palette, {"stops": colours, "count": count})
+            turns = f"turns{k} = {self.turns(node)}"
+            lines = [turns, f"{', '.join(values)} = palette{k}(turns{k} - floor(turns{k}), P)"]
+        if not node["texture"]:
+            return lines, values
+        picture = load_picture(node["texture"], TEXELS, node.fail)
+        width, height = picture.size
+        given = {"light": picture.light, "width": width, "height": height, "tile": node["tile"]}
+        self.linker.bind(f"texture{k}", triplanar, given)
+        seen = [f"q{k}{c}" for c in "rgb"]
+        lines.append(f"{', '.join(seen)} = texture{k}(x, y, z, nx, ny, nz, P)")
+        return lines, [f"{value} * {q}" for value, q in zip(values, seen, strict=True)]
+
+    def turns(self, node: Node) -> str:
+        """Expression of the position in a palette, before its whole part is removed."""
+        return f"tone * {self.linker.argument(node['repeats'])} + {self.linker.argument(node['shift'])}"
+
+    def varied(self) -> list[str]:
+        """Return the lines that change the roughness along the palette."""
+        self.linker.share(shade.varied)
+        turns: list[tuple[list[str], list[str]]] = [
+            ([], [self.turns(n), self.linker.argument(n["vary"])]) for n in self.all
+        ]
+        return [*self.chosen(turns, ("turn", "vary")), "roughness = varied(roughness, vary, turn)"]
 
     def chosen(self, options: list[tuple[list[str], list[str]]], names: tuple[str, ...]) -> list[str]:
         """Return the lines that set variables to the values of the material selected by `paint`.

@@ -10,11 +10,11 @@ from ..kernel.cpu import load_functions
 from ..kernel.host import lane_count
 from ..kernel.machine import constant
 from ..work import Work, chunks
-from .accumulator import Plan
+from .accumulator import PassPlan
 from .lanes import Lane
 from .linking import Frame
 from .packets import loops, workspace
-from .sequence import Samples
+from .sequence import SampleRange
 
 TILE = 2048
 """Maximum rays per tile; their workspace stays in the cache."""
@@ -49,7 +49,7 @@ class CpuTracer:
         functions = load_functions(frame.linked, bits, self.lanes, loops(frame))
         self._tile, self._cones = functions["tile"], functions.get("cones")
         self._own = threading.local()
-        self.samples, self._points = Samples(), np.empty((0, frame.samples), np.int32)
+        self.samples, self._points = SampleRange(), np.empty((0, frame.samples), np.int32)
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
@@ -86,7 +86,7 @@ class CpuTracer:
 
         work.map(task, np.array_split(ids, max(1, len(ids) // 512)))
 
-    def add(self, sums: np.ndarray, plan: Plan, work: Work) -> None:
+    def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:
         """Add samples to pixels up to their goals; a pixel with k samples takes point k of the sequence.
 
         Sums are valid at any time: those of a tile are added at once.
@@ -95,7 +95,7 @@ class CpuTracer:
         ----------
         sums : ndarray, shape (height * width * CHANNELS,)
             Sums of the picture, changed in place.
-        plan : Plan
+        plan : PassPlan
             Pixels to sample.
         work : Work
             Threads and cancellation.

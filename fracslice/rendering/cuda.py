@@ -9,11 +9,11 @@ import numpy as np
 from ..formulas.field import Precision
 from ..kernel.cuda import launched, load_loops, parameters, require
 from ..work import Work
-from .accumulator import Plan
+from .accumulator import PassPlan
 from .cpu import BLOCK, STEPS
 from .cuda_loops import loops
 from .linking import Frame
-from .sequence import Samples
+from .sequence import SampleRange
 
 
 class CudaTracer:
@@ -39,7 +39,7 @@ class CudaTracer:
         self.dtype, self.width, self.height = dtype, width, height
         self._precision: Precision = "float32" if dtype == np.float32 else "float64"
         self._loops = load_loops(frame.linked, self._precision, loops(frame))
-        self.samples, self._points = Samples(), np.empty((0, frame.samples), np.int32)
+        self.samples, self._points = SampleRange(), np.empty((0, frame.samples), np.int32)
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
@@ -67,7 +67,7 @@ class CudaTracer:
             given = (self._parameters, self._starts, self.blocks, self.dtype.type(STEPS[self.dtype.name]))
             launched(self._loops.cones, self._starts.size, *given)
 
-    def add(self, sums: Any, plan: Plan, work: Work) -> None:
+    def add(self, sums: Any, plan: PassPlan, work: Work) -> None:
         """Add samples to pixels up to their goals; a pixel with k samples takes point k of the sequence.
 
         Copies nothing back and does not wait for the GPU.
@@ -76,7 +76,7 @@ class CudaTracer:
         ----------
         sums : device array, shape (height * width * CHANNELS,)
             Sums of the picture, changed in place.
-        plan : Plan
+        plan : PassPlan
             Pixels to sample.
         work : Work
             Cancellation, checked before each launch.

@@ -12,7 +12,7 @@ from ..formulas.field import Precision
 from ..kernel.cuda import launched, load_loops, require
 from ..kernel.linker import Linked
 from ..scene.view import View
-from .accumulator import COARSE, FEW, NEARLY, TRUSTED, Plan
+from .accumulator import COARSE, FEW, NEARLY, TRUSTED, PassPlan
 from .cuda_accumulator_loops import LOOPS
 from .film import shows_background
 from .host_accumulator import HostAccumulator
@@ -81,7 +81,7 @@ class CudaAccumulator:
         total, known, samples = parts.sum(0)
         return samples / (self.width * self.height), math.sqrt(total / known) if known else math.inf
 
-    def plan(self, most: int, tolerance: float) -> Plan:
+    def plan(self, most: int, tolerance: float) -> PassPlan:
         """Set the goals of the next pass; see `Accumulator.plan`."""
         if self.passes < 2:
             step = COARSE if self.passes == 0 else 1
@@ -96,10 +96,10 @@ class CudaAccumulator:
         least = real(NEARLY * total / unfinished if unfinished > FEW * self.width * self.height else 0.0)
         return self._plan(self._loops.choose, self.sums, self._gains, self._parts, real(most), least)
 
-    def _plan(self, loop: Any, *arguments: Any) -> Plan:
+    def _plan(self, loop: Any, *arguments: Any) -> PassPlan:
         """Run a kernel that sets goals. All pixels are passed on: a thread skips those at their goals."""
         left, last, _ = self._summed(loop, *arguments).T
-        return Plan(self._order, int(left.sum()), int(last.max()))
+        return PassPlan(self._order, int(left.sum()), int(last.max()))
 
     def shown(self, view: View) -> np.ndarray:
         """Develop the picture, on the host if it has bloom or no light; see `Accumulator.shown`."""

@@ -75,7 +75,7 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
         start = maximum(start, S[(row >> frame.shift) * blocks + (column >> frame.shift)])
         r, g, b = real(0.0), real(0.0), real(0.0)
         tr, tg, tb = real(1.0), real(1.0), real(1.0)
-        path, side, covered = real(0.0), real(1.0), real(0.0)
+        path, side, covered, dense = real(0.0), real(1.0), real(0.0), real(0.0)
         for bounce in range(frame.bounces + 1):
             t, steps, before, stride = start, real(0.0), real(0.0), real(0.0)
             missed = start >= end
@@ -93,7 +93,7 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
             if missed:
                 if frame.transparent and bounce == 0:
                     break
-                hr, hg, hb = background(dx, dy, dz, P)
+                hr, hg, hb = background(dx, dy, dz, dense, P)
                 r, g, b = r + tr * hr, g + tg * hg, b + tb * hb
                 break
             x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
@@ -101,12 +101,13 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
             chance = tuple(
                 sample(whole(Q[q, first + d]), pixel, first + d) for d in range(frame.bounce_samples)
             )
-            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, chance, P)
+            last = real(1.0) if bounce == frame.bounces else real(0.0)
+            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, last, chance, P)
             hr, hg, hb = light
             r, g, b = r + tr * hr, g + tg * hg, b + tb * hb
             if not frame.bounces:
                 break
-            er, eg, eb, ox, oy, oz, dx, dy, dz, side = onward
+            er, eg, eb, ox, oy, oz, dx, dy, dz, side, dense = onward
             tr, tg, tb = tr * er, tg * eg, tb * eb
             path = path + t
             start, end = span_box(ox, oy, oz, dx, dy, dz, P)

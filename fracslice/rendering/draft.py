@@ -34,7 +34,7 @@ def drafted(root: Node, view: View) -> View:
     """
     lights = tuple(
         replace(light, shadows="no", strength=light.strength * VISIBLE)
-        if light.kind == "sky"
+        if light.surrounds
         else replace(light, size=0.0)
         for light in view.lights or default_lights(root)
     )

@@ -96,7 +96,7 @@ def shows_background(view: View) -> bool:
         False if they show a sky or fog, or if the film is transparent.
     """
     lit = view.shading.mode == "light"
-    return not (view.film.transparent or (lit and (view.fog or any(x.kind == "sky" for x in view.lights))))
+    return not (view.film.transparent or (lit and (view.fog or any(x.surrounds for x in view.lights))))
 
 
 def displayed(values: np.ndarray, mode: str) -> np.ndarray:

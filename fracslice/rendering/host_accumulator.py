@@ -8,7 +8,7 @@ import numpy as np
 
 from ..scene.view import View
 from ..work import Work, chunks
-from .accumulator import CHANNELS, COARSE, COUNT, COVER, FEW, GOAL, NEARLY, TRUSTED, Plan
+from .accumulator import CHANNELS, COARSE, COUNT, COVER, FEW, GOAL, NEARLY, TRUSTED, PassPlan
 from .film import BAND, develop, levels
 from .tiles import band_order
 from .units.pixel import UNKNOWN, squared_error
@@ -140,14 +140,14 @@ class HostAccumulator:
         samples, total, known = map(sum, zip(*self.work.collect(measured, self._bands()), strict=True))
         return samples / (self.width * self.height), float(np.sqrt(total / known)) if known else float("inf")
 
-    def plan(self, most: int, tolerance: float) -> Plan:
+    def plan(self, most: int, tolerance: float) -> PassPlan:
         """Set the goals of the next pass; see `Accumulator.plan`."""
         plan = self._wanted()
         if not plan.samples and self.passes < 2:
             step = COARSE if self.passes == 0 else 1
             self.channels[::step, ::step, GOAL] = 1
             plan = self._wanted()
-        if not plan.samples:
+        if not plan.samples and self.counts.min() < most:
             self._judge(most, tolerance)
             plan = self._wanted()
         return plan
@@ -175,7 +175,7 @@ class HostAccumulator:
         least = NEARLY * total / count if count > FEW * gains.size else 0.0
         self.work.map(aimed, self._bands())
 
-    def _wanted(self) -> Plan:
+    def _wanted(self) -> PassPlan:
         """Pixels that have not reached their goals."""
         order, places = band_order(self.width)
 
@@ -188,7 +188,7 @@ class HostAccumulator:
             return pixels, float(left.sum(dtype=np.float64)), float(self.channels[rows, :, GOAL].max())
 
         pixels, samples, goals = zip(*self.work.collect(chosen, self._bands()), strict=True)
-        return Plan(np.concatenate(pixels), int(sum(samples)), int(max(goals)))
+        return PassPlan(np.concatenate(pixels), int(sum(samples)), int(max(goals)))
 
 
 def around(values: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from ..formulas.vocabulary import any_of, where
 from ..kernel.intrinsics import WIDTH, load, store
 
 Row = IntEnum(
-    "Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb cover px py", start=0
+    "Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb cover dense px py", start=0
 )
 """State of a ray.
 
@@ -24,6 +24,7 @@ Row = IntEnum(
 - r, g, b: light gathered.
 - tr, tg, tb: throughput, the factor on light still to come.
 - cover: 1 if the camera ray hit.
+- dense: density of the direction, for frames whose lights are weighted.
 - px, py: film position, the first two random numbers. The other random numbers are in the rows after them.
 """
 Lane = IntEnum("Lane", "ox oy oz dx dy dz start end side path t steps done before stride", start=0)

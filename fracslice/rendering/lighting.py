@@ -15,12 +15,15 @@ from ..kernel.structure import link_tree
 from ..scene.view import Camera, Light, View
 from .colours import Look, opaque_part
 from .drawn import Drawn
+from .haze import fogged
 from .optics import Optics
-from .scattering import divided
+from .scattering import divided, lacquered
+from .surroundings import Surroundings, seen_as_disc
 from .units import lights, march, shade
 from .units.glossy import highlight
 from .units.intrinsics import background, blocker
 from .units.pixel import linear
+from .units.weights import weights
 
 PATIENCE = 800
 """Maximum steps of a shadow ray."""
@@ -71,6 +74,9 @@ class Lighting:
     seen: Optics
     inside: bool
 
+    def __post_init__(self) -> None:
+        self.around = Surroundings(self.linker, self.weighted)
+
     def lines(self, look: Look) -> list[str]:
         """Lines for ambient light and every light."""
         shading = self.view.shading
@@ -84,8 +90,10 @@ class Lighting:
                     "openness", shade.occlusion, {"strength": shading.occlusion, "reach": shading.reach}
                 )
                 lines.append("ambient = ambient * openness(x, y, z, nx, ny, nz, P)")
+        if look.coated:
+            lines += [f"glaze{c} = 0.0 * t" for c in "rgb"]
         if look.glossy:
-            lines += divided(self.linker)
+            lines += divided(self.linker, look)
             lines += [f"{c} = ambient * c{c}" + f" + glow * e{c}" * look.glows for c in "rgb"]
         else:
             lines += ["ambient = ambient + glow"] * look.glows
@@ -95,12 +103,23 @@ class Lighting:
             self.linker.bind("visible_", march.visible, {"steepness": steepness, "patience": PATIENCE})
             self.linker.functions["blocker"] = self.blocker()
             lines += [f"s{a} = {a} + 3.0 * h * n{a}" for a in "xyz"]
+        if self.weighted:
+            pane = "where((clear > 0.0) | (side < 0.0), 1.0, last)" if look.inside else "last"
+            lines.append(f"free = {pane}")
         for k, light in enumerate(self.view.lights):
-            if light.kind != "sky":
-                lines += self.light(k, light, look.glossy)
+            if light.kind == "environment" and (look.paths or light.shadows == "yes"):
+                lines += self.environment(light, look)
+            elif not light.surrounds:
+                lines += self.light(k, light, look)
             elif not look.paths:  # else rays that continue see it
                 lines += self.sky(light)
         return lines
+
+    @property
+    def weighted(self) -> bool:
+        """True if lights are sampled by their own distribution and by the surface's; see `units.weights`."""
+        paths = self.view.shading.paths == "yes" and self.view.shading.mode == "light"
+        return paths and any(x.kind == "environment" or seen_as_disc(x) for x in self.view.lights)
 
     def blocker(self) -> str:
         """Source of `units.intrinsics.blocker`."""
@@ -111,7 +130,7 @@ class Lighting:
             return text_of(blocker, ["return 0.0 * x + 1.0"])
         return text_of(blocker, [f"return {link_tree(self.linker, opaque, FieldDialect(self.linker))}"])
 
-    def light(self, k: int, light: Light, glossy: bool) -> list[str]:
+    def light(self, k: int, light: Light, look: Look) -> list[str]:
         """Lines for one sun or lamp, or a light at the camera."""
         self.linker.share(shade.phong)
         soft = light.size and light.kind != "camera"
@@ -129,14 +148,48 @@ class Lighting:
             lines.append(
                 "power = power * visible_(sx, sy, sz, lx, ly, lz, where(diffuse > 0.0, far, 0.0), h, P)"
             )
-        shine = "gloss"
-        if glossy:
+        shine, scattered, reflected = "gloss", "", ""
+        if look.glossy:
             self.linker.share(highlight)
             lines.append("spot, half = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, roughness)")
             shine = "where(roughness > 0.0, spot * tinted(half, k{0}), gloss)"
+        if self.weighted and seen_as_disc(light):
+            self.around.bind_sun(k, light)
+            lines += [f"dense = sun_density{k}(lx, ly, lz, P)", *self.weights()]
+            scattered, reflected = "scattered * ", "reflected * "
+        if look.coated:
+            lines += lacquered(self.linker, colour)
         return lines + [
-            f"{c} = {c} + power * {s} * (diffuse * c{c} + {shine.format(c)})"
+            f"{c} = {c} + power * {s} * ({scattered}diffuse * c{c} + {reflected}{shine.format(c)})"
             for c, s in zip("rgb", colour, strict=True)
+        ]
+
+    def weights(self) -> list[str]:
+        """Lines for the weights of a light's sample."""
+        self.linker.share(weights)
+        vectors = ", ".join(f"{v}{a}" for v in "ndl" for a in "xyz")
+        return [f"scattered, reflected = weights(dense, diffuse, {vectors}, roughness, share, free)"]
+
+    def environment(self, light: Light, look: Look) -> list[str]:
+        """Lines for light from a picture of the surroundings, sampled in proportion to its light."""
+        self.around.bind_light(light)
+        self.around.bind_sampling(light)
+        u, v = self.drawn.names(2)
+        far = self.linker.argument(self.seen.far)
+        lines = [
+            f"lx, ly, lz, dense = towards_({u}, {v}, P)",
+            "hr, hg, hb = surroundings_(lx, ly, lz, P)",
+            "diffuse = maximum(nx * lx + ny * ly + nz * lz, 0.0)",
+            f"open = visible_(sx, sy, sz, lx, ly, lz, where(diffuse > 0.0, {far}, 0.0), h, P)",
+            f"power = open / maximum({math.pi} * dense, 1e-30)",
+        ]
+        if not look.paths:
+            return lines + [f"{c} = {c} + power * h{c} * diffuse * c{c}" for c in "rgb"]
+        self.linker.share(highlight)
+        lines += ["spot, half = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, roughness)", *self.weights()]
+        shine = "where(roughness > 0.0, reflected * spot * tinted(half, k{0}), 0.0)"
+        return lines + [
+            f"{c} = {c} + power * h{c} * (scattered * diffuse * c{c} + {shine.format(c)})" for c in "rgb"
         ]
 
     def bind_light(self, name: str, light: Light) -> None:
@@ -158,52 +211,51 @@ class Lighting:
         """Lines for light from the sky: one direction per sample, or along the normal without shadows."""
         self.bind_sky(light)
         if light.shadows == "no":
-            lines = ["kr, kg, kb = sky_(nx, ny, nz, P)", "open = ambient * 0.0 + 1.0"]
+            lines = ["hr, hg, hb = sky_(nx, ny, nz, P)", "open = ambient * 0.0 + 1.0"]
         else:
             u, v = self.drawn.names(2)
             self.linker.share(lights.upward)
             far = self.linker.argument(self.seen.far)
             lines = [
                 f"lx, ly, lz = upward(nx, ny, nz, {u}, {v})",
-                "kr, kg, kb = sky_(lx, ly, lz, P)",
+                "hr, hg, hb = sky_(lx, ly, lz, P)",
                 f"open = visible_(sx, sy, sz, lx, ly, lz, {far} + 0.0 * t, h, P)",
             ]
-        return lines + [f"{c} = {c} + open * k{c} * c{c}" for c in "rgb"]
+        return lines + [f"{c} = {c} + open * h{c} * c{c}" for c in "rgb"]
 
     def bind_sky(self, light: Light) -> None:
-        """Bind the unit of the sky."""
+        """Bind the unit of the sky, or of the light of an environment without shadows."""
+        if light.kind == "environment":
+            self.around.bind_irradiance("sky_", light)
+            return
         names = {"zenith": light.colour, "horizon": light.horizon, "ground": light.ground}
         values = {n: tuple(c * light.strength for c in linear(colour)) for n, colour in names.items()}
         self.linker.bind("sky_", lights.sky, values)
 
     def fog(self, onward: bool) -> list[str]:
-        """Lines for fog; without a colour of its own, surfaces fade into what is behind them."""
+        """Lines for fog; see `haze.fogged`."""
         fog = self.view.fog
-        if fog is None or fog.density == 0:
-            return []
-        self.linker.bind("clearness", shade.fog, {"density": fog.density})
-        lines = ["air = clearness(t, P)"]
-        if fog.colour is None:
-            lines.append("fr, fg, fb = background(dx, dy, dz, P)")
-        else:
-            colour = map(self.linker.argument, linear(fog.colour))
-            lines += [f"f{c} = {value}" for c, value in zip("rgb", colour, strict=True)]
-        if self.inside:
-            lines.insert(1, "air = where(side < 0.0, 1.0 + 0.0 * t, air)")
-        lines += [f"{c} = f{c} + air * ({c} - f{c})" for c in "rgb"]
-        return [*lines, *(f"t{c} = air * t{c}" for c in "rgb" if onward)]
+        return [] if fog is None or fog.density == 0 else fogged(self, fog, onward)
 
     def background(self) -> str:
         """Source of `units.intrinsics.background`: the sky, else the colour of the fog, else of the film."""
         view = self.view
-        for light in view.lights:
-            if light.kind == "sky" and view.shading.mode == "light":
-                self.bind_sky(light)
-                return text_of(background, ["return sky_(dx, dy, dz, P)"])
-        own = view.fog and view.fog.colour
-        shown = (0.0, 0.0, 0.0) if view.shading.mode != "light" else own or view.film.background
-        values = ", ".join(f"{self.linker.argument(c)} + 0.0 * dx" for c in linear(shown))
-        return text_of(background, [f"return {values}"])
+        lit = view.shading.mode == "light"
+        around = next((light for light in view.lights if lit and light.surrounds), None)
+        if around is None:
+            own = view.fog and view.fog.colour
+            shown = (0.0, 0.0, 0.0) if not lit else own or view.film.background
+            values = ", ".join(f"{self.linker.argument(c)} + 0.0 * dx" for c in linear(shown))
+            lines = [f"r, g, b = {values}"]
+        elif around.kind == "sky":
+            self.bind_sky(around)
+            lines = ["r, g, b = sky_(dx, dy, dz, P)"]
+        else:
+            lines = self.around.behind(around)
+        for k, light in enumerate(view.lights):
+            if self.weighted and seen_as_disc(light):
+                lines += self.around.disc(k, light)
+        return text_of(background, [*lines, "return r, g, b"])
 
 
 def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:

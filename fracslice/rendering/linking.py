@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linked, Linker
 from ..scene.view import Camera, View
@@ -42,6 +40,8 @@ class Frame:
         True for a picture of light, False for one of values such as depth.
     transparent : bool
         True if the light of camera rays that miss is left out.
+    weighted : bool
+        True if continued rays carry the density of their direction.
     far : int
         Index in P of the far distance; the upper left pixel of the picture follows.
     block : int
@@ -55,6 +55,7 @@ class Frame:
     sharp: bool
     lit: bool
     transparent: bool
+    weighted: bool
     far: int
     block: int
 
@@ -125,9 +126,9 @@ class _Frame:
         self.bounces = self.view.shading.bounces if look.bounces and self.lit else 0
         linker.functions["background"] = self.lighting.background()
         linker.functions["surface"] = self.surface(look)
-        linked = Linked(linker.text(), np.array(linker.parameters, np.float64))
+        linked = Linked(linker.text(), linker.numbers())
         samples = camera_samples, self.drawn.count
-        kind = self.sharp, self.lit, self.view.film.transparent
+        kind = self.sharp, self.lit, self.view.film.transparent, self.lighting.weighted
         return Frame(linked, *samples, self.bounces, *kind, far, self.block)
 
     def marching(self) -> None:
@@ -165,17 +166,19 @@ class _Frame:
         """Source of `units.intrinsics.surface`."""
         mode = self.view.shading.mode
         lines = ["h = width_at(path + t, P)"]
-        if mode in ("light", "normal"):
+        if mode in ("light", "normal") or (mode == "albedo" and look.textured):
             self.linker.share(normal)
             lines.append("nx, ny, nz = normal(x, y, z, h, P)")
         if mode == "light":
             lines += look.lines() + self.lighting.lines(look)
             if self.bounces:
-                lines += onward(self.linker, self.drawn, look)
+                lines += onward(self.linker, self.drawn, look, self.lighting.weighted)
+            if look.coated:
+                lines += [f"{c} = {c} + glaze{c}" for c in "rgb"]
             lines += self.lighting.fog(self.bounces > 0)
         else:
             lines += self.shown(mode, look)
-        ray = "tr, tg, tb, ox, oy, oz, ex, ey, ez, es" if self.bounces else ""
+        ray = "tr, tg, tb, ox, oy, oz, ex, ey, ez, es, eq" if self.bounces else ""
         return text_of(surface, [*lines, f"return (r, g, b), ({ray})"])
 
     def shown(self, mode: str, look: Look) -> list[str]:
@@ -186,6 +189,8 @@ class _Frame:
             return [f"{c} = {a}" for c, a in zip("rgb", "xyz", strict=True)]
         if mode == "albedo":
             return [*look.lines(), *(f"{c} = c{c}" for c in "rgb")]
+        if mode == "trap":
+            return [*look.trap(), "r, g, b = tone, tone, tone"]
         value = {"steps": "steps", "distance": "t"}.get(mode)
         along = zip(self.camera.forward, "xyz", strict=True)
         value = value or " + ".join(f"{self.linker.argument(f)} * t * d{a}" for f, a in along)

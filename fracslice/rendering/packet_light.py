@@ -13,7 +13,7 @@ from .units.intrinsics import background, span_box, surface
 from .units.pixel import brightness, clamped
 
 
-def shade(W, m, first, P, frame):
+def shade(W, m, first, last, P, frame):
     """Add the light of every ray, and replace each ray by its continuation.
 
     Parameters
@@ -24,6 +24,8 @@ def shade(W, m, first, P, frame):
         Numbers per row of W.
     first : int
         Row of the bounce's first random number.
+    last : float
+        1 for the last bounce, else 0.
     P : pointer to float
         Scene parameters.
     frame : Frame
@@ -39,7 +41,7 @@ def shade(W, m, first, P, frame):
         g = r
         b = r
         if any_of(missed):
-            r, g, b = background(dx, dy, dz, P)
+            r, g, b = background(dx, dy, dz, load(W, Row.dense * m + i) if frame.weighted else 0.0, P)
         more = 0.0 * dx
         if any_of(hit):
             t = load(W, Row.t * m + i)
@@ -49,13 +51,13 @@ def shade(W, m, first, P, frame):
             z = load(W, Row.oz * m + i) + t * dz
             steps, side = load(W, Row.steps * m + i), load(W, Row.side * m + i)
             u = tuple(load(W, (first + k) * m + i) for k in range(frame.bounce_samples))
-            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, u, P)
+            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, last, u, P)
             hr, hg, hb = light
             r = where(hit, hr, r)
             g = where(hit, hg, g)
             b = where(hit, hb, b)
             if frame.bounces:
-                er, eg, eb, ox, oy, oz, ex, ey, ez, es = onward
+                er, eg, eb, ox, oy, oz, ex, ey, ez, es, dense = onward
                 er = where(hit, tr * er, 0.0)
                 eg = where(hit, tg * eg, 0.0)
                 eb = where(hit, tb * eb, 0.0)
@@ -65,6 +67,8 @@ def shade(W, m, first, P, frame):
                 store_vector(W, Row.ox, m, i, ox, oy, oz)
                 store_vector(W, Row.dx, m, i, ex, ey, ez)
                 store(W, Row.side * m + i, es)
+                if frame.weighted:
+                    store(W, Row.dense * m + i, dense)
                 enter, leave = span_box(ox, oy, oz, ex, ey, ez, P)
                 store(W, Row.start * m + i, enter)
                 store(W, Row.end * m + i, where(more > 0.002, leave, 0.0))

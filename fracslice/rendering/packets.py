@@ -94,7 +94,8 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, blocks, frame):
             follow(W, L, rays, left, m, limit, P, step_ray)
             if bounce == 0:
                 cover(W, m)
-            shade(W, m, Row.px + frame.camera_samples + bounce * frame.bounce_samples, P, frame)
+            last = 1.0 if bounce == frame.bounces else 0.0
+            shade(W, m, Row.px + frame.camera_samples + bounce * frame.bounce_samples, last, P, frame)
             if frame.transparent and bounce == 0:
                 clear(W, m)
         gather(W, pixels, A, left, m, width, frame)
@@ -215,4 +216,6 @@ def begin(W, m, P, frame):
         store(W, Row.path * m + i, zero)
         store_vector(W, Row.r, m, i, zero, zero, zero)
         store(W, Row.side * m + i, zero + 1.0)
+        if frame.weighted:
+            store(W, Row.dense * m + i, zero)
         store_vector(W, Row.tr, m, i, zero + 1.0, zero + 1.0, zero + 1.0)

@@ -16,13 +16,13 @@ from ..scene.reader import reads
 from ..scene.view import View
 from ..scene.writer import to_xml
 from ..work import Work
-from .accumulator import CHANNELS, Plan
+from .accumulator import CHANNELS, PassPlan
 from .cpu import CpuTracer
 from .linking import Frame
-from .sequence import Samples
+from .sequence import SampleRange
 
 if TYPE_CHECKING:
-    from ..cluster import Pieces
+    from ..cluster import ResultFolder
     from .progressive import Renderer
 
 SAMPLES, PIXELS = 1 << 21, 1 << 18
@@ -44,13 +44,13 @@ class PartTask:
         Width and height of the film, pixels.
     crop : tuple of int or None
         Part of the film that is rendered.
-    samples : Samples
+    samples : SampleRange
         Part of the sample sequence.
     size : tuple of int
         Width and height of the picture, pixels.
     dtype : str
         Float type of the sums.
-    pieces : Pieces
+    pieces : ResultFolder
         Folder with the input of the pass.
     job : str
         Key of the pass: its frame, pixels and sums.
@@ -69,10 +69,10 @@ class PartTask:
     scene: str
     film: tuple[int, int]
     crop: tuple[int, int, int, int] | None
-    samples: Samples
+    samples: SampleRange
     size: tuple[int, int]
     dtype: str
-    pieces: Pieces
+    pieces: ResultFolder
     job: str
     frame: str
     number: int
@@ -99,7 +99,7 @@ class PartTask:
         data = self._input(width + row * self.start, width + row * self.end)
         sums, places = np.zeros((self.size[0] * self.size[1], CHANNELS), dtype), _places(pixels, self.size)
         sums[places] = np.frombuffer(data, dtype).reshape(-1, CHANNELS)
-        of.tracer.add(sums.reshape(-1), Plan(pixels, len(pixels), self.last), work)
+        of.tracer.add(sums.reshape(-1), PassPlan(pixels, len(pixels), self.last), work)
         return bytes(sums[places].tobytes())
 
     def _input(self, start: int, end: int) -> bytes:
@@ -156,7 +156,7 @@ class PoolTracer:
         return self.tracer.frame
 
     @property
-    def samples(self) -> Samples:
+    def samples(self) -> SampleRange:
         """Part of the sequence."""
         return self.tracer.samples
 
@@ -181,14 +181,14 @@ class PoolTracer:
         """
         self._ahead = True
 
-    def add(self, sums: np.ndarray, plan: Plan, work: Work) -> None:
+    def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:
         """Add samples to pixels up to their goals; see `CpuTracer.add`.
 
         Parameters
         ----------
         sums : ndarray, shape (height * width * CHANNELS,)
             Sums of the picture, changed in place.
-        plan : Plan
+        plan : PassPlan
             Pixels to sample.
         work : Work
             Pool and cancellation.
@@ -220,7 +220,7 @@ _OWN = threading.local()
 
 
 def _renderer(
-    scene: str, film: tuple[int, int], crop: tuple[int, int, int, int] | None, samples: Samples
+    scene: str, film: tuple[int, int], crop: tuple[int, int, int, int] | None, samples: SampleRange
 ) -> Renderer:
     """Renderer of a frame, the last one of this thread."""
     from .progressive import Renderer

@@ -18,14 +18,14 @@ from ..keys import key, program
 from ..memory import available_bytes
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import CHANNELS, Accumulator, Plan
+from .accumulator import CHANNELS, Accumulator, PassPlan
 from .cpu import BLOCK, CpuTracer
 from .host_accumulator import HostAccumulator
 from .linking import Frame, link_frame
 from .optics import optics
 from .parts import PoolTracer
 from .passes import Pass
-from .sequence import Samples
+from .sequence import SampleRange
 from .setup import prepare
 from .state import load_state, save_state
 
@@ -106,7 +106,7 @@ class Renderer:
         size: tuple[int, int] | None = None,
         work: Work | None = None,
         device: str = "auto",
-        samples: Samples | None = None,
+        samples: SampleRange | None = None,
         crop: tuple[int, int, int, int] | None = None,
     ) -> None:
         pixels = (view.film.width, view.film.height) if size is None else size
@@ -223,7 +223,7 @@ class Renderer:
         while (plan := self.accumulator.plan(most, tolerance)).samples:
             yield self._pass(plan)
 
-    def _pass(self, plan: Plan) -> Pass:
+    def _pass(self, plan: PassPlan) -> Pass:
         start = time.perf_counter()
         self.prepare(self.accumulator.passes > 0)
         self.tracer.add(self.accumulator.sums, plan, self.work)

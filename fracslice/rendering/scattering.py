@@ -5,33 +5,42 @@ from __future__ import annotations
 from ..kernel.linker import Linker
 from .colours import Look
 from .drawn import Drawn
-from .units import glossy, lights, shade
+from .units import glossy, lights, shade, weights
 
 CHANNELS = "rgb"
 
 
-def divided(linker: Linker) -> list[str]:
+def divided(linker: Linker, look: Look) -> list[str]:
     """Return the lines that divide a colour into what the surface reflects and what it scatters.
 
     Parameters
     ----------
     linker : Linker
         Linker of the kernel.
+    look : Look
+        Materials.
 
     Returns
     -------
     list of str
         Kernel source lines for the reflectance k at normal incidence, the emitted colour e and the scattered
-        colour c.
+        colour c, and on paths for the probability of reflection.
     """
     for function in (shade.fresnel, glossy.tinted):
         linker.share(function)
     lines = ["facing = -(dx * nx + dy * ny + dz * nz)", *(f"e{c} = c{c}" for c in CHANNELS)]
     lines += [f"k{c} = reflect + metallic * (c{c} - reflect)" for c in CHANNELS]
-    return lines + [f"c{c} = c{c} * (1.0 - metallic) * (1.0 - tinted(facing, k{c}))" for c in CHANNELS]
+    lines += [f"c{c} = c{c} * (1.0 - metallic) * (1.0 - tinted(facing, k{c}))" for c in CHANNELS]
+    if look.paths:
+        lines += [
+            "mirrors = tinted(facing, maximum(maximum(kr, kg), kb))",
+            "scatters = maximum(maximum(cr, cg), cb)",
+            "share = mirrors / maximum(mirrors + scatters, 1e-6)",
+        ]
+    return lines
 
 
-def onward(linker: Linker, drawn: Drawn, look: Look) -> list[str]:
+def onward(linker: Linker, drawn: Drawn, look: Look, weighted: bool) -> list[str]:
     """Return the lines for the ray that continues.
 
     Parameters
@@ -42,16 +51,19 @@ def onward(linker: Linker, drawn: Drawn, look: Look) -> list[str]:
         Random numbers of a bounce.
     look : Look
         Materials.
+    weighted : bool
+        True if the ray carries the density of its direction.
 
     Returns
     -------
     list of str
-        Kernel source lines for the throughput t, the origin o, the direction e and the side es.
+        Kernel source lines for the throughput t, the origin o, the direction e, the side es and the density
+        eq.
     """
     for function in (shade.mirrored, shade.fresnel, shade.bent, shade.goes_on, shade.reflects):
         linker.share(function)
     (u,) = drawn.names(1) if look.inside else ("t",)
-    lines, out = [], ""
+    lines, out = ["eq = 0.0 * t"], ""
     if look.glossy:
         lines += _reflected(linker, drawn)
     elif not look.inside:
@@ -59,9 +71,15 @@ def onward(linker: Linker, drawn: Drawn, look: Look) -> list[str]:
         lines += ["tg, tb, es = tr, tr, side", *(f"{c} = {c} * (1.0 - t{c})" for c in CHANNELS)]
     if look.paths:
         lines += _scattered(linker, drawn)
+    if weighted:
+        linker.share(weights.density_onward)
+        lines.append("eq = density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, roughness, share)")
+    if look.coated:
+        lines += _lacquered(linker, drawn)
     if look.inside:
         out = "out * "
         lines += _refracted(u, look.glossy)
+        lines += ["eq = where(pane, 0.0, eq)"] * weighted
     return [*lines, *(f"o{a} = {a} + 3.0 * h * {out}n{a}" for a in "xyz")]
 
 
@@ -72,6 +90,44 @@ def _reflected(linker: Linker, drawn: Drawn) -> list[str]:
     u, v = drawn.names(2)
     lines = [f"ex, ey, ez, weight, half = glossy(dx, dy, dz, nx, ny, nz, roughness, {u}, {v})", "es = side"]
     return lines + [f"t{c} = weight * tinted(half, k{c})" for c in CHANNELS]
+
+
+def lacquered(linker: Linker, colour: list[str]) -> list[str]:
+    """Return the lines for the reflection of a light in a lacquer.
+
+    Parameters
+    ----------
+    linker : Linker
+        Linker of the kernel.
+    colour : list of str
+        Red, green and blue of the light.
+
+    Returns
+    -------
+    list of str
+        Kernel source lines that add to the light `glaze`.
+    """
+    linker.share(shade.lacquer)
+    lines = [f"spark, slope = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, {glossy.LACQUER})"]
+    return lines + [
+        f"glaze{c} = glaze{c} + power * {s} * spark * lacquer(slope, coat)"
+        for c, s in zip(CHANNELS, colour, strict=True)
+    ]
+
+
+def _lacquered(linker: Linker, drawn: Drawn) -> list[str]:
+    """Lines that choose between the reflection of a lacquer and the ray of the material under it."""
+    linker.share(shade.lacquer)
+    (u,) = drawn.names(1)
+    lines = [
+        "lacquer_ = lacquer(facing, coat)",
+        f"glazed = {u} < lacquer_",
+        "gx, gy, gz = mirrored(dx, dy, dz, nx, ny, nz)",
+        *(f"e{a} = where(glazed, g{a}, e{a})" for a in "xyz"),
+        "eq = where(glazed, 0.0, eq)",
+    ]
+    lines += [f"t{c} = where(glazed, 1.0, t{c})" for c in CHANNELS]
+    return lines + [f"{c} = {c} * (1.0 - lacquer_)" for c in CHANNELS]
 
 
 def _scattered(linker: Linker, drawn: Drawn) -> list[str]:
@@ -85,9 +141,6 @@ def _scattered(linker: Linker, drawn: Drawn) -> list[str]:
     u, v, choice, life = drawn.names(4)
     lines = [
         f"wx, wy, wz = upward(nx, ny, nz, {u}, {v})",
-        "mirrors = tinted(facing, maximum(maximum(kr, kg), kb))",
-        "scatters = maximum(maximum(cr, cg), cb)",
-        "share = mirrors / maximum(mirrors + scatters, 1e-6)",
         f"chosen = {choice} < share",
         *(f"e{a} = where(chosen, e{a}, w{a})" for a in "xyz"),
         *(

@@ -34,7 +34,7 @@ DIMENSIONS = len(_DIMENSIONS)
 
 
 @dataclass(frozen=True)
-class Samples:
+class SampleRange:
     """Part of the sequence that a picture takes.
 
     Attributes

@@ -85,8 +85,8 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     """
     camera = view.camera or _whole(root, size[0] / size[1])
     lights = view.lights or default_lights(root)
-    if sum(light.kind == "sky" for light in lights) > 1:
-        raise lights[-1].fail("kind: expected at most one sky")
+    if sum(light.surrounds for light in lights) > 1:
+        raise lights[-1].fail("kind: expected at most one sky or environment")
     growth, base = footprint(camera, size)
     near = surroundings(root, camera, growth) if growth else 0.0
     pixel, scale = growth * near + base, max(map(abs, camera.eye))

@@ -163,7 +163,7 @@ class Keys(Parameter):
 
 
 @dataclass(frozen=True)
-class Target(Parameter):
+class AttributePath(Parameter):
     """Parameter kind of an attribute of an element: ELEMENT.ATTRIBUTE or ELEMENT[NUMBER].ATTRIBUTE."""
 
     @property
@@ -236,7 +236,7 @@ class Track(Part):
 
     element = "track"
     many = True
-    of: str = described(Target(REQUIRED, "the attribute to move"))
+    of: str = described(AttributePath(REQUIRED, "the attribute to move"))
     keys: Keyframes = described(Keys(REQUIRED, "keyframes: the value at each time"))
     curve: str = described(
         Choice(

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from ..formulas import get, names
-from ..formulas.parameters import REQUIRED, Choice, Parameter
+from ..formulas.parameters import REQUIRED, Choice, Number, Parameter, Vector
 from ..formulas.plugins import load_installed
 from ..formulas.registry import Formula
 from .animation import Animation, Track
 from .element import Part
+from .identifier import Identifier
 from .lengths import Length
 from .printing import Print
 from .view import PARTS
@@ -67,6 +68,38 @@ SOLID = TopElement(
     (1, None),
 )
 
+DEFINE = TopElement(
+    "define",
+    """A formula of the scene's own: the text of the step of an escape-time fractal, or of a distance.
+
+    The last statement returns. A step has the point `w`, the constant `c`, the vocabulary and the verbs, and
+    returns the next point; a distance has `x`, `y`, `z` and the vocabulary. Elements of its name may stand
+    below it. The text is checked against a white list before anything of it is executed: it holds arithmetic,
+    loops over constants and calls of these functions, and nothing else.""",
+    MappingProxyType(
+        {
+            "name": Identifier(REQUIRED, "of the formula"),
+            "kind": Choice("step", "what the text returns", ("step", "distance")),
+            "lipschitz": Number(1.0, "Lipschitz bound of a distance", above=0),
+            "half": Vector(None, "half sizes of a box around the solid of a distance", above=0),
+        }
+    ),
+    (0, None),
+    many=True,
+)
+PARAMETER = TopElement(
+    "parameter",
+    "A parameter of a <define>.",
+    MappingProxyType(
+        {
+            "name": Identifier(REQUIRED, "of the parameter"),
+            "default": Vector(REQUIRED, "where an element does not give it", sizes=(1, 3)),
+            "least": Number(None, "smallest value"),
+            "most": Number(None, "largest value"),
+        }
+    ),
+)
+
 
 def _section(part: type[Part]) -> TopElement:
     parameters = MappingProxyType(part.kinds())
@@ -76,7 +109,7 @@ def _section(part: type[Part]) -> TopElement:
 PRINT = _section(Print)
 PICTURE = [_section(part) for part in PARTS]
 FILM = [_section(part) for part in (Animation, Track)]
-SECTIONS = {section.name: section for section in (SOLID, PRINT, *PICTURE, *FILM)}
+SECTIONS = {section.name: section for section in (DEFINE, SOLID, PRINT, *PICTURE, *FILM)}
 
 
 def registered() -> dict[str, Formula]:

@@ -11,7 +11,7 @@ from ..formulas.parameters import REQUIRED
 from ..formulas.plugins import origin
 from ..formulas.registry import Formula
 from ..nearest import hint
-from .layout import SCENE, SECTIONS, Element, formulas
+from .layout import PARAMETER, SCENE, SECTIONS, Element, formulas
 
 _GROUPS = {
     "shape": ("Shapes", "Solids. They contain no elements."),
@@ -36,7 +36,7 @@ def markdown() -> str:
 
 def _page() -> Iterator[str]:
     yield "## The frame\n"
-    for section in (SCENE, *SECTIONS.values()):
+    for section in (SCENE, *SECTIONS.values(), PARAMETER):
         yield from _described(section)
     for kind, (title, doc) in _GROUPS.items():
         yield f"## {title}\n\n{doc}\n"
@@ -155,7 +155,8 @@ def page(name: str) -> str:
     SceneError
         If there is no such element; the message suggests the nearest name.
     """
-    known: dict[str, Element] = {SCENE.name: SCENE, **SECTIONS, **{f.name: f for f in formulas()}}
+    elements: list[Element] = [SCENE, PARAMETER, *SECTIONS.values(), *formulas()]
+    known = {element.name: element for element in elements}
     if name not in known:
         raise SceneError(f"{name}: no such formula; {hint(name, known)}")
     element = known[name]

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..errors import SceneError
 from ..formulas import Node, get
+from ..formulas.definitions import definitions
 from ..formulas.parameters import AUTO
 from .animation import Animation, Track
 from .lengths import parse_length
@@ -63,6 +64,7 @@ class Scene:
         for name in ("size", "unit"):
             if (value := getattr(self, f"{name}_mm")) is not None:
                 object.__setattr__(self, f"{name}_mm", parse_length(value, name))
+        definitions(self.root)
         _refuse_impossible(self.root)
         if self.tracks and self.animation is None:
             raise self.tracks[0].fail("needs an <animation> in the scene")

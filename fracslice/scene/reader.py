@@ -15,12 +15,13 @@ from xml.parsers import expat
 
 from ..errors import SceneError
 from ..formulas import Node
-from ..formulas.parameters import REQUIRED
+from ..formulas.parameters import REQUIRED, File, Parameter
 from ..formulas.registry import DEEPEST, TOO_DEEP
 from ..nearest import hint
 from .animation import Animation, Track
+from .definitions import defined, parameter
 from .element import Part
-from .layout import SCENE, SECTIONS, SOLID, Element, TopElement, formulas, registered
+from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, SOLID, Element, TopElement, formulas, registered
 from .model import Scene, computing, scene
 from .printing import Print
 from .view import View
@@ -109,6 +110,8 @@ class _Open:
     place: str
     values: dict[str, Any]
     children: list[Node] = field(default_factory=list)
+    declared: list[tuple[str, Parameter]] = field(default_factory=list)
+    lines: dict[int, str] = field(default_factory=dict)
 
     def fail(self, message: str) -> SceneError:
         """The error to raise about this element."""
@@ -123,7 +126,7 @@ class _Builder:
         self.open: list[_Open] = []
         self.done: dict[str, _Open] = {}
         self.parts: list[Part] = []
-        self.formulas: Mapping[str, Element] = registered()
+        self.formulas: dict[str, Element] = {**registered()}
         self.parser = expat.ParserCreate()
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self.doctype
@@ -157,11 +160,18 @@ class _Builder:
             raise SceneError(f"{self.place}: <{name}> {TOO_DEEP}")
         opened = _Open(self.element(name), self.place, {})
         for attribute, text in attributes.items():
-            opened.values[attribute] = _value(opened, attribute, text)
+            opened.values[attribute] = self.located(_value(opened, attribute, text), opened, attribute)
         for attribute, kind in opened.element.parameters.items():
             if kind.default is REQUIRED and attribute not in attributes:
                 raise opened.fail(f'needs the attribute {attribute}="...": expected {kind.expects}')
         self.open.append(opened)
+        self.parser.buffer_text = opened.element not in (DEFINE, PARAMETER)
+
+    def located(self, value: Any, opened: _Open, attribute: str) -> Any:
+        """The value of an attribute; the name of a file is relative to the scene's folder."""
+        if isinstance(opened.element.parameters[attribute], File) and value:
+            return str(Path(self.source).absolute().parent / value)
+        return value
 
     def element(self, name: str) -> Element:
         """The element of this name, if it is allowed here."""
@@ -169,12 +179,14 @@ class _Builder:
             allowed: Mapping[str, Element] = {SCENE.name: SCENE}
         elif self.open[-1].element is SCENE:
             allowed = SECTIONS
+        elif self.open[-1].element is DEFINE:
+            allowed = {PARAMETER.name: PARAMETER}
         else:
             allowed = self.formulas if name in self.formulas else self.all_formulas()
             if self.open[-1].element.children[1] == 0:
                 raise self.open[-1].fail(f"takes no elements inside it, found <{name}>")
         if name not in allowed:
-            known = {SCENE.name, *SECTIONS, *self.all_formulas()}
+            known = {SCENE.name, PARAMETER.name, *SECTIONS, *self.all_formulas()}
             wrong = "cannot stand here" if name in known else "is not a known element"
             raise SceneError(f"{self.place}: <{name}> {wrong}; {hint(name, allowed, '<{}>')}")
         if name in self.done:
@@ -184,7 +196,7 @@ class _Builder:
     def all_formulas(self) -> Mapping[str, Element]:
         """Formulas by name, those of installed packages too, which take long to find."""
         formulas()
-        self.formulas = registered()
+        self.formulas = {**registered(), **self.formulas}
         return self.formulas
 
     def end(self, name: str) -> None:
@@ -204,7 +216,11 @@ class _Builder:
     def close_section(self, closed: _Open) -> None:
         """Store an element that is no formula."""
         section = closed.element
-        if isinstance(section, TopElement) and section.part:
+        if section is PARAMETER:
+            self.open[-1].declared.append(parameter(closed.values, closed.fail))
+        elif section is DEFINE:
+            self.define(closed)
+        elif isinstance(section, TopElement) and section.part:
             self.parts.append(section.part(place=closed.place, **closed.values))
             if not section.many:
                 self.done[section.name] = closed
@@ -215,9 +231,20 @@ class _Builder:
         elif SOLID.name not in self.done:
             raise closed.fail(f"expected <{SOLID.name}> inside it")
 
+    def define(self, closed: _Open) -> None:
+        """Add the formula of a definition."""
+        made = defined(closed.values, closed.declared, closed.lines, self.source)
+        if made.name in self.formulas:
+            raise closed.fail(f"name={_quoted(made.name)}: expected one definition of this name")
+        self.formulas[made.name] = made
+
     def text(self, text: str) -> None:
-        """Refuse text other than white space."""
-        if text.strip():
+        """Keep the lines of a definition; refuse other text than white space elsewhere."""
+        if self.open[-1].element is DEFINE:
+            line = self.parser.CurrentLineNumber
+            before = self.open[-1].lines.get(line, " " * self.parser.CurrentColumnNumber)
+            self.open[-1].lines[line] = before + text.rstrip("\n")
+        elif text.strip():
             shown = " ".join(text.split())[:40]
             raise self.open[-1].fail(f"holds the text {shown!r}: expected elements only")
 

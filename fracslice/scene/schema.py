@@ -12,13 +12,17 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
 
-from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
-from .animation import Keys, Seconds, Target
-from .layout import SCENE, SECTIONS, Element, formulas
+from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, File, Number, Vector
+from .animation import AttributePath, Keys, Seconds
+from .identifier import Identifier
+from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, Element, formulas
 from .lengths import MILLIMETRES, Length
 
 PATH = Path(__file__).with_name("scene.rng")
 """The shipped schema."""
+
+OPEN = PATH.with_name("scene-define.rng")
+"""The shipped schema of scenes that define formulas."""
 
 _NOTES = "http://relaxng.org/ns/compatibility/annotations/1.0"
 _FACETS = {"above": "minExclusive", "least": "minInclusive", "below": "maxExclusive", "most": "maxInclusive"}
@@ -42,13 +46,37 @@ def relaxng() -> str:
         },
     )
     Tree.SubElement(Tree.SubElement(grammar, "start"), "ref", name="scene")
-    _define(grammar, SCENE)
+    for frame in (SCENE, PARAMETER):
+        _define(grammar, frame)
     for section in SECTIONS.values():
         _define(grammar, section)
     choice = Tree.SubElement(Tree.SubElement(grammar, "define", name="formula"), "choice")
     for formula in formulas():
         Tree.SubElement(choice, "ref", name=formula.name)
         _define(grammar, formula)
+    return _text_of(grammar)
+
+
+def open_relaxng() -> str:
+    """Return the schema of scenes that define formulas: elements of other names may hold any attributes.
+
+    Returns
+    -------
+    str
+        XML that includes the schema of `relaxng`.
+    """
+    grammar = Tree.Element("grammar", {"xmlns": "http://relaxng.org/ns/structure/1.0"})
+    Tree.SubElement(grammar, "include", href=PATH.name)
+    body = Tree.SubElement(Tree.SubElement(grammar, "define", name="formula", combine="choice"), "element")
+    others = Tree.SubElement(Tree.SubElement(Tree.SubElement(body, "anyName"), "except"), "choice")
+    for name in (SCENE.name, PARAMETER.name, *SECTIONS, *(formula.name for formula in formulas())):
+        Tree.SubElement(others, "name").text = name
+    attribute = Tree.SubElement(Tree.SubElement(body, "zeroOrMore"), "attribute")
+    Tree.SubElement(attribute, "anyName")
+    return _text_of(grammar)
+
+
+def _text_of(grammar: Tree.Element) -> str:
     Tree.indent(grammar)
     return Tree.tostring(grammar, encoding="unicode", xml_declaration=False) + "\n"
 
@@ -63,9 +91,12 @@ def _define(grammar: Tree.Element, element: Element) -> None:
         inside = Tree.SubElement(body, "interleave")
         for section in SECTIONS.values():
             often = inside
-            if section.part:
+            if section.part or section.many:
                 often = Tree.SubElement(inside, "zeroOrMore" if section.many else "optional")
             Tree.SubElement(often, "ref", name=section.name)
+    elif element is DEFINE:
+        mixed = Tree.SubElement(body, "mixed")
+        Tree.SubElement(Tree.SubElement(mixed, "zeroOrMore"), "ref", name=PARAMETER.name)
     elif element.children[1] != 0:
         Tree.SubElement(Tree.SubElement(body, "oneOrMore"), "ref", name="formula")
 
@@ -115,7 +146,11 @@ def _choices(parent: Tree.Element, kind: Choice) -> None:
         Tree.SubElement(values, "value").text = word
 
 
-def _text(parent: Tree.Element, _: Seconds | Target | Keys) -> None:
+def _identifier(parent: Tree.Element, _: Identifier) -> None:
+    _param(Tree.SubElement(parent, "data", type="string"), "pattern", "[a-z][a-z0-9_]*")
+
+
+def _text(parent: Tree.Element, _: File | Seconds | AttributePath | Keys) -> None:
     Tree.SubElement(parent, "data", type="string")
 
 
@@ -130,8 +165,10 @@ _PATTERNS: dict[type, Any] = {
     Axis: _choices,
     Choice: _choices,
     Length: _length,
+    File: _text,
+    Identifier: _identifier,
     Seconds: _text,
-    Target: _text,
+    AttributePath: _text,
     Keys: _text,
 }
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from ..formulas.parameters import Choice, Count, Number, Vector
+from ..formulas.parameters import Choice, Count, File, Number, Vector
 from .camera import Camera as Camera
 from .camera import Triple
 from .element import Part, described
@@ -48,7 +48,11 @@ class Light(Part):
     element = "light"
     many = True
     kind: str = described(
-        Choice("sun", "far away, near, all around, or at the camera", ("sun", "lamp", "sky", "camera"))
+        Choice(
+            "sun",
+            "far away, near, all around, a picture of the surroundings, or at the camera",
+            ("sun", "lamp", "sky", "environment", "camera"),
+        )
     )
     position: Triple = described(
         Vector((-1.0, -2.0, 3.0), "where a lamp is, or the direction in which the sun stands", nonzero=True)
@@ -73,6 +77,26 @@ class Light(Part):
         )
     )
     shadows: str = described(Choice("yes", "whether objects cast shadows in it", ("yes", "no")))
+    file: str | None = described(
+        File(
+            None,
+            "of an environment, its picture, such as .hdr: longitude across, latitude down, +y in the middle",
+        )
+    )
+    rotation: float = described(
+        Number(0.0, "of an environment, its turn about the z axis in degrees", least=-360, most=360)
+    )
+
+    @property
+    def surrounds(self) -> bool:
+        """True if rays that miss the scene show it."""
+        return self.kind in ("sky", "environment")
+
+    def validate(self) -> None:
+        """Raise `SceneError` unless an environment, and nothing else, has a file."""
+        if (self.kind == "environment") != bool(self.file):
+            wanted = "is only for an environment" if self.file else "expected a picture of the surroundings"
+            raise self.fail(f'file="{self.file or ""}": {wanted}')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +110,18 @@ class Fog(Part):
     density: float = described(
         Number(0.1, "of light, exp(-density distance) comes through", least=0, most=1e6)
     )
+    height: float | None = described(
+        Number(None, "height over which it thins to 1/e; without it, fog is the same everywhere", above=0)
+    )
+    level: float = described(Number(0.0, "height z at which it has its density"))
+    scatter: float = described(
+        Number(
+            0.0,
+            "how much light of suns and lamps it scatters to the eye, where surfaces do not shadow it",
+            least=0,
+            most=1,
+        )
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,9 +133,9 @@ class Shading(Part):
         Choice(
             "light",
             "light: lit by the lights; normal: unit normal; position: coordinates; albedo: colour "
-            "without light; depth: distance along the view, and distance: from the eye, both in "
-            "scene units; steps: steps of the ray",
-            ("light", "normal", "position", "albedo", "depth", "distance", "steps"),
+            "without light; trap: position in a palette, by the orbit; depth: distance along the view, and "
+            "distance: from the eye, both in scene units; steps: steps of the ray",
+            ("light", "normal", "position", "albedo", "trap", "depth", "distance", "steps"),
         )
     )
     ambient: float = described(Number(0.0, "light that is everywhere", least=0, most=100))

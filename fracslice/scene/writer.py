@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from html import escape
-from typing import Any
+from collections.abc import Iterator
 
 from ..formulas import Node
+from ..formulas.definitions import definitions
+from .definitions import attributes, written
 from .element import Part
-from .layout import SCENE, SECTIONS, SOLID, VERSION, Element
+from .layout import SCENE, SECTIONS, SOLID, VERSION
 from .model import Scene
 from .printing import Print
 
@@ -44,12 +44,14 @@ def part_to_xml(part: Part | Print) -> str:
     """
     section = SECTIONS[part.element]
     values = {name: getattr(part, name) for name in section.parameters}
-    return f"<{section.name}{_attributes(section, values)}/>"
+    return f"<{section.name}{attributes(section, values)}/>"
 
 
 def _lines(scene: Scene) -> Iterator[str]:
-    yield f"<{SCENE.name}{_attributes(SCENE, {'version': VERSION})}>"
-    yield f"  <{SOLID.name}{_attributes(SOLID, {'size': scene.size_mm, 'unit': scene.unit_mm})}>"
+    yield f"<{SCENE.name}{attributes(SCENE, {'version': VERSION})}>"
+    for definition in definitions(scene.root):
+        yield from written(definition)
+    yield f"  <{SOLID.name}{attributes(SOLID, {'size': scene.size_mm, 'unit': scene.unit_mm})}>"
     yield from _element(scene.root, "    ")
     yield f"  </{SOLID.name}>"
     printing = () if scene.printing == Print() else (scene.printing,)
@@ -60,7 +62,7 @@ def _lines(scene: Scene) -> Iterator[str]:
 
 
 def _element(node: Node, indent: str) -> Iterator[str]:
-    start = f"{indent}<{node.formula.name}{_attributes(node.formula, node.values)}"
+    start = f"{indent}<{node.formula.name}{attributes(node.formula, node.values)}"
     if not node.children:
         yield start + "/>"
         return
@@ -68,9 +70,3 @@ def _element(node: Node, indent: str) -> Iterator[str]:
     for child in node.children:
         yield from _element(child, indent + "  ")
     yield f"{indent}</{node.formula.name}>"
-
-
-def _attributes(element: Element, values: Mapping[str, Any]) -> str:
-    kinds = element.parameters
-    changed = {name: value for name, value in values.items() if value != kinds[name].default}
-    return "".join(f' {name}="{escape(kinds[name].text(value))}"' for name, value in changed.items())

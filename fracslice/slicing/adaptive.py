@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import SliceError
 from ..formulas.parameters import validated
+from ..quantiles import quantile
 from ..scene.lengths import Length
 from ..work import Work
 from .layers import Layer, Slicer
@@ -100,4 +101,4 @@ def _slope(layer: Layer) -> float:
     )
     length = np.linalg.norm(gradient, axis=0)
     vertical = np.abs(gradient[2]) / np.where(length > 0, length, 1.0)
-    return float(np.quantile(vertical, SHARE))
+    return quantile(vertical, SHARE)

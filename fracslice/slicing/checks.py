@@ -21,7 +21,7 @@ from .necks import Neck, weakest
 from .overhangs import Overhang, farthest, unsupported
 from .printers import Printer
 from .problems import misfit, problems_of
-from .runs import LayerComponents, components_of
+from .runs import LayerComponents, layer_components
 from .stack import Stack
 from .thickness import widths
 
@@ -152,7 +152,7 @@ def check_layers(
     def make(layer: Layer) -> _LayerFindings:
         runs = layer.runs
         measured = widths(runs, stack.pixel) if layer.index in chosen else (None, None)
-        return _LayerFindings(*components_of(runs), layer.area, *measured)
+        return _LayerFindings(*layer_components(runs), layer.area, *measured)
 
     limits, work = limits or Limits(), work or Work()
     finest, origin = max(stack.pixel), stack.origin

@@ -90,7 +90,7 @@ class LayerComponents:
         return len(self.nodes.area)
 
 
-def components_of(solid: Runs) -> tuple[LayerComponents, LayerComponents]:
+def layer_components(solid: Runs) -> tuple[LayerComponents, LayerComponents]:
     """Label the components of a layer: solid ones 8-connected, empty ones 4-connected.
 
     Parameters

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,6 +21,7 @@ from ..work import Work
 from .bricks import Bricks, SignBricks
 from .extent import Extent, extent, reached
 from .lattice import Lattice
+from .pruning import Proofs
 from .sampler import Evaluate, sample, sample_signs
 
 __all__ = [
@@ -47,6 +49,9 @@ COARSE = 64
 """Voxels along the longest side for the first estimate of the size, accurate to a quarter of a voxel, from
 which depths follow.
 """
+
+MANY = 64**3
+"""Bricks of a lattice from which cells are proved."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,8 @@ class Plan:
         Automatic depths, such as "mandelbulb 5".
     drains
         Drain holes.
+    proved
+        True if nothing is skipped without a proof.
     """
 
     root: Field
@@ -98,6 +105,7 @@ class Plan:
     notes: tuple[str, ...] = ()
     depths: tuple[str, ...] = ()
     drains: tuple[Drain, ...] = ()
+    proved: bool = False
 
     @property
     def lattice(self) -> Lattice:
@@ -247,12 +255,25 @@ def _sampled(
 
     def made() -> Arrays:
         kernel, bounds, conservative = _fields(planned, work)
-        bricks = take(kernel, bounds, lattice, work, conservative)
+        bricks = take(kernel, bounds, lattice, work, conservative, _proofs(planned))
         fresh.append(bricks)
-        return {name: getattr(bricks, name) for name in ("ijk", held, "index")}
+        arrays = {name: getattr(bricks, name) for name in ("ijk", held, "index")}
+        return {**arrays, "proved": np.array([np.nan if bricks.proved is None else bricks.proved])}
 
-    kept = stored(work.store, ("samples", held, work.device, lattice), planned.root, made)
-    return fresh[0] if fresh else kind(lattice.origin, lattice.voxel, kept["ijk"], kept[held], kept["index"])
+    kept = stored(work.store, ("samples", held, work.device, lattice, planned.proved), planned.root, made)
+    if fresh:
+        return fresh[0]
+    (proved,) = kept["proved"].tolist()
+    known = None if np.isnan(proved) else proved
+    return kind(lattice.origin, lattice.voxel, kept["ijk"], kept[held], kept["index"], proved=known)
+
+
+def _proofs(planned: Plan) -> Proofs | None:
+    """Proofs to sample with: for a small lattice, compiling them takes longer than they save."""
+    if not planned.proved and math.prod(planned.lattice.bricks) < MANY:
+        return None
+    cells = planned.root.cells()
+    return Proofs(cells, planned.proved) if cells else None
 
 
 def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:

@@ -35,6 +35,9 @@ class Bricks:
         Bricks that a violated bound would have lost, detected by the audit or the closure rule, and sampled.
     audited
         Points tested outside the samples to verify the bounds that pruning relies on.
+    proved
+        Share of the skipped volume that is proved to be empty or full; None if it was not determined. The
+        bound that discards the rest is measured.
     """
 
     origin: tuple[float, float, float]
@@ -45,6 +48,7 @@ class Bricks:
     evaluations: int = field(default=0, kw_only=True)
     repaired: int = field(default=0, kw_only=True)
     audited: int = field(default=0, kw_only=True)
+    proved: float | None = field(default=None, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.ijk)
@@ -63,6 +67,7 @@ class Bricks:
             evaluations=self.evaluations,
             repaired=self.repaired,
             audited=self.audited,
+            proved=self.proved,
         )
 
 
@@ -74,7 +79,7 @@ class SignBricks:
     ----------
     signs
         Sign bits, uint8 [n, 8, 8]: bit z of byte (x, y) is set inside.
-    origin, voxel, ijk, index, evaluations, repaired, audited
+    origin, voxel, ijk, index, evaluations, repaired, audited, proved
         As in `Bricks`.
     """
 
@@ -86,6 +91,7 @@ class SignBricks:
     evaluations: int = field(default=0, kw_only=True)
     repaired: int = field(default=0, kw_only=True)
     audited: int = field(default=0, kw_only=True)
+    proved: float | None = field(default=None, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.ijk)

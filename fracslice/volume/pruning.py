@@ -1,7 +1,7 @@
-"""Cells of a lattice that the field's bound proves free of the surface, and the bricks that remain.
+"""Cells of a lattice that are free of the surface, and the bricks that remain.
 
-Top down, a cell is discarded if the field at its centre proves that no sign change is in it or within a voxel
-of it: ``|f| > L * (half diagonal + voxel)``.
+Top down, a cell is discarded if no sign change is in it or within a voxel of it: by the field at its centre,
+``|f| > L * (half diagonal + voxel)``, or else by an enclosure of the field's values on all of it.
 """
 
 from __future__ import annotations
@@ -11,15 +11,42 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..formulas.field import Bounds
+from ..formulas.field import Bounds, Cells
 from ..kernel import Kernel
-from ..work import Work
+from ..work import Work, chunks
 from .lattice import BRICK, Lattice
 from .states import CANDIDATE, EMPTY, FULL, States
 from .values import values_at
 
 COARSEST = 16
 """Bricks along a cell of the first level: 128 voxels, as in OpenVDB's tree."""
+
+ENCLOSURE = 4
+"""Evaluations that an enclosure counts as; it costs 1.5 to 8."""
+
+BATCH = 1 << 12
+"""Cells per task."""
+
+COUNTED = 4
+"""Bricks along the smallest cells that are proved although a measured bound discards them: most of the
+volume.
+"""
+
+
+@dataclass(frozen=True)
+class Proofs:
+    """Proofs of cells by enclosures.
+
+    Attributes
+    ----------
+    cells
+        Proofs.
+    only
+        True if a measured bound discards nothing.
+    """
+
+    cells: Cells
+    only: bool = False
 
 
 @dataclass
@@ -38,8 +65,13 @@ class Pruning:
         Sampling grid.
     work
         Execution settings.
+    proofs
+        Proofs of cells that the bound does not discard, or of large cells that a measured bound discards;
+        None: none are tried.
     evaluations
         Points evaluated.
+    skipped, proved
+        Volume that was discarded, and what of it is proved to be empty or full, bricks.
     """
 
     kernel: Kernel
@@ -47,7 +79,26 @@ class Pruning:
     bounds: Bounds
     lattice: Lattice
     work: Work
+    proofs: Proofs | None = None
     evaluations: int = 0
+    skipped: int = 0
+    proved: int = 0
+
+    @property
+    def everywhere(self) -> bool:
+        """True if the inside is sampled, too, where it is not proved to be full."""
+        return not self.bounds.exterior_only or self.is_strict
+
+    @property
+    def is_strict(self) -> bool:
+        """True if nothing is discarded without a proof."""
+        return self.proofs is not None and self.proofs.only
+
+    @property
+    def share(self) -> float | None:
+        """Share of the discarded volume that is proved; None if proofs are not looked for."""
+        known = self.proofs or not self.bounds.exterior_only
+        return (self.proved / self.skipped if self.skipped else 1.0) if known else None
 
     def probe(self) -> tuple[States, np.ndarray]:
         """Discard cells from the coarsest level down.
@@ -63,26 +114,65 @@ class Pruning:
         grid = np.full([-(-n // size) for n in self.lattice.bricks], CANDIDATE, np.uint8)
         while True:
             cells = np.nonzero(grid == CANDIDATE)
-            f, reach = self._centres(cells, size, self.conservative), self._reach(size * BRICK)
-            full = (f < -reach) & (not self.bounds.exterior_only)
-            near = ~((f > reach) | full)
-            grid[cells] = np.where(near, CANDIDATE, np.where(full, FULL, EMPTY))
+            indices = self._centres(np.stack(cells), size)
+            f = self.values_at(indices, self.conservative)
+            grid[cells] = self._states(indices, f, size)
             if size == 1:
                 break
             size //= 2
             shape = tuple(slice(-(-n // size)) for n in self.lattice.bricks)
             grid = grid.repeat(2, 0).repeat(2, 1).repeat(2, 2)[shape]
-        if self.conservative is self.kernel:
-            own = f[near]
-        else:
-            own = self._centres(tuple(c[near] for c in cells), 1, self.kernel)
+        near = grid[cells] == CANDIDATE
+        own = f[near] if self.conservative is self.kernel else self.values_at(indices[:, near], self.kernel)
         return States.within(grid), ~(own < 0)
 
-    def _centres(self, cells: tuple[np.ndarray, ...], size: int, kernel: Kernel) -> np.ndarray:
-        """Field at the centres of cells of `size` bricks."""
-        return self.values_at([size * BRICK * c + (size * BRICK - 1) / 2 for c in cells], kernel)
+    def _centres(self, cells: np.ndarray, size: int) -> np.ndarray:
+        """Grid indices of the centres of cells of `size` bricks."""
+        return size * BRICK * cells + (size * BRICK - 1) / 2
 
-    def values_at(self, indices: Sequence[np.ndarray], kernel: Kernel) -> np.ndarray:
+    def _states(self, indices: np.ndarray, f: np.ndarray, size: int) -> np.ndarray:
+        """States of cells of `size` bricks around given points, from the values there."""
+        states = np.full(len(f), CANDIDATE, np.uint8)
+        if not self.is_strict or not self.bounds.exterior_only:
+            reach = self._reach(size * BRICK)
+            states[f > reach] = EMPTY
+            if not self.bounds.exterior_only:
+                states[f < -reach] = FULL
+        bounded = states != CANDIDATE
+        proved = bounded & (not self.bounds.exterior_only)
+        if self.proofs:
+            tried = ~bounded if self.everywhere else bounded & (size >= COUNTED)
+            empty, full = (np.zeros(len(f), bool) for _ in range(2))
+            empty[tried], full[tried] = self._proved(indices[:, tried], size * BRICK)
+            if self.everywhere:
+                states[empty], states[full] = EMPTY, FULL
+            proved |= empty | full
+        self.skipped += size**3 * int(np.count_nonzero(states != CANDIDATE))
+        self.proved += size**3 * int(np.count_nonzero(proved))
+        return states
+
+    def _proved(self, indices: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+        """Masks of the cells of `size` samples around given points that are proved empty, and full."""
+        assert self.proofs
+        cells, points = self.proofs.cells, self._points(indices)
+        half = self.lattice.voxel * (size + 1) / 2
+        empty, full = (np.empty(points.shape[1], bool) for _ in range(2))
+
+        def task(part: slice) -> None:
+            empty[part], full[part] = cells(points[:, part], half)
+
+        self.work.map(task, chunks(len(empty), BATCH))
+        self.evaluations += ENCLOSURE * len(empty)
+        return empty, full
+
+    def _points(self, indices: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+        """Points [3, n] at positions in grid indices, scene units."""
+        points = np.empty((3, len(indices[0])))
+        for row, start, along in zip(points, self.lattice.origin, indices, strict=True):
+            np.add(start, self.lattice.voxel * along, out=row)
+        return points
+
+    def values_at(self, indices: Sequence[np.ndarray] | np.ndarray, kernel: Kernel) -> np.ndarray:
         """Evaluate a field.
 
         Parameters
@@ -97,14 +187,12 @@ class Pruning:
         ndarray
             Field values, [n].
         """
-        points = np.empty((3, len(indices[0])))
-        for row, start, along in zip(points, self.lattice.origin, indices, strict=True):
-            np.add(start, self.lattice.voxel * along, out=row)
+        points = self._points(indices)
         self.evaluations += points.shape[1]
         return values_at(kernel, points, self.work)
 
     def emptied(self, places: np.ndarray) -> np.ndarray:
-        """Prove bricks empty by their eight subcells: 8 evaluations to save 512.
+        """Prove bricks empty by their eight subcells: few evaluations to save 512.
 
         Parameters
         ----------
@@ -118,9 +206,15 @@ class Pruning:
         """
         size = BRICK // 2
         middle = np.indices((2, 2, 2)).reshape(3, 8, 1) * size + (size - 1) / 2
-        f = self.values_at((places[:, None] * BRICK + middle).reshape(3, -1), self.conservative)
-        empty: np.ndarray = f.reshape(8, -1).min(0) > self._reach(size)
-        return empty
+        indices = (places[:, None] * BRICK + middle).reshape(3, -1)
+        empty = np.zeros(indices.shape[1], bool)
+        if not (self.is_strict and self.bounds.exterior_only):
+            empty[self.values_at(indices, self.conservative) > self._reach(size)] = True
+        if self.proofs and self.everywhere:
+            left = ~empty
+            empty[left] = self._proved(indices[:, left], size)[0]
+        found: np.ndarray = empty.reshape(8, -1).min(0)
+        return found
 
     def _reach(self, size: int) -> float:
         """Least |f| at the centre of a cell of `size` samples that excludes a sign change within a voxel of

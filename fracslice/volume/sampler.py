@@ -27,7 +27,7 @@ from ..work import Work, chunks
 from .bricks import INSIDE, OUTSIDE, Bricks, SignBricks
 from .faces import FACES, SignFaces
 from .lattice import BRICK, Lattice
-from .pruning import Pruning
+from .pruning import Proofs, Pruning
 from .states import BORDER, CANDIDATE, EMPTY, FULL, QUEUED, States
 
 Evaluate = Callable[[np.ndarray], np.ndarray]
@@ -49,6 +49,7 @@ def sample(
     lattice: Lattice,
     work: Work | None = None,
     conservative: Kernel | None = None,
+    proofs: Proofs | None = None,
 ) -> Bricks:
     """Sample a scene's field around its surface.
 
@@ -64,6 +65,8 @@ def sample(
         Execution settings.
     conservative
         Kernel to prune by, if not `kernel`; `bounds` are then its own (`Node.conservative`).
+    proofs
+        Proofs of the cells that the bound does not discard.
 
     Returns
     -------
@@ -82,7 +85,7 @@ def sample(
     def keep(wave: np.ndarray) -> None:
         values.append(wave)
 
-    run = _Sampling(Pruning(kernel, conservative or kernel, bounds, lattice, work or Work()), keep)
+    run = _Sampling(Pruning(kernel, conservative or kernel, bounds, lattice, work or Work(), proofs), keep)
     signs, order = run.signs()
     return Bricks(
         signs.origin,
@@ -93,6 +96,7 @@ def sample(
         evaluations=signs.evaluations,
         repaired=signs.repaired,
         audited=signs.audited,
+        proved=signs.proved,
     )
 
 
@@ -102,6 +106,7 @@ def sample_signs(
     lattice: Lattice,
     work: Work | None = None,
     conservative: Kernel | None = None,
+    proofs: Proofs | None = None,
     evaluate: Evaluate | None = None,
 ) -> SignBricks:
     """Sample the same bricks but keep only signs, in 1/32 of the memory.
@@ -118,6 +123,8 @@ def sample_signs(
         Execution settings.
     conservative
         Kernel to prune by, if not `kernel`.
+    proofs
+        Proofs of the cells that the bound does not discard.
     evaluate
         Evaluates large sets of bricks instead of the threads of `work`.
 
@@ -133,7 +140,7 @@ def sample_signs(
     Cancelled
         If the job was cancelled.
     """
-    pruning = Pruning(kernel, conservative or kernel, bounds, lattice, work or Work())
+    pruning = Pruning(kernel, conservative or kernel, bounds, lattice, work or Work(), proofs)
     signs, _ = _Sampling(pruning, None, evaluate).signs()
     return signs
 
@@ -196,7 +203,7 @@ class _Sampling:
         flat = states.flat
         candidates = np.flatnonzero(flat == CANDIDATE)
         edge = states.beside((flat == EMPTY) | (flat == BORDER))
-        if self.bounds.exterior_only:
+        if not self.pruning.everywhere:
             candidates = candidates[edge[candidates] | outside]
         # A full brick next to an empty one: the bound is wrong there.
         wrong = np.flatnonzero((flat == FULL) & edge)
@@ -294,6 +301,7 @@ class _Sampling:
             evaluations=self.pruning.evaluations,
             repaired=self.repaired,
             audited=self.audited,
+            proved=self.pruning.share,
         )
         return bricks, order
 

@@ -85,7 +85,7 @@ def test_shards_make_the_frames_of_one_film(path: Path, tmp_path: Path) -> None:
         channels = file.channels()
         assert {"R", "Z", "Normal.X", "Position.Y", "Albedo.B"} < set(channels)
         assert channels["Z"].pixels[12, 20] == pytest.approx(3, abs=0.1)
-        assert channels["Samples.X"].pixels.max() == 8
+        assert channels["Samples.V"].pixels.max() == 8
     assert animate(path, "-o", shared, *exr, "--shard", "2/2") == 0
     assert not shared.exists()
     assert animate(path, "-o", shared, *exr, "--shard", "1/2") == 0

@@ -12,9 +12,9 @@ from fracslice.cli.main import run
 
 from fracslice.bench.measure import errors, spread
 from fracslice.bench.peers import Peer
-from fracslice.bench.runs import Task, measure
+from fracslice.bench.runs import BenchmarkTask, measure
 from fracslice.bench.workloads import WORKLOADS
-from fracslice.cluster import Pieces, Shard
+from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import BenchError, Cancelled, SharedError
 from fracslice.export import write
 from fracslice.work import Work
@@ -78,7 +78,7 @@ def test_the_command_writes_page_numbers_and_plots(tmp_path, peer, capfd):
 def test_a_peer_that_fails_is_reported_and_the_rest_goes_on():
     broken = Peer.read(f"broken={sys.executable} -c 1/0 {{workload}} {{resolution}} {{output}}")
     missing = Peer.read("missing=/no/such/program {workload} {resolution} {output}")
-    result = measure(Task(("sphere",), (16,), (broken, missing), repeats=1), Work())
+    result = measure(BenchmarkTask(("sphere",), (16,), (broken, missing), repeats=1), Work())
     failed = {one.method: one.failed for one in result if one.failed}
     assert failed == {
         "broken": "ZeroDivisionError: division by zero",
@@ -116,7 +116,7 @@ def test_it_can_be_cancelled():
     work = Work()
     work.cancel.set()
     with pytest.raises(Cancelled):
-        measure(Task(("sphere",), (16,)), work)
+        measure(BenchmarkTask(("sphere",), (16,)), work)
 
 
 def test_a_peer_needs_all_its_places():
@@ -125,8 +125,8 @@ def test_a_peer_needs_all_its_places():
 
 
 def test_shards_share_the_measurements(tmp_path: Path, peer: str) -> None:
-    task = Task(("sphere", "torus"), (16,), (Peer.read(peer),), repeats=1)
-    pieces = Pieces(str(tmp_path / "pieces"))
+    task = BenchmarkTask(("sphere", "torus"), (16,), (Peer.read(peer),), repeats=1)
+    pieces = ResultFolder(str(tmp_path / "pieces"))
     with pytest.raises(SharedError, match=r"[56] measurements are made"):
         measure(task, Work(1, cluster=Shard(pieces, 2, 2)))
     result = measure(task, Work(1, cluster=Shard(pieces, 1, 2)))

@@ -115,7 +115,8 @@ def process(command: Sequence[object], **environment: str) -> Figures:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "figures.json"
         words = [sys.executable, "-I", "-S", "-c", _LAUNCHER, str(path), *map(str, command)]
-        kept = {"env": {**os.environ, **environment}, "capture_output": True, "text": True}
+        installed = {"PYTHONDONTWRITEBYTECODE": ""}  # an installed package has byte code
+        kept = {"env": {**os.environ, **installed, **environment}, "capture_output": True, "text": True}
         done = subprocess.run(words, **kept)  # type: ignore[call-overload]
         if done.returncode > 1 or "Traceback" in done.stderr:
             raise SystemExit(f"{' '.join(map(str, command))}\n{done.stderr}{done.stdout}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,12 @@ def test_everything_that_a_maker_asks() -> None:
         "1.2 ml trapped in 2 sealed cavities: --cavities fill, or --drain 3mm for a hollow",
         "3 loose bodies: --bridge 1mm, or --keep largest",
         "does not stand flat, 2.5 mm2 on the plate: --base 1.2mm",
+    ]
+    assert list(replace(whole, trapped=0.0644, drains=(), bodies=1, contact=50).lines())[1:] == []
+    tiny = replace(whole, volume=8, trapped=0.0644, drains=(), bodies=1, contact=50)
+    assert [line.split(":")[0].split(",")[0] for line in tiny.lines()] == [
+        "8 mm3",
+        "0.064 mm3 trapped in 2 sealed cavities",
     ]
     assert [duration(s) for s in (0.1, 60, 3599, 7260)] == ["1 s", "1 min", "1 h 0 min", "2 h 1 min"]
 

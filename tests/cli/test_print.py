@@ -23,6 +23,11 @@ if {status}:
 open(out, "w").write("G28")
 """
 
+ORCA = PROGRAM.replace('open(out, "w")', 'open(os.path.join(folder, out), "w")').replace(
+    "shutil.copy(sys", 'folder = sys.argv[sys.argv.index("--outputdir") + 1]\nshutil.copy(sys'
+)
+"""The name of the file is relative to the output folder."""
+
 COARSE = "--voxel", "1mm", "--simplify", "0.1mm"
 
 
@@ -35,11 +40,11 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def install(folder: Path, name: str, flag: str, model: str, status: int = 0) -> Path:
+def install(folder: Path, name: str, flag: str, model: str, status: int = 0, script: str = PROGRAM) -> Path:
     """Write a slicer; return the file of its arguments."""
     log, program = folder / "arguments.json", folder / name
     paths = {"log": str(log), "model": str(folder / model)}
-    program.write_text(PROGRAM.format(python=sys.executable, flag=flag, status=status, **paths))
+    program.write_text(script.format(python=sys.executable, flag=flag, status=status, **paths))
     program.chmod(0o755)
     return log
 
@@ -72,37 +77,40 @@ def test_a_slicer_gets_a_simplified_mesh_and_its_warnings_are_passed_on(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="programs are scripts")
-@pytest.mark.parametrize(
-    ("slicer", "program", "flag", "model", "out", "expected"),
-    [
-        ("cura", "CuraEngine", "-o", "model.stl", "x.gcode", ["slice", "-j", "{}", "-o"]),
-        (
-            "orca",
-            "orca-slicer",
-            "--export-3mf",
-            "model.3mf",
-            "x.3mf",
-            ["--load-settings", "{}", "--slice", "0"],
-        ),
-    ],
-)
-def test_other_slicers_have_their_own_command_lines(
-    slicer: str,
-    program: str,
-    flag: str,
-    model: str,
-    out: str,
-    expected: list[str],
-    ball: Path,
-    installed: Path,
-) -> None:
-    log = install(installed, program, flag, model)
-    profile = ball.with_name("my.json")
+def test_curaengine_reads_definitions_before_the_model(ball: Path, installed: Path) -> None:
+    log = install(installed, "CuraEngine", "-o", "model.stl")
+    profile, out = ball.with_name("my.json"), ball.with_name("x.gcode")
     profile.write_text("{}")
-    options = "--slicer", slicer, "--profile", profile, "-q", *COARSE
-    assert printed(ball, "-o", ball.with_name(out), *options) == 0
-    assert json.loads(log.read_text())[: len(expected)] == [e.format(profile) for e in expected]
-    assert ball.with_name(out).exists()
+    assert printed(ball, "-o", out, "--slicer", "cura", "--profile", profile, "-q", *COARSE) == 0
+    given = json.loads(log.read_text())
+    assert given[:4] == ["slice", "-j", str(profile), "-o"] and given[-2] == "-l"
+    assert out.read_text() == "G28"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="programs are scripts")
+@pytest.mark.parametrize(("slicer", "program"), [("orca", "orca-slicer"), ("bambu", "bambu-studio")])
+def test_printer_process_and_filament_go_to_their_own_options(
+    slicer: str, program: str, ball: Path, installed: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The program writes to its output folder and leaves a result.json there, never where it was started."""
+    log = install(installed, program, "--export-3mf", "model.3mf", script=ORCA)
+    out, options = ball.with_name("x.3mf"), ["--slicer", slicer, "-q", *COARSE]
+    profiles = []
+    for kind in ("filament", "machine", "process"):
+        profiles.append(ball.with_name(f"{kind}.json"))
+        profiles[-1].write_text(json.dumps({"type": kind}))
+        options += ["--profile", str(profiles[-1])]
+    assert printed(ball, "-o", out, *options) == 0
+    filament, machine, process = map(str, profiles)
+    given = json.loads(log.read_text())
+    assert given[:4] == ["--load-settings", f"{machine};{process}", "--load-filaments", filament]
+    assert given[4:8] == ["--arrange", "1", "--slice", "0"]
+    assert given[8] == "--outputdir" and given[10:12] == ["--export-3mf", "x.3mf"]
+    assert out.read_text() == "G28"
+    capfd.readouterr()
+    profiles[0].write_text("{}")
+    assert printed(ball, "-o", out, *options) == 2
+    assert "filament.json: type None: expected machine, process or filament" in capfd.readouterr().err
 
 
 def test_a_missing_program_is_one_line(

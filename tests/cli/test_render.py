@@ -13,7 +13,7 @@ from fracslice.cli.main import run
 from PIL import Image
 
 from fracslice.rendering import Pass, Renderer
-from fracslice.rendering.accumulator import Plan
+from fracslice.rendering.accumulator import PassPlan
 
 SCENE = """<scene version="1">
   <solid size="80mm"><material colour="0.9 0.3 0.2"><sphere/></material></solid>
@@ -51,7 +51,7 @@ def test_layers_have_the_names_and_units_of_compositors(scene: Path, tmp_path: P
     assert run([*common, "-o", str(tmp_path / "a.exr"), "--layers"]) == 0
     with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
         held = {name: channel.pixels for name, channel in file.channels().items()}
-    expected = {"R", "G", "B", "Z", "Samples.X", "Albedo.R", "Albedo.G", "Albedo.B"}
+    expected = {"R", "G", "B", "Z", "Samples.V", "Trap.V", "Albedo.R", "Albedo.G", "Albedo.B"}
     assert set(held) == expected | {f"{layer}.{axis}" for layer in ("Normal", "Position") for axis in "XYZ"}
     place, normal = (np.stack([held[f"{n}.{axis}"] for axis in "XYZ"], -1) for n in ("Position", "Normal"))
     hit = held["Z"] < 1e9
@@ -60,7 +60,7 @@ def test_layers_have_the_names_and_units_of_compositors(scene: Path, tmp_path: P
     assert np.allclose((place[hit] - (3, -2, 1)) @ forward, held["Z"][hit], atol=1e-3)
     assert ((place * normal).sum(2)[hit] > 0.9).mean() > 0.9, "on a ball, the normal is the position"
     assert np.allclose(held["Albedo.R"][hit], ((0.9 + 0.055) / 1.055) ** 2.4)
-    assert (held["Samples.X"] == 1).all()
+    assert (held["Samples.V"] == 1).all()
     assert run([*common, "-o", str(tmp_path / "a.png"), "--layers"]) == 2
 
 
@@ -142,7 +142,7 @@ def stopped_after(passes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Press Ctrl-C in the pass after some others."""
     receive = Renderer._pass
 
-    def pressed(self: Renderer, plan: Plan) -> Pass:
+    def pressed(self: Renderer, plan: PassPlan) -> Pass:
         if self.accumulator.passes == passes:
             os.kill(os.getpid(), signal.SIGINT)
         return receive(self, plan)

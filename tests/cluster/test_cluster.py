@@ -15,7 +15,7 @@ from fracslice.cli.main import run as command
 
 from fracslice import meshsampling, meshtasks
 from fracslice.animation import FilmJob, Timeline, write_frames
-from fracslice.cluster import Pieces, Workers, connected, workers
+from fracslice.cluster import ResultFolder, Workers, connected, workers
 from fracslice.cluster.identity import Identity
 from fracslice.errors import Cancelled, ClusterError
 from fracslice.export.slices import write_slices
@@ -250,12 +250,12 @@ def test_a_memory_file_system(name: str, expected: dict[str, bytes], tmp_path: P
     from distributed import Client
 
     with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=":0") as client:
-        pool = Workers(client, Pieces(f"memory://{tmp_path.name}"))
+        pool = Workers(client, ResultFolder(f"memory://{tmp_path.name}"))
         assert JOBS[name](Work(1, cluster=pool), tmp_path) == expected[name]
 
 
 def test_an_object_store_keeps_the_first_of_two_results(tmp_path: Path) -> None:
-    pieces = Pieces(f"memory://{tmp_path.name}")
+    pieces = ResultFolder(f"memory://{tmp_path.name}")
     for data in (b"first", b"second"):
         pieces.write("job", "piece", data)
     assert pieces.read("job", "piece") == b"first"

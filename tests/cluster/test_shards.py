@@ -9,7 +9,7 @@ import pytest
 from fracslice.cli.main import run as command
 
 from fracslice import meshsampling, meshtasks
-from fracslice.cluster import Pieces, Shard
+from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import ClusterError, SharedError
 from fracslice.export.slices import write_slices
 from fracslice.formulas import box, cone, sphere
@@ -52,7 +52,7 @@ def test_shards_of_layers_make_one_file(
 
 
 def test_a_shard_makes_what_others_leave(tmp_path: Path) -> None:
-    shard = Shard(Pieces(str(tmp_path / "pieces")), 1, 3, patience=0)
+    shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 3, patience=0)
     run = RECIPE.run(Work(1, cluster=shard))
     write_slices(run, tmp_path / "b.cli")
     assert (tmp_path / "b.cli").read_bytes() == sliced(Work(2), tmp_path)
@@ -64,7 +64,7 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
     shape = cone(radius=0.5, height=2.0) | sphere(radius=0.05).translate((0.8, 0.0, 0.0))
     turned = scene(shape.rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
     job = MeshJob(resolution=32, dust_mm3=2.0)
-    shards = [Shard(Pieces(str(tmp_path / "pieces")), number, 2) for number in (1, 2)]
+    shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2) for number in (1, 2)]
     files = {number: tmp_path / f"{number}.stl" for number in (0, 1, 2)}
 
     def made(shard: Shard | None) -> MeshResult | None:
@@ -92,7 +92,7 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
 def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(meshtasks, "LEAST", 1)
     hollowed, job = scene(box() - sphere(radius=0.6), size="20mm"), MeshJob(resolution=16)
-    shard = Shard(Pieces(str(tmp_path / "pieces")), 1, 1)
+    shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1)
     for ending in ("3mf", "ply"):
         one, two = (tmp_path / f"{name}.{ending}" for name in ("one", "two"))
         make_mesh(hollowed, job, Work(1), one)
@@ -106,10 +106,10 @@ def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch
     monkeypatch.setattr(sampler, "MANY", 1)
     monkeypatch.setattr(meshsampling, "BRICKS", 8)
     ball, job = scene(sphere(), size="20mm"), MeshJob(resolution=16, chord_mm=0.2, simplify_mm=0.3)
-    pieces, made = Pieces(str(tmp_path / "pieces")), list[str]()
-    write = Pieces.write
+    pieces, made = ResultFolder(str(tmp_path / "pieces")), list[str]()
+    write = ResultFolder.write
     monkeypatch.setattr(
-        Pieces, "write", lambda of, job, name, data: (made.append(name), write(of, job, name, data))
+        ResultFolder, "write", lambda of, job, name, data: (made.append(name), write(of, job, name, data))
     )
     with pytest.raises(SharedError, match="shard 1 makes the mesh"):
         make_mesh(ball, job, Work(1, cluster=Shard(pieces, 2, 2, patience=0)), tmp_path / "two.stl")
@@ -123,7 +123,7 @@ def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch
 
 def test_shards_of_a_frame_work_at_the_same_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "PIXELS", 1024)
-    shards = [Shard(Pieces(str(tmp_path / "pieces")), number, 2) for number in (1, 2)]
+    shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2) for number in (1, 2)]
     with ThreadPoolExecutor(2) as pool:
         sums = list(pool.map(lambda shard: rendered(Work(1, cluster=shard), tmp_path), shards))
     assert sums == [rendered(Work(2), tmp_path)] * 2
@@ -132,7 +132,7 @@ def test_shards_of_a_frame_work_at_the_same_time(tmp_path: Path, monkeypatch: py
 @pytest.mark.parametrize("text", ["0/3", "4/3", "3", "a/b", "1/0"])
 def test_bad_shards(text: str, line: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(ClusterError, match="such as 3/64"):
-        Shard.read(text, Pieces("x"))
+        Shard.read(text, ResultFolder("x"))
     assert command([*line, "--shard", text]) != 0
     assert "such as 3/64" in capsys.readouterr().err
 

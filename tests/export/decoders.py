@@ -11,7 +11,7 @@ def picture(runs: Iterator[tuple[int, int]], shape: tuple[int, int]) -> np.ndarr
     """A picture of runs (value, length), which must fill it exactly."""
     values, lengths = np.array(list(runs)).T
     assert lengths.sum() == shape[0] * shape[1]
-    return np.repeat(values, lengths).astype(np.uint8).reshape(shape)
+    return np.repeat(values.astype(np.uint8), lengths).reshape(shape)
 
 
 def goo(data: bytes) -> Iterator[tuple[int, int]]:

@@ -217,3 +217,22 @@ def nanodlp(data: bytes) -> Read:
     tops = np.cumsum([layer["LayerHeight"] for layer in info]) / 1000
     about = {"volume": plate["TotalSolidArea"] / 1e6}
     return Read(pictures, tops.tolist(), plate["CureTimes"], [preview], about)
+
+
+def sl1(data: bytes) -> Read:
+    """An archive of PrusaSlicer: config.ini, and pictures in the order of their names."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if archive.testzip() is not None:
+                raise DamagedError
+            config = dict(line.split(" = ") for line in archive.read("config.ini").decode().splitlines())
+            pictures = []
+            for name in sorted(n for n in archive.namelist() if n.startswith(config["jobDir"])):
+                with Image.open(io.BytesIO(archive.read(name))) as image:
+                    pictures.append(np.asarray(image))
+    except zipfile.BadZipFile:
+        raise DamagedError from None
+    count, height = len(pictures), float(config["layerHeight"])
+    bottoms, times = int(config["numFade"]), (float(config["expTimeFirst"]), float(config["expTime"]))
+    exposures = np.interp(np.arange(count), [0, bottoms], times).tolist()
+    return Read(pictures, (height * np.arange(1, count + 1)).tolist(), exposures)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +17,11 @@ import pytest
 from fracslice.errors import ExportError
 from fracslice.export.jobs import SliceRun
 from fracslice.export.resins import Resin
-from fracslice.export.slices import PRINTS, write_slices
+from fracslice.export.slices import ENDINGS, PRINTS, printers_file, slice_format, write_slices
 from fracslice.formulas import difference, menger, sphere
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
-from fracslice.slicing.printers import Printer
+from fracslice.slicing.printers import PRINTERS, Printer
 from fracslice.slicing.raster import Screen
 from fracslice.stackmodel import StackModel
 from fracslice.work import Work
@@ -35,6 +37,26 @@ def quantised(bits: int) -> Callable[[np.ndarray], np.ndarray]:
     most = 2**bits - 1
     return lambda image: np.floor(image / 255 * most + 0.5).astype(int)
 
+
+READERS = {
+    "sl1": (readers.sl1, lambda image: image),
+    "goo": (readers.goo, lambda image: image),
+    "ctb": (readers.ctb, lambda image: image >> 1),
+    "pwmx": (readers.photon, quantised(4)),
+    "nanodlp": (readers.nanodlp, lambda image: image),
+}
+"""Readers of the formats of known printers, and what a format keeps of a grey level."""
+
+LARGEST = {
+    form: max(machines, key=lambda machine: math.prod(machine.pixels))
+    for form, machines in groupby(
+        sorted(
+            (p for p in PRINTERS.values() if f".{p.file}" in ENDINGS), key=lambda p: ENDINGS[f".{p.file}"]
+        ),
+        key=lambda p: ENDINGS[f".{p.file}"],
+    )
+}
+"""Of each format, the printer of most pixels."""
 
 CASES = {
     "goo": ("part.goo", readers.goo, lambda image: image),
@@ -81,6 +103,38 @@ def test_every_pixel_height_and_exposure_comes_back(case: str, most: float | Non
     unit = 1000 if name.endswith(("goo", "prz")) else 1
     area = sum(image.sum() / 255 * h for image, h in zip(expected, job.stack.heights, strict=True))
     assert result.about["volume"] * 1000 / unit == pytest.approx(area * 0.25**2, rel=1e-3)
+
+
+def printed(machine: Printer, layer: float, path: Path) -> Path:
+    """A file of a ball that touches no side, for a machine; checked to be that machine's."""
+    job = SliceJob(size=12, layer=layer, pixel=machine.pixel)
+    stack = plan_stack(sphere(), job)
+    one = SliceRun(stack, Screen(stack, machine), resin=RESIN, metadata={"Title": "test"}, picture=picture)
+    form = slice_format(write_slices(one, path))
+    read, level = READERS[form]
+    found = read(path.read_bytes())
+    expected = [level(image) for image in Slicer(stack).map(one.screen.picture)]
+    assert len(found.pictures) == len(expected) == len(stack.z)
+    assert all(np.array_equal(a, b) for a, b in zip(found.pictures, expected, strict=True))
+    np.testing.assert_allclose(found.tops, stack.tops, rtol=1e-5)
+    assert sum(image.any() for image in found.pictures) == len(expected)
+    return path
+
+
+@pytest.mark.parametrize("name", PRINTERS)
+def test_one_object_through_every_printer(name: str, tmp_path: Path) -> None:
+    """An eighth of the pixels of the screen along each side, as the screen is turned and mirrored."""
+    machine = PRINTERS[name]
+    ending = f".{machine.file}" if f".{machine.file}" in ENDINGS else ".goo"
+    instead = printers_file(machine, f"part{ending}")
+    assert instead == "" or instead.endswith("make part.goo and convert it with UVtools")
+    columns, rows = machine.pixels
+    printed(replace(machine, pixels=(columns // 8, rows // 8)), 3.0, tmp_path / f"part{ending}")
+
+
+@pytest.mark.parametrize("form", LARGEST)
+def test_the_largest_screen_of_every_format(form: str, tmp_path: Path) -> None:
+    printed(LARGEST[form], 6.0, tmp_path / f"part.{LARGEST[form].file}")
 
 
 def test_pictures_that_are_compensated(tmp_path: Path) -> None:

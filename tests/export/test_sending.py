@@ -23,12 +23,15 @@ class PrusaLink(BaseHTTPRequestHandler):
     """PrusaLink: stores a file under a key, never over another."""
 
     files: dict[str, bytes]
+    usb: str | None = "usb"
 
     def do_PUT(self) -> None:
         data = self.rfile.read(int(self.headers["Content-Length"]))
         status = 201
         if self.headers["X-Api-Key"] != "secret":
             status = 401
+        elif "/usb/" in self.path and self.usb is None:
+            status = 404
         elif self.path in self.files:
             status = 409
         else:
@@ -118,6 +121,13 @@ def test_the_key_is_in_the_environment_or_a_file(
     with printer(PrusaLink) as (port, files):
         sending.send(job, f"prusalink://127.0.0.1:{port}/local", Work())
         assert list(files) == ["/api/v1/files/local/my%20job.goo"]
+
+
+def test_a_storage_that_the_printer_lacks(job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FRACSLICE_KEY", "secret")
+    monkeypatch.setattr(PrusaLink, "usb", None)
+    with printer(PrusaLink) as (port, _), pytest.raises(ExportError, match=r"has no storage usb; .*/local"):
+        sending.send(job, f"prusalink://127.0.0.1:{port}", Work())
 
 
 def test_sdcp_stores_the_packets_in_order(job: Path) -> None:

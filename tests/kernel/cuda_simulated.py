@@ -8,7 +8,7 @@ import numpy as np
 
 from fracslice.kernel import cuda, reference
 from fracslice.mesh.roots import LOOPS, Roots
-from tests.examples import EXAMPLES
+from tests.examples import DEFINED, EXAMPLES
 
 TOLERANCE = {"float32": 2e-5, "float64": 1e-13}
 
@@ -16,7 +16,7 @@ TOLERANCE = {"float32": 2e-5, "float64": 1e-13}
 def main() -> None:
     assert cuda.available()
     with np.errstate(all="ignore"):
-        for name, root in EXAMPLES.items():
+        for name, root in (EXAMPLES | DEFINED).items():
             for precision in ("float32", "float64"):
                 points(name, cuda.compile_scene(root, precision), reference(root))
         bricks()

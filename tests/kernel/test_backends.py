@@ -7,7 +7,9 @@ import pytest
 
 from fracslice.formulas import mandelbulb, sphere
 from fracslice.kernel import compile_scene, link, reference
-from tests.examples import EXAMPLES
+from tests.examples import DEFINED, EXAMPLES
+
+ALL = EXAMPLES | DEFINED
 
 # Largest error in units of the last place of the largest coordinate, times the conditioning of the longest
 # orbit.
@@ -21,12 +23,12 @@ def random_points(dtype: str, count: int = 5000) -> np.ndarray:
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", ALL)
 class TestAgainstTheReference:
     def test_random_points(self, name: str, precision: str) -> None:
         points = random_points(precision)
-        expected = reference(EXAMPLES[name])(*points)
-        got = compile_scene(EXAMPLES[name], precision).points(*points)  # type: ignore[arg-type]
+        expected = reference(ALL[name])(*points)
+        got = compile_scene(ALL[name], precision).points(*points)  # type: ignore[arg-type]
         assert got.dtype == precision
         np.testing.assert_allclose(got, expected, rtol=TOLERANCE[precision], atol=TOLERANCE[precision])
 
@@ -34,27 +36,27 @@ class TestAgainstTheReference:
         r = np.linspace(-1.5, 1.5, 31).astype(precision).astype(np.float64)
         o, tiny = np.zeros_like(r), np.full_like(r, 1e-7)
         points = np.concatenate([[r, o, o], [o, r, o], [o, o, r], [tiny, o, r], [r, r, o], [o, o, o]], axis=1)
-        expected = reference(EXAMPLES[name])(*points)
-        got = compile_scene(EXAMPLES[name], precision).points(*points)  # type: ignore[arg-type]
+        expected = reference(ALL[name])(*points)
+        got = compile_scene(ALL[name], precision).points(*points)  # type: ignore[arg-type]
         np.testing.assert_allclose(got, expected, rtol=1e-3, atol=TOLERANCE[precision] * 10)
 
     def test_denormal_points_are_the_origin(self, name: str, precision: str) -> None:
-        kernel = compile_scene(EXAMPLES[name], precision)  # type: ignore[arg-type]
+        kernel = compile_scene(ALL[name], precision)  # type: ignore[arg-type]
         zero, tiny = np.zeros(3), np.full(3, 1e-42 if precision == "float32" else 5e-324)
         np.testing.assert_allclose(kernel.points(*tiny[:, None]), kernel.points(*zero[:, None]), atol=1e-6)
 
     def test_far_points_are_outside(self, name: str, precision: str) -> None:
-        root = EXAMPLES[name]
+        root = ALL[name]
         far = np.random.default_rng(1).normal(size=(3, 64)) * np.logspace(1, 18, 64)
         outside = compile_scene(root, precision).points(*far) > 0  # type: ignore[arg-type]
         assert (outside == (reference(root)(*far) > 0)).all()
         assert outside.all() or not root.bounds.box.finite
 
     def test_nan_and_infinity_are_never_inside(self, name: str, precision: str) -> None:
-        kernel = compile_scene(EXAMPLES[name], precision)  # type: ignore[arg-type]
+        kernel = compile_scene(ALL[name], precision)  # type: ignore[arg-type]
         bad = np.array([(np.nan, 0, 0), (0, np.nan, 0), (0, 0, np.nan), (np.nan,) * 3], float).T
         assert np.isnan(kernel.points(*bad)).all()
-        if EXAMPLES[name].bounds.box.finite:
+        if ALL[name].bounds.box.finite:
             endless = np.array(
                 [(np.inf, 0, 0), (0, -np.inf, 0), (0, 0, np.inf), (np.inf, np.inf, -np.inf)], float
             ).T
@@ -62,7 +64,7 @@ class TestAgainstTheReference:
 
     def test_a_value_depends_on_its_point_alone(self, name: str, precision: str) -> None:
         """Bit for bit the same whatever is in the other lanes, and through the brick loop."""
-        kernel, voxel = compile_scene(EXAMPLES[name], precision), 0.125  # type: ignore[arg-type]
+        kernel, voxel = compile_scene(ALL[name], precision), 0.125  # type: ignore[arg-type]
         corners = np.array([(0, 0, 0), (8, 0, 16), (16, 8, 8)], np.int32)
         out = np.empty((3, 512), precision)
         kernel.bricks(corners, (-1.5, -1.25, -1.375), voxel, out)

@@ -17,7 +17,7 @@ import pytest
 from fracslice.errors import FracsliceWarning, KernelError
 from fracslice.formulas import Node, sphere
 from fracslice.kernel import cuda, cuda_loops, cuda_source, link, modules
-from tests.examples import EXAMPLES
+from tests.examples import DEFINED, EXAMPLES
 from tests.kernel.cuda_ptx import compiled
 
 installed = pytest.mark.skipif(
@@ -42,9 +42,9 @@ def test_text_that_others_can_write_is_not_imported(tmp_path: Path, monkeypatch:
 class TestMachineCode:
     """PTX for an H100 or H200, which needs no GPU to be compiled."""
 
-    @pytest.mark.parametrize("name", EXAMPLES)
+    @pytest.mark.parametrize("name", EXAMPLES | DEFINED)
     def test_float32_kernels_hold_no_float64(self, name: str, tmp_path: Path) -> None:
-        ptx = points_of(EXAMPLES[name], 32, tmp_path)
+        ptx = points_of((EXAMPLES | DEFINED)[name], 32, tmp_path)
         assert ".f32" in ptx
         assert ".f64" not in ptx
 

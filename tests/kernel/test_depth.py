@@ -8,6 +8,7 @@ import pytest
 
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Box, Node, julia, mandelbulb, menger, sphere, transform, union
+from fracslice.kernel import depth
 from fracslice.kernel.depth import Known, _step, _surface_points, resolve_depths, visible
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, plan_stack
@@ -97,3 +98,14 @@ def test_nothing_has_no_surface():
     nothing = julia(c=(3, 2, 1, 0), iterations=30)
     assert _surface_points(Known(nothing)).shape == (3, 0)
     assert resolve_depths(julia(c=(3, 2, 1, 0)), 1e-6)["iterations"] < 30
+
+
+def test_automatic_depths_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Searching them takes a fifth of a picture of one sample."""
+    root = mandelbulb(power=7)
+    known = resolve_depths(root, 0.01)
+    depth._steps.cache_clear()
+    monkeypatch.setattr(depth, "_step", None)
+    assert resolve_depths(root, 0.01) == known
+    with pytest.raises(TypeError):
+        resolve_depths(root, 1e-5)

@@ -3,6 +3,8 @@ compiler."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import dataclass
 from enum import IntEnum
 from types import ModuleType
@@ -13,7 +15,7 @@ import pytest
 from fracslice.errors import KernelError
 from fracslice.formulas import box
 from fracslice.formulas.field import Kernel, Precision
-from fracslice.kernel import intrinsics
+from fracslice.kernel import intrinsics, loop_linker
 from fracslice.kernel.arrays import ArrayField
 from fracslice.kernel.cpu import load_functions
 from fracslice.kernel.host import lane_count
@@ -169,3 +171,30 @@ def test_a_loop_is_a_function_of_a_module() -> None:
 
     with pytest.raises(KernelError, match=r"test_loops.py:\d+: loop inner: expected a def in a module"):
         loop_source([Loop(inner, "r")])
+
+
+def test_the_text_of_loops_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linking it takes a tenth of a picture of one sample."""
+    loops = [example.fix(setup=Setup(True, 2))]
+    text = loop_source(loops)
+    monkeypatch.setattr(loop_linker, "link_loops", None)
+    assert loop_source(loops) == text
+    for changed in ([example.fix(setup=Setup(True, 3))], [example.fix(setup=Setup(False, 2))]):
+        with pytest.raises(TypeError):
+            loop_source(changed)
+    monkeypatch.setattr(sys.modules[__name__], "FLAT", Setup(True, 0))
+    with pytest.raises(TypeError):
+        loop_source([Loop(applied_flat, "r")])
+
+
+def test_the_identity_of_a_function_is_the_same_in_every_process() -> None:
+    """And follows every number that it or a function that it calls uses."""
+    code = (
+        "from fracslice.rendering.packets import tile; from fracslice.kernel.identity import identity; "
+        "print(identity(tile.function))"
+    )
+    one, other = (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    )
+    assert one == other and "COUNT" in one and "0x" not in one

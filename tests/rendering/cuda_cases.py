@@ -2,7 +2,25 @@
 
 from __future__ import annotations
 
-from fracslice.formulas import Node, box, get, mandelbulb, menger, plane, sphere, torus, transform, union
+from pathlib import Path
+from tempfile import gettempdir
+
+import numpy as np
+from PIL import Image
+
+from fracslice.formulas import (
+    Node,
+    box,
+    get,
+    mandelbulb,
+    material,
+    menger,
+    plane,
+    sphere,
+    torus,
+    transform,
+    union,
+)
 from fracslice.rendering.cpu import BLOCK
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.optics import optics
@@ -24,6 +42,15 @@ def _glass() -> Node:
     return union(material(sphere(radius=0.8), clear=0.9, reflect=0.1), mirror, plane(offset=-1.2))
 
 
+def _surroundings() -> str:
+    """A picture of 16 x 8 pixels, one of them bright."""
+    path = Path(gettempdir()) / "fracslice-surroundings.png"
+    pixels = np.full((8, 16, 3), 60, np.uint8)
+    pixels[1:3, 3] = 255
+    Image.fromarray(pixels).save(path)
+    return str(path)
+
+
 CASES: dict[str, tuple[Node, View]] = {
     "fractal": (mandelbulb(iterations=5), View(lights=(SUN,), shading=Shading(ambient=0.1))),
     "soft shadows, fog, occlusion": (
@@ -39,6 +66,17 @@ CASES: dict[str, tuple[Node, View]] = {
     "rough metal and glass, paths": (
         union(get("material")(torus(), metallic=0.7, roughness=0.4), _glass()),
         View(lights=SOFT, shading=Shading(paths="yes", bounces=2)),
+    ),
+    "surroundings, a sun that rays meet": (
+        union(get("material")(torus(), metallic=0.7, roughness=0.4), plane(offset=-1.2)),
+        View(
+            lights=(Light(kind="environment", file=_surroundings(), rotation=70.0), SOFT[0]),
+            shading=Shading(paths="yes", bounces=2),
+        ),
+    ),
+    "texture, lacquer, shafts of light": (
+        material(torus(), texture=_surroundings(), coat=0.8, vary=0.4, roughness=0.2),
+        View(lights=SOFT[:1], fog=Fog(density=0.2, height=0.6, scatter=0.7), shading=Shading(bounces=2)),
     ),
     "normals": (torus(), View(shading=Shading(mode="normal"))),
     "fisheye": (torus(), View(camera=Camera(kind="fisheye", fov=200.0, eye=(0.0, -1.0, 0.6)), lights=(SUN,))),

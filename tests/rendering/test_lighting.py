@@ -11,6 +11,7 @@ from fracslice.errors import RenderError
 from fracslice.formulas import Node, box, material, plane, repeat, sphere, union
 from fracslice.rendering import Pass, Renderer, develop, progressive
 from fracslice.rendering.units.pixel import linear
+from fracslice.rendering.units.shade import height_fog
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
 
@@ -116,3 +117,23 @@ def test_albedo_is_the_colour_without_light() -> None:
     seen = rendered(scene, View(camera=CAMERA, shading=Shading(mode="albedo")), 1, (25, 19))
     assert np.allclose(seen.image[9, 12], linear((0.9, 0.2, 0.1)), atol=1e-6)
     assert np.allclose(develop(seen.mean, seen.view)[9, 12], (0.9, 0.2, 0.1), atol=1e-4)
+
+
+@pytest.mark.parametrize("slope", [-0.6, 0.0, 1e-5, 0.8])
+def test_height_fog_is_the_integral_of_its_density(slope: float) -> None:
+    t, end, fog = 3.0, 0.7, {"density": 0.4, "level": 0.2, "height": 0.9}
+    heights = end - slope * (np.arange(20_000) + 0.5) / 20_000 * t
+    depth = (0.4 * np.exp((0.2 - heights) / 0.9)).mean() * t
+    assert height_fog(t, np.float64(end), np.float64(slope), **fog) == pytest.approx(np.exp(-depth), rel=1e-6)
+
+
+@pytest.mark.parametrize("height", [None, 1e6])
+def test_fog_scatters_the_light_that_no_surface_shadows(height: float | None) -> None:
+    """Of a sun of strength 1, albedo / 4 (1 - exp(-density distance)); nothing of it under a roof."""
+    wall = material(box(size=(9, 0.2, 9)), colour=(0, 0, 0), specular=0)
+    roof = box(size=(20, 20, 4)) + (0, -6, 6)
+    fog = Fog(colour=(0, 0, 0), density=0.3, height=height, scatter=0.8)
+    view = View(camera=CAMERA, lights=(Light(position=(0, -0.01, 1)),), fog=fog)
+    bright = rendered(wall, view, 64, (5, 5)).image[2, 2]
+    assert bright == pytest.approx(0.8 / 4 * (1 - np.exp(-0.3 * 3.9)), rel=0.02)
+    assert rendered(wall | roof, view, 64, (5, 5)).image[2, 2].max() < 0.1 * bright.max()

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fracslice.formulas import Node, box, difference, material, sphere
+from fracslice.formulas import Node, box, difference, mandelbulb, material, sphere
 from fracslice.rendering import Renderer
 from fracslice.rendering.units.glossy import glossy, highlight
 from fracslice.rendering.units.pixel import linear
+from fracslice.rendering.units.shade import varied
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 
@@ -18,6 +19,7 @@ WHITE = (1.0, 1.0, 1.0)
 FURNACE = (Light(kind="sky", colour=WHITE, horizon=WHITE, ground=WHITE),)
 CAMERA = Camera(eye=(0, -4, 0), fov=20)
 NORMAL = (0.0, 0.0, 1.0)
+SUN = (Light(position=(1, -2, 2), shadows="no"),)
 
 
 def directions(count: int, seed: int) -> np.ndarray:
@@ -99,3 +101,32 @@ def test_a_glowing_surface_lights_the_others_on_paths_only() -> None:
         seen(scene, Shading(paths=paths), 16, camera, lights=lights).mean() for paths in ("no", "yes")
     )
     assert lit > dark + 0.01
+
+
+@pytest.mark.parametrize("paths", ["no", "yes"])
+def test_a_lacquered_ball_vanishes_in_a_white_furnace(paths: str) -> None:
+    """What the lacquer does not reflect, the colour under it scatters."""
+    ball = material(sphere(), colour=WHITE, coat=1, specular=0)
+    assert np.allclose(seen(ball, Shading(paths=paths, bounces=2)).mean(0), 1, atol=0.01)
+
+
+def test_a_lacquer_mirrors_the_sky_over_a_black_surface() -> None:
+    black = material(sphere(), colour=(0, 0, 0), coat=1, specular=0)
+    middle = seen(black, Shading(bounces=1), 256, replace(CAMERA, fov=2)).mean()
+    assert middle == pytest.approx(0.04, abs=0.01)
+    sun = (Light(position=CAMERA.eye, strength=1, shadows="no"),)
+    shining = seen(black, Shading(bounces=1), 16, replace(CAMERA, fov=2), lights=sun).mean()
+    assert shining > 0.3, "the sun's reflection"
+
+
+def test_roughness_follows_the_orbit() -> None:
+    tone = np.array([0.0, 0.25, 0.5, 1.0, 1.75])
+    assert varied(0.2, 0.6, tone) == pytest.approx([0.2, 0.5, 0.8, 0.2, 0.5])
+    assert (varied(0.9, 0.6, tone) <= 1).all() and (varied(0.1, -0.6, tone) >= 0).all()
+    bulb = mandelbulb(iterations=4)
+    shading, camera = Shading(bounces=1), Camera(eye=(2, -2, 1), fov=60)
+    polished, uneven = (
+        seen(material(bulb, metallic=1, roughness=0.2, vary=v, shift=0.2), shading, 4, camera, lights=SUN)
+        for v in (0, 0.7)
+    )
+    assert abs(polished - uneven).mean() > 0.01

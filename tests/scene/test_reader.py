@@ -126,7 +126,8 @@ def test_wrong_sizes(size):
         (
             "<scene version='1'><box/></scene>",
             "f.xml:1: <box> cannot stand here; "
-            "expected <animation>, <camera>, <film>, <fog>, <light>, <print>, <shading>, <solid> or <track>",
+            "expected <animation>, <camera>, <define>, <film>, <fog>, <light>, <print>, <shading>, <solid> "
+            "or <track>",
         ),
         (
             "<scene version='1'><solid><box/></solid></scene>",

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from fracslice.errors import SceneError
 from fracslice.formulas import Node
-from fracslice.formulas.parameters import AUTO, REQUIRED, SMALLEST, Axis, Choice, Count, Number, Vector
+from fracslice.formulas.parameters import AUTO, REQUIRED, SMALLEST, Axis, Choice, Count, File, Number, Vector
 from fracslice.scene import scene
 from fracslice.scene.layout import formulas
 from fracslice.scene.model import computing
@@ -48,6 +48,7 @@ _POSSIBLE: dict[type, Any] = {
     Count: _count,
     Vector: _vector,
     Choice: lambda kind: st.sampled_from(kind.choices),
+    File: lambda kind: st.none(),
     Axis: lambda kind: st.sampled_from("xyz"),
 }
 

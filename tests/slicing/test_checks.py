@@ -15,7 +15,7 @@ from fracslice.slicing.checks import PrintReport, check_layers
 from fracslice.slicing.graph import Graph
 from fracslice.slicing.overhangs import unsupported
 from fracslice.slicing.printers import PRINTERS
-from fracslice.slicing.runs import Runs, components_of, overlaps
+from fracslice.slicing.runs import Runs, layer_components, overlaps
 from fracslice.slicing.thickness import widths
 
 
@@ -189,11 +189,11 @@ def test_parts_by_hand() -> None:
     image = 255 * np.array(
         [[0, 0, 0, 0, 0], [0, 1, 1, 0, 0], [0, 1, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 0]], np.uint8
     )
-    solid, empty = components_of(runs_of(image))
+    solid, empty = layer_components(runs_of(image))
     assert solid.nodes.area.tolist() == [5]
     assert sorted(empty.nodes.area.tolist()) == [1, 19]
     assert empty.nodes.open[np.argsort(empty.nodes.area)].tolist() == [False, True]
-    other, _ = components_of(runs_of(np.roll(image, 1, 1)))
+    other, _ = layer_components(runs_of(np.roll(image, 1, 1)))
     assert overlaps(solid, other).tolist() == [[0, 0]]
     bare = unsupported(solid.runs, other.runs, 0.0)
     assert (bare.end - bare.begin).sum() == 5 - (image & np.roll(image, 1, 1) > 0).sum()
@@ -212,7 +212,7 @@ def test_time_is_linear_in_the_holes() -> None:
         image[2:-2, 2:-2][(y % side < side // 2) & (x % side < side // 2)] = 0
         begin, graph = time.perf_counter(), Graph()
         for _ in range(3):
-            graph.add(components_of(runs_of(image))[1])
+            graph.add(layer_components(runs_of(image))[1])
         assert len(graph.groups(~graph.nodes.open, np.ones(3), (1, 1), image.shape)) == holes**2
         return time.perf_counter() - begin
 

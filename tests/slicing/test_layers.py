@@ -74,12 +74,7 @@ def open_edges(inside: np.ndarray, known: np.ndarray) -> int:
     return int(across.sum() + along.sum())
 
 
-LOST = pytest.mark.xfail(
-    strict=True, reason="6 % of the samples lie in gaps of a pixel between balls, and are lost"
-)
-
-
-@pytest.mark.parametrize("name", [pytest.param(n, marks=LOST) if n == "apollonian" else n for n in FINITE])
+@pytest.mark.parametrize("name", FINITE)
 def test_closed_and_equal_to_dense_sampling(name: str) -> None:
     stack = stack_of(EXAMPLES[name])
     z = stack.z[len(stack.z) // 3 :][:8]

@@ -9,12 +9,22 @@ import numpy as np
 
 from fracslice.errors import SceneError
 from fracslice.formulas import Node
-from fracslice.formulas.parameters import LARGEST, SMALLEST, Axis, Choice, Count, Number, Parameter, Vector
+from fracslice.formulas.parameters import (
+    LARGEST,
+    SMALLEST,
+    Axis,
+    Choice,
+    Count,
+    File,
+    Number,
+    Parameter,
+    Vector,
+)
 
 
 def ends(kind: Parameter) -> list[object]:
     """The values at both ends of a parameter's range, and next to zero where it has both signs."""
-    if isinstance(kind, (Axis, Choice)):
+    if isinstance(kind, (Axis, Choice, File)):
         return []
     if isinstance(kind, Count):
         return [kind.least, min(kind.most, 1000)]

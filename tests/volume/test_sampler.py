@@ -5,6 +5,7 @@ threads.
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from fracslice.formulas.field import Bounds
 from fracslice.kernel import compile_scene
 from fracslice.volume import Bricks, Lattice, extent, plan, sample, sample_scene
 from fracslice.volume.bricks import INSIDE, OUTSIDE
+from fracslice.volume.pruning import Proofs
 from fracslice.work import Work
 from tests.examples import EXAMPLES
 
@@ -184,3 +186,24 @@ def test_progress_is_reported() -> None:
     reported: list[tuple[str, float]] = []
     sample_scene(plan(sphere(), 64), Work(progress=lambda stage, done: reported.append((stage, done))))
     assert reported and all(0 <= done <= 1 for _, done in reported) and reported[-1][1] == 1.0
+
+
+@pytest.mark.parametrize("name", ["menger", "many", "smooth difference"])
+def test_proofs_change_no_sample(name: str) -> None:
+    """Enclosures discard cells that the bound keeps, and none with a sign change."""
+    planned = plan(EXAMPLES[name], 96)
+    kernel, bounds = planned.root.kernel(), planned.root.bounds
+    without = sample(kernel, bounds, planned.lattice)
+    proofs = Proofs(planned.root.cells())
+    bricks = sample(kernel, bounds, planned.lattice, proofs=proofs)
+    assert bricks.values.tobytes() == without.values.tobytes() and (bricks.index == without.index).all()
+    assert bricks.proved == 1
+
+
+@pytest.mark.parametrize("name", ["mandelbulb 5", "mandelbox -1.5", "hybrid"])
+def test_only_proofs_leave_no_pocket(name: str) -> None:
+    """With proofs alone the inside of an escape-time fractal is known, too."""
+    planned = replace(plan(EXAMPLES[name], 48), proved=True)
+    bricks = sample_scene(planned)
+    inside, _ = unfolded(bricks)
+    assert (inside == (dense(planned.root, planned.lattice) < 0)).all() and bricks.proved == 1

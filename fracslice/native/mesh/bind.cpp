@@ -22,14 +22,9 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-template <class T>
-std::span<const T> span_of(const Vector<T>& values) {
-    return {values.data(), values.size()};
-}
-
 void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t components) {
     if (labels.size() != mesh.vertices) throw std::invalid_argument("vertices and labels differ in length");
-    require_below(labels.data(), labels.size(), components, "a label names a component that does not exist", -1);
+    require_below(span_of(labels), components, "a label names a component that does not exist", -1);
     std::atomic<bool> unknown = false;
     for_each_block(mesh.count, [&](size_t, size_t first, size_t last) {
         for (size_t t = first; t < last; ++t) {
@@ -92,7 +87,7 @@ nb::object bind_pointed(const Rows<double>& vertices, const Rows<int32_t>& trian
 
 nb::tuple bind_bounds(const Rows<double>& points, int threads) {
     if (!points.shape(0)) throw nb::value_error("no points");
-    Bounds result = unlocked(threads, [&] { return bounds(points.data(), points.shape(0)); });
+    Bounds result = unlocked(threads, [&] { return bounds(span_of(points)); });
     return nb::make_tuple(result.low, result.high);
 }
 
@@ -102,8 +97,8 @@ nb::tuple bind_quantise(const Rows<double>& vertices, const Rows<int32_t>& trian
     Quantised result = unlocked(threads, [&] {
         MeshView mesh = mesh_of(vertices, triangles);
         if (rows.size() != corners.shape(0)) throw std::invalid_argument("rows and corners differ in length");
-        require_below(rows.data(), rows.size(), mesh.count, "an edit names a triangle that does not exist");
-        require_below(corners.data(), corners.size(), mesh.vertices, "an edit names a vertex that does not exist", -1);
+        require_below(span_of(rows), mesh.count, "an edit names a triangle that does not exist");
+        require_below(span_of(corners), mesh.vertices, "an edit names a vertex that does not exist", -1);
         Edits edits{span_of(rows), corners.data()};
         return quantise(mesh, marks_of(keep, mesh.vertices), marks_of(displaced, mesh.vertices), edits,
                         {planes.data(), planes.shape(0)}, frame_of(frame));
@@ -129,15 +124,15 @@ nb::object bind_touching(const Rows<int32_t>& triangles, const Vector<bool>& ver
 }
 
 nb::object bind_near(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<double>& points, double reach, int threads) {
-    return numbers(unlocked(threads, [&] { return near(mesh_of(vertices, triangles), points.data(), points.shape(0), reach); }));
+    return numbers(unlocked(threads, [&] { return near(mesh_of(vertices, triangles), span_of(points), reach); }));
 }
 
 nb::object bind_near_bodies(const Rows<double>& points, const Vector<int32_t>& labels, const Vector<int32_t>& bodies, size_t count,
                             int32_t largest, const Point& origin, double edge, int threads) {
     return numbers(unlocked(threads, [&] {
         if (labels.size() != points.shape(0)) throw std::invalid_argument("points and labels differ in length");
-        require_below(labels.data(), labels.size(), bodies.size(), "a label names no body");
-        require_below(bodies.data(), bodies.size(), count, "a body does not exist", -1);
+        require_below(span_of(labels), bodies.size(), "a label names no body");
+        require_below(span_of(bodies), count, "a body does not exist", -1);
         LabelledPoints all{points.data(), span_of(labels), span_of(bodies)};
         return near_bodies(all, count, largest, {origin, edge});
     }));
@@ -159,7 +154,7 @@ nb::object bind_stl(const Rows<double>& vertices, const Rows<int32_t>& triangles
 
 nb::tuple bind_weld(const Rows<float>& points) {
     size_t count = points.shape(0);
-    Welded result = unlocked(1, [&] { return weld(reinterpret_cast<const uint32_t*>(points.data()), count); });
+    Welded result = unlocked(1, [&] { return weld({reinterpret_cast<const uint32_t*>(points.data()), 3 * count}); });
     size_t sets = result.first.rows;
     return nb::make_tuple(to_numpy(std::move(result.first), {sets}), to_numpy(std::move(result.labels), {count}));
 }
@@ -189,7 +184,7 @@ nb::tuple bind_nesting(const Rows<double>& vertices, const Rows<int32_t>& triang
         MeshView mesh = mesh_of(vertices, triangles);
         require_labels(mesh, labels, shells);
         if (first.size() != shells) throw std::invalid_argument("sizes and first differ in length");
-        require_below(first.data(), shells, mesh.vertices, "first names a vertex that does not exist", int64_t(-1));
+        require_below(span_of(first), mesh.vertices, "first names a vertex that does not exist", -1);
         return nesting(mesh, span_of(labels), span_of(sizes), span_of(first));
     });
     return nb::make_tuple(to_numpy(std::move(result.winding), {shells}), to_numpy(std::move(result.parent), {shells}));

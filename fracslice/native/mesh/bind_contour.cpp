@@ -119,7 +119,7 @@ nb::object bind_trust_regions(const In<double, nb::shape<-1, 3>>& points, const 
         for (size_t i = 0; i < count; ++i) {
             if (which.data()[i] < 0 || size_t(which.data()[i]) >= rows) throw std::invalid_argument("no such feature");
         }
-        trust_regions({points.data(), to_means.data(), cases.data()}, which.data(), inside.data(), count,
+        trust_regions({points.data(), to_means.data(), cases.data()}, {which.data(), count}, {inside.data(), count},
                       {origin, voxel, margin}, out.data.get());
     }
     return to_numpy(std::move(out), {4, 3, count});

@@ -55,17 +55,16 @@ class BoundNearest {
         Array<double> distances(count, 1);
         auto beyond = unlocked(threads, [&] {
             MeshView mesh = mesh_of(vertices, triangles);
-            bool hinted = hints.shape(0) > 0;
-            if (hinted && hints.shape(0) != mesh.count) throw std::invalid_argument("triangles and hints differ in length");
-            require_below(hints.data(), hints.size(), triangles_.shape(0), "a hint names a triangle that does not exist");
-            return nearest_.bounds(mesh, hinted ? hints.data() : nullptr, tolerance, distances.data.get());
+            if (hints.shape(0) > 0 && hints.shape(0) != mesh.count) throw std::invalid_argument("triangles and hints differ in length");
+            require_below(span_of(hints), triangles_.shape(0), "a hint names a triangle that does not exist");
+            return nearest_.bounds(mesh, span_of(hints), tolerance, distances.data.get());
         });
         return nb::make_tuple(to_numpy(std::move(distances), {count}), to_numpy<int32_t>(beyond));
     }
 
     nb::object points(const Rows<double>& points, int threads) const {
         Array<double> distances(points.shape(0), 1);
-        unlocked(threads, [&] { nearest_.points(points.data(), points.shape(0), distances.data.get()); });
+        unlocked(threads, [&] { nearest_.points(span_of(points), distances.data.get()); });
         return to_numpy(std::move(distances), {points.shape(0)});
     }
 

@@ -1,6 +1,8 @@
 // Meshes that come in from Python: looked through once, for no index may leave its array.
 #pragma once
+#include <span>
 #include <stdexcept>
+#include <type_traits>
 
 #include "../numpy.h"
 #include "blocks.h"
@@ -13,10 +15,16 @@ using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 template <class T>
 using Rows = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
+template <class T, class... Shape>
+std::span<const T> span_of(const nb::ndarray<const T, Shape...>& values) {
+    return {values.data(), values.size()};
+}
+
+// Throws std::invalid_argument unless all values are at least `least` and those that are not negative below `end`.
 template <class T>
-void require_below(const T* values, size_t count, size_t end, const char* what, T least = 0) {
+void require_below(std::span<const T> values, size_t end, const char* what, std::type_identity_t<T> least = 0) {
     std::atomic<bool> result = false;
-    for_each_block(count, [&](size_t, size_t first, size_t last) {
+    for_each_block(values.size(), [&](size_t, size_t first, size_t last) {
         bool beyond = false;
         for (size_t i = first; i < last; ++i) beyond |= values[i] < least || (values[i] >= 0 && size_t(values[i]) >= end);
         if (beyond) result.store(true, std::memory_order_relaxed);
@@ -25,7 +33,7 @@ void require_below(const T* values, size_t count, size_t end, const char* what, 
 }
 
 inline Triangles triangles_of(const Rows<int32_t>& triangles, size_t vertices) {
-    require_below(triangles.data(), triangles.size(), vertices, "a triangle names a vertex that does not exist");
+    require_below(span_of(triangles), vertices, "a triangle names a vertex that does not exist");
     return {triangles.data(), triangles.shape(0), vertices};
 }
 
@@ -40,7 +48,7 @@ inline TreeView tree_of(const MeshView& mesh, const Vector<int64_t>& order, cons
     if (order.size() != mesh.count || low.shape(0) != 2 * leaves || high.shape(0) != 2 * leaves) {
         throw std::invalid_argument("the tree is not of this mesh");
     }
-    require_below(tree.order, tree.count, mesh.count, "the tree names a triangle that does not exist");
+    require_below(span_of(order), mesh.count, "the tree names a triangle that does not exist");
     return tree;
 }
 

@@ -69,14 +69,14 @@ std::vector<int64_t> pointed(const MeshView& mesh, double sine, size_t most) {
     return joined(result);
 }
 
-Bounds bounds(const double* points, size_t count) {
+Bounds bounds(std::span<const double> points) {
     auto spread = [](Bounds& to, const Vec3& low, const Vec3& high) {
         for (int k = 0; k < 3; ++k) to.low[k] = std::min(to.low[k], low[k]), to.high[k] = std::max(to.high[k], high[k]);
     };
     Bounds all;
-    for (const Bounds& part : in_blocks<Bounds>(count, [&](size_t first, size_t last) {
+    for (const Bounds& part : in_blocks<Bounds>(points.size() / 3, [&](size_t first, size_t last) {
              Bounds result;
-             for (size_t i = first; i < last; ++i) spread(result, at(points + 3 * i), at(points + 3 * i));
+             for (size_t i = first; i < last; ++i) spread(result, at(&points[3 * i]), at(&points[3 * i]));
              return result;
          })) {
         spread(all, part.low, part.high);

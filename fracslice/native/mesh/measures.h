@@ -1,6 +1,7 @@
 // Triangles of a mesh that rounding turns over, pointed vertices, and the bounding box.
 #pragma once
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "quantise.h"
@@ -20,6 +21,7 @@ struct Bounds {
     Vec3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
 };
 
-Bounds bounds(const double* points, size_t count);
+// points: [n, 3].
+Bounds bounds(std::span<const double> points);
 
 }  // namespace fracslice::mesh

@@ -77,13 +77,13 @@ Neighbour Nearest::within(double limit, const double* p, size_t guess) const {
     return best.square <= limit ? best : (*this)(p, best.triangle);
 }
 
-std::vector<Nearest::Pair> Nearest::bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* distances) const {
+std::vector<Nearest::Pair> Nearest::bounds(const MeshView& triangles, std::span<const int32_t> hints, double tolerance, double* distances) const {
     std::vector<std::vector<Pair>> beyond((triangles.count + kTurn - 1) / kTurn);
     in_turns(triangles.count, [&](size_t first, size_t last) {
         Bound<Nearest> bound(*this, tolerance);
         size_t near[3] = {0, 0, 0};
         for (size_t t = first; t < last; ++t) {
-            if (hints) std::copy_n(hints + 3 * t, 3, near);
+            if (!hints.empty()) std::copy_n(&hints[3 * t], 3, near);
             distances[t] = std::sqrt(bound({triangles.corner(t, 0), triangles.corner(t, 1), triangles.corner(t, 2)}, near));
             for (size_t other : bound.beyond()) beyond[first / kTurn].push_back({int32_t(t), int32_t(other)});
         }
@@ -93,15 +93,18 @@ std::vector<Nearest::Pair> Nearest::bounds(const MeshView& triangles, const int3
     return pairs;
 }
 
-void Nearest::points(const double* points, size_t count, double* distances) const {
-    in_turns(count, [&](size_t first, size_t last) {
+void Nearest::points(std::span<const double> points, double* distances) const {
+    in_turns(points.size() / 3, [&](size_t first, size_t last) {
         size_t guess = 0;
-        for (size_t i = first; i < last; i += kRun) run(points + 3 * i, std::min(kRun, last - i), guess, distances + i);
+        for (size_t i = first; i < last; i += kRun) {
+            run(points.subspan(3 * i, 3 * std::min(kRun, last - i)), guess, distances + i);
+        }
     });
 }
 
 // What is nearest to a point of a ball is at most the ball's diameter farther from its centre than what is nearest to that.
-void Nearest::run(const double* points, size_t count, size_t& guess, double* distances) const {
+void Nearest::run(std::span<const double> points, size_t& guess, double* distances) const {
+    const size_t count = points.size() / 3;
     double centre[3], radius = 0;
     for (size_t x = 0; x < 3; ++x) {
         double low = points[x], high = points[x];
@@ -113,7 +116,7 @@ void Nearest::run(const double* points, size_t count, size_t& guess, double* dis
     TriangleDistance near[kMost + 1];
     size_t known = around(centre, (std::sqrt(nearest.square) + 2 * std::sqrt(radius)) * (1 + 1e-9), near);
     for (size_t i = 0; i < count; ++i) {
-        const double* p = points + 3 * i;
+        const double* p = &points[3 * i];
         double best = std::numeric_limits<double>::infinity();
         if (known > kMost) {
             Neighbour one = (*this)(p, guess);

@@ -1,5 +1,6 @@
 // How far other meshes are from one: proved, or sampled.
 #pragma once
+#include <span>
 #include <vector>
 
 #include "bound.h"
@@ -18,12 +19,12 @@ class Nearest {
     Neighbour within(double limit, const double* p, size_t guess) const;
 
     // For each triangle a bound on how far its points are; infinite where one is farther than the tolerance, or that could not be
-    // excluded. hints: of each corner a triangle here that may be near it, [count, 3], or none. Returns what bounds depend on
+    // excluded. hints: of each corner a triangle here that may be near it, [count, 3], or empty. Returns what bounds depend on
     // besides: a triangle, and one here.
     using Pair = std::array<int32_t, 2>;
-    std::vector<Pair> bounds(const MeshView& triangles, const int32_t* hints, double tolerance, double* distances) const;
-    // The distance of each point. Runs of points that lie close together are fast.
-    void points(const double* points, size_t count, double* distances) const;
+    std::vector<Pair> bounds(const MeshView& triangles, std::span<const int32_t> hints, double tolerance, double* distances) const;
+    // The distance of each of the points [n, 3]. Runs of points that lie close together are fast.
+    void points(std::span<const double> points, double* distances) const;
     // For each triangle how far its samples are at most: exactly, but for distances below `enough`. Samples are at most `spacing`
     // apart along its edges.
     void samples(const MeshView& triangles, double spacing, double enough, double* distances) const;
@@ -32,7 +33,7 @@ class Nearest {
     double to_box(const double* p, size_t node) const;
     // The triangles at most `reach` from a point, up to kMost.
     size_t around(const double* p, double reach, TriangleDistance* triangles) const;
-    void run(const double* points, size_t count, size_t& guess, double* distances) const;
+    void run(std::span<const double> points, size_t& guess, double* distances) const;
     double sampled(const MeshView& triangles, size_t t, double spacing, double limit, size_t& guess) const;
 
     MeshView mesh_;

@@ -12,7 +12,7 @@ namespace {
 class CoarseGrid {
   public:
     explicit CoarseGrid(const MeshView& mesh) : mesh_(mesh), cells_(mesh.vertices, 1), marked_(kSide * kSide * kSide, false) {
-        Bounds box = bounds(mesh.positions, mesh.vertices);
+        Bounds box = bounds({mesh.positions, 3 * mesh.vertices});
         double size = 0;
         for (size_t k = 0; k < 3; ++k) size = std::max(size, box.high[k] - box.low[k]);
         double scale = size > 0 ? kSide / size : 0;
@@ -94,16 +94,16 @@ std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> 
     });
 }
 
-std::vector<int64_t> near(const MeshView& mesh, const double* points, size_t count, double reach) {
+std::vector<int64_t> near(const MeshView& mesh, std::span<const double> points, double reach) {
     constexpr size_t kMost = 128;
-    Bounds box = bounds(points, count);
+    Bounds box = bounds(points);
     double size = reach;
     for (size_t k = 0; k < 3; ++k) size = std::max(size, (box.high[k] - box.low[k]) / kMost);
     constexpr size_t side = kMost + 4;  // a point in the second cell to the last but one marks those beside its own, too
     auto place = [&](const double* p, size_t k) { return size_t(std::clamp((p[k] - box.low[k]) / size + 2, 0.0, side - 1.0)); };
     std::vector<uint8_t> marked(side * side * side, false);
-    for (size_t i = 0; i < count; ++i) {
-        size_t x = place(points + 3 * i, 0), y = place(points + 3 * i, 1), z = place(points + 3 * i, 2);
+    for (size_t i = 0; i + 3 <= points.size(); i += 3) {
+        size_t x = place(&points[i], 0), y = place(&points[i], 1), z = place(&points[i], 2);
         for (size_t k = 0; k < 27; ++k) marked[((x + k / 9 - 1) * side + y + k / 3 % 3 - 1) * side + z + k % 3 - 1] = true;
     }
     Array<bool> seen(mesh.vertices, 1);

@@ -19,8 +19,8 @@ Selection selected(const MeshView& mesh, std::span<const bool> keep);
 // The triangles with a corner among some vertices, ascending.
 std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> vertices);
 
-// The triangles with a corner near some points, ascending: all that are within `reach` of one along each axis, and others.
-std::vector<int64_t> near(const MeshView& mesh, const double* points, size_t count, double reach);
+// The triangles with a corner near some points [n, 3], ascending: all that are within `reach` of one along each axis, and others.
+std::vector<int64_t> near(const MeshView& mesh, std::span<const double> points, double reach);
 
 // The triangles that may meet one of some, these included, ascending: those with a box in the same cells of a coarse grid.
 std::vector<int64_t> surroundings(const MeshView& mesh, std::span<const bool> of);

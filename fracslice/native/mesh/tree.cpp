@@ -30,7 +30,7 @@ uint64_t spread(uint64_t x) {
 // The place of each triangle's middle on Morton's curve, in a grid of 2^11 cells along the longest side, before its number.
 Array<uint64_t> keys(const MeshView& mesh) {
     constexpr double most = (1 << kPlaceBits) - 1;
-    Bounds box = bounds(mesh.positions, mesh.vertices);
+    Bounds box = bounds({mesh.positions, 3 * mesh.vertices});
     double size = 0;
     for (int k = 0; k < 3; ++k) size = std::max(size, box.high[k] - box.low[k]);
     double scale = size > 0 ? most / size : 0;

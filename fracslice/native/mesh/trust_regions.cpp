@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <cmath>
 
 namespace fracslice::mesh {
@@ -21,8 +22,10 @@ int nearest_corner(unsigned face, unsigned number, unsigned from, bool inside) {
 
 }  // namespace
 
-void trust_regions(const FeatureRows& features, const int64_t* which, const bool* inside, size_t count,
+void trust_regions(const FeatureRows& features, std::span<const int64_t> which, std::span<const bool> inside,
                    const Placement& placement, double* out) {
+    assert(which.size() == inside.size());
+    const size_t count = which.size();
     double voxel = placement.voxel, margin = placement.minimum_edge_parameter;
     for (size_t i = 0; i < count; ++i) {
         size_t row = size_t(which[i]);

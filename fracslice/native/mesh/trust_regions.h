@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "marching_cubes.h"
 
@@ -16,8 +17,8 @@ struct FeatureRows {
 };
 
 // Of some features, inside or not: the low and the high corner of the interior of the cell or face that each lies in, the
-// nearest of its corners of the other sign, and the mean of the crossings around it, within the box. out: [4, 3, count].
-void trust_regions(const FeatureRows& features, const int64_t* which, const bool* inside, size_t count,
+// nearest of its corners of the other sign, and the mean of the crossings around it, within the box. out: [4, 3, which.size()].
+void trust_regions(const FeatureRows& features, std::span<const int64_t> which, std::span<const bool> inside,
                    const Placement& placement, double* out);
 
 }  // namespace fracslice::mesh

@@ -20,7 +20,8 @@ size_t mixed(const uint32_t* point) {
 
 }  // namespace
 
-Welded weld(const uint32_t* bits, size_t count) {
+Welded weld(std::span<const uint32_t> bits) {
+    const size_t count = bits.size() / 3;
     if (count > INT32_MAX) throw std::invalid_argument("more than 2^31 points");
     size_t slots = 16;
     while (slots <= 2 * count) slots *= 2;
@@ -28,10 +29,10 @@ Welded weld(const uint32_t* bits, size_t count) {
     Welded result{{count, 1}, {count, 1}};
     int32_t sets = 0;
     for (size_t i = 0; i < count; ++i) {
-        const uint32_t* point = bits + 3 * i;
+        const uint32_t* point = &bits[3 * i];
         if (i + kAhead < count) prefetch(&table[mixed(point + 3 * kAhead) & (slots - 1)]);
         size_t slot = mixed(point) & (slots - 1);
-        while (table[slot] >= 0 && !std::equal(point, point + 3, bits + 3 * result.first.data[table[slot]])) {
+        while (table[slot] >= 0 && !std::equal(point, point + 3, &bits[3 * size_t(result.first.data[table[slot]])])) {
             slot = (slot + 1) & (slots - 1);
         }
         if (table[slot] < 0) {

@@ -3,6 +3,7 @@
 #include "../array.h"
 
 #include <cstdint>
+#include <span>
 
 namespace fracslice::mesh {
 
@@ -11,7 +12,7 @@ struct Welded {
     Array<int32_t> labels;  // the set of each point
 };
 
-// bits: [count, 3], of float32 coordinates without negative zeros. Throws std::invalid_argument for more than 2^31 points.
-Welded weld(const uint32_t* bits, size_t count);
+// bits: [n, 3], of float32 coordinates without negative zeros. Throws std::invalid_argument for more than 2^31 points.
+Welded weld(std::span<const uint32_t> bits);
 
 }  // namespace fracslice::mesh

@@ -81,7 +81,7 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
     return ex + sx, ey + sy, ez + sz, dx, dy, dz
 
 
-def beside(px, width):
+def stereo_half(px, width):
     """Return the picture of two side by side that a film position is in, and the position in that picture.
 
     Parameters
@@ -132,7 +132,7 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, offset, half, focu
     ax, ay, az = across
     bx, by, bz = down
     rx, ry, rz = offset
-    second, column = beside(px, half)
+    second, column = stereo_half(px, half)
     sx = second * rx
     sy = second * ry
     sz = second * rz
@@ -250,7 +250,7 @@ def equirectangular(px, py, lens_u, lens_v, eye, right, up, forward, width, heig
     rx, ry, rz = right
     ux, uy, uz = up
     fx, fy, fz = forward
-    second, column = beside(px, width)
+    second, column = stereo_half(px, width)
     longitude = 6.283185307179586 * (column / width - 0.5)
     latitude = 3.141592653589793 * (0.5 - py / height)
     c = cos(longitude)

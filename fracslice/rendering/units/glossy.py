@@ -12,6 +12,8 @@ from .shade import fresnel, mirrored
 
 SMOOTHEST = 1e-3
 """Smallest square of the roughness."""
+LACQUER = 0.1
+"""Roughness with which a lacquer reflects a light; what it mirrors is sharp."""
 
 
 def width(rough):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...kernel.intrinsics import field, intrinsic
+from ...kernel.intrinsics import field, gather, intrinsic
 
 __all__ = [
     "GIVEN",
@@ -10,13 +10,14 @@ __all__ = [
     "blocker",
     "camera_ray",
     "field",
+    "gather",
     "span_box",
     "step_cone",
     "step_ray",
     "surface",
 ]
 
-GIVEN = frozenset({"blocker", "field"})
+GIVEN = frozenset({"blocker", "field", "gather"})
 """Intrinsics that units may call before the linker writes them."""
 
 
@@ -130,7 +131,7 @@ def step_cone(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
 
 
 @intrinsic
-def surface(x, y, z, dx, dy, dz, t, path, steps, side, u, P):
+def surface(x, y, z, dx, dy, dz, t, path, steps, side, last, u, P):
     """Shade a surface point.
 
     Parameters
@@ -147,6 +148,8 @@ def surface(x, y, z, dx, dy, dz, t, path, steps, side, u, P):
         Steps of the ray.
     side : float
         -1 inside the solid, 1 outside.
+    last : float
+        1 if the ray is not continued, else 0.
     u : tuple of float
         Random numbers in [0, 1).
     P : array of float
@@ -157,20 +160,22 @@ def surface(x, y, z, dx, dy, dz, t, path, steps, side, u, P):
     light : tuple of float
         Light towards the ray's origin: red, green, blue.
     onward : tuple of float
-        Continued ray: throughput (red, green, blue), origin, direction and side; empty if rays do not
-        continue.
+        Continued ray: throughput (red, green, blue), origin, direction, side and density; empty if rays do
+        not continue.
     """
     raise NotImplementedError
 
 
 @intrinsic
-def background(dx, dy, dz, P):
+def background(dx, dy, dz, q, P):
     """Return the light of a ray that misses the scene.
 
     Parameters
     ----------
     dx, dy, dz : float
         Unit direction of the ray.
+    q : float
+        Density of the direction; see `units.weights`.
     P : array of float
         Scene parameters.
 

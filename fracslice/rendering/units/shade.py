@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import absolute, exp, log, maximum, minimum, sqrt, where
+from ...formulas.vocabulary import absolute, exp, floor, log, maximum, minimum, sqrt, where
 from .intrinsics import field
 from .normal import normalised
 
@@ -81,6 +81,51 @@ def fog(t, density):
     return exp(-density * t)
 
 
+def thickness(z, density, level, height):
+    """Extinction of fog that thins with the height.
+
+    Parameters
+    ----------
+    z : float
+        Height.
+    density : float
+        Extinction per scene unit at the level.
+    level : float
+        Height with that density.
+    height : float
+        Height over which it thins to 1/e.
+
+    Returns
+    -------
+    float
+        Extinction per scene unit.
+    """
+    return density * exp(minimum((level - z) / height, 40.0))
+
+
+def height_fog(t, z, dz, density, level, height):
+    """Transmittance of fog that thins with the height: the integral of its extinction along a ray.
+
+    Parameters
+    ----------
+    t : float
+        Distance, scene units.
+    z, dz : float
+        Height of the ray's end, and vertical component of its direction.
+    density, level, height : float
+        See `thickness`.
+
+    Returns
+    -------
+    float
+        Fraction of the light that passes.
+    """
+    drop = minimum(maximum(t * dz / height, -40.0), 40.0)
+    curved = absolute(drop) > 1e-3
+    mean = where(curved, (exp(drop) - 1.0) / where(curved, drop, 1.0), 1.0 + 0.5 * drop)
+    return exp(-minimum(t * mean * thickness(z, density, level, height), 80.0))
+
+
 def palette(tone, P, stops, count):
     """Interpolate a cyclic palette; tone 0 and tone 1 are both the first stop.
 
@@ -111,6 +156,45 @@ def palette(tone, P, stops, count):
         g = g + weight * stops[3 * k + 1]
         b = b + weight * stops[3 * k + 2]
     return r, g, b
+
+
+def varied(rough, vary, turn):
+    """Return the roughness at a position in a palette.
+
+    Parameters
+    ----------
+    rough : float
+        Roughness at the ends of the palette.
+    vary : float
+        Change in its middle.
+    turn : float
+        Position; only its fractional part counts.
+
+    Returns
+    -------
+    float
+        Roughness, 0 to 1.
+    """
+    middle = 1.0 - absolute(2.0 * (turn - floor(turn)) - 1.0)
+    return minimum(maximum(rough + vary * middle, 0.0), 1.0)
+
+
+def lacquer(facing, coat):
+    """Return the reflectance of a lacquer of refractive index 1.5.
+
+    Parameters
+    ----------
+    facing : float
+        Cosine of the angle of incidence.
+    coat : float
+        Strength of the lacquer.
+
+    Returns
+    -------
+    float
+        Reflectance.
+    """
+    return coat * fresnel(facing, 0.04)
 
 
 def mirrored(dx, dy, dz, nx, ny, nz):

@@ -16,7 +16,7 @@ import numpy as np
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
 from fracslice.kernel.loop_linker import link_loops
 from fracslice.rendering import Renderer, packets
-from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, Plan
+from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, PassPlan
 from fracslice.rendering.tiles import ordered
 from fracslice.rendering.units.random import hashed
 from fracslice.scene.view import Camera, Light, View
@@ -66,7 +66,7 @@ def mean_of_rounds(of: Renderer, count: int, first: int = 0) -> Iterator[np.ndar
     for n in range(first, first + count):
         sums[:] = 0
         sums[:, COUNT], sums[:, GOAL] = n, n + 1
-        of.tracer.add(sums.ravel(), Plan(pixels, pixels.size, n + 1), of.work)
+        of.tracer.add(sums.ravel(), PassPlan(pixels, pixels.size, n + 1), of.work)
         total = total + sums[:, :3].astype(np.float64)
         yield total / (n - first + 1)
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from fracslice import read
 from fracslice.rendering import Renderer
-from fracslice.rendering.accumulator import GOAL, Plan
+from fracslice.rendering.accumulator import GOAL, PassPlan
 from fracslice.rendering.host_accumulator import HostAccumulator
 from fracslice.rendering.tiles import ordered
 from fracslice.scene import library
@@ -52,7 +52,7 @@ def moved(of: Renderer, show: Callable[[Camera], None], camera: Camera) -> Figur
     picture, pixels = HostAccumulator.empty(*size, kept.sums.dtype), ordered(*size)
     picture.channels[..., GOAL] = 1
     pixels = pixels[kept.counts[pixels >> 16, pixels & 65535] > 0]
-    plan = Plan(pixels, len(pixels), 1)
+    plan = PassPlan(pixels, len(pixels), 1)
     bound = timed(lambda: of.tracer.add(picture.sums, plan, of.work))["cpu_s"]
     spent = {"wall_ms": 1e3 * whole["wall_s"], "cpu_ms": 1e3 * whole["cpu_s"]}
     return {**spent, "rays": float(len(pixels)), "of the bound": whole["cpu_s"] / bound}

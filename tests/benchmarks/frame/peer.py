@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice.formulas import mandelbulb
-from fracslice.rendering.accumulator import GOAL, Plan
+from fracslice.rendering.accumulator import GOAL, PassPlan
 from fracslice.rendering.cpu import BLOCK, CpuTracer
 from fracslice.rendering.host_accumulator import HostAccumulator
 from fracslice.rendering.linking import link_frame
@@ -43,7 +43,7 @@ def ours(of: CpuTracer, pixels: np.ndarray, samples: int, work: Work) -> Figures
 
     def add(goal: int) -> None:
         picture.channels[..., GOAL] = goal
-        of.add(picture.sums, Plan(pixels, goal * pixels.size, goal), work)
+        of.add(picture.sums, PassPlan(pixels, goal * pixels.size, goal), work)
 
     def first() -> None:
         of.look_ahead(work)

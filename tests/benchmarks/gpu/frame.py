@@ -13,7 +13,7 @@ import numpy as np
 
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
-from fracslice.rendering.accumulator import CHANNELS, GOAL, Plan
+from fracslice.rendering.accumulator import CHANNELS, GOAL, PassPlan
 from fracslice.rendering.cpu import BLOCK, CpuTracer
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.linking import Frame, link_frame
@@ -134,10 +134,10 @@ def rows(run: Run) -> Iterator[Row]:
     tracer = CudaTracer(seen, SINGLE, WIDTH, HEIGHT)
     placed = numba_cuda.to_device(pixels)
     sums, work = numba_cuda.to_device(empty()), Work(1)
-    tracer.add(sums, Plan(placed, pixels.size, 1), work)
+    tracer.add(sums, PassPlan(placed, pixels.size, 1), work)
     picture = sums.copy_to_host().reshape(-1, CHANNELS)
-    tracer.add(sums, Plan(placed, pixels.size, ROUNDS), work)
-    one = Plan(placed, pixels.size, 1)
+    tracer.add(sums, PassPlan(placed, pixels.size, ROUNDS), work)
+    one = PassPlan(placed, pixels.size, 1)
     acts: dict[str, Callable[[], None]] = {
         "frame": lambda: tracer.add(sums, one, work),
         "cones": lambda: tracer.look_ahead(work),
@@ -160,7 +160,7 @@ def on_cpu(seen: Frame, pixels: np.ndarray) -> np.ndarray:
     """The same sums from the lanes."""
     sums = empty()
     sums.reshape(-1, CHANNELS)[:, GOAL] = 1
-    CpuTracer(seen, SINGLE, WIDTH, HEIGHT).add(sums, Plan(pixels, pixels.size, 1), Work())
+    CpuTracer(seen, SINGLE, WIDTH, HEIGHT).add(sums, PassPlan(pixels, pixels.size, 1), Work())
     return sums.reshape(-1, CHANNELS)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
 from fracslice.rendering import Renderer
-from fracslice.rendering.accumulator import CHANNELS, GOAL, Plan
+from fracslice.rendering.accumulator import CHANNELS, GOAL, PassPlan
 from fracslice.rendering.tiles import ordered
 from fracslice.scene.view import Camera, Film, Light, View
 
@@ -45,7 +45,7 @@ def rows(run: Run) -> Iterator[Row]:
     placed = numba_cuda.to_device(sums.ravel())
 
     def traced() -> None:
-        of.tracer.add(placed, Plan(pixels, pixels.size, 1), of.work)
+        of.tracer.add(placed, PassPlan(pixels, pixels.size, 1), of.work)
         numba_cuda.synchronize()
 
     moved = Renderer(mandelbulb(), VIEW, (640, 360), device="cuda")

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from fracslice.animation import FilmJob, Timeline, write_frames
-from fracslice.cluster import Pieces, Pool, Task, Workers, connected
+from fracslice.cluster import Pool, ResultFolder, Task, Workers, connected
 from fracslice.cluster.pieces import run as make_piece
 from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb
@@ -79,7 +79,7 @@ def by_pool(pool: Pool, tasks: Sequence[Task]) -> None:
 class Timed(Pool):
     """Makes all tasks in this process, and measures them; stages by the begin of their names."""
 
-    pieces: Pieces
+    pieces: ResultFolder
     seconds: dict[str, list[float]] = field(default_factory=dict)
 
     def made(self, tasks: Sequence[Task], work: Work) -> Iterator[int]:
@@ -137,7 +137,7 @@ class Stages:
 
     @classmethod
     def of(cls, job: Job, folder: Path) -> Stages:
-        pool = Timed(Pieces(str(folder / "timed")))
+        pool = Timed(ResultFolder(str(folder / "timed")))
         begun = time.process_time()
         job(Work(1, cluster=pool), folder)
         total = time.process_time() - begun

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fracslice.bench.peers import Peer
 from fracslice.bench.report import write_report
-from fracslice.bench.runs import Task, measure
+from fracslice.bench.runs import BenchmarkTask, measure
 from fracslice.work import Work
 
 from ..runner import Row, Run
@@ -52,7 +52,7 @@ def rows(
     plot: str = "",
 ) -> Iterator[Row]:
     result = measure(
-        Task(workloads, resolutions, tuple(commands(peers)), run.runs, limit), Work(run.threads[0])
+        BenchmarkTask(workloads, resolutions, tuple(commands(peers)), run.runs, limit), Work(run.threads[0])
     )
     finest = {(one.workload, one.method): one for one in result}
     for (workload, method), one in finest.items():

@@ -1,0 +1,102 @@
+"""The implicit job: from a scene to a 3MF file that holds its formula."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .errors import SceneError
+from .finishing import Placement
+from .formulas import Node
+from .formulas.box import Box
+from .meshjob import MeshJob
+from .planning import planned
+from .scene import Print, Scene
+from .work import Clock, Work
+
+
+@dataclass(frozen=True)
+class Implicit:
+    """A file that holds a formula.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    operations : int
+        Operations of the formula.
+    root : Node
+        The field that was written.
+    place : Placement
+        Map from the scene to the file.
+    box : Box
+        Bounds of the object, mm.
+    notes : tuple of str
+        Details that the voxel is too large to resolve.
+    """
+
+    path: Path
+    operations: int
+    root: Node
+    place: Placement
+    box: Box
+    notes: tuple[str, ...]
+
+
+def make_implicit(
+    scene: Scene, what: MeshJob | None = None, path: str | Path = "", work: Work | None = None
+) -> Implicit:
+    """Write the formula of a scene as 3MF with the volumetric and implicit extensions.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    what : MeshJob, optional
+        Size, and the voxel that automatic depths follow from.
+    path : str or Path
+        The file to write.
+    work : Work, optional
+        Threads and cancellation.
+
+    Returns
+    -------
+    Implicit
+
+    Raises
+    ------
+    SceneError, KernelError, VolumeError, ExportError, Cancelled
+        For a scene that is no formula or too large a one, or a file that cannot be written.
+    """
+    from .export import application, check_target
+    from .export.implicit import write_implicit
+    from .job import metadata
+    from .kernel.graph import graph
+    from .volume.sizing import sizing
+
+    what, clock = what or MeshJob(), Clock(work or Work())
+    _refuse(what.how(scene))
+    check_target(path)
+    size = sizing(scene, what.size_mm, what.scale, clock.work)
+    made = planned(scene, what, size, clock)
+    plan = made.planned
+    assert plan.root.tree is not None
+    scale = made.scale or size.scale(plan.box)
+    x, y, _ = plan.box.centre
+    place = Placement(scale, (-scale * x, -scale * y, -scale * plan.box.lo[2]))
+    box, outer = (Box.around(map(tuple, place.mm(np.array([b.lo, b.hi])))) for b in (plan.box, plan.outer))
+    operations = graph(plan.root.tree, place.scale, place.offset)
+    about = {"Application": application()} | metadata(scene)
+    file = write_implicit(operations, outer, plan.voxel * scale, path, about)
+    return Implicit(file, len(operations), plan.root.tree, place, box, plan.notes)
+
+
+def _refuse(how: Print) -> None:
+    """Raise an error for a change that needs samples of the field."""
+    names = ["bridge", "gap", "thickness", "hollow"]
+    changes = [name for name in names if getattr(how, name)]
+    changes += [name for name in ("keep", "cavities") if getattr(how, name) not in ("all", "keep")]
+    if changes:
+        raise SceneError(f"{changes[0]}: needs samples of the field; expected a mesh, or formulas alone")

@@ -1,0 +1,271 @@
+"""Light from a picture of the surroundings: longitude across, latitude down.
+
+The table of light holds red, green and blue of each pixel. The tables of probability hold the distribution
+function of the rows, then that of the columns of each row, every one from 0 to 1 (Pharr, Jakob and Humphreys
+2016, "Physically Based Rendering", 13.6.7 and 14.2.4).
+"""
+
+from __future__ import annotations
+
+from ...formulas.vocabulary import atan2, cos, floor, maximum, minimum, sin, sqrt, where
+from .intrinsics import gather
+from .lights import TURN
+
+HALF_TURN = 3.141592653589793
+
+
+def bounded(i, count):
+    """Return a whole index limited to a range.
+
+    Parameters
+    ----------
+    i : float
+        Index; NaN becomes 0.
+    count : float
+        Number of elements.
+
+    Returns
+    -------
+    float
+        Index from 0 to count - 1.
+    """
+    return minimum(where(i > 0.0, i, 0.0), count - 1.0)
+
+
+def seen_at(dx, dy, dz, turn):
+    """Return the point of the picture in a direction.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction.
+    turn : float
+        Rotation about the z axis, full turns.
+
+    Returns
+    -------
+    u, v : float
+        Coordinates in [0, 1], from the upper left; the middle of the picture is at +y.
+    """
+    u = 0.5 + atan2(dx, dy) / TURN + turn
+    return u - floor(u), atan2(sqrt(dx * dx + dy * dy), dz) / HALF_TURN
+
+
+def between(light, width, left, right, across, upper, lower, down, P):
+    """Interpolate four pixels bilinearly.
+
+    Parameters
+    ----------
+    light : float
+        Index of the table in P.
+    width : float
+        Pixels of a row.
+    left, right, upper, lower : float
+        Columns and rows of the four pixels.
+    across, down : float
+        Weights of the right column and of the lower row.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    r, g, b : float
+        Linear light.
+    """
+    a = light + 3.0 * (upper * width + left)
+    b = light + 3.0 * (upper * width + right)
+    c = light + 3.0 * (lower * width + left)
+    d = light + 3.0 * (lower * width + right)
+    wa = (1.0 - across) * (1.0 - down)
+    wb = across * (1.0 - down)
+    wc = (1.0 - across) * down
+    wd = across * down
+    return (
+        wa * gather(a, P) + wb * gather(b, P) + wc * gather(c, P) + wd * gather(d, P),
+        wa * gather(a + 1.0, P) + wb * gather(b + 1.0, P) + wc * gather(c + 1.0, P) + wd * gather(d + 1.0, P),
+        wa * gather(a + 2.0, P) + wb * gather(b + 2.0, P) + wc * gather(c + 2.0, P) + wd * gather(d + 2.0, P),
+    )
+
+
+def surroundings(dx, dy, dz, light, width, height, turn, tint, P):
+    """Return the light from a direction.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction.
+    light : float
+        Index of the table of light in P.
+    width, height : float
+        Size of the picture, pixels.
+    turn : float
+        Rotation about the z axis, full turns.
+    tint : tuple of float
+        Factor on red, green and blue.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    r, g, b : float
+        Linear light.
+    """
+    tr, tg, tb = tint
+    u, v = seen_at(dx, dy, dz, turn)
+    column = floor(u * width - 0.5)
+    row = floor(v * height - 0.5)
+    left = bounded(where(column < 0.0, width - 1.0, column), width)
+    right = where(left > width - 1.5, 0.0, left + 1.0)
+    upper = bounded(row, height)
+    lower = bounded(row + 1.0, height)
+    across = u * width - 0.5 - column
+    down = v * height - 0.5 - row
+    r, g, b = between(light, width, left, right, across, upper, lower, down, P)
+    return tr * r, tg * g, tb * b
+
+
+def interval(value, first, count, steps, half, P):
+    """Find the interval of a distribution function that contains a value, by bisection.
+
+    Parameters
+    ----------
+    value : float
+        Value in [0, 1).
+    first : float
+        Index of the function's first value in P; there are count + 1.
+    count : float
+        Number of intervals.
+    steps : int
+        Binary logarithm of the count, rounded up.
+    half : float
+        Largest power of two below the count.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    i : float
+        Number of the interval.
+    share : float
+        Position of the value in the interval, from 0 to 1.
+    density : float
+        Probability of the interval, relative to the mean one.
+    """
+    i = 0.0 * value
+    step = i + half
+    for _ in range(steps):
+        next_ = minimum(i + step, count - 1.0)
+        i = where(gather(first + next_, P) <= value, next_, i)
+        step = 0.5 * step
+    low = gather(first + i, P)
+    size = gather(first + i + 1.0, P) - low
+    return i, minimum((value - low) / maximum(size, 1e-30), 1.0), size * count
+
+
+def towards(u, v, rows, columns, size, steps, halves, turn, P):
+    """Sample a direction with a density in proportion to the light.
+
+    Parameters
+    ----------
+    u, v : float
+        Random numbers in [0, 1).
+    rows, columns : float
+        Indices of the tables of probability in P.
+    size, steps, halves : tuple
+        Width and height of the picture; see `interval`.
+    turn : float
+        Rotation about the z axis, full turns.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    dx, dy, dz : float
+        Unit direction.
+    density : float
+        Probability density per unit solid angle.
+    """
+    width, height = size
+    across, down = steps
+    half_across, half_down = halves
+    row, part, dense = interval(v, rows, height, down, half_down, P)
+    latitude = HALF_TURN * (row + part) / height
+    column, part, denser = interval(u, columns + row * (width + 1.0), width, across, half_across, P)
+    longitude = TURN * ((column + part) / width - 0.5 - turn)
+    sine = sin(latitude)
+    density = dense * denser / (2.0 * HALF_TURN * HALF_TURN * maximum(sine, 1e-6))
+    return sine * sin(longitude), sine * cos(longitude), cos(latitude), density
+
+
+def likelihood(dx, dy, dz, rows, columns, size, turn, P):
+    """Return the density with which `towards` takes a direction.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction.
+    rows, columns : float
+        Indices of the tables of probability in P.
+    size : tuple of float
+        Width and height of the picture.
+    turn : float
+        Rotation about the z axis, full turns.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    float
+        Probability density per unit solid angle.
+    """
+    width, height = size
+    u, v = seen_at(dx, dy, dz, turn)
+    row = bounded(floor(v * height), height)
+    place = columns + row * (width + 1.0) + bounded(floor(u * width), width)
+    dense = height * (gather(rows + row + 1.0, P) - gather(rows + row, P))
+    denser = width * (gather(place + 1.0, P) - gather(place, P))
+    sine = sqrt(dx * dx + dy * dy)
+    return dense * denser / (2.0 * HALF_TURN * HALF_TURN * maximum(sine, 1e-6))
+
+
+def irradiance(nx, ny, nz, harmonics):
+    """Return the light that a white surface scatters under a sky without shadows.
+
+    Nine spherical harmonics (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance
+    Environment Maps").
+
+    Parameters
+    ----------
+    nx, ny, nz : float
+        Unit normal.
+    harmonics : tuple of tuple of float
+        Factors of 1, y, z, x, xy, yz, 3 z^2 - 1, xz and x^2 - y^2, for red, green and blue.
+
+    Returns
+    -------
+    r, g, b : float
+        Linear light.
+    """
+    hr, hg, hb = harmonics
+    return harmonic(nx, ny, nz, hr), harmonic(nx, ny, nz, hg), harmonic(nx, ny, nz, hb)
+
+
+def harmonic(x, y, z, h):
+    """Return one channel of `irradiance`.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Unit normal.
+    h : tuple of float
+        Nine factors.
+
+    Returns
+    -------
+    float
+        Linear light.
+    """
+    a, b, c, d, e, f, g, i, j = h
+    linear = a + b * y + c * z + d * x
+    square = e * x * y + f * y * z + g * (3.0 * z * z - 1.0) + i * x * z + j * (x * x - y * y)
+    return maximum(linear + square, 0.0)

@@ -1,0 +1,170 @@
+"""Multiple importance sampling of lights by their own distribution and by that of the surface.
+
+The power heuristic of Veach and Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo
+Rendering". Each ray carries the density with which the surface took its direction; 0 for a ray of the camera,
+a mirror or glass, for which no light is sampled.
+"""
+
+from __future__ import annotations
+
+from ...formulas.vocabulary import maximum, sqrt, where
+from .glossy import hidden, highlight, width
+
+HALF_TURN = 3.141592653589793
+
+
+def heuristic(taken, other):
+    """Return the weight of a sample.
+
+    Parameters
+    ----------
+    taken, other : float
+        Densities of the sample under the distribution it was taken from, and under the other one.
+
+    Returns
+    -------
+    float
+        Weight, 0 to 1; the weights of both distributions add up to 1.
+    """
+    ratio = other / maximum(taken, 1e-12)
+    return where(taken > 0.0, 1.0 / (1.0 + ratio * ratio), 0.0)
+
+
+def facet_density(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough):
+    """Return the density with which `glossy.glossy` takes a direction.
+
+    Parameters
+    ----------
+    nx, ny, nz : float
+        Unit normal.
+    dx, dy, dz : float
+        Unit direction of the ray.
+    lx, ly, lz : float
+        Unit direction of reflection.
+    rough : float
+        Roughness.
+
+    Returns
+    -------
+    float
+        Probability density per unit solid angle.
+    """
+    a = width(rough)
+    value, _ = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough)
+    there = hidden(nx * lx + ny * ly + nz * lz, a)
+    back = hidden(maximum(-(nx * dx + ny * dy + nz * dz), 1e-4), a)
+    return value * (1.0 + there + back) / ((1.0 + back) * HALF_TURN)
+
+
+def weights(dense, diffuse, nx, ny, nz, dx, dy, dz, lx, ly, lz, rough, share, free):
+    """Return the weights of a light's sample for scattered and for reflected light.
+
+    Parameters
+    ----------
+    dense : float
+        Density of the sample per unit solid angle.
+    diffuse : float
+        Cosine of the angle between light and normal.
+    nx, ny, nz, dx, dy, dz, lx, ly, lz : float
+        Unit normal, direction of the ray, direction to the light.
+    rough : float
+        Roughness; a smooth surface reflects into one direction.
+    share : float
+        Probability of reflection.
+    free : float
+        1 if no continued ray can meet the light.
+
+    Returns
+    -------
+    scattered, reflected : float
+        Weights.
+    """
+    facets = share * facet_density(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough)
+    scattered = heuristic(dense, (1.0 - share) * diffuse / HALF_TURN)
+    reflected = where(rough > 0.0, heuristic(dense, facets), 1.0)
+    return where(free > 0.5, 1.0, scattered), where(free > 0.5, 1.0, reflected)
+
+
+def density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, rough, share):
+    """Return the density of a continued ray.
+
+    Parameters
+    ----------
+    chosen : bool
+        True if it is reflected, not scattered.
+    nx, ny, nz, dx, dy, dz, ex, ey, ez : float
+        Unit normal, direction of the ray, direction of the continued ray.
+    rough : float
+        Roughness.
+    share : float
+        Probability of reflection.
+
+    Returns
+    -------
+    float
+        Probability density per unit solid angle; 0 for a smooth mirror.
+    """
+    facets = share * facet_density(nx, ny, nz, dx, dy, dz, ex, ey, ez, rough)
+    cosine = maximum(nx * ex + ny * ey + nz * ez, 0.0)
+    mirror = where(rough > 0.0, facets, 0.0)
+    return where(chosen, mirror, (1.0 - share) * cosine / HALF_TURN)
+
+
+def sun_density(dx, dy, dz, towards, spread):
+    """Return the density with which `lights.sun` takes a direction.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Unit direction.
+    towards : tuple of float
+        Unit direction to the centre of the sun.
+    spread : float
+        Tangent of half its angular diameter.
+
+    Returns
+    -------
+    float
+        Probability density per unit solid angle.
+    """
+    lx, ly, lz = towards
+    cosine = dx * lx + dy * ly + dz * lz
+    s2 = spread * spread
+    inside = cosine * sqrt(1.0 + s2) > 1.0
+    return where(inside, 1.0 / (HALF_TURN * s2 * maximum(cosine * cosine * cosine, 1e-6)), 0.0)
+
+
+def behind(q, dense):
+    """Return the weight of a picture of the surroundings for a ray that misses the scene.
+
+    Parameters
+    ----------
+    q : float
+        Density of the ray; 0 for one of the camera, a mirror or glass.
+    dense : float
+        Density with which the picture is sampled in its direction.
+
+    Returns
+    -------
+    float
+        Weight, 0 to 1.
+    """
+    return where(q > 0.0, heuristic(q, dense), 1.0)
+
+
+def sunshine(q, dense):
+    """Return the light of a sun for a ray that misses the scene.
+
+    Parameters
+    ----------
+    q : float
+        Density of the ray; others than scattered and glossy ones do not see a sun.
+    dense : float
+        Density with which the sun is sampled in its direction.
+
+    Returns
+    -------
+    float
+        Factor on the sun's strength.
+    """
+    return where(q > 0.0, HALF_TURN * dense * heuristic(q, dense), 0.0)
