@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from fracslice.work import Work
 
 GRID = ".vdb"
+COLOURS = ("material", "point", "axes", "planes", "sphere", "steps", "direction")
 
 
 @click.command()
@@ -81,6 +82,12 @@ GRID = ".vdb"
     default="cpu",
     help="The device that evaluates the field; cpu by default. auto: the GPU, if there is one.",
 )
+@click.option(
+    "--colour",
+    type=click.Choice(COLOURS),
+    help="Colour the vertices of a .ply, .glb or .3mf file: as the scene's materials, or by a property of "
+    "the orbit. PLY and GLB hold the property itself, too.",
+)
 @cluster_options
 @click.option(
     "--material",
@@ -106,6 +113,7 @@ def mesh(
     implicit: bool,
     cache: str | None,
     device: str,
+    colour: str | None,
     cluster: str | None,
     shard: str | None,
     store: str | None,
@@ -125,7 +133,7 @@ def mesh(
 
     check_outputs(source, output, report, picture)
     if Path(output).suffix.lower() == GRID:
-        names = {"chord", "simplify", "cluster", "shard", "store"}
+        names = {"chord", "simplify", "colour", "cluster", "shard", "store"}
         refuse_options(context, names, "only for meshes, and a .vdb file holds samples")
     if implicit:
         refuse_what_needs_triangles(context, output)
@@ -142,7 +150,8 @@ def mesh(
                 if implicit:
                     write_formula(scene, job_of(scene, **options), str(file), work, quiet)
                     continue
-                result = made(scene, job_of(scene, **options), str(file), others[0], work)
+                job = replace(job_of(scene, **options), colour=colour)
+                result = made(scene, job, str(file), others[0], work)
                 if others[1] is not None:
                     write_report(result.report, others[1])
                 if not quiet:
@@ -174,9 +183,9 @@ def refuse_what_needs_triangles(context: click.Context, output: str) -> None:
     """Raise a usage error for a file other than .3mf, or an option without effect on a formula."""
     if Path(output).suffix.lower() != ".3mf":
         raise click.UsageError(f"{output}: expected a file name that ends in .3mf, for --implicit")
-    names = {"chord", "simplify", "dust", "report", "picture", "cache", "device", "material", "price"}
+    names = {"chord", "simplify", "colour", "dust", "report", "picture", "cache", "device", "material"}
     refuse_options(
-        context, names | {"cluster", "shard", "store"}, "only for meshes, and --implicit makes none"
+        context, names | {"price", "cluster", "shard", "store"}, "only for meshes, and --implicit makes none"
     )
 
 

@@ -173,6 +173,11 @@ _JOB = [
         metavar="LENGTH",
         help="Remove triangles within this tolerance, such as 0.02mm.",
     ),
+    click.option(
+        "--proved",
+        is_flag=True,
+        help="Skip space by proofs only, not by the measured bounds of fractals.",
+    ),
 ]
 
 
@@ -271,4 +276,5 @@ def job_of(
         simplify_mm=others["simplify"],
         up=others["up"],
         scale=others["scale"],
+        proved=others["proved"],
     )

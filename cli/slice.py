@@ -18,6 +18,7 @@ from .layers import LAYER, PIXEL_MM, ending, heights, html_option, printer_optio
 from .options import (
     NAME,
     NUMBER,
+    Whole,
     length,
     output_option,
     price_option,
@@ -74,6 +75,20 @@ if TYPE_CHECKING:
     help="Move all outlines outwards by this, or inwards if it is negative; at most 1mm, 0 by default.",
 )
 @click.option("--gamma", type=NUMBER, default=1.0, metavar="N", help="Gamma of grey levels; 1 by default.")
+@click.option(
+    "--levels",
+    type=Whole(1, 255),
+    default=255,
+    metavar="N",
+    help="Anti-aliasing: grey levels above black, 1 for black and white; 255 by default.",
+)
+@click.option(
+    "--blur",
+    type=Whole(0, 16),
+    default=0,
+    metavar="N",
+    help="Radius of the blur of outlines, in pixels; 0 by default.",
+)
 @click.option(
     "--mirror/--no-mirror", default=None, help="Mirror along x; as the printer needs it by default."
 )
@@ -160,6 +175,8 @@ def slice_(
             resin,
             created(),
             int(options["sections"]),
+            options["levels"],
+            options["blur"],
         ).run(work)
         stack, screen = run.stack, run.screen
         write_slices(run, output, form)

@@ -95,6 +95,7 @@ register(
     compiler="fracslice.kernel.tree",
     orbits="fracslice.kernel.orbits",
     growth="fracslice.kernel.growth",
+    orbit_signs="fracslice.kernel.orbit_signs",
     distances="fracslice.api.distances",
     parsing="fracslice.kernel.parsing",
     reference="fracslice.kernel.reference",

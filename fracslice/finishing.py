@@ -231,6 +231,11 @@ class Finish:
         bodies, cavities = int((self.stays & ~hollow).sum()), int((self.stays & hollow).sum())
         return tally.report(bodies, cavities, self.misplaced)
 
+    def count_near(self) -> None:
+        """Count the bodies that nearly touch, of pieces that another process finishes."""
+        for number, mesh in enumerate(self.pieces.meshes()):
+            self.near.add(mesh.vertices, self.pieces.labels(number), self.pieces.ends[number])
+
     def finished(self) -> Iterator[Finished]:
         """Place and clean the pieces, mm. Pieces held in memory are released.
 

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from .volume.sizing import Sizing
 
 STL = ".stl"
+COLOURED = (".ply", ".glb", ".3mf")
+"""Formats that hold colours of vertices."""
 
 
 def make_mesh(
@@ -105,8 +107,12 @@ class _Job:
         if self.path is not None:
             from .export import check_format, check_target
 
-            check_format(self.path)
+            ending = check_format(self.path)
             check_target(self.path)
+            if self.what.colour is not None and ending not in COLOURED:
+                raise SceneError(f"colour: expected a file that holds colours: {', '.join(COLOURED)}")
+        if self.what.colour is not None and self.clock.work.cluster is not None:
+            raise SceneError(f"colour {self.what.colour}: expected no cluster and no shard")
 
     @contextmanager
     def aside(self) -> Iterator[Callable[[], Path] | None]:
@@ -214,6 +220,7 @@ class _Job:
             surface_error_mm=SurfaceError.of(scale * made.errors),
             surface_to_mesh_mm=SurfaceToMesh.of(scale * made.back),
             evaluations=signs.evaluations,
+            proved=signs.proved,
             bricks=len(signs),
             seconds=clock.seconds,
             peak_rss_mb=peak_rss_mb(),
@@ -254,7 +261,10 @@ class _Job:
             return None
         check, blocks = finished(surface, finish)
         ending = STL if self.path is None else self.path.suffix.lower()
-        mesh = None if self.path and ending == STL else whole(list(blocks))
+        mesh = None
+        if not self.path or ending != STL:
+            mesh = whole(list(blocks))
+            finish.count_near()
         if self.path:
             with self.file(self.path) as (file, about):
                 if mesh is None:
@@ -295,6 +305,8 @@ class _Job:
         meshes = ahead(check.passing(finished))
         if several := len(finish.pieces) > 1:
             meshes = tips_last(meshes, tips)
+        if self.what.colour is not None:
+            meshes = self.painted(meshes, finish)
         if self.path is None:
             (mesh,) = meshes
             return mesh, simplified
@@ -312,6 +324,20 @@ class _Job:
                 for whole in timed():
                     FORMATS[self.path.suffix.lower()](whole, file, about)
         return None if several else mesh, simplified
+
+    def painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
+        """Colour the vertices. Edits that are no formulas have the colour of the object there."""
+        from .rendering.painting import paint
+
+        assert self.what.colour is not None
+        field: Any = finish.planned.root
+        while field.tree is None:
+            field = field.root
+        for mesh in meshes:
+            with self.clock("colouring"):
+                points = finish.place.units(mesh.vertices)
+                done = paint(field.tree, points, self.what.colour, self.clock.work)
+            yield replace(mesh, colours=done.colours, scalars=done.scalars)
 
 
 def metadata(scene: Scene) -> dict[str, str]:

@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .errors import SceneError
-from .formulas.parameters import Number, Vector, validate
+from .formulas.material import TRAPS
+from .formulas.parameters import Choice, Number, Vector, validate
 from .scene import Print, Scene
 from .scene.lengths import Length, Percent
 
 RESOLUTION = 256.0
 """Default number of voxels along the longest side, and the detail that automatic depths resolve."""
+
+COLOURS = ("material", *TRAPS)
+"""What the colours of vertices show."""
 
 COARSEST, FINEST = 8, 16384
 """Limits of the voxels along the longest side."""
@@ -47,6 +51,11 @@ class MeshJob:
         Direction of the scene that is up in the print.
     scale : tuple of float
         Compensation of shrinkage along x, y and z; one factor or percentage for all, or three.
+    colour : str, optional
+        Colours and scalars of the vertices: "material" for the materials of the scene, or a property of the
+        orbit: "point", "axes", "planes", "sphere", "steps" or "direction".
+    proved : bool
+        Skip no space by a measured bound, only by a proof.
 
     Raises
     ------
@@ -63,6 +72,8 @@ class MeshJob:
     simplify_mm: float | None = None
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    colour: str | None = None
+    proved: bool = False
 
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:
@@ -140,5 +151,6 @@ _KINDS = {
     "resolution": Number(None, "voxels along the longest side", least=COARSEST, most=FINEST),
     "dust_mm3": Number(None, "a volume", least=0),
     "up": Vector((0.0, 0.0, 1.0), "a direction", nonzero=True),
+    "colour": Choice(None, "colours of vertices", COLOURS),
     "scale": Percent((1.0, 1.0, 1.0), "compensation of shrinkage"),
 }

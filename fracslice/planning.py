@@ -64,7 +64,9 @@ def planned(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
     with clock("planning"):
         root = oriented(scene.root, what.up, size.stretch, clock.work)
         made = plan(root, what.voxels(size.longest), clock.work)
-    return Sized(made, None, how) if how.whole else edited(made, scene, what, size, clock)
+    if not how.whole:
+        return edited(made, scene, what, size, clock)
+    return Sized(made.strict if what.proved else made, None, how)
 
 
 def edited(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
@@ -95,4 +97,5 @@ def edited(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Clock) 
     # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.
     keep = how.keep if made.root.bounds.exterior_only else "all"
     # Keep cavities: the hollow is one.
+    changed = changed.strict if what.proved else changed
     return Sized(changed, scale, Print(keep=keep, cavities=how.cavities if how.whole else "keep"))

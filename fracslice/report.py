@@ -138,6 +138,8 @@ class Report:
         Area on the plate, mm2.
     cavities_mm3 : float
         Volume of sealed cavities, mm3.
+    proved : float, optional
+        Share of the space without samples whose sign is proved; the rest relies on a measured bound.
     """
 
     scene: str
@@ -160,6 +162,7 @@ class Report:
     depths: tuple[str, ...] = ()
     contact_mm2: float = 0.0
     cavities_mm3: float = 0.0
+    proved: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))

@@ -34,7 +34,7 @@ class SliceRecipe:
         Name and format of the file.
     printer : Printer or None
         Printer whose screen the layers are for.
-    compensation, gamma, mirror
+    compensation, gamma, mirror, levels, blur
         As for `Screen`.
     resin, created, sections
         As for `SliceRun`.
@@ -53,6 +53,8 @@ class SliceRecipe:
     resin: Resin | None = None
     created: datetime = EPOCH
     sections: int = 1
+    levels: int = 255
+    blur: int = 0
 
     def run(self, work: Work) -> SliceRun:
         """Plan the layers.
@@ -75,7 +77,9 @@ class SliceRecipe:
         stack = slicing.plan_stack(scene.root, self.job, work)
         if self.most is not None:
             stack = slicing.adapted(stack, self.most, work)
-        screen = Screen(stack, self.printer, self.compensation, self.gamma, self.mirror)
+        screen = Screen(
+            stack, self.printer, self.compensation, self.gamma, self.mirror, self.levels, self.blur
+        )
         about = {"Title": self.name, "scene_hash": scene.hash}
         model = StackModel(scene, self.job, replace(work, cluster=None))
         files = about, model.mesh, model.picture, self.created

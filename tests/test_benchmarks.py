@@ -25,6 +25,7 @@ def test_runs_at_its_smallest_size(name: str, monkeypatch: pytest.MonkeyPatch) -
         here = partial(distributed.LocalCluster, processes=False)
         monkeypatch.setattr(distributed, "LocalCluster", here)
     module, run = benchmarks.load(name), Run(1, (1,))
+    pytest.importorskip(getattr(module, "NEEDS", "numpy"))
     rows = benchmarks.measure(module, run, module.SMALLEST)
     assert rows
     assert run.faults == []

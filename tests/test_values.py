@@ -72,6 +72,8 @@ NUMBERS: dict[str, Callable[[Any], Any]] = {
     "SliceJob.up": lambda v: SliceJob(20, up=(v, 0, v)),
     "SliceJob.up, all": lambda v: SliceJob(20, up=v),
     "Screen.gamma": lambda v: Screen(STACK, gamma=v),
+    "Screen.levels": lambda v: Screen(STACK, levels=v),
+    "Screen.blur": lambda v: Screen(STACK, blur=v),
     "Resin.exposure": lambda v: Resin(v, 30),
     "adapted": lambda v: adapted(STACK, v),
     "Limits.speck": lambda v: Limits(speck=v),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from ..job import make_mesh as make_mesh_job
 from ..mesh import Mesh
@@ -38,7 +38,7 @@ class Result(Mesh):
         Result of the mesh job.
     """
 
-    made: MeshResult
+    made: MeshResult  # type: ignore[misc]
 
     def __init__(self, made: MeshResult) -> None:
         object.__setattr__(self, "made", made)
@@ -58,6 +58,16 @@ class Result(Mesh):
     def vertices(self) -> NDArray[np.float64]:
         """Vertices, float64 [n, 3], mm."""
         return self.mesh.vertices
+
+    @property  # type: ignore[misc]
+    def colours(self) -> NDArray[np.uint8] | None:
+        """Colours of the vertices, sRGB, uint8 [n, 3]; None without `colour`."""
+        return self.mesh.colours
+
+    @property  # type: ignore[misc]
+    def scalars(self) -> Mapping[str, NDArray[np.float32]]:
+        """Named numbers of the vertices, float32 [n]."""
+        return self.mesh.scalars
 
     @property  # type: ignore[misc]
     def triangles(self) -> NDArray[np.int32]:
@@ -102,6 +112,8 @@ def make_mesh(
     chord: Length | None = None,
     simplify: Length | None = None,
     dust: float | None = None,
+    colour: Literal["material", "point", "axes", "planes", "sphere", "steps", "direction"] | None = None,
+    proved: bool | None = None,
     path: str | Path | None = None,
     **options: Unpack[Options],
 ) -> Result:
@@ -135,6 +147,10 @@ def make_mesh(
         Remove triangles within this tolerance.
     dust : float, optional
         Drop connected components of less volume, mm3; 1e-5 of the whole by default.
+    colour : str, optional
+        Colours and scalars of the vertices: those of the scene's materials, or a property of the orbit.
+    proved : bool, optional
+        Skip no space by a measured bound, only by a proof.
     path : str or path, optional
         The file to write, in the format of its extension. An .stl file may be larger than memory: the mesh
         is then only in that file, and access to its vertices raises `TooLargeError`.
@@ -182,7 +198,14 @@ def make_mesh(
     given: dict[str, Any] = {
         f"{name}_mm": parse_length(value, name) for name, value in lengths.items() if value is not None
     }
-    others = {"resolution": resolution, "dust_mm3": dust, "up": up, "scale": scale}
+    others = {
+        "resolution": resolution,
+        "dust_mm3": dust,
+        "up": up,
+        "scale": scale,
+        "colour": colour,
+        "proved": proved,
+    }
     given |= {name: value for name, value in others.items() if value is not None}
     job, how = replace(what or MeshJob(), **given), work_of(options, work)
     scene = as_scene(shape)

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fracslice.errors import ExportError
 from fracslice.mesh.model import Mesh
@@ -36,7 +37,8 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
     ExportError
         For a file of 4 GiB or more.
     """
-    if 12 * (len(mesh.vertices) + len(mesh.triangles)) + HEADERS + len(str(metadata)) >= 2**32:
+    values = 4 * (len(mesh.scalars) + (mesh.colours is not None))
+    if (12 + values) * len(mesh.vertices) + 12 * len(mesh.triangles) + HEADERS + len(str(metadata)) >= 2**32:
         raise ExportError("GLB cannot hold more than 4 GiB; STL and PLY can")
     import trimesh
     from trimesh.exchange.gltf import export_glb
@@ -46,7 +48,18 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
         tree["asset"] |= {"generator": metadata["Application"], "extras": dict(metadata)}
 
     solid = mesh.to_trimesh()
-    solid.visual = trimesh.visual.TextureVisuals(material=PBRMaterial(**GREY))
+    if mesh.colours is None:
+        solid.visual = trimesh.visual.TextureVisuals(material=PBRMaterial(**GREY))
+    else:
+        solid.visual = trimesh.visual.ColorVisuals(solid, vertex_colors=_linear(mesh.colours))
     scene = trimesh.Scene()
     scene.add_geometry(solid, node_name="mesh", geom_name="mesh", transform=TO_METRES_Y_UP)
     file.write(export_glb(scene, include_normals=False, tree_postprocessor=described))
+
+
+def _linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Colours in linear light, as glTF defines them."""
+    share = colours / 255
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    encoded: NDArray[np.uint8] = np.rint(255 * light).astype(np.uint8)
+    return encoded

@@ -67,7 +67,8 @@ def _header(job: PrintData) -> bytes:
     previews = b"".join(
         rgb565(job.preview(side, side)).astype(">u2").tobytes() + DELIMITER for side in (SMALL, LARGE)
     )
-    levels = struct.pack(">3H", 8, 1, 0)  # anti-aliasing, grey and blur
+    screen = job.run.screen
+    levels = struct.pack(">3H", min(screen.levels, 8), int(screen.levels > 1), screen.blur)
     return b"V3.0" + MAGIC + named + levels + previews + _settings(job)
 
 

@@ -133,6 +133,8 @@ class SliceRun:
             "pixels": screen.shape[::-1],
             "printer": screen.printer.name if screen.printer else None,
             "gamma": screen.gamma,
+            "grey_levels": screen.levels,
+            "blur_pixels": screen.blur,
             "compensation_mm": screen.compensation,
             "mirror": screen.mirror,
             "layers": [

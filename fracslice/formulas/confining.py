@@ -52,6 +52,11 @@ def bounds_arguments(node: Node) -> dict[str, object]:
     return {"centre": box.centre, "half": half, "margin": max(half) / 4}
 
 
+@bounds.keeps_sign
+def bounds_keeps_sign(_: Node) -> bool:
+    return True
+
+
 @bounds.bounds
 def bounds_bounds(node: Node) -> Box:
     return Box(node["min"], node["max"]) & node.children[0].bounds.box
@@ -194,6 +199,11 @@ def repeat_arguments(node: Node) -> dict[str, object]:
         "ny": Fixed(windows[1]),
         "nz": Fixed(windows[2]),
     }
+
+
+@repeat.keeps_sign
+def repeat_keeps_sign(_: Node) -> bool:
+    return True
 
 
 @repeat.bounds

@@ -98,6 +98,10 @@ def csg_unordered(node: Node) -> bool:
     return bool(node["smooth"] < SMALLEST)
 
 
+def csg_keeps_sign(node: Node) -> bool:
+    return csg_unordered(node)
+
+
 def csg_select(node: Node) -> Callable[..., Any]:
     """A seam of a union adds material, and its conservative field has to know. Other seams only remove
     material, so a ball outside the sharp solid is outside the smooth one.
@@ -141,6 +145,7 @@ def csg_slope(node: Node) -> float:
 
 for _operator in SHARP:
     _operator.unordered(csg_unordered)
+    _operator.keeps_sign(csg_keeps_sign)
     _operator.select(csg_select)
     _operator.arguments(csg_arguments)
     _operator.slope(csg_slope)

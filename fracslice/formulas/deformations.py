@@ -67,6 +67,11 @@ def twist_arguments(node: Node) -> dict[str, object]:
     }
 
 
+@twist.keeps_sign
+def twist_keeps_sign(_: Node) -> bool:
+    return True
+
+
 @twist.bounds
 def twist_bounds(node: Node) -> Box:
     axis, radius, box = "xyz".index(node["axis"]), _twist_radius(node), node.children[0].bounds.box
@@ -157,6 +162,11 @@ def bend_arguments(node: Node) -> dict[str, object]:
         "margin": margin,
         "axis": chosen_axis(node),
     }
+
+
+@bend.keeps_sign
+def bend_keeps_sign(_: Node) -> bool:
+    return True
 
 
 @bend.bounds

@@ -204,6 +204,11 @@ class Field(Protocol):
         """True if all shapes of the field are escape-time fractals with the field of a potential."""
         return False
 
+    @property
+    def proved_box(self) -> Box:
+        """Box that is proved to enclose all points where the field is negative."""
+        return self.bounds.box
+
     def conservative(self) -> Field:
         """Conservative field, for skipping empty space.
 

@@ -51,6 +51,22 @@ class Hooks:
         """Set the hook that selects another function for a node that needs less or different code."""
         return self._hook("select", hook)
 
+    def sign(self, hook: Callable[[Node], tuple[Callable[..., Any], dict[str, Any]] | None]) -> Hook:
+        """Set the hook that returns a function with the sign of the field, which intervals enclose more
+        tightly, and its arguments; or None.
+        """
+        return self._hook("sign", hook)
+
+    def proved_bounds(self, hook: Callable[[Node], Box]) -> Callable[[Node], Box]:
+        """Set the hook that returns a box proved to enclose the inside, if that of `bounds` is measured."""
+        return self._hook("proved_bounds", hook)
+
+    def keeps_sign(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """Set the hook that returns True if the sign of an operator's field depends on the signs of its
+        elements' fields alone.
+        """
+        return self._hook("keeps_sign", hook)
+
     def identity(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
         """Set the hook that returns True if the node changes nothing and can be left out."""
         return self._hook("identity", hook)

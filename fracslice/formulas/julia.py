@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from .box import Box
 from .escape import CORE, levels, potential_distance
-from .orbits import REPEAT, Stepped, single
+from .orbits import REPEAT, Stepped, escape_sign, single
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
 from .vocabulary import any_of, maximum, orbit, sqrt, where
@@ -126,3 +127,9 @@ def julia_step(node: Node) -> Stepped:
     if node["c"][3]:
         raise node.fail("c: expected a last number of 0 inside <orbit>: its points have no k")
     return step, {}, node["c"][:3]
+
+
+@julia.sign
+def julia_sign(node: Node) -> tuple[Callable[..., Any], dict[str, object]] | None:
+    _, _, escape2, _ = levels(2, node["iterations"], node["bailout"], ESCAPED)
+    return escape_sign(node, node["bailout"], escape2) if not node["c"][3] else None

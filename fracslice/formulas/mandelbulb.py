@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 from . import escape
 from .box import Box, Triple
 from .escape import CORE, potential_distance, sure_distance
-from .orbits import REPEAT, Stepped, single
+from .orbits import REPEAT, Stepped, escape_sign, single
 from .parameters import AUTO, Count, Number, Vector
 from .registry import Fixed, Node, shape
 from .verbs import power as raised
@@ -310,3 +312,9 @@ def mandelbulb_step(node: Node) -> Stepped:
     if power % 1:
         return step, {"power": power}, node["julia"]
     return whole_step, {**_products(power), "power": power}, node["julia"]
+
+
+@mandelbulb.sign
+def mandelbulb_sign(node: Node) -> tuple[Callable[..., Any], dict[str, object]]:
+    _, _, escape2, _ = escape.levels(node["power"], node["iterations"], node["bailout"], ESCAPED)
+    return escape_sign(node, node["bailout"], escape2)

@@ -56,6 +56,11 @@ def material(child, x, y, z):  # type: ignore[no-untyped-def]
     return child(x, y, z)
 
 
+@material.keeps_sign
+def material_keeps_sign(_: Node) -> bool:
+    return True
+
+
 @material.bounds
 def material_bounds(node: Node) -> Box:
     return node.children[0].bounds.box

@@ -212,6 +212,35 @@ class Node(Operators, Field):
         node: Node = self._hooked("visible", self, voxel)
         return node
 
+    def signs(self) -> Node:
+        """Tree whose field has the sign of this one's and is enclosed more tightly by intervals.
+
+        Returns
+        -------
+        Node
+        """
+        if found := self._hooked("sign", None):
+            function, values = found
+            own = {"select": lambda _: function, "arguments": lambda _: values}
+            return replace(self, formula=replace(self.formula, hooks={**self.formula.hooks, **own}))
+        if self._hooked("keeps_sign", False):
+            return replace(self, children=tuple(child.signs() for child in self.children))
+        return self
+
+    @property
+    def proved_box(self) -> Box:
+        """See `Field.proved_box`."""
+        return self._boxed().bounds.box
+
+    def _boxed(self) -> Node:
+        """Tree with proved boxes."""
+        if self.formula.kind != "shape":
+            return replace(self, children=tuple(child._boxed() for child in self.children))
+        hooks = self.formula.hooks
+        if "proved_bounds" not in hooks:
+            return self
+        return replace(self, formula=replace(self.formula, hooks={**hooks, "bounds": hooks["proved_bounds"]}))
+
     @property
     def is_identity(self) -> bool:
         """True if the node changes nothing and can be left out."""

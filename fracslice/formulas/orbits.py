@@ -93,7 +93,7 @@ def orbit_step(node: Node) -> Stepped:
 
 def _steps(node: Node) -> Iterator[tuple[Node, Affine | None]]:
     """Steps of a round, and the maps of the transforms around them."""
-    if node.formula is not orbit:
+    if not node.children:
         yield node, None
         return
     for child in node.children:
@@ -202,6 +202,41 @@ def orbit_arguments(node: Node) -> dict[str, object]:
     return {**own, **values}
 
 
+def orbit_sign(node: Node) -> tuple[Callable[..., Any], dict[str, object]] | None:
+    code, values = steps(node)
+    grown_by = grown(node)
+    own = provider("orbit_signs").sign_arguments(code, grown_by, node["iterations"])
+    return (provider("orbits").sign(code, grown_by.scaled), {**own, **values}) if own else None
+
+
+def orbit_proved_bounds(node: Node) -> Box:
+    code, values = steps(node)
+    rounds = 1 if node["iterations"] == AUTO else node["iterations"]
+    box: Box = provider("orbit_signs").proved_box(code, tuple(values.items()), rounds)
+    return box
+
+
+def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Callable[..., Any], dict[str, object]]:
+    """Function with the sign of an escape-time fractal's field, and its arguments.
+
+    Parameters
+    ----------
+    node : Node
+        Escape-time fractal with a step.
+    radius : float
+        Bailout radius.
+    escape2 : float
+        Square of the radius where its orbits stop, which is not smaller.
+
+    Returns
+    -------
+    (callable, dict)
+    """
+    code, values = steps(node)
+    own = {"iterations": node["iterations"], "radius2": radius**2, "stop0": escape2}
+    return provider("orbits").sign(code, False), {**own, **values}
+
+
 def orbit_select(node: Node) -> Callable[..., Any]:
     bound = grown(node)
     function: Callable[..., Any] = provider("orbits").field(steps(node)[0], bound.by_power, bound.scaled)
@@ -238,6 +273,8 @@ HOOKS: dict[str, Callable[..., Any]] = {
     "bounds": orbit_bounds,
     "arguments": orbit_arguments,
     "select": orbit_select,
+    "sign": orbit_sign,
+    "proved_bounds": orbit_proved_bounds,
     "steepening": orbit_steepening,
     "potential": orbit_potential,
     "check": orbit_check,

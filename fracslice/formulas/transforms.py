@@ -107,6 +107,11 @@ def transform_arguments(node: Node) -> dict[str, object]:
     return {"back": tuple(flat), "shrink": float(stretches(linear)[-1])}
 
 
+@transform.keeps_sign
+def transform_keeps_sign(_: Node) -> bool:
+    return True
+
+
 @transform.bounds
 def transform_bounds(node: Node) -> Box:
     box = node.children[0].bounds.box
@@ -145,6 +150,11 @@ def chosen_axis(node: Node) -> Fixed:
 @mirror.arguments
 def mirror_arguments(node: Node) -> dict[str, object]:
     return {"axis": chosen_axis(node)}
+
+
+@mirror.keeps_sign
+def mirror_keeps_sign(_: Node) -> bool:
+    return True
 
 
 @mirror.bounds

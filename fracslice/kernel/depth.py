@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -29,7 +28,7 @@ ENOUGH = 256
 CELLS = 1 << 13
 """Largest number of cells searched for the surface."""
 
-STEPS = "depths"
+STEPS = "steps"
 """Kind of text in the cache."""
 
 BISECTIONS = 24
@@ -152,7 +151,7 @@ def _depth(node: Node, detail: float) -> int:
     for depth in range(1, DEEPEST):
         for k in range(len(steps) + 1, depth + 2):
             steps.append(_step(*(Known(node.changed(iterations=d)) for d in (k, k + 1))))
-            keep_text(STEPS, steps.made_of, json.dumps(steps))
+            keep_text(STEPS, steps.made_of, " ".join(map(repr, steps)))
         step, following = steps[depth - 1 : depth + 1]
         if step is None:
             return max(depth - 1, 1)
@@ -166,7 +165,8 @@ class _Steps(list[float | None]):
 
     def __init__(self, *made_of: str) -> None:
         self.made_of = made_of
-        super().__init__(json.loads(kept_text(STEPS, made_of, lambda: "[]")))
+        steps = kept_text(STEPS, made_of, lambda: "").split()
+        super().__init__(None if step == repr(None) else float(step) for step in steps)
 
 
 @lru_cache(maxsize=64)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -347,3 +348,20 @@ def on_cells(name: str) -> Callable[..., Any]:
 def _on_arrays(value: Any) -> Interval:
     """Interval of numbers; an interval unchanged."""
     return value if isinstance(value, Interval) else Interval.at(np.asarray(value, np.float64), ARRAYS)
+
+
+def on_intervals(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function in the language of formulas that takes intervals.
+
+    Parameters
+    ----------
+    function
+        Function that uses the vocabulary and nothing else from outside.
+
+    Returns
+    -------
+    callable
+        The same code with functions of intervals.
+    """
+    assert isinstance(function, FunctionType)
+    return FunctionType(function.__code__, {name: on_cells(name) for name in vocabulary.NAMES})

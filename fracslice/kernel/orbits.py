@@ -150,6 +150,50 @@ def _field(steps: Round, by_power: bool, scaled: bool, _: object) -> Callable[..
     return written(steps, ["x", "y", "z", "iterations", own, *given], body)
 
 
+def sign(steps: Round, scaled: bool) -> Callable[..., Any]:
+    """Write the function of ``|w_N|^2 - R^2`` where an orbit does not stop before, else of 1.
+
+    Parameters
+    ----------
+    steps
+        Steps of a round.
+    scaled
+        True if R is that of ``scale |w|``.
+
+    Returns
+    -------
+    Callable
+        Function in the language of formulas.
+
+    Raises
+    ------
+    KernelError
+        If a step is not in the language.
+    """
+    return _sign(steps, scaled, tuple(functions.fingerprint(code.step) for code in steps))
+
+
+@lru_cache(maxsize=256)
+def _sign(steps: Round, scaled: bool, _: object) -> Callable[..., Any]:
+    given, setup, loop = [], [], []
+    for place, code in enumerate(steps):
+        lines, assigned = code.image(place)
+        given += [*code.arguments(place), f"stop{place}"]
+        setup += [*code.unpacked(place), code.constant(place, ("x", "y", "z"))]
+        loop += [*lines, *assigned, "r2 = x * x + y * y + z * z"]
+        loop += [f"alive = alive & (r2 < stop{place})"]
+    body = [
+        *setup,
+        "r2 = x * x + y * y + z * z",
+        f"alive = r2 < stop{len(steps) - 1}",
+        "for _ in range(iterations):",
+        *_indented(["if not any_of(alive):", "    break", *loop]),
+        f"return where(alive, {'scale * scale * ' if scaled else ''}r2 - radius2, 1.0 + 0.0 * r2)",
+    ]
+    own = ["scale", "radius2"] if scaled else ["radius2"]
+    return written(steps, ["x", "y", "z", "iterations", *own, *given], body)
+
+
 def _taken(code: Code, place: int, by_power: bool, scale: str) -> list[str]:
     """Lines of the loop that take a step."""
     by_w, by_c = code.traced(place).stretch

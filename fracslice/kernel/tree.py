@@ -95,7 +95,7 @@ def cells(root: Node, precision: Precision) -> Cells:
     KernelError
         If the scene cannot be compiled.
     """
-    return Enclosures(cpu.compile_loops(link(root), (enclosures,), precision), np.dtype(precision))
+    return Enclosures(cpu.compile_loops(link(root.signs()), (enclosures,), precision), np.dtype(precision))
 
 
 def key(root: Node) -> str:

@@ -1,4 +1,4 @@
-"""Trial of a formula at random points: back ends, Lipschitz bound and box."""
+"""Trial of a formula at random points: back ends, derivative of the step, Lipschitz bound and box."""
 
 from __future__ import annotations
 
@@ -8,13 +8,20 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
+from ..formulas.orbits import steps
 from ..formulas.parameters import AUTO, REQUIRED
 from ..formulas.registry import Formula, Node, get
 from .cpu import compile_scene
+from .orbits import written
 from .reference import reference
 
 COUNT, STEPS = 20_000, 6
 """Random points, and the iterations of a trial where the depth is automatic."""
+
+NEAR, CREASES = 1e-6, 0.002
+"""Distance of the points that a step's stretch is examined with, and the share of points that may lie at its
+creases.
+"""
 
 TOLERANCE = {"float64": 1e-9, "float32": 1e-3}
 """Differences from the reference, relative to values above 1."""
@@ -30,10 +37,13 @@ class Trial:
         One line per examination.
     faults
         Number of examinations that failed.
+    root
+        Node that was examined.
     """
 
     lines: tuple[str, ...]
     faults: int
+    root: Node
 
 
 def trial(formula: Formula) -> Trial:
@@ -65,6 +75,8 @@ def trial(formula: Formula) -> Trial:
     points = rng.uniform(lo - 0.25 * size, hi + 0.25 * size, (COUNT, 3)).T
     expected = reference(root)(*points)
     results = [_parity(root, points, expected, "float64"), _parity(root, points, expected, "float32")]
+    if "step" in formula.hooks:
+        results.append(_derivative(root, points))
     field = compile_scene(root, "float64").points
     values = field(*points)
     step = rng.normal(size=points.shape)
@@ -81,7 +93,7 @@ def trial(formula: Formula) -> Trial:
     inside = float((values < 0).mean())
     results.append((0 < inside < 1, f"inside: {inside:.1%} of the points in and around the box"))
     lines = [f"{'ok   ' if good else 'FAULT'} {line}" for good, line in results]
-    return Trial(tuple(lines), sum(not good for good, _ in results))
+    return Trial(tuple(lines), sum(not good for good, _ in results), root)
 
 
 def _sample(formula: Formula) -> Node:
@@ -102,3 +114,23 @@ def _parity(root: Node, points: np.ndarray, expected: np.ndarray, precision: str
     typical = float(np.quantile(error, 0.99))
     good = bool(np.isfinite(values).all()) and typical < TOLERANCE[precision]
     return good, f"{precision}: 99% of the values within {typical:.1e} of the reference"
+
+
+def _derivative(root: Node, points: np.ndarray) -> tuple[bool, str]:
+    """Comparison of a step's stretch with the distances of its images."""
+    taken, values = steps(root)
+    code = taken[0]
+    made, names = code.traced(0), code.arguments(0)
+    start = code.constant(0, ("px", "py", "pz"))
+    image = f"return ({', '.join(made.point)}), {made.stretch[0]}"
+    body = [*code.unpacked(0), start, *made.lines, image]
+    step = written(taken, ["x", "y", "z", "px", "py", "pz", *names], body)
+    given = [values[name] for name in names]
+    apart = np.random.default_rng(1).normal(size=points.shape)
+    apart *= NEAR / np.linalg.norm(apart, axis=0)
+    with np.errstate(all="ignore"):
+        here, stretch = step(*points, *points, *given)
+        there, _ = step(*(points + apart), *points, *given)
+        moved = np.linalg.norm(np.array(np.broadcast_arrays(*there)) - np.broadcast_arrays(*here), axis=0)
+        broken = float((moved > NEAR * (1.001 * np.asarray(stretch) + 1e-3)).mean())
+    return broken < CREASES, f"derivative of the step: too small at {broken:.1%} of the points"

@@ -50,12 +50,18 @@ class Exchange:
         Returns
         -------
         trimesh.Trimesh
-            The same vertices and triangles.
+            The same vertices and triangles; colours and, as vertex attributes, scalars.
         """
         import trimesh
 
         mesh = cast("Mesh", self)
-        return trimesh.Trimesh(mesh.vertices.copy(), mesh.triangles.copy(), process=False)
+        return trimesh.Trimesh(
+            mesh.vertices.copy(),
+            mesh.triangles.copy(),
+            process=False,
+            vertex_colors=None if mesh.colours is None else mesh.colours.copy(),
+            vertex_attributes={name: values.copy() for name, values in mesh.scalars.items()},
+        )
 
     def to_pyvista(self) -> Any:
         """Copy of the mesh as a `pyvista.PolyData`.
@@ -63,7 +69,7 @@ class Exchange:
         Returns
         -------
         pyvista.PolyData
-            The same vertices and triangles.
+            The same vertices and triangles; scalars and, as "RGB", colours are point data.
 
         Raises
         ------
@@ -76,7 +82,12 @@ class Exchange:
 
         mesh = cast("Mesh", self)
         surface: Any = pyvista.PolyData
-        return surface.from_regular_faces(mesh.vertices.copy(), mesh.triangles)
+        made = surface.from_regular_faces(mesh.vertices.copy(), mesh.triangles)
+        for name, values in mesh.scalars.items():
+            made.point_data[name] = values
+        if mesh.colours is not None:
+            made.point_data["RGB"] = mesh.colours
+        return made
 
     def plot(self, **options: Any) -> Any:
         """Show the mesh in a window, or in the output of a notebook cell.
@@ -96,4 +107,6 @@ class Exchange:
         MeshError
             If pyvista is not installed.
         """
-        return self.to_pyvista().plot(**{"color": CLAY, "split_sharp_edges": True, **options})
+        mesh = cast("Mesh", self)
+        usual = {"color": CLAY} if mesh.colours is None else {"scalars": "RGB", "rgb": True}
+        return self.to_pyvista().plot(**{**usual, "split_sharp_edges": True, **options})

@@ -91,7 +91,8 @@ def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) 
         return {"vertices": piece.mesh.vertices, "triangles": piece.mesh.triangles}
 
     parts = ("surface", work.device, bricks.origin, bricks.voxel, bricks.index, bricks.ijk, signs.signs)
-    return Mesh(**stored(work.store, parts, root, made))
+    arrays = stored(work.store, parts, root, made)
+    return Mesh(arrays["vertices"], arrays["triangles"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,8 +217,7 @@ class SurfaceContours:
         vertices, triangles, count, cases, to_means = surface.finish()
         features = vertices[count:]
         regions = partial(_trust_regions, (features, cases, to_means), self._placement)
-        moved, places = project(self.root, features, regions, signs.voxel, work)
-        features[moved] = places
+        project(self.root, features, regions, signs.voxel, work)
         mesh, border = Mesh(vertices, triangles), np.inf
         if last < len(signs.index):  # Unused vertices belong to the next piece.
             mesh = mesh.compact()

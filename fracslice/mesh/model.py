@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +24,10 @@ class Mesh(Exchange):
         Positions; mm in print space.
     triangles : ndarray of int32, shape (m, 3)
         Vertex indices, counter-clockwise seen from outside.
+    colours : ndarray of uint8, shape (n, 3), optional
+        Colours of the vertices, sRGB.
+    scalars : mapping of str to ndarray of float32, shape (n,)
+        Named numbers of the vertices.
 
     Examples
     --------
@@ -35,6 +42,8 @@ class Mesh(Exchange):
 
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int32]
+    colours: NDArray[np.uint8] | None = None
+    scalars: Mapping[str, NDArray[np.float32]] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:
         for name, kind in (("vertices", np.float64), ("triangles", np.int32)):
@@ -124,7 +133,7 @@ class Mesh(Exchange):
         Mesh
             The copy.
         """
-        return Mesh(self.vertices + np.asarray(offset, dtype=np.float64), self.triangles)
+        return self._with(self.vertices + np.asarray(offset, dtype=np.float64))
 
     def scaled(self, factor: float) -> Mesh:
         """Copy scaled about the origin.
@@ -146,7 +155,7 @@ class Mesh(Exchange):
         """
         if not factor > 0:
             raise ValueError(f"scale factor must be positive, not {factor}")
-        return Mesh(self.vertices * factor, self.triangles)
+        return self._with(self.vertices * factor)
 
     def selected(self, keep: NDArray[np.bool_], threads: int = 1) -> Mesh:
         """Select triangles, and the vertices they use.
@@ -165,6 +174,11 @@ class Mesh(Exchange):
         """
         from fracslice._native import selected
 
+        if self.colours is not None or self.scalars:
+            used = np.zeros(len(self.vertices), bool)
+            used[self.triangles[keep]] = True
+            number = np.cumsum(used, dtype=np.int32) - np.int32(1)
+            return self._taken(np.flatnonzero(used), number[self.triangles[keep]])
         kept = selected(self.vertices, self.triangles, keep, threads)
         return Mesh(*kept) if kept else self
 
@@ -182,7 +196,7 @@ class Mesh(Exchange):
         starts = np.zeros(len(flat), bool)
         starts[first[first >= 0]] = True
         number = np.cumsum(starts, dtype=np.int32) - np.int32(1)
-        return Mesh(self.vertices[flat[starts]], number[first[self.triangles]])
+        return self._taken(flat[starts], number[first[self.triangles]])
 
     def compact(self) -> Mesh:
         """Remove unused vertices.
@@ -193,6 +207,16 @@ class Mesh(Exchange):
             All triangles; this mesh if there are no such vertices.
         """
         return self.selected(np.ones(len(self.triangles), bool), 0)
+
+    def _with(self, vertices: NDArray[np.float64]) -> Mesh:
+        """Copy with other positions."""
+        return Mesh(vertices, self.triangles, self.colours, self.scalars)
+
+    def _taken(self, index: NDArray[Any], triangles: NDArray[np.int32]) -> Mesh:
+        """Mesh of some of the vertices, with their colours and scalars."""
+        colours = None if self.colours is None else self.colours[index]
+        scalars = {name: values[index] for name, values in self.scalars.items()}
+        return Mesh(self.vertices[index], triangles, colours, scalars)
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -108,7 +108,8 @@ class Pieces:
         Mesh
             Its triangles, scene units.
         """
-        return Mesh(**self._get(f"mesh{number}"))
+        arrays = self._get(f"mesh{number}")
+        return Mesh(arrays["vertices"], arrays["triangles"])
 
     def labels(self, number: int) -> NDArray[np.int32]:
         """Load the labels of a piece.

@@ -43,8 +43,8 @@ def project(
     trust_regions: Callable[[np.ndarray, np.ndarray], TrustRegions],
     voxel: float,
     work: Work | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Project points to the zero set within their trust regions.
+) -> None:
+    """Project points, in place, to the zero set within their trust regions.
 
     A point moves along the gradient if the field changes its sign there within four Newton steps and the box,
     else straight towards the point of opposite sign of its trust region. Where the field is smooth nearby, it
@@ -58,35 +58,28 @@ def project(
     points
         Points, float64 [n, 3], scene units.
     trust_regions
-        Function of point numbers and of a mask of the interior ones, returns their trust regions.
+        Function of point numbers and of a mask of the interior ones, returns their trust regions. It may
+        read these points, not others.
     voxel
         Voxel size, scene units.
     work
         Execution settings.
 
-    Returns
-    -------
-    numbers : ndarray
-        Numbers of the points that were off the surface, int64 [k].
-    places : ndarray
-        Their new positions, float64 [k, 3], scene units.
-
     Raises
     ------
     Cancelled
-        If the job was cancelled.
+        If the job was cancelled; some points are moved then.
     """
     work = work or Work()
     kernel = root.kernel(work.device, "float64")
     guess, exact = (Roots(root, precision, voxel, work.device) for precision in ("float32", "float64"))
 
-    def task(part: slice) -> tuple[np.ndarray, np.ndarray]:
+    def task(part: slice) -> None:
         values = kernel.points(*points[part].T)
         away = np.flatnonzero(np.abs(values) > NEAR * voxel)
-        if not len(away):
-            return away, np.empty((0, 3))
-        own = guess.padded(away)
-        return part.start + away, brought(part.start + own, values[own])[:, : len(away)].T
+        if len(away):
+            own = guess.padded(away)
+            points[part.start + away] = brought(part.start + own, values[own])[:, : len(away)].T
 
     def brought(which: np.ndarray, f: np.ndarray) -> np.ndarray:
         p, region = np.ascontiguousarray(points[which].T), trust_regions(which, f < 0)
@@ -100,11 +93,7 @@ def project(
         there = np.clip(p + t * rays[3:], region.low, region.high)
         return np.where(miss * voxel < np.abs(f), there, p)
 
-    result = work.collect(task, chunks(len(points), kernel.batch >> 3))
-    if not result:
-        return np.empty(0, np.int64), np.empty((0, 3))
-    numbers, places = zip(*result, strict=True)
-    return np.concatenate(numbers), np.concatenate(places)
+    work.map(task, chunks(len(points), kernel.batch >> 3))
 
 
 def anywhere(which: np.ndarray, inside: np.ndarray) -> TrustRegions:

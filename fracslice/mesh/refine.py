@@ -164,8 +164,7 @@ def _wanted(
     split[longest[free[longest] & (state.off[left] < rough[longest])]] = True
     split = np.asarray(with_needles(split, sides, lengths) & free)
     chosen = there[split]
-    moved, places = project(root, chosen, anywhere, voxel, work)
-    chosen[moved] = places
+    project(root, chosen, anywhere, voxel, work)
     return split, chosen
 
 

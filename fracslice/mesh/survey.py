@@ -174,7 +174,8 @@ class Survey:
         of_label, count = connected_components(pairs[:, [0, 1, 1]], len(own))
         extremes = self._all("extremes")
         outermost = np.empty((count, 6), np.int64)
-        for side in range(6):
+        outermost[:] = np.arange(count)[:, None]
+        for side in range(6 if self.same else 0):  # else each component is a shell
             height: NDArray[np.float64] = extremes[:, side, side % 3] * (1 if side < 3 else -1)
             order = np.lexsort((height, of_label))
             outermost[:, side] = order[np.searchsorted(of_label[order], np.arange(count))]

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from ..formulas import difference, intersection, union
-from ..formulas.field import Bounds, Device, Precision
+from ..formulas.box import Box
+from ..formulas.field import Bounds, Cells, Device, Precision
 from ..kernel import Field, Kernel
 from ..kernel.arrays import ArrayField
 from ..keys import key
@@ -53,14 +54,40 @@ class EditedField(ArrayField):
         """`Field.key`."""
         return key(self.root.key, self.does, self.shape.key)
 
+    @property
+    def proved_box(self) -> Box:
+        """`Field.proved_box`."""
+        own = self.root.proved_box
+        return own | self.shape.proved_box if self.does == "add" else own
+
     def conservative(self) -> EditedField:
         """`Field.conservative`. A cut shape stays exact: a conservative one would cut too much."""
         shape = self.shape if self.does == "cut" else self.shape.conservative()
         return EditedField(self.root.conservative(), self.does, shape)
 
+    def cells(self, precision: Precision = "float32") -> Cells | None:
+        """`Field.cells`."""
+        root, shape = self.root.cells(precision), self.shape.cells(precision)
+        return _CompositeCells(root, self.does, shape) if root and shape else None
+
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
         """`Field.kernel`, always on the CPU."""
         return _Composite(self.root.kernel("cpu", precision), self.does, self.shape.kernel("cpu", precision))
+
+
+@dataclass(frozen=True, eq=False)
+class _CompositeCells:
+    """`formulas.field.Cells` of an edited field."""
+
+    root: Cells
+    does: Does
+    shape: Cells
+
+    def __call__(self, centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
+        (empty, full), (no, yes) = self.root(centres, half), self.shape(centres, half)
+        if self.does == "cut":
+            no, yes = yes, no
+        return (empty & no, full | yes) if self.does == "add" else (empty | no, full & yes)
 
 
 class _Composite(Kernel):

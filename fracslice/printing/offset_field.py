@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..formulas.box import Box
 from ..formulas.confining import moved_slope
 from ..formulas.field import Bounds, Device, Precision
 from ..kernel import Field, Kernel
@@ -39,6 +40,11 @@ class OffsetField(ArrayField):
     def key(self) -> str:
         """`Field.key`."""
         return key(self.root.key, "offset", self.by)
+
+    @property
+    def proved_box(self) -> Box:
+        """`Field.proved_box`."""
+        return self.root.proved_box.grown(self.by)
 
     def conservative(self) -> OffsetField:
         """`Field.conservative`. An escape-time fractal is not shrunk: its interior values bound nothing."""

@@ -25,7 +25,7 @@ COARSE = 4
 """Grid spacing of the first pass, pixels."""
 NEARLY = 0.999
 """Safety factor: a mean times this does not exceed the largest value, despite rounding."""
-FEW = 1 / 256
+FEW = 1 / 16
 """Fraction of unfinished pixels up to which all of them are sampled: a pass has a fixed cost even for one
 pixel."""
 

@@ -42,6 +42,33 @@ def opaque_part(node: Node) -> Node | None:
     return node.changed(left) if left else None
 
 
+def transparent_part(node: Node) -> Node | None:
+    """Return a scene with those members of its unions alone that are transparent.
+
+    Parameters
+    ----------
+    node : Node
+        Root of the formula tree.
+
+    Returns
+    -------
+    Node or None
+        The rest; None if nothing is transparent.
+    """
+    if node.formula.name == material.name and node["clear"]:
+        return node
+    parts = tuple(transparent_part(child) for child in node.children)
+    if node.formula.name != "union":
+        return node.changed((parts[0], *node.children[1:])) if parts and parts[0] else None
+    left = tuple(part for part in parts if part)
+    return node.changed(left) if len(left) > 1 else (left or (None,))[0]
+
+
+def _head_on(index: float) -> float:
+    """Reflectance of glass at normal incidence (Fresnel)."""
+    return ((index - 1) / (index + 1)) ** 2
+
+
 @dataclass
 class Look:
     """Materials of a scene, and the kernel lines that load the material at a hit.
@@ -113,6 +140,26 @@ class Look:
         """
         dialect = TraceDialect(self.linker, materials=self.paints, traps=traps(self.root))
         return [f"_, paint, tone = {link_tree(self.linker, self.root, dialect)}"]
+
+    def transparent(self) -> list[str]:
+        """Return the lines of `units.intrinsics.transparent`.
+
+        Returns
+        -------
+        list of str
+            Kernel source lines.
+        """
+        part = transparent_part(self.root)
+        assert part
+        dialect = TraceDialect(self.linker, materials=self.paints, traps=traps(self.root))
+        lines = [f"f, paint, tone = {link_tree(self.linker, part, dialect)}", "t = 0.0 * x"]
+        values = [
+            (*n["absorb"], n["clear"] * (1 - ((n["index"] - 1) / (n["index"] + 1)) ** 2)) for n in self.all
+        ]
+        options: list[tuple[list[str], list[str]]] = [
+            ([], [self.linker.argument(v) for v in row]) for row in values
+        ]
+        return [*lines, *self.chosen(options, ("r", "g", "b", "kept")), "return f, r, g, b, kept"]
 
     def colour(self, k: int, node: Node) -> tuple[list[str], list[str]]:
         """Return the colour of a material.

@@ -34,6 +34,9 @@ class CudaTracer:
         If there is no GPU.
     """
 
+    prepasses = 1
+    """Cone prepasses."""
+
     def __init__(self, frame: Frame, dtype: np.dtype, width: int, height: int) -> None:
         self._cuda = require()
         self.dtype, self.width, self.height = dtype, width, height

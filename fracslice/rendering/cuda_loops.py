@@ -140,9 +140,10 @@ def cones(P, S, blocks, limit, frame):
         px, py = px + P[frame.far + 1], py + P[frame.far + 2]
         ox, oy, oz, dx, dy, dz = camera_ray(px, py, real(0.0), real(0.0), P)
         t, steps, before, stride, gap = real(0.0), real(0.0), real(0.0), real(0.0), real(1.0)
+        spread = P[frame.far + 3] * real(frame.block)
         while not t > P[frame.far]:
             t, before, stride, gap = step_cone(
-                ox, oy, oz, dx, dy, dz, t, before, stride, real(1.0), real(0.0), P
+                ox, oy, oz, dx, dy, dz, t, before, stride, real(1.0), spread, P
             )
             steps += real(1.0)
             if gap < real(0.0) or steps >= limit:

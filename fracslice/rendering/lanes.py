@@ -19,7 +19,7 @@ Row = IntEnum(
 - ox, oy, oz, dx, dy, dz: origin and unit direction.
 - start, end: interval of t to march.
 - side: -1 inside the solid.
-- path: length of the path before this ray.
+- path: length of the path before this ray; of a cone its half width at distance 1.
 - status: 1 hit, 2 missed, 3 out of steps.
 - r, g, b: light gathered.
 - tr, tg, tb: throughput, the factor on light still to come.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..formulas.registry import Node
+from ..formulas.registry import Fixed, Node
 from ..kernel import functions
 from ..kernel.dialects import FieldDialect
 from ..kernel.linker import Linker
@@ -16,12 +16,12 @@ from ..scene.view import Camera, Light, View
 from .colours import Look, opaque_part
 from .drawn import Drawn
 from .haze import fogged
-from .optics import Optics
+from .optics import Optics, ray_bound
 from .scattering import divided, lacquered
 from .surroundings import Surroundings, seen_as_disc
 from .units import lights, march, shade
 from .units.glossy import highlight
-from .units.intrinsics import background, blocker
+from .units.intrinsics import background, blocker, transparent
 from .units.pixel import linear
 from .units.weights import weights
 
@@ -99,8 +99,13 @@ class Lighting:
             lines += ["ambient = ambient + glow"] * look.glows
             lines += [f"{c} = ambient * c{c}" for c in "rgb"]
         if any(map(casts_shadows, self.view.lights)):
-            steepness = 1 / self.root.bounds.lipschitz
-            self.linker.bind("visible_", march.visible, {"steepness": steepness, "patience": PATIENCE})
+            steepness = 1 / ray_bound(self.root)
+            marched = {"steepness": steepness, "patience": PATIENCE}
+            self.linker.bind("visible_", march.visible, {**marched, "glass": Fixed(False)})
+            if look.inside:
+                self.linker.bind("unobstructed_", march.visible, {**marched, "glass": Fixed(True)})
+                self.linker.bind("tinted_shadow_", march.tinted_shadow, marched)
+                self.linker.functions["transparent"] = text_of(transparent, look.transparent())
             self.linker.functions["blocker"] = self.blocker()
             lines += [f"s{a} = {a} + 3.0 * h * n{a}" for a in "xyz"]
         if self.weighted:
@@ -144,10 +149,10 @@ class Lighting:
             f"lx, ly, lz, far, power = light{k}(x, y, z, {u}, {v}, P)",
             "diffuse, gloss = phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess)",
         ]
+        passed = ""
         if casts_shadows(light):
-            lines.append(
-                "power = power * visible_(sx, sy, sz, lx, ly, lz, where(diffuse > 0.0, far, 0.0), h, P)"
-            )
+            lines += [*self.shadow("where(diffuse > 0.0, far, 0.0)"), "power = power * open"]
+            passed = self.passed
         shine, scattered, reflected = "gloss", "", ""
         if look.glossy:
             self.linker.share(highlight)
@@ -159,10 +164,27 @@ class Lighting:
             scattered, reflected = "scattered * ", "reflected * "
         if look.coated:
             lines += lacquered(self.linker, colour)
-        return lines + [
-            f"{c} = {c} + power * {s} * ({scattered}diffuse * c{c} + {reflected}{shine.format(c)})"
-            for c, s in zip("rgb", colour, strict=True)
-        ]
+        for c, s in zip("rgb", colour, strict=True):
+            sent = f"{scattered}diffuse * c{c} + {reflected}{shine.format(c)}"
+            lines.append(f"{c} = {c} + power * {s}{passed.format(c)} * ({sent})")
+        return lines
+
+    @property
+    def passed(self) -> str:
+        """Factor on a light for what transparent parts pass on; the colour is left open."""
+        return " * w{0}" if self.inside else ""
+
+    def shadow(self, far: str, bent: bool = False) -> list[str]:
+        """Lines for the light that arrives from a direction.
+
+        Rays that are bent carry the light of surroundings through glass, which then blocks straight ones.
+        """
+        ray = f"(sx, sy, sz, lx, ly, lz, {far}, h, P)"
+        if not self.inside:
+            return [f"open = visible_{ray}"]
+        if bent:
+            return [f"open = unobstructed_{ray}"]
+        return [f"open = visible_{ray}", f"wr, wg, wb = tinted_shadow_{ray}"]
 
     def weights(self) -> list[str]:
         """Lines for the weights of a light's sample."""
@@ -180,11 +202,14 @@ class Lighting:
             f"lx, ly, lz, dense = towards_({u}, {v}, P)",
             "hr, hg, hb = surroundings_(lx, ly, lz, P)",
             "diffuse = maximum(nx * lx + ny * ly + nz * lz, 0.0)",
-            f"open = visible_(sx, sy, sz, lx, ly, lz, where(diffuse > 0.0, {far}, 0.0), h, P)",
+            *self.shadow(f"where(diffuse > 0.0, {far}, 0.0)", look.paths),
             f"power = open / maximum({math.pi} * dense, 1e-30)",
         ]
         if not look.paths:
-            return lines + [f"{c} = {c} + power * h{c} * diffuse * c{c}" for c in "rgb"]
+            passed = (self.passed.format(c) for c in "rgb")
+            return lines + [
+                f"{c} = {c} + power * h{c}{w} * diffuse * c{c}" for c, w in zip("rgb", passed, strict=True)
+            ]
         self.linker.share(highlight)
         lines += ["spot, half = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, roughness)", *self.weights()]
         shine = "where(roughness > 0.0, reflected * spot * tinted(half, k{0}), 0.0)"
@@ -219,7 +244,8 @@ class Lighting:
             lines = [
                 f"lx, ly, lz = upward(nx, ny, nz, {u}, {v})",
                 "hr, hg, hb = sky_(lx, ly, lz, P)",
-                f"open = visible_(sx, sy, sz, lx, ly, lz, {far} + 0.0 * t, h, P)",
+                *self.shadow(f"{far} + 0.0 * t"),
+                *(f"h{c} = h{c}{self.passed.format(c)}" for c in "rgb" if self.inside),
             ]
         return lines + [f"{c} = {c} + open * h{c} * c{c}" for c in "rgb"]
 

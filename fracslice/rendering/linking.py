@@ -15,11 +15,14 @@ from .cameras import camera_unit
 from .colours import Look
 from .drawn import Drawn
 from .lighting import Lighting, text_of
-from .optics import Optics
+from .optics import Optics, ray_bound
 from .scattering import onward
 from .units import march
 from .units.intrinsics import GIVEN, surface
 from .units.normal import normal
+
+CIRCLE = 1.4143 * 1.02
+"""Radius of the circle around a pixel, half sides, with 2 % for the film's perspective."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +46,10 @@ class Frame:
     weighted : bool
         True if continued rays carry the density of their direction.
     far : int
-        Index in P of the far distance; the upper left pixel of the picture follows.
+        Index in P of the far distance; the upper left pixel of the picture follows, and the half width of
+        a pixel's cone at distance 1.
     block : int
-        Side of a block of the cone prepass, pixels; a power of two.
+        Side of a block of the cone prepass on a GPU, pixels; a power of two.
     """
 
     linked: Linked
@@ -121,7 +125,7 @@ class _Frame:
         camera_samples = self.cameras()
         look = Look(linker, self.root, self.paths)
         far = len(linker.parameters)
-        for number in (self.seen.far, *self.seen.origin):
+        for number in (self.seen.far, *self.seen.origin, CIRCLE * self.seen.cone):
             linker.argument(number)
         self.bounces = self.view.shading.bounces if look.bounces and self.lit else 0
         linker.functions["background"] = self.lighting.background()
@@ -133,16 +137,15 @@ class _Frame:
 
     def marching(self) -> None:
         """Bind the units that march rays and cones."""
-        seen, steepness = self.seen, 1 / self.root.bounds.lipschitz
+        seen, steepness = self.seen, 1 / ray_bound(self.root)
         box = self.root.bounds.box
         lo = tuple(max(a, e - seen.far) for a, e in zip(box.lo, self.camera.eye, strict=True))
         hi = tuple(min(a, e + seen.far) for a, e in zip(box.hi, self.camera.eye, strict=True))
         self.linker.bind("span_box", march.span, {"lo": lo, "hi": hi})
-        widest = 1.4143 * self.block * seen.cone * 1.02
         width = {"cone": seen.cone, "least": seen.least}
         stepping = {"steepness": steepness, **width, "glass": Fixed(self.inside)}
         self.linker.bind("step_ray", march.advance, stepping)
-        self.linker.bind("step_cone", march.widen, {"steepness": steepness, "spread": widest})
+        self.linker.bind("step_cone", march.widen, {"steepness": steepness})
         self.linker.bind("width_at", _width, width)
 
     @property

@@ -19,6 +19,7 @@ from .draft import Follower, drafted
 from .passes import Pass
 from .progressive import Renderer
 from .steering import CameraInput
+from .watching import POLL, WatchedFile
 
 WITHIN = 0.05
 """Aim for the time of a draft, seconds."""
@@ -26,8 +27,6 @@ COARSEST = 8
 """Largest spacing of a draft's pixels."""
 READABLE = 4
 """Samples per pixel from which the final picture replaces the draft: fewer are noisier."""
-POLL = 0.2
-"""Interval between checks of the file, seconds."""
 LONGEST = 0.1
 """Longest step of a flight, seconds: the camera rests while a kernel is compiled."""
 
@@ -106,10 +105,10 @@ class Live:
         self._drafting = replace(self._refining, cancel=threading.Event())  # input must not stop a draft
         self._lock = threading.Lock()
         self._camera_input, self._spacing = CameraInput(), COARSEST // 2
-        self._checked = self._stepped = time.monotonic()
+        self._stepped = time.monotonic()
         self.making: float | None = None
         self._aim: Camera
-        self._saved = self._stamp()
+        self._file = WatchedFile(self._path)
         self._load(self._read(), None)
         self.first = self.camera
         self._open = True
@@ -277,24 +276,12 @@ class Live:
         with self._lock:
             self._aim = self.camera
 
-    def _stamp(self) -> tuple[int, int] | None:
-        """Modification time and size of the file; None while it is being replaced."""
-        try:
-            status = self._path.stat()
-        except OSError:
-            return None
-        return status.st_mtime_ns, status.st_size
-
     def _follow_file(self) -> None:
         """Load a new version of the file.
 
         Its camera is used only if it differs from the previous version's.
         """
-        now, saved = time.monotonic(), self._saved
-        if now - self._checked < POLL:
-            return
-        self._checked, self._saved = now, self._stamp() or saved
-        if self._saved == saved:
+        if not self._file.changed():
             return
         try:
             scene = self._read()

@@ -61,6 +61,31 @@ def footprint(camera: Camera, size: tuple[int, int]) -> tuple[float, float]:
     return tangent, 0.0
 
 
+ESTIMATE = 0.5
+"""Lipschitz bound of rays, as part of the guaranteed one, for escape-time fractals."""
+
+
+def ray_bound(root: Node) -> float:
+    """Return the Lipschitz bound that rays step by.
+
+    Half of the guaranteed bound of an escape-time fractal is for sets like a needle, by Koebe's theorem. Its
+    field estimates the distance (`formulas.escape`), and rays step by that: a ray that steps too far comes to
+    lie inside the solid and returns. No other field has such a half.
+
+    Parameters
+    ----------
+    root : Node
+        Root of the formula tree.
+
+    Returns
+    -------
+    float
+        Bound.
+    """
+    bounds = root.bounds
+    return bounds.lipschitz * (ESTIMATE if bounds.exterior_only else 1.0)
+
+
 def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> Optics:
     """Compute the optics of a picture.
 

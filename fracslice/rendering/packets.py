@@ -3,7 +3,7 @@
 Conventions:
 
 - P holds the scene's parameters, Q the points of the sample sequence, S the distance at which the rays of
-  each block of pixels start, A the sums of the picture.
+  each block of pixels start, A the sums of the picture. A block is 2^shift pixels wide.
 - W is the workspace of a tile: one row per quantity in `Row`, m numbers each. The t of ray i is
   ``W[Row.t * m + i]``.
 - L holds the packet under way: one row per quantity in `Lane`, WIDTH numbers each. `rays` holds the ray of
@@ -56,8 +56,8 @@ def workspace(frame: Frame, rays: int) -> int:
     return (Row.px + frame.samples) * rays
 
 
-@loop("rirrriirnnnn")
-def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, blocks, frame):
+@loop("rirrriirnnnnn")
+def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, shift, blocks, frame):
     """Add samples to each of n pixels up to their goals.
 
     Parameters
@@ -76,8 +76,8 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, blocks, frame):
         Picture width, pixels.
     limit : int
         Steps per ray.
-    blocks : int
-        Blocks per row of the picture.
+    shift, blocks : int
+        Binary logarithm of a block's side, and blocks per row of the picture.
     frame : Frame
         Linked frame.
     """
@@ -88,7 +88,7 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, blocks, frame):
         begin(W, m, P, frame)
         for k in range(left):
             pixel = pixels[k]
-            early = S[(pixel >> 16 + frame.shift) * blocks + ((pixel & 65535) >> frame.shift)]
+            early = S[(pixel >> 16 + shift) * blocks + ((pixel & 65535) >> shift)]
             W[Row.start * m + k] = max(W[Row.start * m + k], early)
         for bounce in range(frame.bounces + 1):
             follow(W, L, rays, left, m, limit, P, step_ray)
@@ -129,22 +129,24 @@ def unfinished(pixels, A, n, width):
     return kept
 
 
-@loop("rrirrinnnn")
-def cones(P, S, ids, W, L, rays, n, m, blocks, limit, frame):
+@loop("rrrirrinnnnnnn")
+def cones(P, S, C, ids, W, L, rays, n, m, shift, blocks, coarser, parents, limit, frame):
     """Cone prepass: compute the distance up to which all rays of each block of pixels are free.
 
     Parameters
     ----------
-    P, S : pointer to float
-        Scene parameters; start distance of each block, written.
+    P, S, C : pointer to float
+        Scene parameters; start distance of each block, written; that of each coarser block.
     ids : pointer to int32
         Block numbers.
     W, L, rays : pointer to float, pointer to float, pointer to int32
         Workspace, lanes, ray of each lane.
     n, m : int
         Blocks, and numbers per row of W.
-    blocks : int
-        Blocks per row of the picture.
+    shift, blocks : int
+        Binary logarithm of a block's side, and blocks per row of the picture.
+    coarser, parents : int
+        The same for the coarser blocks, whose free distance is known; `coarser` is relative to `shift`.
     limit : int
         Steps per cone.
     frame : Frame
@@ -152,12 +154,14 @@ def cones(P, S, ids, W, L, rays, n, m, blocks, limit, frame):
     """
     for k in range(m):
         block = ids[min(k, n - 1)]
-        W[Row.px * m + k] = (block % blocks + 0.5) * frame.block
-        W[Row.py * m + k] = (block // blocks + 0.5) * frame.block
+        W[Row.px * m + k] = (block % blocks + 0.5) * (1 << shift)
+        W[Row.py * m + k] = (block // blocks + 0.5) * (1 << shift)
     begin(W, m, P, frame)
     for k in range(n):
-        W[Row.start * m + k] = 0.0
+        block = ids[k]
+        W[Row.start * m + k] = C[(block // blocks >> coarser) * parents + (block % blocks >> coarser)]
         W[Row.end * m + k] = P[frame.far]
+        W[Row.path * m + k] = P[frame.far + 3] * (1 << shift)
     follow(W, L, rays, n, m, limit, P, step_cone)
     for k in range(n):
         S[ids[k]] = W[Row.t * m + k] if W[Row.status * m + k] != 2.0 else 1e30

@@ -58,8 +58,8 @@ class PartTask:
         Key of the linked frame.
     number : int
         Number of the pass.
-    ahead : bool
-        True if the cone prepass was run.
+    prepasses : int
+        Cone prepasses that were run.
     last : int
         Largest goal of a pixel.
     start, end, count : int
@@ -76,7 +76,7 @@ class PartTask:
     job: str
     frame: str
     number: int
-    ahead: bool
+    prepasses: int
     last: int
     start: int
     end: int
@@ -90,7 +90,7 @@ class PartTask:
     def make(self, work: Work) -> bytes:
         """Sums of the pixels after the pass; see `Task.make`."""
         of = _renderer(self.scene, self.film, self.crop, self.samples)
-        of.prepare(self.ahead)
+        of.prepare(self.prepasses)
         if of.dtype.name != self.dtype or frame_key(of.tracer.frame) != self.frame:
             raise ClusterError("the frame linked here is another than that of the job")
         width, dtype = 4 * self.count, of.dtype
@@ -148,12 +148,17 @@ class PoolTracer:
     ) -> None:
         self.scene, self.tracer = to_xml(Scene(root, 1.0, view=view)), tracer
         self._part = film, crop
-        self._passes, self._ahead = 0, False
+        self._passes, self._prepasses = 0, 0
 
     @property
     def frame(self) -> Frame:
         """The frame."""
         return self.tracer.frame
+
+    @property
+    def prepasses(self) -> int:
+        """Cone prepasses."""
+        return self.tracer.prepasses
 
     @property
     def samples(self) -> SampleRange:
@@ -169,17 +174,17 @@ class PoolTracer:
             Linked frame.
         """
         self.tracer.aim(frame)
-        self._ahead = False
+        self._prepasses = 0
 
     def look_ahead(self, work: Work) -> None:
-        """Leave the cone prepass to the workers.
+        """Leave the next cone prepass to the workers.
 
         Parameters
         ----------
         work : Work
             Threads and cancellation.
         """
-        self._ahead = True
+        self._prepasses += 1
 
     def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:
         """Add samples to pixels up to their goals; see `CpuTracer.add`.
@@ -198,9 +203,9 @@ class PoolTracer:
         state, places = sums.reshape(-1, CHANNELS), _places(plan.pixels, size)
         frame, count = frame_key(self.frame), len(plan.pixels)
         known = np.ascontiguousarray(plan.pixels), state[places]
-        job = key(frame, size, self.samples, self._ahead, *known)
+        job = key(frame, size, self.samples, self._prepasses, *known)
         of = self.scene, *self._part, self.samples, size, sums.dtype.name, pool.pieces, job, frame
-        about = *of, self._passes, self._ahead, plan.last
+        about = *of, self._passes, self._prepasses, plan.last
         step = max(1, min(PIXELS, SAMPLES * count // max(plan.samples, 1)))
         tasks = [PartTask(*about, start, min(start + step, count), count) for start in range(0, count, step)]
         pool.pieces.write(job, INPUT, b"".join(part.tobytes() for part in known))

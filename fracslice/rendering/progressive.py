@@ -125,7 +125,7 @@ class Renderer:
         if self.work.cluster is not None:
             self.tracer = PoolTracer(root, view, self.tracer, film, crop)
         self.accumulator = self._placed(self._empty)
-        self._prepared = False
+        self._prepasses = 0
 
     @property
     def _empty(self) -> HostAccumulator:
@@ -161,7 +161,7 @@ class Renderer:
         seen = optics(camera, setup.optics.size, setup.root, setup.optics.least)
         seen = replace(seen, origin=setup.optics.origin)
         self.setup = replace(setup, camera=camera, optics=seen)
-        self._frame, self._prepared = self._linked(), False
+        self._frame, self._prepasses = self._linked(), 0
         self.tracer.aim(self._frame)
         self.accumulator = self.accumulator.anew()
 
@@ -225,25 +225,27 @@ class Renderer:
 
     def _pass(self, plan: PassPlan) -> Pass:
         start = time.perf_counter()
-        self.prepare(self.accumulator.passes > 0)
+        self.prepare(self.accumulator.passes)
         self.tracer.add(self.accumulator.sums, plan, self.work)
         self.accumulator.passes += 1
         samples, error = self.accumulator.statistics()
         return self._seen(samples, error, plan.samples, plan.samples / (time.perf_counter() - start))
 
-    def prepare(self, ahead: bool) -> None:
-        """Load the frame into the tracer.
+    def prepare(self, passes: int) -> None:
+        """Run the cone prepasses, which pay if a block gets several rays: one more after each pass.
 
         Parameters
         ----------
-        ahead : bool
-            True to run the cone prepass, which pays if a block holds several rays.
+        passes : int
+            Completed passes.
         """
-        if ahead != self._prepared:
+        wanted = min(passes, self.tracer.prepasses)
+        if wanted < self._prepasses:
             self.tracer.aim(self._frame)
-            if ahead:
-                self.tracer.look_ahead(self.work)
-            self._prepared = ahead
+            self._prepasses = 0
+        for _ in range(self._prepasses, wanted):
+            self.tracer.look_ahead(self.work)
+            self._prepasses += 1
 
     def _linked(self) -> Frame:
         setup = self.setup

@@ -105,7 +105,7 @@ def lacquered(linker: Linker, colour: list[str]) -> list[str]:
     Returns
     -------
     list of str
-        Kernel source lines that add to the light `glaze`.
+        Kernel source lines that add to the reflection of the lacquer.
     """
     linker.share(shade.lacquer)
     lines = [f"spark, slope = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, {glossy.LACQUER})"]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from ..formulas.material import material
 from ..formulas.registry import Node
@@ -19,6 +18,7 @@ from ..kernel.arguments import Arguments, arguments, read
 from ..kernel.dialects import OF_FORMULAS, FieldDialect, folded, function, leading
 from ..kernel.parsing import parse
 from ..kernel.structure import Run, Subroutine
+from .trace_syntax import KeepChild, KeepNearest
 
 TRAP, NEAREST = "trap", "point"
 
@@ -196,7 +196,7 @@ class TraceDialect(FieldDialect):
         """
         fixed = dict(given.fixed)
         start, update, tone = _TRAPS[fixed.pop(TRAP, NEAREST)]
-        tree = _KeepsNearest(update).visit(source.specialised(given.function, fixed))
+        tree = KeepNearest(update).visit(source.specialised(given.function, fixed))
         tree.body.insert(0, parse(f"nearest = 0.0 * x + {start}").body[0])
         called = f"{name}_of"
         self.linker.functions[called] = self.linker.named(called, tree, given.function)
@@ -259,67 +259,8 @@ class TraceDialect(FieldDialect):
         tree = source.specialised(given.function, dict(given.fixed))
         arguments = [a.arg for a in tree.args.args][4:]
         tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]
-        tree = _KeepsChild(runs[0]).visit(tree)
+        tree = KeepChild(runs[0]).visit(tree)
         start = [f"{a} = {p}" for a, p in zip(arguments, given.passed, strict=True)]
         start += ["lowest = 0.0 * x + 1e30", "paint = 0.0 * x", "tone = 0.0 * x"]
         tree.body = [*(parse(line).body[0] for line in start), *tree.body]
         return self.linker.named(name, tree, given.function)
-
-
-class _KeepsNearest(ast.NodeTransformer):
-    """Replace orbit marks by the update of a running value, and return it beside the field's."""
-
-    def __init__(self, update: str) -> None:
-        self.update = update
-
-    def visit_Expr(self, node: ast.Expr) -> Any:
-        if not source.is_mark(node):
-            return node
-        assert isinstance(node.value, ast.Call)
-        r2, alive, x, y, z = (f"({ast.unparse(argument)})" for argument in node.value.args)
-        value = self.update.format(r2=r2, x=x, y=y, z=z)
-        return parse(f"nearest = where({alive}, {value}, nearest)").body[0]
-
-    def visit_Return(self, node: ast.Return) -> Any:
-        assert node.value is not None
-        return parse(f"return {ast.unparse(node.value)}, nearest").body[0]
-
-
-class _KeepsChild(ast.NodeTransformer):
-    """Evaluate the child's triple before each statement that calls the child.
-
-    The triple of lowest value is kept.
-    """
-
-    def __init__(self, child: Run) -> None:
-        self.child = child
-
-    def visit_Assign(self, node: ast.Assign) -> Any:
-        return self.taken(node)
-
-    def visit_Return(self, node: ast.Return) -> Any:
-        lines = self.taken(node)
-        value = ast.unparse(lines[-1].value)
-        return [*lines[:-1], parse(f"return {value}, paint, tone").body[0]]
-
-    def taken(self, node: Any) -> list[Any]:
-        calls = [
-            c
-            for c in ast.walk(node)
-            if isinstance(c, ast.Call) and isinstance(c.func, ast.Name) and c.func.id == "child"
-        ]
-        if not calls:
-            return [node]
-        point = ", ".join(map(ast.unparse, calls[0].args))
-        text = ast.unparse(node).replace(ast.unparse(calls[0]), "inner")
-        lines = [
-            f"inner, p, t = {self.child.call(points=point)}",
-            "paint, tone = where(inner < lowest, p, paint), where(inner < lowest, t, tone)",
-            "lowest = minimum(lowest, inner)",
-        ]
-        return [statement for line in [*lines, text] for statement in self.parsed(line)]
-
-    @staticmethod
-    def parsed(line: str) -> list[Any]:
-        # `ast.parse` accepts a return statement outside a function.
-        return parse(line).body

@@ -1,4 +1,4 @@
-"""From coverage to the picture on a printer's screen: compensation, gamma, position, mirroring."""
+"""From coverage to the picture on a printer's screen: compensation, blur, grey levels, place, mirroring."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from .._slices import Encoding, encoded
 from ..errors import SliceError
-from ..formulas.parameters import Number, validate
+from ..formulas.parameters import Count, Number, validate
 from ..scene.lengths import Shift
 from .layers import Layer, ScreenView
 from .printers import Printer
@@ -33,6 +33,10 @@ class Screen:
         Exponent of the grey levels.
     mirror : bool or None
         Overrides the printer's.
+    levels : int
+        Grey levels above black; 1 for black and white.
+    blur : int
+        Radius of the blur of outlines, pixels.
 
     Raises
     ------
@@ -45,6 +49,8 @@ class Screen:
     compensation: float = 0.0
     gamma: float = 1.0
     mirror: bool | None = None
+    levels: int = 255
+    blur: int = 0
 
     def __post_init__(self) -> None:
         validate(self, _KINDS, SliceError)
@@ -82,13 +88,18 @@ class Screen:
             bed[mine.on_bed] = compensated(layer.coverage, self.compensation, self.stack.pixel)[mine.of_layer]
         else:
             bed[mine.on_bed] = layer.coverage[mine.of_layer]
-        bed[mine.on_bed] = self._levels[bed[mine.on_bed]]
+        shown = tuple(slice(max(on.start - self.blur, 0), on.stop + self.blur) for on in mine.on_bed)
+        if self.blur:
+            from .blur import blurred
+
+            bed[shown] = blurred(bed[shown], self.blur)
+        bed[shown] = self._levels[bed[shown]]
         return image
 
     def encoded(self, layer: Layer, encoding: Encoding, shown: np.ndarray | None = None) -> bytes:
         """Encode the picture of a layer.
 
-        A section without compensation is encoded from the layer's tiles, as runs of equal pixels, and the
+        A section without compensation and blur is encoded from its tiles, as runs of equal pixels, and the
         picture is never allocated.
 
         Parameters
@@ -105,7 +116,7 @@ class Screen:
         bytes
             Encoded picture.
         """
-        if self.compensation or layer.mean is not None:
+        if self.compensation or self.blur or layer.mean is not None:
             image = self.picture(layer)
             return encoded(image if shown is None else shown[image], encoding)
         view = self._view
@@ -124,7 +135,8 @@ class Screen:
     @cached_property
     def _levels(self) -> np.ndarray:
         """Grey level for each coverage, uint8 [256]."""
-        return np.rint(255 * (np.arange(256) / 255) ** self.gamma).astype(np.uint8)
+        shares = np.rint(self.levels * (np.arange(256) / 255) ** self.gamma) / self.levels
+        return np.rint(255 * shares).astype(np.uint8)
 
     @cached_property
     def _place(self) -> _Window:
@@ -157,6 +169,8 @@ class Screen:
 _KINDS = {
     "compensation": Shift(0.0, "how far outlines move"),
     "gamma": Number(1.0, "of the grey levels", above=0, most=10),
+    "levels": Count(255, "grey levels above black", least=1, most=255),
+    "blur": Count(0, "radius of the blur, pixels", least=0, most=16),
 }
 
 

@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 CLAY = "#efe3d0"
 INSIDE = "#b3543f"  # inner side, visible after a cut
+COLOURS = "RGB"
+"""Name of the colours in the data of points."""
+
 CLAY_LIGHT = {"ambient": 0.2, "diffuse": 1.0, "specular": 0.06, "specular_power": 12}
 BACKGROUNDS = {"light": ("#c4c9cd", "#f4f5f5"), "dark": ("#08090b", "#2a2f37")}  # bottom, top
 SHARP = 50.0  # feature angle, degrees: edges above it are drawn sharp
@@ -21,7 +24,9 @@ THREE_QUARTER = (0.62, -1.0, 0.52)
 FILLED = 0.86  # fraction of the picture that the model fills
 
 
-def body(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Any:
+def body(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int32], colours: NDArray[np.uint8] | None = None
+) -> Any:
     """Convert a mesh to a VTK surface, smooth except at sharp edges.
 
     Parameters
@@ -30,6 +35,8 @@ def body(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Any:
         Vertices.
     triangles : ndarray of int32, shape (m, 3)
         Vertex indices.
+    colours : ndarray of uint8, shape (n, 3), optional
+        Colours of the vertices, sRGB.
 
     Returns
     -------
@@ -41,13 +48,15 @@ def body(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Any:
     surface: Any = pyvista.PolyData()
     surface.points = vertices.astype(np.float32)
     surface.regular_faces = triangles
+    if colours is not None:
+        surface.point_data[COLOURS] = colours
     return surface.compute_normals(
         cell_normals=False, split_vertices=True, feature_angle=SHARP, consistent_normals=False
     )
 
 
 def set_lighting(plotter: Any, surface: Any, background: str, brightness: float = 1.0) -> Any:
-    """Add a mesh in matte clay under a key, a fill and a rim light, in a three-quarter view.
+    """Add a mesh in its colours or in clay, under a key, a fill and a rim light, in a three-quarter view.
 
     Parameters
     ----------
@@ -69,7 +78,11 @@ def set_lighting(plotter: Any, surface: Any, background: str, brightness: float 
 
     below, above = BACKGROUNDS[background]
     plotter.set_background(below, top=above)
-    actor = plotter.add_mesh(surface, color=CLAY, **CLAY_LIGHT, backface_params={"color": INSIDE})
+    own = COLOURS in surface.point_data
+    colour = (
+        {"scalars": COLOURS, "rgb": True} if own else {"color": CLAY, "backface_params": {"color": INSIDE}}
+    )
+    actor = plotter.add_mesh(surface, **colour, **CLAY_LIGHT)
     plotter.remove_all_lights()
     for position, intensity, tint in (
         ((-0.7, 1.0, 1.2), 0.95, "#fff4e2"),
@@ -116,7 +129,7 @@ def draw(source: str, target: str, width: int, height: int, background: str) -> 
     Parameters
     ----------
     source : str
-        .npz file with `vertices` and `triangles`.
+        .npz file with `vertices`, `triangles` and, for a mesh that has them, `colours`.
     target : str
         PNG file, written.
     width, height : int
@@ -127,7 +140,7 @@ def draw(source: str, target: str, width: int, height: int, background: str) -> 
     import pyvista
 
     with np.load(source) as arrays:
-        surface = body(arrays["vertices"], arrays["triangles"])
+        surface = body(arrays["vertices"], arrays["triangles"], arrays.get("colours"))
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=[width, height])
     set_lighting(plotter, surface, background)
     plotter.enable_ssao(radius=surface.length / 25, bias=surface.length / 2000, kernel_size=64, blur=True)

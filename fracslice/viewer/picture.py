@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def picture(
     size: tuple[int, int] = (1280, 960),
     background: Literal["light", "dark"] = "light",
 ) -> Path:
-    """Draw a mesh in matte clay from a three-quarter view into a PNG file.
+    """Draw a mesh in its colours, or in matte clay, from a three-quarter view into a PNG file.
 
     Needs no screen, but OpenGL in software or hardware (Debian: libegl1 with libgl1-mesa-dri, or libosmesa6).
 
@@ -63,7 +63,8 @@ def picture(
     need_pyvista()
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, replacing(path) as file:
         source, target = os.path.join(folder, "mesh.npz"), os.path.join(folder, "picture.png")
-        np.savez(source, vertices=mesh.vertices, triangles=mesh.triangles)
+        arrays: dict[str, Any] = {"vertices": mesh.vertices, "triangles": mesh.triangles}
+        np.savez(source, **arrays if mesh.colours is None else arrays | {"colours": mesh.colours})
         _draw([source, target, *map(str, size), background])
         file.write(Path(target).read_bytes())
     return Path(path)

@@ -73,7 +73,7 @@ class ViewerWindow:
     """
 
     def __init__(self, mesh: Mesh, name: str) -> None:
-        self.surface = body(mesh.vertices, mesh.triangles)
+        self.surface = body(mesh.vertices, mesh.triangles, mesh.colours)
         self.cutting = False
         title = name + caption(mesh)
         self.plotter = _plotter(f"fracslice  {title}")

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..errors import VolumeError
 from ..formulas.box import Box, Triple
 from ..formulas.field import Bounds
 from ..formulas.registry import Node
@@ -106,6 +107,15 @@ class Plan:
     depths: tuple[str, ...] = ()
     drains: tuple[Drain, ...] = ()
     proved: bool = False
+
+    @property
+    def strict(self) -> Plan:
+        """The same plan, with nothing skipped but by a proof: the box that the formulas state is sampled."""
+        stated = self.root.proved_box
+        if not stated.finite:
+            raise VolumeError("no box is proved to hold the object: expected <bounds> around it")
+        outer = self.outer | stated
+        return replace(self, outer=outer.about(self.box.centre), proved=True)
 
     @property
     def lattice(self) -> Lattice:
@@ -273,7 +283,7 @@ def _proofs(planned: Plan) -> Proofs | None:
     if not planned.proved and math.prod(planned.lattice.bricks) < MANY:
         return None
     cells = planned.root.cells()
-    return Proofs(cells, planned.proved) if cells else None
+    return Proofs(cells, planned.proved) if cells or planned.proved else None
 
 
 def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:

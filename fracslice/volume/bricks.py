@@ -36,8 +36,8 @@ class Bricks:
     audited
         Points tested outside the samples to verify the bounds that pruning relies on.
     proved
-        Share of the skipped volume that is proved to be empty or full; None if it was not determined. The
-        bound that discards the rest is measured.
+        Share of the unsampled bricks whose sign is proved; None if it was not determined. The rest relies on
+        a measured bound.
     """
 
     origin: tuple[float, float, float]

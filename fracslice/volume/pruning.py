@@ -15,7 +15,7 @@ from ..formulas.field import Bounds, Cells
 from ..kernel import Kernel
 from ..work import Work, chunks
 from .lattice import BRICK, Lattice
-from .states import CANDIDATE, EMPTY, FULL, States
+from .states import CANDIDATE, EMPTY, FULL, QUEUED, States
 from .values import values_at
 
 COARSEST = 16
@@ -27,10 +27,8 @@ ENCLOSURE = 4
 BATCH = 1 << 12
 """Cells per task."""
 
-COUNTED = 4
-"""Bricks along the smallest cells that are proved although a measured bound discards them: most of the
-volume.
-"""
+LOOKED_AT = 1 << 12
+"""Unsampled bricks whose proofs are looked for where a measured bound discarded them."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +38,12 @@ class Proofs:
     Attributes
     ----------
     cells
-        Proofs.
+        Proofs; None: there are none.
     only
         True if a measured bound discards nothing.
     """
 
-    cells: Cells
+    cells: Cells | None
     only: bool = False
 
 
@@ -66,12 +64,9 @@ class Pruning:
     work
         Execution settings.
     proofs
-        Proofs of cells that the bound does not discard, or of large cells that a measured bound discards;
-        None: none are tried.
+        Proofs of the cells that a proved bound does not discard; None: none are tried.
     evaluations
         Points evaluated.
-    skipped, proved
-        Volume that was discarded, and what of it is proved to be empty or full, bricks.
     """
 
     kernel: Kernel
@@ -81,8 +76,6 @@ class Pruning:
     work: Work
     proofs: Proofs | None = None
     evaluations: int = 0
-    skipped: int = 0
-    proved: int = 0
 
     @property
     def everywhere(self) -> bool:
@@ -94,11 +87,29 @@ class Pruning:
         """True if nothing is discarded without a proof."""
         return self.proofs is not None and self.proofs.only
 
-    @property
-    def share(self) -> float | None:
-        """Share of the discarded volume that is proved; None if proofs are not looked for."""
-        known = self.proofs or not self.bounds.exterior_only
-        return (self.proved / self.skipped if self.skipped else 1.0) if known else None
+    def share(self, states: States) -> float | None:
+        """Return the share of the unsampled bricks whose sign is proved; None if it is not known.
+
+        Where a measured bound discarded them, proofs of a few thousand are looked for.
+
+        Parameters
+        ----------
+        states
+            States of all bricks.
+
+        Returns
+        -------
+        float or None
+            Share.
+        """
+        if self.everywhere:
+            return 1.0
+        bare = np.flatnonzero(states.flat < QUEUED)
+        if self.proofs is None or not len(bare):
+            return None
+        some = bare[np.linspace(0, len(bare) - 1, min(len(bare), LOOKED_AT)).astype(np.intp)]
+        empty, full = self._proved(self._centres(states.places(some), 1), BRICK)
+        return float(np.where(states.flat[some] == EMPTY, empty, full).mean())
 
     def probe(self) -> tuple[States, np.ndarray]:
         """Discard cells from the coarsest level down.
@@ -138,17 +149,10 @@ class Pruning:
             states[f > reach] = EMPTY
             if not self.bounds.exterior_only:
                 states[f < -reach] = FULL
-        bounded = states != CANDIDATE
-        proved = bounded & (not self.bounds.exterior_only)
-        if self.proofs:
-            tried = ~bounded if self.everywhere else bounded & (size >= COUNTED)
-            empty, full = (np.zeros(len(f), bool) for _ in range(2))
-            empty[tried], full[tried] = self._proved(indices[:, tried], size * BRICK)
-            if self.everywhere:
-                states[empty], states[full] = EMPTY, FULL
-            proved |= empty | full
-        self.skipped += size**3 * int(np.count_nonzero(states != CANDIDATE))
-        self.proved += size**3 * int(np.count_nonzero(proved))
+        if self.proofs and self.everywhere:
+            (left,) = np.nonzero(states == CANDIDATE)
+            empty, full = self._proved(indices[:, left], size * BRICK)
+            states[left[empty]], states[left[full]] = EMPTY, FULL
         return states
 
     def _proved(self, indices: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -156,7 +160,9 @@ class Pruning:
         assert self.proofs
         cells, points = self.proofs.cells, self._points(indices)
         half = self.lattice.voxel * (size + 1) / 2
-        empty, full = (np.empty(points.shape[1], bool) for _ in range(2))
+        empty, full = (np.zeros(points.shape[1], bool) for _ in range(2))
+        if cells is None:
+            return empty, full
 
         def task(part: slice) -> None:
             empty[part], full[part] = cells(points[:, part], half)

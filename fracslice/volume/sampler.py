@@ -301,7 +301,7 @@ class _Sampling:
             evaluations=self.pruning.evaluations,
             repaired=self.repaired,
             audited=self.audited,
-            proved=self.pruning.share,
+            proved=self.pruning.share(states),
         )
         return bricks, order
 

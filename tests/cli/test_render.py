@@ -197,3 +197,20 @@ def test_a_time_limit_interrupts_a_pass(
     assert 0 < samples < 1
     with Image.open(tmp_path / "a.png") as image:
         assert np.asarray(image).reshape(-1, 3).max(1).min() > 0, "no pixel is empty"
+
+
+def test_noise_is_removed_from_a_picture_of_light(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from fracslice.rendering.denoising import advice
+
+    common = ["render", str(scene), "-q", "--device", "cpu", "-o"]
+    assert run([*common, str(tmp_path / "a.png")]) == 0
+    assert run([*common, str(tmp_path / "b.png"), "--denoise"]) == 0
+    note = capsys.readouterr().err
+    assert ("--denoise: by non-local means" in note) == bool(advice())
+    noisy, clean = (np.asarray(Image.open(tmp_path / f"{name}.png")).astype(int) for name in "ab")
+    assert abs(noisy - clean).max() > 0 and abs(noisy - clean).mean() < 2
+    assert run([*common, str(tmp_path / "c.png"), "--denoise", "--set", "shading.mode=depth"]) == 2
+    assert 'expected a scene with shading mode="light"' in capsys.readouterr().err
+    assert not (tmp_path / "c.png").exists()

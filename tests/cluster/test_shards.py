@@ -12,7 +12,7 @@ from fracslice import meshsampling, meshtasks
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import ClusterError, SharedError
 from fracslice.export.slices import write_slices
-from fracslice.formulas import box, cone, sphere
+from fracslice.formulas import box, cone, flake, sphere
 from fracslice.job import MeshResult, make_mesh
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import parts
@@ -142,3 +142,12 @@ def test_options_that_exclude_each_other(line: list[str], capsys: pytest.Capture
     assert command([*line, "--store", "x"]) == 2
     assert command([*line, "--cluster", "local:x"]) != 0
     assert "expected local, local:N" in capsys.readouterr().err
+
+
+def test_a_shared_mesh_has_the_note_on_near_bodies(tmp_path: Path) -> None:
+    flakes = scene(flake(solid="tetrahedron", level=1), size="40mm", name="flakes")
+    shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1, patience=0)
+    shared, alone = (
+        make_mesh(flakes, MeshJob(resolution=32), work) for work in (Work(1, cluster=shard), Work(1))
+    )
+    assert shared.report.notes == alone.report.notes and "two voxels" in shared.report.notes[0]

@@ -230,9 +230,11 @@ def sl1(data: bytes) -> Read:
             for name in sorted(n for n in archive.namelist() if n.startswith(config["jobDir"])):
                 with Image.open(io.BytesIO(archive.read(name))) as image:
                     pictures.append(np.asarray(image))
+            with Image.open(io.BytesIO(archive.read("thumbnail/thumbnail400x400.png"))) as image:
+                preview = np.asarray(image) >> 3
     except zipfile.BadZipFile:
         raise DamagedError from None
     count, height = len(pictures), float(config["layerHeight"])
     bottoms, times = int(config["numFade"]), (float(config["expTimeFirst"]), float(config["expTime"]))
     exposures = np.interp(np.arange(count), [0, bottoms], times).tolist()
-    return Read(pictures, (height * np.arange(1, count + 1)).tolist(), exposures)
+    return Read(pictures, (height * np.arange(1, count + 1)).tolist(), exposures, [preview])

@@ -25,7 +25,7 @@ from fracslice.slicing.printers import PRINTERS, Printer
 from fracslice.slicing.raster import Screen
 from fracslice.stackmodel import StackModel
 from fracslice.work import Work
-from tests.export import readers
+from tests.export import decoders, readers
 
 MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
 ROOT = difference(menger(level=1), sphere(radius=0.9))
@@ -117,7 +117,8 @@ def printed(machine: Printer, layer: float, path: Path) -> Path:
     assert len(found.pictures) == len(expected) == len(stack.z)
     assert all(np.array_equal(a, b) for a, b in zip(found.pictures, expected, strict=True))
     np.testing.assert_allclose(found.tops, stack.tops, rtol=1e-5)
-    assert sum(image.any() for image in found.pictures) == len(expected)
+    assert all(image.any() for image in found.pictures)
+    assert found.previews and all(len(np.unique(p.reshape(-1, 3), axis=0)) > 50 for p in found.previews)
     return path
 
 
@@ -183,3 +184,17 @@ def test_goo_by_the_crate_goo(tmp_path: Path) -> None:
     rows, columns = job.screen.shape
     result = np.fromfile(tmp_path / "pixels", np.uint8).reshape(-1, rows, columns)
     assert (result == list(Slicer(job.stack).map(job.screen.picture))).all()
+
+
+def test_photon_by_pyphotonfile(tmp_path: Path) -> None:
+    """It reads the layout; its own decoder of run lengths needs NumPy 1. Its screen: 1440 x 2560 pixels."""
+    pyphotonfile = pytest.importorskip("pyphotonfile")
+    machine = PRINTERS["photon"]
+    stack = plan_stack(sphere(), SliceJob(size=12, layer=3, pixel=machine.pixel))
+    job = SliceRun(stack, Screen(stack, machine), resin=RESIN, picture=picture)
+    found = pyphotonfile.Photon(str(write_slices(job, tmp_path / "part.photon")))
+    assert (found.layer_height, found.exposure_time, found.exposure_time_bottom) == (3, 2.5, 30)
+    pictures = [decoders.picture(decoders.rle1(layer._data), (2560, 1440)) for layer in found.layers]
+    expected = [image >= 224 for image in Slicer(stack).map(job.screen.picture)]
+    assert len(pictures) == 4 and expected[1].any()
+    assert all((one == other).all() for one, other in zip(pictures, expected, strict=True))

@@ -1,5 +1,5 @@
-"""Layers read by programs of others: CLI by the Rust crate colain, SVG drawn by librsvg. (3MF by lib3mf:
-`test_slices`.) Skipped where cargo or rsvg-convert is missing.
+"""Layers read by programs of others: CLI by the Rust crate colain, SVG drawn by librsvg, the mesh of a 3MF by
+PrusaSlicer. (3MF by lib3mf: `test_slices`; print files: `test_prints`.) Skipped where the program is missing.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ from PIL import Image
 from fracslice.export.jobs import SliceRun
 from fracslice.export.slices import write_slices
 from fracslice.formulas import difference, menger, sphere
+from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.raster import Screen
+from fracslice.stackmodel import StackModel
+from fracslice.work import Work
 
 SVG = "{http://www.w3.org/2000/svg}svg"
 
@@ -75,3 +78,18 @@ def test_svg_by_librsvg(run: SliceRun, layers: np.ndarray, tmp_path: Path) -> No
         layered = drawn(ET.tostring(group), "black")
         result = [alone.mean() * window, layered.mean() * window]
         np.testing.assert_allclose(result, layers[k, 1], rtol=2e-3)
+
+
+@pytest.mark.skipif(not shutil.which("prusa-slicer"), reason="needs prusa-slicer")
+def test_3mf_by_prusaslicer(tmp_path: Path) -> None:
+    """It reads no slices; the mesh beside them is the object, not its box."""
+    root, job = difference(menger(level=1), sphere(radius=0.9)), SliceJob(12, 0.5, (0.3, 0.3))
+    stack, mesh = plan_stack(root, job), StackModel(scene(root, size=12), job, Work()).mesh
+    path = write_slices(SliceRun(stack, Screen(stack), mesh=mesh), tmp_path / "part.3mf")
+    command = ["prusa-slicer", "--info", path]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    values = dict(line.split(" = ") for line in lines if " = " in line)
+    assert values["manifold"] == "yes"
+    assert float(values["size_z"]) == pytest.approx(12, abs=1e-3)
+    area = sum(Slicer(stack).map(lambda layer: layer.contours.area))
+    assert float(values["volume"]) == pytest.approx(area * 0.5, rel=0.03)

@@ -88,6 +88,12 @@ def test_sl1(tmp_path: Path) -> None:
         assert config["layerHeight"] == "0.5"
         assert config["numFast"] == "24"
         assert config["jobDir"] == "part"
+        assert config["fileCreationTimestamp"] == "1980-01-01 at 00:00:00 UTC"
+        area = sum(job.slicer.map(lambda layer: layer.area))
+        assert float(config["usedMaterial"]) == pytest.approx(area * 0.5 / 1000, rel=1e-3)
+        for width, height in ((400, 400), (800, 480)):
+            with Image.open(io.BytesIO(archive.read(f"thumbnail/thumbnail{width}x{height}.png"))) as image:
+                assert image.size == (width, height)
         assert settings["display_pixels_x"] == "96"
         assert settings["display_orientation"] == "portrait"
         assert pictures == [f"part{k:05d}.png" for k in range(24)]
@@ -349,7 +355,8 @@ def test_a_job_is_known_by_all_that_its_layers_follow_from(monkeypatch: pytest.M
             {"corner": (0.0, 0.0)},
             {"notes": ("a",)},
         ],
-        "screen": [{"gamma": 1.1}, {"compensation": 0.01}, {"mirror": True}, {"printer": None}],
+        "screen": [{"gamma": 1.1}, {"compensation": 0.01}, {"mirror": True}, {"printer": None}]
+        + [{"levels": 4}, {"blur": 1}],
         "": [{"resin": Resin(2, 21)}, {"metadata": {"Title": "other"}}],
     }
     jobs = [job]

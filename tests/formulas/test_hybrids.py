@@ -127,6 +127,11 @@ def test_a_random_hybrid_loses_no_inside_sample(seed: int) -> None:
     assert lost(random_hybrid(seed), 64) == 0
 
 
+@pytest.mark.parametrize("seed", [5, 12])
+def test_proofs_lose_no_inside_sample(seed: int) -> None:
+    assert lost(random_hybrid(seed), 48, proved=True) == 0
+
+
 def test_automatic_rounds_are_resolved() -> None:
     from fracslice.kernel.depth import resolve_depths
 

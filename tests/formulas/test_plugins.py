@@ -68,11 +68,27 @@ def test_a_check_examines_the_formulas_of_a_file(
 ) -> None:
     assert run(["formulas", "--check", files[0]]) == 0
     out = capsys.readouterr().out
-    assert out.count("ok ") == 10 and "egg:" in out and "own_box:" in out
+    assert (
+        out.count("ok ") == 11
+        and "derivative of the step: too small at 0.0%" in out
+        and "egg:" in out
+        and "own_box:" in out
+    )
     steep = Path(files[0]).with_name("steep.py")
     steep.write_text(OWN.replace("own_box", "steep_box").replace("egg", "steep").replace("** 0.5 -", "-"))
     assert run(["formulas", "--check", str(steep)]) == 1
     assert capsys.readouterr().out.count("FAULT bound L = 1: broken") == 1
+
+
+def test_a_check_finds_a_derivative_that_is_too_small(
+    files: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    picture = tmp_path / "own.png"
+    Path(files[0]).write_text(OWN.replace("0.5) + c", "0.5) + c, 1.5").replace("@shape", "# @shape"))
+    assert run(["formulas", "--check", files[0], "--picture", str(picture)]) == 1
+    assert "FAULT derivative of the step: too small at" in capsys.readouterr().out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert run(["formulas", "--picture", str(picture)]) == 2
 
 
 @pytest.mark.parametrize(

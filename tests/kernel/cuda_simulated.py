@@ -54,7 +54,7 @@ def roots() -> None:
     for precision, tolerance in (("float32", 1e-4), ("float64", 1e-9)):
         rows = segments.astype(precision)
         lanes, threads = (Roots(root, precision, 0.02, device) for device in ("cpu", "cuda"))
-        expected, computed = lanes.found(rows), threads.found(rows)
+        expected, computed = lanes.find(rows), threads.find(rows)
         assert ((expected > 0) & (expected < 1)).all()
         np.testing.assert_allclose(computed, expected, atol=tolerance)
     polished = [np.tile(expected, (5, 1)) for _ in range(2)]

@@ -27,8 +27,7 @@ def projected(
         return TrustRegions(low[which].T, high[which].T, other, None if middle is None else middle[which].T)
 
     moved = points.copy()
-    which, there = project(root, points, trust_regions, 0.1)
-    moved[which] = there
+    project(root, moved, trust_regions, 0.1)
     return moved
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from fracslice.errors import RenderError
 from fracslice.formulas import Node, box, material, plane, repeat, sphere, union
@@ -137,3 +139,28 @@ def test_fog_scatters_the_light_that_no_surface_shadows(height: float | None) ->
     bright = rendered(wall, view, 64, (5, 5)).image[2, 2]
     assert bright == pytest.approx(0.8 / 4 * (1 - np.exp(-0.3 * 3.9)), rel=0.02)
     assert rendered(wall | roof, view, 64, (5, 5)).image[2, 2].max() < 0.1 * bright.max()
+
+
+def test_coloured_glass_casts_a_coloured_shadow() -> None:
+    """Of a pane of thickness 0.5: twice the loss at its sides, and what fades inside."""
+    floor = material(plane(offset=-1), colour=(1, 1, 1), specular=0)
+    pane = material(box(size=(4, 4, 0.5)), clear=0.9, absorb=(0, 1, 3)) + (0, 0, 1.5)
+    camera = Camera(eye=(0, -4, -0.5), target=(0, 0, -1), fov=4)
+    for kind in ({"kind": "sun", "position": (0, 0, 1)}, {"kind": "lamp", "position": (0, 0, 20)}):
+        view = View(camera=camera, lights=(Light(**kind),), shading=Shading(bounces=0))  # type: ignore[arg-type]
+        bare, shaded = (rendered(root, view, 1, (5, 5)).image[2, 2] for root in (floor, floor | pane))
+        expected = (0.9 * 0.96) ** 2 * np.exp(-0.5 * np.array((0, 1, 3)))
+        assert shaded / bare == pytest.approx(expected, rel=0.03)
+
+
+def test_surroundings_are_seen_once_through_glass(tmp_path: Path) -> None:
+    """A ball that refracts nothing hides nothing from the ground, on paths too."""
+    file = tmp_path / "even.png"
+    Image.new("RGB", (8, 4), (255, 255, 255)).save(file)
+    lights = (Light(kind="environment", file=str(file)),)
+    floor = material(plane(offset=-1), colour=(1, 1, 1), specular=0)
+    ball = material(sphere(radius=0.9), clear=1, index=1)
+    camera = Camera(eye=(0, -5, 1), target=(0, 0, -1), fov=3)
+    for paths in ("no", "yes"):
+        view = View(camera=camera, lights=lights, shading=Shading(paths=paths, bounces=12))
+        assert rendered(floor | ball, view, 64, (5, 5)).image.mean() == pytest.approx(1, abs=0.03)

@@ -24,7 +24,7 @@ def frame(root: Node = BULB, camera: Camera = CAMERA, **view: object) -> Frame:
 
 
 EFFECTS = {
-    "def visible(": {"lights": (Light(),)},
+    "def visible_glass_False(": {"lights": (Light(),)},
     "def sun(": {"lights": (Light(size=2, shadows="no"),)},
     "def lamp(": {"lights": (Light(kind="lamp", size=0.1, shadows="no"),)},
     "def sharp_lamp(": {"lights": (Light(kind="lamp", shadows="no"),)},
@@ -41,6 +41,12 @@ EFFECTS = {
     "def reflects(": {"root": material(BULB, reflect=0.2)},
     "def goes_on(": {"root": material(BULB, clear=0.9)},
     "def glossy(": {"root": material(BULB, roughness=0.5, reflect=0.1)},
+    "def height_fog(": {"fog": Fog(height=1)},
+    "haze = ": {"fog": Fog(scatter=1), "lights": (Light(),)},
+    "def lacquer(": {"root": material(BULB, coat=1)},
+    "def varied(": {"root": material(BULB, vary=0.5)},
+    "def tinted_shadow(": {"root": material(BULB, clear=0.9), "lights": (Light(),)},
+    "def sunshine(": {"shading": Shading(paths="yes"), "lights": (Light(size=2),)},
     "def upward(nx": {"shading": Shading(paths="yes")},
     "glow": {"root": material(BULB, glow=1)},
     "paint": {"root": union(material(BULB), sphere(radius=0.3))},

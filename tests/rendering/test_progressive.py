@@ -197,3 +197,11 @@ def test_looking_back_again_gives_the_same_picture() -> None:
     assert abs(finished(of) - wanted).mean() > 0.01
     of.look(camera)
     assert finished(of).tobytes() == wanted.tobytes()
+
+
+def test_the_last_pixels_take_no_pass_each() -> None:
+    """A pass of a few pixels costs as much as one of many, and all threads wait for it."""
+    view = View(camera=Camera(eye=(1.9, -2.3, 1.2), fov=50), lights=(Light(size=5), Light(kind="sky")))
+    active = [done.active for done in Renderer(menger(level=2), view, (96, 64), Work(1), "cpu").passes(64)]
+    assert min(active[1:]) > 0.1
+    assert len(active) < 20

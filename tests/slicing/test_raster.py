@@ -14,6 +14,7 @@ from fracslice._slices import Encoding, encoded
 from fracslice.errors import SliceError
 from fracslice.formulas import Node, box, mandelbulb, menger, sphere, transform, union
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
+from fracslice.slicing.blur import blurred
 from fracslice.slicing.compensation import compensated
 from fracslice.slicing.printers import Printer, printer
 from fracslice.slicing.raster import Screen
@@ -91,7 +92,15 @@ def test_too_large_for_the_printer() -> None:
 
 @pytest.mark.parametrize("machine", [None, SMALL, replace(SMALL, portrait=True)])
 @pytest.mark.parametrize(
-    "options", [{}, {"mirror": True}, {"mirror": False}, {"gamma": 2.2}, {"compensation": 0.1}]
+    "options",
+    [
+        {},
+        {"mirror": True},
+        {"mirror": False},
+        {"gamma": 2.2, "levels": 4},
+        {"compensation": 0.1},
+        {"blur": 2},
+    ],
 )
 @pytest.mark.parametrize("root", [ELL, mandelbulb(), menger(level=2)])
 def test_deflated_pictures_are_the_pictures(
@@ -163,8 +172,38 @@ def test_gamma_leaves_black_and_white() -> None:
     np.testing.assert_allclose(after[grey], 255 * (before[grey] / 255.0) ** 2, atol=0.5)
 
 
+@pytest.mark.parametrize("levels", [1, 2, 4, 8, 255])
+def test_grey_levels_of_anti_aliasing(levels: int) -> None:
+    stack = stack_of(sphere())
+    before, after = picture(Screen(stack)).astype(float), picture(Screen(stack, levels=levels))
+    assert len(np.unique(after)) <= levels + 1 and after.max() == 255
+    assert np.abs(after - before).max() <= 255 / levels / 2 + 0.5
+
+
+def test_blur_is_the_mean_over_a_square() -> None:
+    """Also beyond the object's own pixels, where the screen has some."""
+    dot = np.zeros((7, 9), np.uint8)
+    dot[3, 4] = 250
+    expected = np.zeros((7, 9))
+    expected[2:5, 3:6] = 28
+    assert (blurred(dot, 1) == expected).all()
+    machine = Printer("s", "S", (200, 200), (20.0, 20.0), 30)
+    stack = stack_of(box(size=(6, 6, 6)))
+    sharp, soft = (picture(Screen(stack, machine, blur=b)).astype(int) for b in (0, 3))
+    assert soft.sum() == pytest.approx(sharp.sum(), rel=0.01)
+    assert (soft > 0).any(0).sum() == (sharp > 0).any(0).sum() + 6
+
+
 @pytest.mark.parametrize(
-    "options", [{"gamma": 0.0}, {"gamma": math.nan}, {"compensation": 2.0}, {"compensation": math.nan}]
+    "options",
+    [
+        {"gamma": 0.0},
+        {"gamma": math.nan},
+        {"compensation": 2.0},
+        {"compensation": math.nan},
+        {"levels": 0},
+        {"blur": 17},
+    ],
 )
 def test_impossible_screens(options: dict[str, float]) -> None:
     with pytest.raises(SliceError, match="expected"):

@@ -76,9 +76,10 @@ def _value(rng: np.random.Generator, kind: object) -> object:
     return (*drawn[:3], 0.0) if len(drawn) == 4 else drawn
 
 
-def lost(root: Node, resolution: float) -> int:
-    """Grid points inside the solid that are outside by its sparse samples."""
+def lost(root: Node, resolution: float, proved: bool = False) -> int:
+    """Grid points inside the solid that are outside by its sparse samples, or skipped by proofs alone."""
     planned = plan(root, resolution)
+    planned = planned.strict if proved else planned
     try:
         bricks = sample_scene(planned)
     except VolumeError:  # all of it is thinner than a voxel

@@ -207,3 +207,22 @@ def test_only_proofs_leave_no_pocket(name: str) -> None:
     bricks = sample_scene(planned)
     inside, _ = unfolded(bricks)
     assert (inside == (dense(planned.root, planned.lattice) < 0)).all() and bricks.proved == 1
+
+
+def test_proofs_see_through_operators_to_an_orbit() -> None:
+    """The sign of an orbit is enclosed where its distance is not: most of the space around it is proved."""
+    root = transform(mandelbulb(power=5, iterations=4), rotate=(1, 2, 3, 40))
+    planned = replace(plan(difference(root, box(size=(3.0, 3.0, 0.4))), 64), proved=True)
+    strict, measured = sample_scene(planned), sample_scene(replace(planned, proved=False))
+    assert strict.values.tobytes() == measured.values.tobytes()
+    assert strict.evaluations < 5 * measured.evaluations and measured.proved is None
+
+
+def test_wrong_bounds_lose_nothing_with_proofs() -> None:
+    """A bound that is far too small hides a fractal, and nothing is skipped by it if proofs alone count."""
+    root = transform(mandelbulb(power=2, iterations=6), scale=(0.5,))
+    lattice, kernel = Lattice.around(root.bounds.box, 1.3 / 64), compile_scene(root)
+    wrong = Bounds(root.bounds.box, 0.05, True)
+    bricks = sample(kernel, wrong, lattice, proofs=Proofs(root.cells(), only=True))
+    assert bricks.repaired == 0 and (unfolded(bricks)[0] == (dense(root, lattice) < 0)).all()
+    assert sample(kernel, wrong, lattice).repaired > 0

@@ -15,9 +15,10 @@ __all__ = [
     "step_cone",
     "step_ray",
     "surface",
+    "transparent",
 ]
 
-GIVEN = frozenset({"blocker", "field", "gather"})
+GIVEN = frozenset({"blocker", "field", "gather", "transparent"})
 """Intrinsics that units may call before the linker writes them."""
 
 
@@ -36,6 +37,26 @@ def blocker(x, y, z, P):
     -------
     float
         Field value.
+    """
+    raise NotImplementedError
+
+
+@intrinsic
+def transparent(x, y, z, P):
+    """Evaluate the field of the transparent parts of the scene.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Coordinates, scene units.
+    P : array of float
+        Scene parameters.
+
+    Returns
+    -------
+    f, r, g, b, kept : float
+        Field value, absorption of red, green and blue per scene unit, and the fraction of the light that
+        passes the surface.
     """
     raise NotImplementedError
 
@@ -116,9 +137,9 @@ def step_cone(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
     t, before, stride : float
         Distance along the ray, radius of the previous ball, step taken from its centre.
     side : float
-        -1 inside the solid, 1 outside.
+        Unused.
     path : float
-        Length of the path before this ray.
+        Half width of the cone at distance 1.
     P : array of float
         Scene parameters.
 

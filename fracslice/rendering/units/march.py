@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import any_of, maximum, minimum, sqrt, where
-from .intrinsics import blocker, field
+from ...formulas.vocabulary import absolute, any_of, exp, maximum, minimum, sqrt, where
+from .intrinsics import blocker, field, transparent
 
-MOST = 1.9
+MOST = 1.8
 """Maximum over-relaxation factor; above 2, balls do not touch."""
 
 
@@ -110,7 +110,7 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     return after, where(kept, radius, before), where(kept, step, before), where(hit, -1.0, 1.0)
 
 
-def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, spread):
+def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness):
     """Take one step of a cone, as far as the empty ball contains the whole cone.
 
     Parameters
@@ -120,15 +120,13 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, s
     t, before, stride : float
         Distance along the ray, radius of the previous ball, step taken from its centre.
     side : float
-        -1 inside the solid, 1 outside.
+        Unused.
     path : float
-        Length of the path before this ray.
+        Half width of the cone at distance 1.
     P : array of float
         Scene parameters.
     steepness : float
         Reciprocal of the field's Lipschitz bound.
-    spread : float
-        Half width of the cone at distance 1.
 
     Returns
     -------
@@ -137,14 +135,57 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, s
         up to t.
     """
     radius = field(ox + t * dx, oy + t * dy, oz + t * dz, P) * steepness
-    width = spread * (t + maximum(radius, 0.0))
-    gap = radius - 1.5 * width
+    width = path * (t + maximum(radius, 0.0))
+    gap = radius - 1.2 * width
     step = sqrt(maximum(radius * radius - width * width, 0.0))
     return where(gap < 0.0, t, t + step), before, stride, gap
 
 
-def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
+def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience, glass):
     """Trace a shadow ray.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Start of the ray.
+    dx, dy, dz : float
+        Unit direction to the light.
+    far : float
+        Distance of the light.
+    least : float
+        Smallest step.
+    P : array of float
+        Scene parameters.
+    steepness : float
+        Reciprocal of the field's Lipschitz bound.
+    patience : int
+        Maximum steps.
+    glass : bool
+        True if what is transparent blocks the ray, too.
+
+    Returns
+    -------
+    float
+        1 if the light is visible, 0 if it is blocked.
+    """
+    t = 0.0 * x
+    blocked = 0.0 * x
+    going = t < far
+    for _ in range(patience):
+        if not any_of(going):
+            break
+        if glass:
+            radius = field(x + t * dx, y + t * dy, z + t * dz, P) * steepness
+        else:
+            radius = blocker(x + t * dx, y + t * dy, z + t * dz, P) * steepness
+        blocked = where(going & (radius < 0.0), 1.0, blocked)
+        t = t + maximum(radius, least)
+        going = going & (t < far) & (blocked < 0.5)
+    return 1.0 - blocked
+
+
+def tinted_shadow(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
+    """Return the light that transparent parts pass on to a point, as if they did not bend it.
 
     Parameters
     ----------
@@ -165,17 +206,27 @@ def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
 
     Returns
     -------
-    float
-        1 if the light is visible, 0 if it is blocked.
+    r, g, b : float
+        Fractions of red, green and blue.
     """
     t = 0.0 * x
-    blocked = 0.0 * x
+    r = t + 1.0
+    g = r
+    b = r
+    before = r
     going = t < far
     for _ in range(patience):
         if not any_of(going):
             break
-        radius = blocker(x + t * dx, y + t * dy, z + t * dz, P) * steepness
-        blocked = where(going & (radius < 0.0), 1.0, blocked)
-        t = t + maximum(radius, least)
-        going = going & (t < far) & (blocked < 0.5)
-    return 1.0 - blocked
+        f, fr, fg, fb, kept = transparent(x + t * dx, y + t * dy, z + t * dz, P)
+        step = maximum(absolute(f) * steepness, least)
+        side = where(f < 0.0, -1.0, 1.0 + 0.0 * t)
+        inside = going & (f < 0.0)
+        edge = where(going & (side * before < 0.0), kept, 1.0)
+        r = r * edge * where(inside, exp(-fr * step), 1.0)
+        g = g * edge * where(inside, exp(-fg * step), 1.0)
+        b = b * edge * where(inside, exp(-fb * step), 1.0)
+        before = where(going, side, before)
+        t = t + step
+        going = going & (t < far)
+    return r, g, b

@@ -1,7 +1,9 @@
-// W1 as a picture with Phong's shading: `frame OUT.ppm [WIDTH 800] [HEIGHT 600] [SAMPLES 16] [--runs 5] [--threads T]`.
+// W1 as a picture with Phong's shading: `frame OUT.ppm [WIDTH 800] [HEIGHT 600] [SAMPLES 16] [--roots 0] [--runs 5]
+// [--threads T]`.
 //
-// Tiles of 40 x 40 pixels; the rays of a tile march together and are compacted as they end. "wall_s" and "cpu_s" are of
-// the first sample, "wall16_s" and "cpu16_s" of all of them.
+// Tiles of 40 x 40 pixels; the rays of a tile march together and are compacted as they end. A ray ends half a pixel before
+// the surface by the estimate of its distance; with `--roots 1`, at the first root of the signed field, by the rule of
+// fracslice/rendering/units/march.py. "wall_s" and "cpu_s" are of the first sample, "wall16_s" and "cpu16_s" of all.
 #include <omp.h>
 
 #include <array>
@@ -14,7 +16,8 @@ using namespace peers;
 
 namespace {
 
-constexpr int TILE = 40, MOST = TILE * TILE + Floats::count, STEPS = 300;
+constexpr int TILE = 40, MOST = TILE * TILE + Floats::count, STEPS = 300, ROOT_STEPS = 1600;
+constexpr float LIPSCHITZ = 1.0f, RELAXATION = 1.8f, ROUNDING = 1e-7f;  // as fracslice chooses them
 constexpr float SPHERE = 1.25f, BACKGROUND[3] = {0.08f, 0.08f, 0.12f};
 using Vector = std::array<double, 3>;
 
@@ -29,6 +32,7 @@ Vector cross(Vector a, Vector b) {
 // A camera that looks at the origin, 40 degrees high, with a light that goes with it.
 struct View {
     int width, height;
+    bool roots;
     Vector eye{2.2, -2.0, 1.4}, forward = unit(-1 * eye), right = unit(cross(forward, {0, 0, 1})), up = cross(right, forward);
     double tangent = std::tan(20 * 3.14159265358979323846 / 180);
     Vector light = unit(-0.35 * right + 0.5 * up + -0.8 * forward);
@@ -47,7 +51,8 @@ struct View {
 
 // Rays side by side, by coordinate.
 struct Rays {
-    alignas(64) float dx[MOST], dy[MOST], dz[MOST], t[MOST], end[MOST];
+    // radius, stride: the last empty ball, and the step from its centre
+    alignas(64) float dx[MOST], dy[MOST], dz[MOST], t[MOST], end[MOST], radius[MOST], stride[MOST];
     int pixel[MOST], count = 0;
 
     void put(int at, const Rays& from, int i, float distance) {
@@ -56,6 +61,8 @@ struct Rays {
         dz[at] = from.dz[i];
         end[at] = from.end[i];
         pixel[at] = from.pixel[i];
+        radius[at] = from.radius[i];
+        stride[at] = from.stride[i];
         t[at] = distance;
     }
 };
@@ -74,7 +81,12 @@ public:
         start(x0, y0, across, down);
         hits.rays.count = 0;
         evaluations = 0;
-        for (int step = 0; step < STEPS && rays.count; ++step) march();
+        for (int step = 0; step < (view.roots ? ROOT_STEPS : STEPS) && rays.count; ++step) {
+            if (view.roots)
+                advance();
+            else
+                march();
+        }
         differences();
         for (int i = 0; i < hits.rays.count; ++i) shade(i);
         return evaluations;
@@ -85,7 +97,8 @@ private:
     std::vector<float>& picture;
     Rays rays;
     Hits hits;
-    alignas(64) float x[MOST], y[MOST], z[MOST], d[MOST];
+    alignas(64) float x[MOST], y[MOST], z[MOST], d[MOST], ends[MOST];
+    const Bulb solid;
     std::size_t evaluations = 0;
 
     void add(int pixel, float r, float g, float b) {
@@ -115,14 +128,16 @@ private:
                 rays.t[i] = -b - std::sqrt(inner);
                 rays.end[i] = -b + std::sqrt(inner);
                 rays.pixel[i] = py * view.width + px;
+                rays.radius[i] = rays.stride[i] = 0;
             }
     }
 
     void evaluate(int count) {
-        for (int i = 0; i < count; i += Floats::count)
-            bulb(Floats::load(x + i), Floats::load(y + i), Floats::load(z + i)).store(d + i);
+        for (int i = 0; i < count; i += Floats::count) value(Floats::load(x + i), Floats::load(y + i), Floats::load(z + i)).store(d + i);
         evaluations += count;
     }
+
+    Floats value(Floats px, Floats py, Floats pz) const { return view.roots ? solid(px, py, pz) : bulb(px, py, pz); }
 
     static int padded(int count) { return (count + Floats::count - 1) / Floats::count * Floats::count; }
 
@@ -140,11 +155,7 @@ private:
         for (int i = 0; i < rays.count; ++i) {
             const float next = rays.t[i] + d[i];
             if (d[i] < 0.5f * view.pixel * rays.t[i]) {
-                const int hit = hits.rays.count++;
-                hits.x[hit] = x[i];
-                hits.y[hit] = y[i];
-                hits.z[hit] = z[i];
-                hits.rays.put(hit, rays, i, rays.t[i]);
+                hit(i);
             } else if (next > rays.end[i]) {
                 miss(rays.pixel[i]);
             } else {
@@ -152,6 +163,52 @@ private:
             }
         }
         rays.count = left;
+    }
+
+    // A step of every ray to the root, without branches; then those that ended are replaced by the last ones.
+    void advance() {
+        const int n = padded(rays.count);
+        for (int i = rays.count; i < n; ++i) rays.put(i, rays, 0, rays.t[0]);
+        for (int i = 0; i < n; i += Floats::count) advance(i);
+        evaluations += n;
+        for (int i = rays.count - 1; i >= 0; --i) {
+            if (ends[i] == 0) continue;
+            if (ends[i] > 1)
+                miss(rays.pixel[i]);
+            else
+                hit(i);
+            rays.put(i, rays, rays.count - 1, rays.t[rays.count - 1]);
+            --rays.count;
+        }
+    }
+
+    void advance(int i) {
+        const Floats zero(0.0f), one(1.0f), dx = Floats::load(rays.dx + i), dy = Floats::load(rays.dy + i), dz = Floats::load(rays.dz + i);
+        const Floats t = Floats::load(rays.t + i), before = Floats::load(rays.radius + i), stride = Floats::load(rays.stride + i);
+        const Floats radius = Floats(1 / LIPSCHITZ) * solid(multiply_add(t, dx, Floats(float(view.eye[0]))),
+                                                            multiply_add(t, dy, Floats(float(view.eye[1]))),
+                                                            multiply_add(t, dz, Floats(float(view.eye[2]))));
+        const Floats near = multiply_add(Floats(0.5f * view.pixel), t, Floats(ROUNDING));
+        const Floats fall = maximum(before - radius, Floats(1e-30f)), ahead = radius * stride / fall;
+        const auto root = greater(Floats(ROUNDING), radius) & ~greater(stride, maximum(before, Floats(4.0f) * near));
+        const auto kept = ~greater(stride, maximum(radius, zero) + before);
+        const Floats relaxed = maximum(Floats(RELAXATION) * stride / (stride + fall), one) * radius;
+        const Floats step = select(greater(Floats(0.5f) * near, ahead), maximum(relaxed, ahead + ahead), relaxed);
+        const Floats on = select(kept, t + step, t - stride + before), kept_radius = select(kept, radius, before);
+        const Floats kept_step = select(kept, step, before);
+        const Floats free = select(greater(kept_step, zero), on - kept_step + kept_radius, on);
+        select(root, t + select(greater(zero, radius), ahead, zero), on).store(rays.t + i);
+        kept_radius.store(rays.radius + i);
+        kept_step.store(rays.stride + i);
+        select(root, one, select(greater(free, Floats::load(rays.end + i)), Floats(2.0f), zero)).store(ends + i);
+    }
+
+    void hit(int i) {
+        const int at = hits.rays.count++;
+        hits.x[at] = float(view.eye[0]) + rays.t[i] * rays.dx[i];
+        hits.y[at] = float(view.eye[1]) + rays.t[i] * rays.dy[i];
+        hits.z[at] = float(view.eye[2]) + rays.t[i] * rays.dz[i];
+        hits.rays.put(at, rays, i, rays.t[i]);
     }
 
     // Gradients by differences over a tetrahedron's corners.
@@ -216,11 +273,11 @@ void write_picture(const std::string& path, const View& view, const std::vector<
 }  // namespace
 
 int main(int count, char** given) {
-    return run(count, given, "OUT.ppm [WIDTH 800] [HEIGHT 600] [SAMPLES 16] [--runs 5] [--threads T]", [](const Options& options) {
+    return run(count, given, "OUT.ppm [WIDTH 800] [HEIGHT 600] [SAMPLES 16] [--roots 0] [--runs 5] [--threads T]", [](const Options& options) {
         const auto number = [&](std::size_t at, int otherwise) {
             return options.words.size() > at ? std::stoi(options.words[at]) : otherwise;
         };
-        const View view{number(1, 800), number(2, 600)};
+        const View view{number(1, 800), number(2, 600), options.whole("roots", 0) != 0};
         const int samples = number(3, 16);
         omp_set_num_threads(options.threads());
         std::vector<float> sums;

@@ -62,6 +62,62 @@ template <class V> inline V bulb(V cx, V cy, V cz) {
     return select(escaped, V(T(0.25)) * log(last_r2) * sqrt(last_r2) / last_dr, V(T(0)));
 }
 
+// Signed: the solid is where the last step of the orbit is at most BAILOUT. No more than twice the distance from outside.
+// Formulas and constants are those of fracslice/formulas/mandelbulb.py and escape.py, for power 8.
+struct Bulb {
+    static constexpr double BAILOUT = 2, ESCAPED_SQUARED = 10, BOX = 1.1040895;
+    double last_level = 2 * std::log(BAILOUT), first_level = last_level * std::pow(0.125, BULB_ITERATIONS);
+    double least = BAILOUT * BAILOUT * std::exp(-0.2 / BAILOUT), reach_squared = std::pow(BAILOUT + BOX, 0.25);
+    double fading = 1 / (2 * reach_squared), fade = 1 + reach_squared * fading;
+
+    template <class V> V operator()(V cx, V cy, V cz) const {
+        using T = typename Traits<V>::Value;
+        using Mask = typename Traits<V>::Mask;
+        const auto all = [](double value) { return V(T(value)); };
+        const V one = all(1), tiny = all(1e-30);
+        V x = cx, y = cy, z = cz, dr = one, rho2 = multiply_add(x, x, y * y), r2 = multiply_add(z, z, rho2);
+        V last_r2 = r2, slope = dr, level = all(first_level);
+        double reached = first_level;
+        Mask alive = Mask(greater(all(ESCAPED_SQUARED), r2));
+        for (int i = 0; i < BULB_ITERATIONS && alive; ++i) {
+            rho2 = maximum(rho2, tiny);
+            // (z + i rho)^8 over rho, and e^(8 i phi) from e^(2 i phi), by squaring
+            V re = z, im = one, norm2 = r2;
+            for (int k = 0; k < 3; ++k) {
+                const V twice = re + re;
+                re = multiply_subtract(twice, re, norm2);
+                im = twice * im;
+                norm2 = norm2 * norm2;
+            }
+            const V inverse = inverse_sqrt(rho2), over = y * inverse * inverse;
+            V u = subtract_product(y + y, over, one), v = (x + x) * over;
+            for (int k = 0; k < 2; ++k) {
+                const V twice = v + v;
+                v = twice * u;
+                u = subtract_product(twice, all(0.5) * twice, one);
+            }
+            const V r4 = r2 * r2, meridian = r4 * r4 * inverse_sqrt(maximum(r2, tiny));
+            const V latitude = absolute(im) * minimum(one, subtract_product(r2, all(fading), all(fade)));
+            dr = multiply_add(maximum(meridian, latitude), all(8) * dr, one);
+            const V s = im * (rho2 * inverse);
+            x = multiply_add(s, u, cx);
+            y = multiply_add(s, v, cy);
+            z = re + cz;
+            rho2 = multiply_add(x, x, y * y);
+            r2 = multiply_add(z, z, rho2);
+            reached *= 8;
+            last_r2 = select(alive, r2, last_r2);
+            slope = select(alive, maximum(dr, slope), slope);
+            level = select(alive, all(reached), level);
+            alive &= Mask(greater(all(ESCAPED_SQUARED), r2));
+        }
+        last_r2 = minimum(maximum(last_r2, all(least)), all(1e30));
+        level = minimum(level, all(last_level));
+        const V height = log(last_r2), damping = multiply_add(all(2 * first_level), height, level + level);
+        return (height - level) * (level * maximum(sqrt(last_r2) / slope, tiny)) / damping;
+    }
+};
+
 template <class V> inline V julia(V x, V y, V z) {
     using T = typename Traits<V>::Value;
     using Mask = typename Traits<V>::Mask;

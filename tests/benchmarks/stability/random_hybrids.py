@@ -14,7 +14,7 @@ SMALLEST = {"count": 1, "resolution": 16.0}
 def rows(run: Run, count: int = 200, first: int = 0, resolution: float = 64.0) -> Iterator[Row]:
     faulty = 0
     for seed in range(first, first + count):
-        result = lost(random_hybrid(seed), resolution)
+        result = sum(lost(random_hybrid(seed), resolution, proved) for proved in (False, True))
         if result:
             faulty += 1
             run.faults.append(f"{seed}: {result} samples lost\n    {random_hybrid(seed)}")

@@ -1,0 +1,110 @@
+"""Colours of points on a surface, as in pictures without light, and the scalars behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..formulas import vocabulary
+from ..formulas.material import material
+from ..formulas.registry import Node
+from ..kernel.linker import CALLED, Linker
+from ..kernel.structure import link_tree
+from ..work import Work, chunks
+from .colours import Look
+from .tracing import TraceDialect, traps
+
+MATERIAL, PALETTE = "material", "viridis"
+
+COUNT = 1 << 14
+"""Points that are evaluated at a time."""
+
+_FUNCTION = "colour"
+
+
+@dataclass(frozen=True)
+class Paint:
+    """Colours of points.
+
+    Attributes
+    ----------
+    colours : ndarray of uint8, shape (n, 3)
+        sRGB.
+    scalars : mapping of str to ndarray of float32, shape (n,)
+        Property of the orbit, by the name of the trap, or "trap" where materials choose it; and the number of
+        the material, "material", 0 for none.
+    """
+
+    colours: NDArray[np.uint8]
+    scalars: Mapping[str, NDArray[np.float32]]
+
+
+def paint(root: Node, points: NDArray[np.float64], shown: str, work: Work) -> Paint:
+    """Evaluate the colours of a scene.
+
+    Parameters
+    ----------
+    root : Node
+        Scene with resolved depths.
+    points : ndarray of float64, shape (n, 3)
+        Points of its surface, scene units.
+    shown : str
+        "material" for the materials of the scene, or one of `formulas.material.TRAPS` for all of it.
+    work : Work
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    Paint
+        Colours and scalars.
+    """
+    if shown != MATERIAL:
+        root = material(_plain(root), palette=PALETTE, trap=shown)
+    source, parameters = _linked(root)
+    scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
+    scope[CALLED] = lambda function: function
+    exec(compile(source, "<linked colours>", "exec"), scope)
+    values = np.empty((5, len(points)))
+
+    def evaluate(rows: slice) -> None:
+        with np.errstate(all="ignore"):
+            values[:, rows] = np.broadcast_arrays(*scope[_FUNCTION](*points[rows].T, parameters))
+
+    work.map(evaluate, chunks(len(points), COUNT))
+    tone = {"trap" if shown == MATERIAL else shown: values[4].astype(np.float32)}
+    number = {MATERIAL: values[3].astype(np.float32)} if shown == MATERIAL else {}
+    return Paint(_encoded(values[:3].T), {**tone, **number})
+
+
+def _plain(node: Node) -> Node:
+    """The tree without its materials."""
+    if node.formula is material:
+        return _plain(node.children[0])
+    return node.changed(tuple(map(_plain, node.children))) if node.children else node
+
+
+def _linked(root: Node) -> tuple[str, NDArray[np.float64]]:
+    """Text and parameters of the function of linear red, green and blue, material number and tone."""
+    linker = Linker()
+    look = Look(linker, root)
+    dialect = TraceDialect(linker, materials=look.paints, traps=traps(root))
+    colours = [look.colour(k, node) for k, node in enumerate(look.all)]
+    lines = [
+        f"_, paint, tone = {link_tree(linker, root, dialect)}",
+        "t = 0.0 * x",
+        *look.chosen(colours, ("cr", "cg", "cb")),
+        "return cr, cg, cb, paint, tone",
+    ]
+    linker.functions[_FUNCTION] = "\n    ".join([f"def {_FUNCTION}(x, y, z, P):", *lines])
+    return linker.text(), np.array(linker.parameters or [0.0])
+
+
+def _encoded(light: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Linear light in sRGB (IEC 61966-2-1)."""
+    light = light.clip(0.0, 1.0)
+    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    colours: NDArray[np.uint8] = np.rint(255 * encoded).astype(np.uint8)
+    return colours
