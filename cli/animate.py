@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from .cluster import cluster_options, pooled
 from .inputs import check_folder, check_targets, load_scene
 from .options import (
     Positive,
@@ -38,8 +39,8 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
 @source_argument("SCENE")
 @output_option(
     "OUT",
-    "A film (.mp4, .webm, .mov, .gif, .apng), a contact sheet (.png), the first frame's scene (.xml), "
-    "or a folder of frames.",
+    "A film (.mp4, .webm, .mkv, .mov, .gif, .apng), a contact sheet (.png), the first frame's "
+    "scene (.xml), or a folder of frames.",
 )
 @click.option(
     "--frames", callback=numbers, metavar="N[..N]", help="These frames, counted from 0; all by default."
@@ -59,7 +60,11 @@ def numbers(_: click.Context, __: click.Parameter, text: str | None) -> range | 
 @click.option("--preview", is_flag=True, help="A quarter of the size, and 4 samples per pixel.")
 @click.option("--resume", is_flag=True, help="Keep the frames that are there.")
 @click.option("--exr", is_flag=True, help="Frames of linear floats, in a folder.")
+@click.option(
+    "--layers", is_flag=True, help="Add depth, normal, position, albedo and samples to --exr frames."
+)
 @device_option
+@cluster_options
 @run_options
 def animate(
     source: str,
@@ -72,7 +77,11 @@ def animate(
     preview: bool,
     resume: bool,
     exr: bool,
+    layers: bool,
     device: str,
+    cluster: str | None,
+    shard: str | None,
+    store: str | None,
     settings: tuple[str, ...],
     threads: int,
     quiet: bool,
@@ -84,12 +93,15 @@ def animate(
     from fracslice.animation import FilmJob, Timeline, check_film, encode, flown, write_frames
     from fracslice.export import replacing
     from fracslice.scene.writer import to_xml
+    from fracslice.work import Work
 
     target, ending = Path(output), Path(output).suffix.lower()
     if ending and ending != ".xml":
         check_film(target)
     if exr and ending:
         raise click.UsageError("--exr: expected a folder as OUT; films are made of PNG frames")
+    if layers and not exr:
+        raise click.UsageError("--layers: expected --exr, whose frames hold them")
     folder = target.with_suffix(".preview.frames" if preview else ".frames") if ending else target
     check_folder(folder)
     check_targets(source, output if ending else None)
@@ -103,7 +115,7 @@ def animate(
         width, height, samples = max(width // SMALLER, 1), max(height // SMALLER, 1), FEWER
     rate = fps or timeline.animation.fps
     form = ".exr" if exr else ".png"
-    job = FilmJob(timeline, (width, height), samples or film.samples, rate, form, device)
+    job = FilmJob(timeline, (width, height), samples or film.samples, rate, form, device, layers)
     chosen = range(job.frames) if frames is None else frames
     if chosen[-1] >= job.frames:
         raise click.UsageError(f"--frames: expected frames from 0 to {job.frames - 1}")
@@ -113,7 +125,10 @@ def animate(
             file.write(to_xml(scene if whole else job.scene(chosen[0])).encode())
         return
     try:
-        with working(threads, quiet) as work:
+        with (
+            pooled(output, threads, cluster, shard, store) as pool,
+            working(Work(threads, cluster=pool), quiet) as work,
+        ):
             paths = write_frames(job, chosen, folder, resume, work)
     except StoppedError as error:
         error.args = (f"stopped; the frames in {folder} are whole, and --resume goes on",)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from .cluster import cluster_options, pooled
 from .inputs import check_folder
 from .options import NAME, Positive, Whole, quiet_option, threads_option
 from .working import working
@@ -56,6 +57,7 @@ from .working import working
     metavar="SECONDS",
     help="Skip finer resolutions of what takes longer; 60 by default.",
 )
+@cluster_options
 @threads_option
 @quiet_option
 def bench(
@@ -65,6 +67,9 @@ def bench(
     peers: tuple[str, ...],
     repeat: int,
     limit: float,
+    cluster: str | None,
+    shard: str | None,
+    store: str | None,
     threads: int,
     quiet: bool,
 ) -> int:
@@ -74,8 +79,10 @@ def bench(
     time is that of the whole command, unless the last line it prints is a JSON object with "wall_s" and
     "cpu_s". Needs matplotlib; what scikit-image makes is left out without it.
     """
+    from fracslice.bench.peers import Peer
     from fracslice.bench.report import require_plots, write_report
-    from fracslice.bench.runs import BenchmarkTask, Peer, measure
+    from fracslice.bench.runs import BenchmarkTask, measure
+    from fracslice.work import Work
 
     require_plots()
     chosen = {"workloads": workloads, "resolutions": resolutions}
@@ -84,7 +91,10 @@ def bench(
     task = BenchmarkTask(**given, peers=others, repeats=repeat, limit_s=limit)  # type: ignore[arg-type]
     folder = Path(output)
     check_folder(folder)
-    with working(threads, quiet) as work:
+    with (
+        pooled(output, threads, cluster, shard, store) as pool,
+        working(Work(threads, cluster=pool), quiet) as work,
+    ):
         rows = measure(task, work)
         folder.mkdir(exist_ok=True)
         paths = write_report(rows, folder)

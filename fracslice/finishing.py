@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .mesh.check import MeshReport
     from .mesh.components import Removed
+    from .mesh.halo import Finished, SelectedPiece
     from .mesh.quantisation import Frame
-    from .mesh.window import Finished, Tally
+    from .mesh.tally import Tally
     from .surfaces import Surface
     from .volume import Plan, SignBricks
     from .volume.sizing import Sizing
@@ -196,23 +197,32 @@ class Finish:
         Finished
             Triangles that are finished with each piece.
         """
-        from .mesh.window import Window
+        from .mesh.halo import finished_piece
 
-        window = Window(self.planned.voxel, self._planes, self._frame, self.clock.work.threads)
-        count = len(self.pieces)
+        work, voxel, count = self.clock.work, self.planned.voxel, len(self.pieces)
+        ends, before, own = [-np.inf, *self.pieces.ends], None, self._kept(0)
         for number in range(count):
             with self.clock("finishing"):
-                self.clock.work.progress("finishing", number / count)
-                mesh, end = self.pieces.mesh(number), self.pieces.ends[number]
-                labels = self.pieces.labels(number)
-                self.near.add(mesh.vertices, labels, end)
-                keep = self.stays[self.shells.of_label][labels]
-                fresh = np.arange(len(mesh.triangles) - self.pieces.fresh[number], len(mesh.triangles))
+                work.progress("finishing", number / count)
+                after = self._kept(number + 1) if number + 1 < count else None
+                place = (ends[number], ends[number + 1]), voxel, self._planes, self._frame
+                made = finished_piece(own, before, after, *place, work.threads)
                 self.pieces.drop(number)
-                made = window.add(mesh, end, keep, fresh)
-                del mesh  # free it before the checks of the caller
-            self.clock.work.progress("finishing", (number + 1) / count)
+                if after is not None:
+                    before, own = own, after
+                else:
+                    del before, own  # free them before the checks of the caller
+            work.progress("finishing", (number + 1) / count)
             yield made
+
+    def _kept(self, number: int) -> SelectedPiece:
+        """The next piece, with the choice of its bodies."""
+        from .mesh.halo import SelectedPiece
+
+        mesh, labels = self.pieces.mesh(number), self.pieces.labels(number)
+        self.near.add(mesh.vertices, labels, self.pieces.ends[number])
+        fresh = np.arange(len(mesh.triangles) - self.pieces.fresh[number], len(mesh.triangles))
+        return SelectedPiece(mesh, self.stays[self.shells.of_label][labels], fresh)
 
 
 class Check:
@@ -227,7 +237,7 @@ class Check:
     """
 
     def __init__(self, finish: Finish, bricks: int) -> None:
-        from .mesh.window import Tally
+        from .mesh.tally import Tally
 
         self._finish, self._tally = finish, Tally(finish.clock.work.threads)
         self._stride = stride(bricks)

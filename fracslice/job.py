@@ -14,7 +14,7 @@ import numpy as np
 
 from . import surfaces
 from .clock import Clock
-from .errors import SceneError, TooLargeError
+from .errors import SceneError, SharedError, TooLargeError
 from .finishing import Check, Finish
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
@@ -29,8 +29,9 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .mesh.check import MeshReport
     from .mesh.simplify import Simplified
+    from .meshrecipe import MeshRecipe
     from .surfaces import Surface
-    from .volume import SignBricks
+    from .volume import Plan, SignBricks
     from .volume.sizing import Sizing
 
 STL = ".stl"
@@ -104,11 +105,6 @@ class _Job:
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
         self.what.voxels(self.size.longest)
-        if self.clock.work.cluster is not None:
-            for name, length in self.needing_all():
-                raise SceneError(
-                    f"{name} {length:g}mm needs the whole mesh: expected no cluster and no shard"
-                )
         if self.path is not None:
             from .export import check_format, check_target
 
@@ -147,24 +143,43 @@ class _Job:
         Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
         """
         sized, how = planned(self.scene, self.what, self.size, self.clock), self.what.how(self.scene)
-        signs = surfaces.sampled(sized.planned, self.clock)
+        signs = self.signs(sized.planned, False)
         thin = how.sorts and surfaces.has_thin_walls(signs)
         if again := thin and how.whole:
             sized = edited(sized.planned, self.scene, self.what, self.size, self.clock)
-            signs = surfaces.sampled(sized.planned, self.clock)
+            signs = self.signs(sized.planned, True)
             thin = surfaces.has_thin_walls(signs)
         return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, signs, again
+
+    def recipe(self, again: bool) -> MeshRecipe:
+        """Recipe of the field, for other processes; `again` if the field chose the bodies."""
+        from .meshrecipe import MeshRecipe
+        from .scene.writer import to_xml
+
+        return MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
+
+    def signs(self, planned: Plan, again: bool) -> SignBricks:
+        """Samples, by the pool of the work if there is one; a GPU samples here."""
+        work = self.clock.work
+        if work.cluster is None or work.device != "cpu":
+            return surfaces.sampled(planned, self.clock)
+        from .meshsampling import by_pool
+
+        job, evaluate = by_pool(self.recipe(again), planned, work.cluster, work)
+        signs = surfaces.sampled(planned, self.clock, evaluate)
+        work.cluster.finished(job)
+        return signs
 
     def surface(self, aside: Callable[[], Path] | None) -> tuple[Sized, Surface]:
         """Surface, in one piece if it fits in memory, and the choice of bodies that is left."""
         sized, signs, again = self.sampled()
         if (pool := self.clock.work.cluster) is not None:
-            from .meshtasks import MeshRecipe
-            from .scene.writer import to_xml
-            from .sharedmesh import shared_surface
+            if not any(self.needing_all()):
+                from .sharedmesh import shared_surface
 
-            recipe = MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
-            return sized, shared_surface(recipe, sized.planned, signs, pool, self.clock)
+                return sized, shared_surface(self.recipe(again), sized.planned, signs, pool, self.clock)
+            if not pool.first:
+                raise SharedError("the samples are made; shard 1 makes the mesh of them and writes the file")
         most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
@@ -191,7 +206,7 @@ class _Job:
         with clock("finishing"):
             finish = Finish(surface, sized.left, what.dust, size, sized.scale, clock)
         scale = finish.place.scale
-        made = self.alone(surface, finish) if clock.work.cluster is None else self.joined(surface, finish)
+        made = self.joined(surface, finish) or self.alone(surface, finish)
         with clock("checking"):
             amount, off = mesh_amount(planned, finish.volume, scale, clock.work)
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
@@ -237,13 +252,14 @@ class _Job:
         whole, simplified = self.written(finish, check, finish.place.mm(surface.tips))
         return _Made(whole, simplified, check.mesh, check.errors, back, check.contact)
 
-    def joined(self, surface: Surface, finish: Finish) -> _Made:
-        """Write the file from the pieces of a pool."""
+    def joined(self, surface: Surface, finish: Finish) -> _Made | None:
+        """Write the file from the pieces of a pool; None for a surface that was made here."""
         from .export import FORMATS
         from .export.stl import write_blocks
         from .sharedmesh import SharedSurface, finished, whole
 
-        assert isinstance(surface, SharedSurface)
+        if not isinstance(surface, SharedSurface):
+            return None
         check, blocks = finished(surface, finish)
         ending = STL if self.path is None else self.path.suffix.lower()
         mesh = None
@@ -276,7 +292,8 @@ class _Job:
         """
         from .export import FORMATS
         from .export.stl import write_pieces
-        from .mesh.window import Finished, tips_last
+        from .mesh.halo import Finished
+        from .mesh.tip_triangles import tips_last
 
         finished, simplified, mesh = finish.finished(), None, None
         if self.what.simplify_mm is not None:

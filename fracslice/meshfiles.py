@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import io
+import json
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,14 +13,23 @@ from numpy.typing import NDArray
 from .cluster import ResultFolder
 from .mesh.model import Mesh
 from .mesh.pieces import Pieces as MeshPieces
+from .mesh.survey import PieceComponents
+from .placement import Placement
 from .store import Arrays
 
 Files = dict[str, NDArray[Any]]
 """Arrays by name."""
 
+CHOICE = "choice"
+"""File of a job with what stays of its surface."""
+
+
+ALIGNED = 64
+"""Bytes to whose multiples arrays are aligned in a file."""
+
 
 def packed(**arrays: NDArray[Any]) -> bytes:
-    """Bytes of arrays.
+    """Bytes of arrays: a header line of JSON, then the arrays, without copies and checksums.
 
     Parameters
     ----------
@@ -30,9 +41,14 @@ def packed(**arrays: NDArray[Any]) -> bytes:
     bytes
         For `unpacked`.
     """
-    file = io.BytesIO()
-    np.savez(file, **arrays)  # type: ignore[arg-type]  # names are no options of savez
-    return file.getvalue()
+    about, parts, end = dict[str, tuple[str, tuple[int, ...], int]](), list[Any](), 0
+    for name, array in arrays.items():
+        plain = np.ascontiguousarray(array)
+        about[name] = plain.dtype.str, np.shape(array), end
+        parts += [plain.reshape(-1).view(np.uint8), bytes(-plain.nbytes % ALIGNED)]
+        end += plain.nbytes + len(parts[-1])
+    head = json.dumps(about).encode()
+    return b"".join([head, b" " * (-len(head) % ALIGNED + ALIGNED - 1), b"\n", *parts])
 
 
 def unpacked(data: bytes) -> Files:
@@ -41,15 +57,19 @@ def unpacked(data: bytes) -> Files:
     Parameters
     ----------
     data : bytes
-        The bytes.
+        The bytes, which the arrays view.
 
     Returns
     -------
     dict
-        Arrays by name.
+        Arrays by name, read-only.
     """
-    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        return dict(arrays)
+    start = data.index(b"\n") + 1
+    arrays: Files = {}
+    for name, (kind, shape, begin) in json.loads(data[:start]).items():
+        count = math.prod(shape)
+        arrays[name] = np.frombuffer(data, kind, count, start + begin).reshape(shape)
+    return arrays
 
 
 class StoredPieces(MeshPieces):
@@ -57,7 +77,7 @@ class StoredPieces(MeshPieces):
 
     Parameters
     ----------
-    store : Pieces
+    store : ResultFolder
         Files.
     job : str
         Key of the job.
@@ -95,3 +115,95 @@ class StoredPieces(MeshPieces):
 
     def _get(self, name: str) -> Arrays:
         return unpacked(self.store.read(self.job, self.prefix + name))
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """What stays of a surface, and where it is placed.
+
+    Attributes
+    ----------
+    prefix : str
+        Begin of the names of the pieces.
+    ends : ndarray of float64, shape (p,)
+        x at which each piece ends.
+    fresh, first_labels : ndarray of int, shape (p,)
+        Trailing triangles of each piece that were not made by contouring, and its first label.
+    stays : ndarray of bool, shape (l,)
+        Labels that stay.
+    placed : ndarray of float64, shape (4,)
+        Scale and offset.
+    points, tips : ndarray of float64, shape (n, 3)
+        Points whose distance from the mesh is measured, scene units; tips, mm.
+    stride : int
+        Each vertex of this stride is measured.
+    """
+
+    prefix: str
+    ends: NDArray[np.float64]
+    fresh: NDArray[np.int64]
+    first_labels: NDArray[np.int32]
+    stays: NDArray[np.bool_]
+    placed: NDArray[np.float64]
+    points: NDArray[np.float64]
+    tips: NDArray[np.float64]
+    stride: int
+
+    @property
+    def place(self) -> Placement:
+        """Placement."""
+        scale, x, y, z = self.placed.tolist()
+        return Placement(scale, (x, y, z))
+
+
+def read_choice(pieces: ResultFolder, job: str) -> Selection:
+    """Selection of the bodies of a job from its file.
+
+    Parameters
+    ----------
+    pieces : ResultFolder
+        Folder with the files of the job.
+    job : str
+        Key of the job.
+
+    Returns
+    -------
+    Selection
+    """
+    files = unpacked(pieces.read(job, CHOICE))
+    prefix, stride = str(files.pop("prefix")), int(files.pop("stride"))
+    return Selection(prefix=prefix, stride=stride, **files)
+
+
+def read_components(files: Files) -> PieceComponents:
+    """Components of a piece from the result of its `ContourTask`.
+
+    Parameters
+    ----------
+    files : dict
+        Arrays by name.
+
+    Returns
+    -------
+    PieceComponents
+        The components.
+    """
+    return PieceComponents(**{name: files[name] for name in PieceComponents.__dataclass_fields__})
+
+
+def read_seam(files: Files, name: str) -> Mesh:
+    """Triangles at a seam from the result of a `ContourTask`.
+
+    Parameters
+    ----------
+    files : dict
+        Arrays by name.
+    name : {"head", "tail"}
+        The begin or the end of the piece.
+
+    Returns
+    -------
+    Mesh
+        The triangles.
+    """
+    return Mesh(files[f"{name}_vertices"], files[f"{name}_triangles"])

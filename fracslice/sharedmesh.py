@@ -20,23 +20,12 @@ from .mesh.model import Mesh
 from .mesh.nesting import Nesting
 from .mesh.pointed_vertices import Pointed, PointedPiece
 from .mesh.survey import Survey, survey
+from .mesh.tally import Tally
+from .mesh.tip_triangles import by_tip
 from .mesh.tips import with_tips
-from .mesh.window import Tally, by_tip
-from .meshfiles import Files, StoredPieces, packed, unpacked
-from .meshtasks import (
-    CHOICE,
-    SAMPLES,
-    SHELLS,
-    ContourTask,
-    FinishTask,
-    MeshRecipe,
-    MeshTask,
-    NestTask,
-    cuts,
-    read_components,
-    read_seam,
-    samples_key,
-)
+from .meshfiles import CHOICE, Files, StoredPieces, packed, read_components, read_seam, unpacked
+from .meshrecipe import SAMPLES, MeshRecipe, samples_key
+from .meshtasks import SHELLS, ContourTask, FinishTask, MeshTask, NestTask, cuts
 from .surfaces import Surface
 from .volume import Plan, SignBricks
 

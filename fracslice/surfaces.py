@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .mesh.refine import Refined
     from .mesh.survey import WholeShells
     from .volume import Plan, SignBricks
+    from .volume.sampler import Evaluate
 
 BYTES_A_BRICK = 30_000
 """Peak memory per brick of samples, its triangles at all stages included, bytes; measured."""
@@ -75,7 +76,7 @@ class Surface:
         return self.shells.thin_walls(self.planned.voxel)
 
 
-def sampled(planned: Plan, clock: Clock) -> SignBricks:
+def sampled(planned: Plan, clock: Clock, evaluate: Evaluate | None = None) -> SignBricks:
     """Sample the signs of a planned scene around its surface.
 
     Parameters
@@ -84,6 +85,8 @@ def sampled(planned: Plan, clock: Clock) -> SignBricks:
         Field and voxel.
     clock : Clock
         Threads, progress, cancellation and timing.
+    evaluate : callable, optional
+        As for `sample_signs`.
 
     Returns
     -------
@@ -93,7 +96,7 @@ def sampled(planned: Plan, clock: Clock) -> SignBricks:
     from .volume import sample_scene_signs
 
     with clock("sampling"):
-        return sample_scene_signs(planned, clock.work)
+        return sample_scene_signs(planned, clock.work, evaluate)
 
 
 def has_thin_walls(signs: SignBricks) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,11 @@ NAMES = list(benchmarks.summaries())
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("gpu.")])
-def test_runs_at_its_smallest_size(name: str) -> None:
+def test_runs_at_its_smallest_size(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if name in ("jobs.cluster", "jobs.workers"):  # workers as threads, which start at once
+        distributed = pytest.importorskip("distributed")
+        here = partial(distributed.LocalCluster, processes=False)
+        monkeypatch.setattr(distributed, "LocalCluster", here)
     module, run = benchmarks.load(name), Run(1, (1,))
     pytest.importorskip(getattr(module, "NEEDS", "numpy"))
     rows = benchmarks.measure(module, run, module.SMALLEST)

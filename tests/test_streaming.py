@@ -131,7 +131,8 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
     """Triangles taken out of every piece: each open edge is counted once, wherever the pieces end."""
     from fracslice.mesh.check import check_mesh
     from fracslice.mesh.extract import contour_pieces
-    from fracslice.mesh.window import Tally, Window
+    from fracslice.mesh.halo import SelectedPiece, finished_piece
+    from fracslice.mesh.tally import Tally
     from fracslice.volume import plan, sample_scene_signs
 
     planned = plan(menger(level=2), 40)
@@ -139,11 +140,16 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
     whole = next(p.mesh for p in contour_pieces(planned.root, signs, most=10**6))
     lost = np.random.default_rng(1).random(len(whole.triangles)) < 0.01
     centres = {tuple(c) for c in whole.corners[lost].mean(axis=1).tolist()}
-    window, tally, passed = Window(planned.voxel), Tally(), 0
+    tally, passed, kept = Tally(), 0, list[SelectedPiece | None]()
     pieces = list(contour_pieces(planned.root, signs, most=1))
     for piece in pieces:
         keep = np.array([tuple(c) not in centres for c in piece.mesh.corners.mean(axis=1).tolist()])
-        finished = window.add(piece.mesh.selected(keep), piece.end)
+        mesh = piece.mesh.selected(keep)
+        kept.append(SelectedPiece(mesh, np.ones(len(mesh.vertices), bool), np.empty(0, np.int64)))
+    ends = [-np.inf, *(piece.end for piece in pieces)]
+    for n, (before, own, after) in enumerate(zip([None, *kept], kept, [*kept[1:], None], strict=False)):
+        assert own
+        finished = finished_piece(own, before, after, (ends[n], ends[n + 1]), planned.voxel)
         tally.add(finished)
         passed += len(finished.passed.triangles)
     truth, reported = check_mesh(whole.selected(~lost)), tally.report(1, 0, 0)

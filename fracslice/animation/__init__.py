@@ -1,8 +1,9 @@
 """Films: a scene over time, its frames and their files."""
 
 from .encode import ENDINGS, check_film, encode
-from .film import FilmJob, write_frames
+from .film import FilmJob
 from .flight import flown
+from .frames import write_frames
 from .timeline import Timeline
 
 __all__ = ["ENDINGS", "FilmJob", "Timeline", "check_film", "encode", "flown", "write_frames"]

@@ -17,8 +17,9 @@ CODECS = {
     ".mp4": ("libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"),
     ".webm": ("libvpx-vp9", "-pix_fmt", "yuv420p", "-crf", "24", "-b:v", "0", "-row-mt", "1"),
     ".mov": ("prores_ks", "-profile:v", "3", "-pix_fmt", "yuv422p10le"),
+    ".mkv": ("libsvtav1", "-pix_fmt", "yuv420p", "-crf", "28", "-preset", "6"),
 }
-"""Codec and options of ffmpeg by ending: H.264, VP9 and ProRes 422 HQ."""
+"""Codec and options of ffmpeg by ending: H.264, VP9, ProRes 422 HQ and AV1."""
 COLUMNS, ROWS, THUMBNAIL = 6, 4, 240
 """Pictures of a contact sheet, and their width in pixels."""
 ENDINGS = (*CODECS, ".gif", ".apng", ".png")

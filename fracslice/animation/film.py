@@ -1,9 +1,7 @@
-"""Frames of a film: numbered files, each whole or absent."""
+"""Frames of a film, one by one."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -12,12 +10,12 @@ import numpy as np
 
 from ..errors import RenderError
 from ..export import application
-from ..export.images import write_image
-from ..files import replacing, reported
+from ..export.images import encoded_image
 from ..formulas.parameters import Number, validated
 from ..formulas.registry import Node
 from ..keys import key, program
 from ..rendering import Renderer, develop, picture
+from ..rendering.layers import layers
 from ..rendering.sequence import SampleRange
 from ..rendering.setup import default_lights
 from ..scene.model import Scene
@@ -27,9 +25,6 @@ from .timeline import Timeline
 
 TURNS = 5
 """Step through the depths from one time of the shutter to the next, so that a late one is not a deep one."""
-
-JOURNAL = "film.json"
-"""File in the folder that says whose frames these are."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +45,8 @@ class FilmJob:
         Format of the frames.
     device : {"cpu", "cuda", "auto"}
         Device that traces the rays.
+    layers : bool
+        True to add depth, normal, position, albedo and samples to .exr frames.
     """
 
     timeline: Timeline
@@ -58,6 +55,7 @@ class FilmJob:
     fps: float
     ending: str = ".png"
     device: str = "auto"
+    layers: bool = False
 
     def __post_init__(self) -> None:
         validated("fps", self.fps, Number(24.0, "", above=0, most=1000), RenderError)
@@ -71,7 +69,7 @@ class FilmJob:
     def key(self) -> str:
         """Hash of everything that determines the frames."""
         scene = self.timeline.scene
-        return key(program(), scene.hash, self.size, self.samples, self.fps, self.ending)
+        return key(program(), scene.hash, self.size, self.samples, self.fps, self.ending, self.layers)
 
     def path(self, folder: Path, number: int) -> Path:
         """Return the file of a frame.
@@ -123,17 +121,49 @@ class FilmJob:
         ndarray of float32, shape (height, width, 4)
             Mean of the samples; see `Pass.mean`.
         """
+        return self._traced(number, work)[0]
+
+    def _traced(self, number: int, work: Work) -> tuple[np.ndarray, np.ndarray]:
+        """Mean of the samples of a frame, and their number at each pixel."""
         moments, shift = self.moments(number), number + 1 if self.timeline.animation.noise == "moving" else 0
         share, begin = self.samples // len(moments), 0
-        mean = np.zeros((self.size[1], self.size[0], 4), np.float32)
+        mean = np.zeros((*self.size[::-1], 4), np.float32)
+        counts = np.zeros(self.size[::-1], np.float32)
         for scene, same in groupby(moments):
             count = len(list(same))
             part = SampleRange(begin, shift)
             renderer = Renderer(scene.root, scene.view, self.size, work, self.device, part)
             *_, done = renderer.passes(count * share)
             mean += done.mean * np.float32(count / len(moments))
+            counts += renderer.accumulator.host().counts
             begin += count * share
-        return mean
+        return mean, counts
+
+    def file(self, number: int, work: Work) -> bytes:
+        """Render and encode a frame.
+
+        Parameters
+        ----------
+        number : int
+            Number of the frame, from 0.
+        work : Work
+            Threads and cancellation.
+
+        Returns
+        -------
+        bytes
+            PNG or OpenEXR file; the same for any number of threads.
+        """
+        (mean, counts), at, scene = self._traced(number, work), self.scene(number), self.timeline.scene
+        view = replace(at.view, lights=at.view.lights or default_lights(at.root))
+        text = {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
+        more = self._layers(at, work) | {"samples": counts} if self.layers else None
+        light = picture(mean, view.shading.mode)
+        return encoded_image(self.ending, develop(mean, view), light, text=text, layers=more)
+
+    def _layers(self, at: Scene, work: Work) -> dict[str, np.ndarray]:
+        """Layers of a frame, at the time at which its shutter opens."""
+        return layers(Renderer(at.root, at.view, self.size, work, self.device))
 
     def moments(self, number: int) -> list[Scene]:
         """Return the scenes that a frame is the mean of: its times, each with another depth.
@@ -163,62 +193,3 @@ class FilmJob:
         """Trees of a scene for a range of details; see `gradual_depths`."""
         camera = scene.view.camera
         return gradual_depths(scene.root, camera, self.size, count) if camera else [scene.root] * count
-
-
-def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: bool, work: Work) -> list[Path]:
-    """Write frames into a folder.
-
-    Parameters
-    ----------
-    job : FilmJob
-        The film.
-    numbers : sequence of int
-        Numbers of the frames, from 0.
-    folder : Path
-        Folder, made if it is missing.
-    resume : bool
-        True to keep frames that are there; False to make them again.
-    work : Work
-        Threads, progress and cancellation.
-
-    Returns
-    -------
-    list of Path
-        The frames, in order.
-
-    Raises
-    ------
-    RenderError
-        If the folder has the frames of another film, or files that are no frames of a film.
-    """
-    _claim(job, folder, resume)
-    scene, paths = job.timeline.scene, [job.path(folder, number) for number in numbers]
-    for done, (number, path) in enumerate(zip(numbers, paths, strict=True)):
-        work.progress(f"frame {number}", done / len(paths))
-        if resume and path.exists():
-            continue
-        mean, at = job.light(number, replace(work, progress=lambda *_: None)), job.scene(number)
-        view = replace(at.view, lights=at.view.lights or default_lights(at.root))
-        text = {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
-        write_image(path, develop(mean, view), picture(mean, view.shading.mode), text=text)
-    work.progress("frames", 1.0)
-    return paths
-
-
-def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
-    """Make the folder this film's; frames of an earlier film are removed, unless it is to be resumed."""
-    journal = folder / JOURNAL
-    if journal.exists():
-        known = json.loads(journal.read_text())["key"]
-        if known == job.key:
-            return
-        if resume:
-            raise RenderError(f"{folder}: has frames of another film: expected those of this one, to resume")
-        for path in folder.glob("frame?????.*"):
-            path.unlink()
-    elif folder.exists() and any(folder.iterdir()):
-        raise RenderError(f"{folder}: expected an empty folder, or one with the frames of a film")
-    with reported(folder):
-        folder.mkdir(exist_ok=True)
-    with replacing(journal) as file:
-        file.write(json.dumps({"key": job.key, "fps": job.fps}).encode())

@@ -4,74 +4,29 @@ from __future__ import annotations
 
 import json
 import os
-import shlex
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-from ..errors import BenchError, FracsliceError
+from ..cluster import Shard
+from ..errors import BenchError, FracsliceError, SharedError
 from ..formulas.parameters import Count, Number, validate, validated
+from ..keys import key, program
 from ..work import Work
 from .methods import METHODS
+from .peers import Peer
 from .workloads import WORKLOADS
 
-PLACES = ("{workload}", "{resolution}", "{output}")
 FIGURES = ("wall_s", "cpu_s", "peak_mb", "evaluations")
 """Figures that a peer may report itself, in place of those of its process."""
-
-
-@dataclass(frozen=True)
-class Peer:
-    """External program to compare with.
-
-    Attributes
-    ----------
-    name : str
-        Name in the report.
-    command : tuple of str
-        Command with {workload}, {resolution} and {output}, the mesh file in scene units that it writes.
-    """
-
-    name: str
-    command: tuple[str, ...]
-
-    @classmethod
-    def read(cls, text: str) -> Peer:
-        """Parse NAME=COMMAND.
-
-        Parameters
-        ----------
-        text : str
-            The text.
-
-        Returns
-        -------
-        Peer
-            The peer.
-
-        Raises
-        ------
-        BenchError
-            If the text is malformed.
-        """
-        name, _, command = text.partition("=")
-        missing = [place for place in PLACES if place not in command]
-        if not name or missing:
-            raise BenchError(
-                f"peer {text!r}: expected NAME=COMMAND with {{workload}}, {{resolution}} and {{output}}"
-            )
-        try:
-            return cls(name, tuple(shlex.split(command)))
-        except ValueError as error:
-            raise BenchError(f"peer {text!r}: {str(error).lower()}") from None
 
 
 @dataclass(frozen=True)
@@ -152,7 +107,7 @@ def measure(task: BenchmarkTask, work: Work) -> list[Measurement]:
     task : BenchmarkTask
         The task.
     work : Work
-        Threads, progress and cancellation.
+        Threads or pool, progress and cancellation. A worker measures with one thread.
 
     Returns
     -------
@@ -165,26 +120,80 @@ def measure(task: BenchmarkTask, work: Work) -> list[Measurement]:
         If the work was cancelled.
     """
     methods: list[str | Peer] = [name for name in METHODS if "scikit" not in name or find_spec("skimage")]
-    methods += task.peers
-    cases = [(w, n, m) for w in task.workloads for n in sorted(task.resolutions) for m in methods]
-    result: list[Measurement] = []
-    slow = set()
-    for i, (workload, resolution, method) in enumerate(cases):
-        work.progress("measuring", i / len(cases))
-        name = method.name if isinstance(method, Peer) else method
-        if (workload, name) in slow:
-            continue
-        started = time.perf_counter()
-        try:
-            runs = list(_runs(task.repeats, workload, resolution, method, work))
-            middle = {key: median(run[key] for run in runs) for key in runs[0]}
-            result.append(Measurement(workload, resolution, name, middle))
-        except _FailedError as error:
-            result.append(Measurement(workload, resolution, name, {}, str(error)))
-        if time.perf_counter() - started > task.limit_s * task.repeats:
-            slow.add((workload, name))
+    result: dict[tuple[int, int, int], Measurement] = {}
+    slow = set[tuple[str, int]]()
+    for turn, resolution in enumerate(sorted(task.resolutions)):
+        cases = [
+            (row, column, MeasureTask(name, resolution, method, task.repeats))
+            for row, name in enumerate(task.workloads)
+            for column, method in enumerate([*methods, *task.peers])
+            if (name, column) not in slow
+        ]
+        for (row, column, case), data in zip(
+            cases, _results([case for *_, case in cases], work), strict=True
+        ):
+            seconds, one = json.loads(data)
+            result[row, turn, column] = Measurement(**one)
+            if seconds > task.limit_s * task.repeats:
+                slow.add((case.workload, column))
     work.progress("measuring", 1.0)
-    return result
+    return [result[place] for place in sorted(result)]
+
+
+def _results(cases: Sequence[MeasureTask], work: Work) -> Iterator[bytes]:
+    """Results of measurements, in order, one after the other here, or by the pool of the work."""
+    if (pool := work.cluster) is None:
+        for done, case in enumerate(cases):
+            work.progress("measuring", done / len(cases))
+            yield case.make(work)
+    elif isinstance(pool, Shard) and not pool.first:
+        raise SharedError(f"{pool.share(cases, work)} measurements are made; shard 1 writes the report")
+    else:
+        yield from pool.results(cases, work, "measuring")
+        pool.finished(cases[0].job)
+
+
+@dataclass(frozen=True)
+class MeasureTask:
+    """Measurement as a task.
+
+    Attributes
+    ----------
+    workload : str
+        Name of the workload.
+    resolution : int
+        Voxels along the cube.
+    method : str or Peer
+        What is measured.
+    repeats : int
+        Runs, of which the median is reported.
+    """
+
+    workload: str
+    resolution: int
+    method: str | Peer
+    repeats: int
+
+    @property
+    def job(self) -> str:
+        """Key of all measurements of a resolution."""
+        return key(program(), "bench", self.resolution, self.repeats)
+
+    @property
+    def name(self) -> str:
+        """Name of the measurement."""
+        return f"{self.workload}-{self.resolution:04}-{key(self.method)[:8]}"
+
+    def make(self, work: Work) -> bytes:
+        """Seconds and `Measurement` as JSON; see `Task.make`."""
+        name = self.method.name if isinstance(self.method, Peer) else self.method
+        begun, of = time.perf_counter(), (self.workload, self.resolution)
+        try:
+            runs = list(_runs(self.repeats, *of, self.method, work))
+            one = Measurement(*of, name, {each: median(run[each] for run in runs) for each in runs[0]})
+        except _FailedError as error:
+            one = Measurement(*of, name, {}, str(error))
+        return json.dumps([time.perf_counter() - begun, asdict(one)]).encode()
 
 
 class _FailedError(FracsliceError):

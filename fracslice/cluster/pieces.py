@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import os
-import platform
 import posixpath
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..errors import ClusterError
 from ..extras import lacking
-from ..keys import program
-from ..version import __version__
 
 if TYPE_CHECKING:
     from ..work import Work
@@ -139,7 +136,7 @@ class ResultFolder:
             raise ClusterError(f"{self.url}: {job}/{name}: {error}") from None
 
     def write(self, job: str, name: str, data: bytes) -> None:
-        """Write a file of a job atomically.
+        """Write a file of a job atomically: beside and moved, or by a conditional put of an object store.
 
         Parameters
         ----------
@@ -156,11 +153,15 @@ class ResultFolder:
             If it cannot be written.
         """
         system, root = self._place
-        part = f"{root}/{job}/.{name}.{token_hex(8)}.part"
+        path, part = f"{root}/{job}/{name}", f"{root}/{job}/.{name}.{token_hex(8)}.part"
         try:
             system.makedirs(f"{root}/{job}", exist_ok=True)
-            system.pipe_file(part, data)
-            system.mv(part, f"{root}/{job}/{name}")
+            if "://" in self.url:
+                with suppress(FileExistsError):  # the same bytes
+                    system.pipe_file(path, data, mode="create")
+            else:
+                system.pipe_file(part, data)
+                system.mv(part, path)
         except OSError as error:
             raise ClusterError(f"{self.url}: {error}") from None
 
@@ -185,52 +186,6 @@ class ResultFolder:
             system.rmdir(root)
 
 
-@dataclass(frozen=True)
-class Identity:
-    """What two processes must share to make the same bytes.
-
-    Attributes
-    ----------
-    version, python, program, processor : str
-        Version of fracslice and of Python; keys of the program's text and of the processor's instructions.
-    """
-
-    version: str
-    python: str
-    program: str
-    processor: str
-
-    @classmethod
-    def here(cls) -> Identity:
-        """Identity of this process."""
-        from ..kernel.objects import toolchain
-
-        return cls(__version__, platform.python_version(), program(), toolchain())
-
-    def difference(self, expected: Identity) -> str:
-        """Describe the first difference; "" if there is none.
-
-        Parameters
-        ----------
-        expected : Identity
-            Identity of the process that started the job.
-
-        Returns
-        -------
-        str
-            Such as "Python 3.12.1, expected 3.11.7".
-        """
-        for name, own, other in (
-            ("fracslice", self.version, expected.version),
-            ("Python", self.python, expected.python),
-            ("program text", self.program[:8], expected.program[:8]),
-            ("processor", self.processor[:8], expected.processor[:8]),
-        ):
-            if own != other:
-                return f"{name} {own}, expected {other}"
-        return ""
-
-
 def run(task: Task, pieces: ResultFolder, work: Work) -> None:
     """Make the result of a task, unless it is there.
 
@@ -244,7 +199,8 @@ def run(task: Task, pieces: ResultFolder, work: Work) -> None:
         Threads.
     """
     if not pieces.has(task):
-        pieces.write(task.job, task.name, task.make(work))
+        alone = replace(work, cluster=None)  # a task that shared its own work would wait for itself
+        pieces.write(task.job, task.name, task.make(alone))
 
 
 class Pool(ABC):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ClusterError
 from ..extras import lacking
 from ..files import warn
-from .pieces import Identity, Pool, ResultFolder, Task, run
+from .identity import Identity
+from .pieces import Pool, ResultFolder, Task, run
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -23,8 +24,15 @@ if TYPE_CHECKING:
 HIDDEN = ".fracslice-pieces"
 """Folder of the results where none is named."""
 
-POLL, CONNECT = 0.02, 20.0
+POLL, CONNECT = 0.05, 20.0
 """Seconds between two looks for results, and until a scheduler answers."""
+
+SELDOM = {
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.profile.enabled": False,
+}
+"""Dask's measures of itself, which take 5 % of a processor for each local worker at their defaults."""
 
 
 class UnfitWorkerError(ClusterError):
@@ -221,7 +229,7 @@ def connected(where: str, store: str, threads: int = 1) -> Iterator[Workers]:
     where : str
         Address of a scheduler, such as "tcp://host:8786"; or "local" or "local:4" for processes here.
     store : str
-        Folder of the results, see `ResultFolder`.
+        Folder of the results, see `Pieces`.
     threads : int
         Threads of all local workers together.
 
@@ -236,25 +244,34 @@ def connected(where: str, store: str, threads: int = 1) -> Iterator[Workers]:
     """
     if reason := lacking("distributed", "clusters need"):
         raise ClusterError(reason)
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
     kind, _, count = where.partition(":")
-    if kind != "local":
+    with ExitStack() as stack:
+        if kind == "local":
+            if count and not 1 <= int(count if count.isdigit() else 0) <= 1024:
+                raise ClusterError(f"{where!r}: expected local, local:N or the address of a scheduler")
+            scheduler = stack.enter_context(_local(int(count or threads), threads))
+        else:
+            scheduler = where
         try:
-            client = Client(where, timeout=CONNECT, set_as_default=False)
+            client = Client(scheduler, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ClusterError(f"{where}: no scheduler answers: {error}") from None
-        with client:
-            yield Workers(client, ResultFolder(store))
-        return
-    if count and not 1 <= int(count if count.isdigit() else 0) <= 1024:
-        raise ClusterError(f"{where!r}: expected local, local:N or the address of a scheduler")
-    workers = int(count or threads)
-    per_worker = max(1, threads // workers)
+        yield Workers(stack.enter_context(client), ResultFolder(store))
+
+
+@contextmanager
+def _local(workers: int, threads: int) -> Iterator[Any]:
+    """Cluster of processes here, which share some threads."""
+    import dask
+    from distributed import LocalCluster
+
+    each = max(1, threads // workers)
     with (
+        dask.config.set(SELDOM),
         LocalCluster(
-            n_workers=workers, threads_per_worker=per_worker, memory_limit=None, dashboard_address=None
+            n_workers=workers, threads_per_worker=each, memory_limit=None, dashboard_address=None
         ) as cluster,
-        Client(cluster, timeout=CONNECT, set_as_default=False) as client,
     ):
-        yield Workers(client, ResultFolder(store))
+        yield cluster

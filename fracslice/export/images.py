@@ -99,18 +99,42 @@ def write_image(
     """
     if bits not in (8, 16):
         raise ExportError(f"{path}: {bits} bits: expected 8 or 16")
-    metadata, ending = text or {}, check_image(path)
-    if layers and ending != ".exr":
+    if layers and check_image(path) != ".exr":
         raise ExportError(f"{path}: expected an .exr file, which holds layers")
-    if ending == ".png":
-        data = png(shown, bits, metadata, work)
-    elif ending in LOSSY:
-        data = lossy(shown, LOSSY[ending], metadata)
-    else:
-        data = exr(light, metadata, layers or {}) if ending == ".exr" else tiff(light, metadata)
+    data = encoded_image(check_image(path), shown, light, bits, text, work, layers)
     with replacing(path) as file:
         file.write(data)
     return Path(path)
+
+
+def encoded_image(
+    ending: str,
+    shown: np.ndarray,
+    light: np.ndarray,
+    bits: int = 8,
+    text: Mapping[str, str] | None = None,
+    work: Work | None = None,
+    layers: Mapping[str, np.ndarray] | None = None,
+) -> bytes:
+    """Encode an image, in the format of an extension.
+
+    Parameters
+    ----------
+    ending : str
+        Extension, one of `IMAGES`.
+    shown, light, bits, text, work, layers
+        As for `write_image`.
+
+    Returns
+    -------
+    bytes
+    """
+    metadata = text or {}
+    if ending == ".png":
+        return png(shown, bits, metadata, work)
+    if ending in LOSSY:
+        return lossy(shown, LOSSY[ending], metadata)
+    return exr(light, metadata, layers or {}) if ending == ".exr" else tiff(light, metadata)
 
 
 def lossy(shown: np.ndarray, kind: str, text: Mapping[str, str]) -> bytes:

@@ -46,7 +46,6 @@ def cleaned(
     mesh: Mesh,
     keep: NDArray[np.bool_],
     fresh: NDArray[np.int64] = NO_EDITS[0],
-    edited: NDArray[np.int64] = NO_EDITS[0],
     planes: NDArray[np.float64] = NO_PLANES,
     frame: Frame = UNMOVED,
     between: tuple[float, float] = (-np.inf, np.inf),
@@ -69,8 +68,6 @@ def cleaned(
         Vertices of the connected components that stay.
     fresh : ndarray of int64, shape (k,), optional
         Triangles that were not made by contouring, ascending.
-    edited : ndarray of int64, shape (k,), optional
-        Triangles that were edited before, ascending.
     planes : ndarray of float64, shape (k, 3), optional
         Placed planes of the grid; see `quantise`.
     frame : Frame, optional
@@ -92,7 +89,6 @@ def cleaned(
         If a coordinate is not finite or an index is out of range.
     """
     edits, gone = _mended(mesh, keep, frame, between, threads)
-    edits = _with_edited(edits, edited, mesh.triangles)
     displaced, keep = np.zeros(len(keep), bool), keep.copy()
     displaced[mesh.triangles[fresh]], keep[gone] = True, False
     final, displaced, places = quantise(mesh, keep, displaced, edits, planes, frame, threads)
@@ -100,16 +96,6 @@ def cleaned(
     suspected[touching(final.triangles, displaced, threads)] = suspected[places[places >= 0]] = True
     # Only displaced vertices can coincide with others.
     return Cleaned(welded(final) if displaced.any() else final, np.flatnonzero(suspected), edits)
-
-
-def _with_edited(edits: Edits, edited: NDArray[np.int64], triangles: NDArray[np.int32]) -> Edits:
-    """Edits, and triangles edited before, as they are."""
-    if not len(edited):
-        return edits
-    edited = np.setdiff1d(edited, edits[0], assume_unique=True)
-    rows = np.concatenate([edits[0], edited])
-    order = np.argsort(rows)
-    return rows[order], np.concatenate([edits[1], triangles[edited]])[order]
 
 
 def _mended(

@@ -1,10 +1,9 @@
-"""Cleaning of one piece of a surface, with the same result as `Window`: for pieces that are finished in any
-order, each with the triangles of its neighbours near the seams.
-"""
+"""Cleaning of the pieces of a surface in any order, each with its neighbours' triangles near the seams."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,68 @@ from .clean import cleaned
 from .model import Mesh
 from .pieces import seamed
 from .quantisation import NO_PLANES, UNMOVED, Frame
-from .window import MENDS, WAITS, Finished
+
+WAITS, MENDS = 7.5, 3.0
+"""Distances from a seam, voxels. Triangles with a vertex nearer than the first are those of the halo;
+triangles are cleaned up to the second. An edit reaches three voxels at most, so that it never meets triangles
+beyond the halo.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Finished:
+    """Finished triangles as a file holds them, among neighbouring ones.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Finished triangles and neighbours, mm, quantised.
+    suspects : ndarray of int64, shape (k,)
+        Triangles that may intersect others, ascending.
+    done : int
+        Number of finished triangles; the first ones. Each triangle is finished once, in the
+        order of the pieces.
+    counted : ndarray of bool, shape (n,)
+        Vertices with all their triangles in `mesh`. Each vertex is counted once.
+    """
+
+    mesh: Mesh
+    suspects: NDArray[np.int64]
+    done: int
+    counted: NDArray[np.bool_]
+
+    @classmethod
+    def whole(cls, mesh: Mesh, suspects: NDArray[np.int64] | None = None) -> Finished:
+        """A whole mesh as one piece.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            Quantised mesh, mm.
+        suspects : ndarray of int64, shape (k,), optional
+            Triangles that may intersect others; all by default.
+
+        Returns
+        -------
+        Finished
+            All triangles and vertices of the mesh.
+        """
+        count = len(mesh.triangles)
+        return cls(
+            mesh, np.arange(count) if suspects is None else suspects, count, np.ones(len(mesh.vertices), bool)
+        )
+
+    @cached_property
+    def passed(self) -> Mesh:
+        """The finished triangles, among vertices of others too; open where their neighbours are."""
+        mesh = self.mesh
+        return mesh if self.done == len(mesh.triangles) else Mesh(mesh.vertices, mesh.triangles[: self.done])
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """The counted vertices, float64 [k, 3]."""
+        vertices = self.mesh.vertices
+        return vertices if self.counted.all() else vertices[self.counted]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +107,7 @@ class SelectedPiece:
 
         Returns
         -------
-        Kept
+        SelectedPiece
             The triangles, with all vertices of the piece; unused ones do not stay.
         """
         rows = touching(self.mesh.triangles, vertices, threads)
@@ -69,7 +129,7 @@ class SelectedPiece:
 
         Returns
         -------
-        Kept
+        SelectedPiece
             Both.
         """
         mesh, number = seamed(self.mesh, other.mesh, seam, near)
@@ -79,7 +139,7 @@ class SelectedPiece:
         return SelectedPiece(mesh, keep, np.concatenate([self.fresh, other.fresh + len(self.mesh.triangles)]))
 
 
-def finished_alone(
+def finished_piece(
     piece: SelectedPiece,
     before: SelectedPiece | None,
     after: SelectedPiece | None,
@@ -98,14 +158,18 @@ def finished_alone(
     ----------
     piece : SelectedPiece
         The piece, at least a brick thick.
-    before, after : Kept or None
+    before, after : SelectedPiece or None
         Its neighbours; None at the ends of the surface.
     ends : tuple of float
         x at which it begins and ends; infinite at the ends of the surface.
     voxel : float
         Voxel, scene units.
-    planes, frame, threads
-        As for `Window`.
+    planes : ndarray of float64, shape (k, 3), optional
+        Placed planes of the grid that the pieces were contoured on.
+    frame : Frame, optional
+        Placement; none by default.
+    threads : int, optional
+        Threads; 0 for all cores.
 
     Returns
     -------
@@ -125,6 +189,8 @@ def finished_alone(
     final, suspects, edits = cleaned(
         mesh, keep, whole.fresh, planes=planes, frame=frame, between=between, threads=threads
     )
+    if before is None and after is None:
+        return Finished.whole(final, suspects)
     triangles = mesh.triangles.copy()
     triangles[edits[0]] = edits[1]
     stays = keep[triangles[:, 0]] & (triangles[:, 0] >= 0)

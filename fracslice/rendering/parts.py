@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from ..cluster import ResultFolder
     from .progressive import Renderer
 
-PIXELS = 1 << 14
-"""Pixels of a task."""
+SAMPLES, PIXELS = 1 << 21, 1 << 18
+"""Samples of a task, about two seconds, and most pixels."""
 
 INPUT = "input"
 """Name of the file with the pixels of a pass and their sums."""
@@ -206,9 +206,8 @@ class PoolTracer:
         job = key(frame, size, self.samples, self._prepasses, *known)
         of = self.scene, *self._part, self.samples, size, sums.dtype.name, pool.pieces, job, frame
         about = *of, self._passes, self._prepasses, plan.last
-        tasks = [
-            PartTask(*about, start, min(start + PIXELS, count), count) for start in range(0, count, PIXELS)
-        ]
+        step = max(1, min(PIXELS, SAMPLES * count // max(plan.samples, 1)))
+        tasks = [PartTask(*about, start, min(start + step, count), count) for start in range(0, count, step)]
         pool.pieces.write(job, INPUT, b"".join(part.tobytes() for part in known))
         parts = pool.results(tasks, work)
         for task, data in zip(tasks, parts, strict=True):

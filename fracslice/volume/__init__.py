@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -22,7 +23,7 @@ from .bricks import Bricks, SignBricks
 from .extent import Extent, extent, reached
 from .lattice import Lattice
 from .pruning import Proofs
-from .sampler import sample, sample_signs
+from .sampler import Evaluate, sample, sample_signs
 
 __all__ = [
     "Bricks",
@@ -222,7 +223,9 @@ def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
     return _sampled(planned, work or Work(), sample, Bricks, "values")
 
 
-def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
+def sample_scene_signs(
+    planned: Plan, work: Work | None = None, evaluate: Evaluate | None = None
+) -> SignBricks:
     """Sample a planned scene as `sample_scene` does, but keep only the signs.
 
     Signs suffice to extract the exact surface.
@@ -233,6 +236,8 @@ def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
         Scene, bounds and voxel size.
     work
         Execution settings.
+    evaluate
+        As for `sample_signs`.
 
     Returns
     -------
@@ -246,7 +251,8 @@ def sample_scene_signs(planned: Plan, work: Work | None = None) -> SignBricks:
     Cancelled
         If the job was cancelled.
     """
-    return _sampled(planned, work or Work(), sample_signs, SignBricks, "signs")
+    take = partial(sample_signs, evaluate=evaluate)
+    return _sampled(planned, work or Work(), take, SignBricks, "signs")
 
 
 def _sampled(

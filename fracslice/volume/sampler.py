@@ -30,6 +30,12 @@ from .lattice import BRICK, Lattice
 from .pruning import Proofs, Pruning
 from .states import BORDER, CANDIDATE, EMPTY, FULL, QUEUED, States
 
+Evaluate = Callable[[np.ndarray], np.ndarray]
+"""Sign bits of bricks, uint8 [n, 64], from their corners, int32 [n, 3]; see `brick_signs`."""
+
+MANY = 1 << 17
+"""Bricks that are worth another evaluation than by the threads at hand."""
+
 AUDITS = 8
 """Largest number of audits."""
 
@@ -101,6 +107,7 @@ def sample_signs(
     work: Work | None = None,
     conservative: Kernel | None = None,
     proofs: Proofs | None = None,
+    evaluate: Evaluate | None = None,
 ) -> SignBricks:
     """Sample the same bricks but keep only signs, in 1/32 of the memory.
 
@@ -118,6 +125,8 @@ def sample_signs(
         Kernel to prune by, if not `kernel`.
     proofs
         Proofs of the cells that the bound does not discard.
+    evaluate
+        Evaluates large sets of bricks instead of the threads of `work`.
 
     Returns
     -------
@@ -132,8 +141,33 @@ def sample_signs(
         If the job was cancelled.
     """
     pruning = Pruning(kernel, conservative or kernel, bounds, lattice, work or Work(), proofs)
-    signs, _ = _Sampling(pruning, None).signs()
+    signs, _ = _Sampling(pruning, None, evaluate).signs()
     return signs
+
+
+def brick_signs(kernel: Kernel, corners: np.ndarray, lattice: Lattice, values: np.ndarray) -> np.ndarray:
+    """Sample some bricks.
+
+    Parameters
+    ----------
+    kernel
+        Float32 kernel.
+    corners
+        Grid indices of their first samples, int32 [n, 3].
+    lattice
+        Sampling grid.
+    values
+        Output: the samples, float32 [n, 512].
+
+    Returns
+    -------
+    ndarray
+        Sign bits, uint8 [n, 64], set inside.
+    """
+    kernel.bricks(corners, lattice.origin, lattice.voxel, values)
+    if np.isnan(values.max()):
+        np.nan_to_num(values, copy=False, nan=lattice.voxel)
+    return np.packbits(values < 0, axis=1, bitorder="little")
 
 
 @dataclass
@@ -142,6 +176,7 @@ class _Sampling:
 
     pruning: Pruning
     keep: Callable[[np.ndarray], None] | None
+    evaluate: Evaluate | None = None
     repaired: int = 0
     audited: int = 0
     numbers: list[np.ndarray] = field(default_factory=list)
@@ -195,18 +230,17 @@ class _Sampling:
     def sampled(self, places: np.ndarray) -> np.ndarray:
         """Sample bricks; return their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set inside."""
         corners = np.ascontiguousarray(places.T * BRICK, np.int32)
+        self.pruning.evaluations += len(corners) * BRICK**3
+        if self.evaluate and len(corners) >= MANY:
+            return self.evaluate(corners).reshape(-1, 8, 8)
         values = np.empty((len(corners) if self.keep else 0, BRICK**3), np.float32)
         signs = np.empty((len(corners), 64), np.uint8)
 
         def task(part: slice) -> None:
             out = values[part] if self.keep else np.empty((part.stop - part.start, BRICK**3), np.float32)
-            self.kernel.bricks(corners[part], self.lattice.origin, self.lattice.voxel, out)
-            if np.isnan(out.max()):
-                np.nan_to_num(out, copy=False, nan=self.lattice.voxel)
-            signs[part] = np.packbits(out < 0, axis=1, bitorder="little")
+            signs[part] = brick_signs(self.kernel, corners[part], self.lattice, out)
 
         self.work.map(task, chunks(len(corners), self.kernel.batch // BRICK**3))
-        self.pruning.evaluations += len(corners) * BRICK**3
         if self.keep:
             self.keep(values)
         return signs.reshape(-1, 8, 8)

@@ -7,6 +7,7 @@ import signal
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 from fracslice.cli.main import run
 from PIL import Image
@@ -61,19 +62,35 @@ def test_a_film_that_stopped_goes_on_and_is_the_same(path: Path, tmp_path: Path)
 def test_a_stopped_film_says_what_is_there(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    light = FilmJob.light
+    encoded = FilmJob.file
 
-    def interrupted(job: FilmJob, number: int, work: Work) -> np.ndarray:
+    def interrupted(job: FilmJob, number: int, work: Work) -> bytes:
         if number == 3:
             os.kill(os.getpid(), signal.SIGINT)
-        return light(job, number, work)
+        return encoded(job, number, work)
 
-    monkeypatch.setattr(FilmJob, "light", interrupted)
+    monkeypatch.setattr(FilmJob, "file", interrupted)
     assert animate(path, "-o", tmp_path / "film.gif") == 130
     assert "film.frames are whole" in capsys.readouterr().err
     frames = sorted(file.name for file in (tmp_path / "film.frames").iterdir())
     assert frames == ["film.json", "frame00000.png", "frame00001.png", "frame00002.png"]
     assert not (tmp_path / "film.gif").exists()
+
+
+def test_shards_make_the_frames_of_one_film(path: Path, tmp_path: Path) -> None:
+    alone, shared = tmp_path / "alone", tmp_path / "shared"
+    exr = ["--frames", "0..2", "--exr", "--layers"]
+    assert animate(path, "-o", alone, *exr) == 0
+    with OpenEXR.File(str(alone / "frame00001.exr"), separate_channels=True) as file:
+        channels = file.channels()
+        assert {"R", "Z", "Normal.X", "Position.Y", "Albedo.B"} < set(channels)
+        assert channels["Z"].pixels[12, 20] == pytest.approx(3, abs=0.1)
+        assert channels["Samples.V"].pixels.max() == 8
+    assert animate(path, "-o", shared, *exr, "--shard", "2/2") == 0
+    assert not shared.exists()
+    assert animate(path, "-o", shared, *exr, "--shard", "1/2") == 0
+    for frame in alone.iterdir():
+        assert frame.read_bytes() == (shared / frame.name).read_bytes()
 
 
 def test_frames_of_another_film_are_not_mixed_in(
@@ -134,7 +151,7 @@ def test_pictures_that_move_and_contact_sheets(path: Path, tmp_path: Path) -> No
     assert Image.open(tmp_path / "film.preview.frames" / "frame00000.png").size == (10, 6)
 
 
-@pytest.mark.parametrize("ending", [".mp4", ".webm", ".mov"])
+@pytest.mark.parametrize("ending", [".mp4", ".webm", ".mov", ".mkv"])
 def test_films(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     frames = []
@@ -190,6 +207,7 @@ def test_a_mesh_of_a_time(tmp_path: Path) -> None:
     [
         (["-o", "film.avi"], "known are .mp4"),
         (["-o", "film.mp4", "--exr"], "expected a folder"),
+        (["-o", "f", "--layers"], "expected --exr"),
         (["-o", "f", "--frames", "9..3"], "such as 10..20"),
         (["-o", "f", "--fps", "0"], "--fps"),
     ],

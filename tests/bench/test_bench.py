@@ -11,9 +11,11 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice.bench.measure import errors, spread
-from fracslice.bench.runs import BenchmarkTask, Peer, measure
+from fracslice.bench.peers import Peer
+from fracslice.bench.runs import BenchmarkTask, measure
 from fracslice.bench.workloads import WORKLOADS
-from fracslice.errors import BenchError, Cancelled
+from fracslice.cluster import ResultFolder, Shard
+from fracslice.errors import BenchError, Cancelled, SharedError
 from fracslice.export import write
 from fracslice.work import Work
 
@@ -120,3 +122,15 @@ def test_it_can_be_cancelled():
 def test_a_peer_needs_all_its_places():
     with pytest.raises(BenchError, match="expected NAME=COMMAND"):
         Peer.read("a=b {workload} {output}")
+
+
+def test_shards_share_the_measurements(tmp_path: Path, peer: str) -> None:
+    task = BenchmarkTask(("sphere", "torus"), (16,), (Peer.read(peer),), repeats=1)
+    pieces = ResultFolder(str(tmp_path / "pieces"))
+    with pytest.raises(SharedError, match=r"[56] measurements are made"):
+        measure(task, Work(1, cluster=Shard(pieces, 2, 2)))
+    result = measure(task, Work(1, cluster=Shard(pieces, 1, 2)))
+    alone = measure(task, Work(1))
+    assert [(r.workload, r.method) for r in result] == [(r.workload, r.method) for r in alone]
+    ours, theirs = ([r.numbers["error_voxels"] for r in rows] for rows in (result, alone))
+    assert ours == theirs

@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run as command
 
-from fracslice import meshtasks
+from fracslice import meshsampling, meshtasks
+from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import ResultFolder, Workers, connected, workers
-from fracslice.cluster.pieces import Identity
+from fracslice.cluster.identity import Identity
 from fracslice.errors import Cancelled, ClusterError
 from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb, sphere
@@ -23,10 +24,12 @@ from fracslice.job import make_mesh
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import Renderer, parts
 from fracslice.scene import scene
+from fracslice.scene.reader import reads
 from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
 from fracslice.slicerecipe import SliceRecipe
 from fracslice.slicing import SliceJob
+from fracslice.volume import sampler
 from fracslice.work import Work
 
 from .processes import SECONDS, Cluster, wait_until
@@ -39,6 +42,9 @@ RECIPE = SliceRecipe(
 MESHED = scene(mandelbulb(iterations=4) | sphere(radius=0.1).translate((-1.5, 0.0, 0.0)), size="20mm")
 VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
 SIZE, SAMPLES = (96, 72), 6
+FILM = """<scene version="1"><solid size="80mm"><mandelbulb iterations="4"/></solid><camera eye="2 -2 1"/>
+<animation duration="1s" shutter="0.5" times="2"/>
+<track of="camera.eye" keys="0s: 2 -2 1; 1s: 2 -1.5 1"/></scene>"""
 
 Job = Callable[[Work, Path], bytes]
 
@@ -60,6 +66,14 @@ def meshed(work: Work, folder: Path) -> bytes:
     """STL file of a mesh with dust that is removed."""
     make_mesh(MESHED, MeshJob(resolution=40, dust_mm3=5.0), work, folder / "a.stl")
     return (folder / "a.stl").read_bytes()
+
+
+def filmed(work: Work, folder: Path) -> bytes:
+    """Frames of a film."""
+    timeline = Timeline(reads(FILM))
+    job = FilmJob(timeline, (32, 24), 4, 6.0, device="cpu")
+    paths = write_frames(job, range(job.frames), folder / "frames", False, work)
+    return b"".join(path.read_bytes() for path in paths)
 
 
 JOBS: dict[str, Job] = {"slice": sliced, "render": rendered, "mesh": meshed}
@@ -90,6 +104,8 @@ def no_workers_of_other_tests(cluster: Cluster) -> Iterator[None]:
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "PIXELS", 1024)
     monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(sampler, "MANY", 1)
+    monkeypatch.setattr(meshsampling, "BRICKS", 32)
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
 
 
@@ -104,7 +120,7 @@ def test_a_killed_worker_and_a_late_one(
 
     def progress(stage: str, share: float) -> None:
         shares.setdefault(stage, []).append(share)
-        shared = stage in ("slicing", "rendering", "meshing")
+        shared = stage in ("slicing", "rendering", "meshing", "frames")
         if shared and 0 < share < 1 and not late and first.poll() is None:
             first.send_signal(signal.SIGKILL)
             first.wait()
@@ -115,7 +131,9 @@ def test_a_killed_worker_and_a_late_one(
         result = JOBS[name](Work(1, progress=progress, cluster=pool), tmp_path)
     assert late
     assert made[0] < 25
-    assert all(of == sorted(of) for stage, of in shares.items() if stage in ("slicing", "rendering"))
+    assert all(
+        of == sorted(of) for stage, of in shares.items() if stage in ("slicing", "rendering", "frames")
+    )
     assert result == expected[name]
     assert not any(pieces.iterdir())
 
@@ -180,7 +198,7 @@ def test_a_worker_of_another_version_is_not_used(
     cluster: Cluster, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
     old = tmp_path / "old.py"
-    old.write_text('from fracslice.cluster import pieces\npieces.__version__ = "0.0.9"\n')
+    old.write_text('from fracslice.cluster import identity\nidentity.__version__ = "0.0.9"\n')
     cluster.worker("--preload", str(old))
     good = cluster.worker()
     with (
@@ -234,6 +252,14 @@ def test_a_memory_file_system(name: str, expected: dict[str, bytes], tmp_path: P
     with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=":0") as client:
         pool = Workers(client, ResultFolder(f"memory://{tmp_path.name}"))
         assert JOBS[name](Work(1, cluster=pool), tmp_path) == expected[name]
+
+
+def test_an_object_store_keeps_the_first_of_two_results(tmp_path: Path) -> None:
+    pieces = ResultFolder(f"memory://{tmp_path.name}")
+    for data in (b"first", b"second"):
+        pieces.write("job", "piece", data)
+    assert pieces.read("job", "piece") == b"first"
+    assert pieces.read("job", "piece", 1, 3) == b"ir"
 
 
 def test_local_workers_are_processes(tmp_path: Path) -> None:

@@ -8,18 +8,19 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run as command
 
-from fracslice import meshtasks
+from fracslice import meshsampling, meshtasks
 from fracslice.cluster import ResultFolder, Shard
-from fracslice.errors import ClusterError, SceneError, SharedError
+from fracslice.errors import ClusterError, SharedError
 from fracslice.export.slices import write_slices
 from fracslice.formulas import box, cone, flake, sphere
 from fracslice.job import MeshResult, make_mesh
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import parts
 from fracslice.scene import scene
+from fracslice.volume import sampler
 from fracslice.work import Work
 
-from .test_cluster import MESHED, RECIPE, rendered, sliced
+from .test_cluster import RECIPE, rendered, sliced
 
 pytest.importorskip("fsspec")
 
@@ -100,10 +101,24 @@ def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         assert shared.mesh.is_watertight
 
 
-def test_what_needs_the_whole_mesh_is_refused(tmp_path: Path) -> None:
-    shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1)
-    with pytest.raises(SceneError, match=r"simplify 0\.1mm needs the whole mesh: expected no"):
-        make_mesh(MESHED, MeshJob(simplify_mm=0.1), Work(1, cluster=shard))
+def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chord and simplification are of the whole mesh, so shard 1 makes them of the shared samples."""
+    monkeypatch.setattr(sampler, "MANY", 1)
+    monkeypatch.setattr(meshsampling, "BRICKS", 8)
+    ball, job = scene(sphere(), size="20mm"), MeshJob(resolution=16, chord_mm=0.2, simplify_mm=0.3)
+    pieces, made = ResultFolder(str(tmp_path / "pieces")), list[str]()
+    write = ResultFolder.write
+    monkeypatch.setattr(
+        ResultFolder, "write", lambda of, job, name, data: (made.append(name), write(of, job, name, data))
+    )
+    with pytest.raises(SharedError, match="shard 1 makes the mesh"):
+        make_mesh(ball, job, Work(1, cluster=Shard(pieces, 2, 2, patience=0)), tmp_path / "two.stl")
+    make_mesh(ball, job, Work(1, cluster=Shard(pieces, 1, 2, patience=0)), tmp_path / "one.stl")
+    make_mesh(ball, job, Work(1), tmp_path / "alone.stl")
+    assert (tmp_path / "one.stl").read_bytes() == (tmp_path / "alone.stl").read_bytes()
+    assert not (tmp_path / "two.stl").exists()
+    samples = [name for name in made if name.startswith("samples")]
+    assert len(samples) > 2 and len(set(samples)) == len(samples), "made once"
 
 
 def test_shards_of_a_frame_work_at_the_same_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

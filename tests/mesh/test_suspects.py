@@ -13,8 +13,9 @@ from fracslice.mesh import Mesh
 from fracslice.mesh.check import MeshReport, check_mesh
 from fracslice.mesh.clean import cleaned
 from fracslice.mesh.extract import contour
+from fracslice.mesh.halo import Finished
 from fracslice.mesh.quantisation import grid_planes
-from fracslice.mesh.window import Finished, Tally
+from fracslice.mesh.tally import Tally
 from fracslice.volume import plan, sample_scene
 
 SOLIDS: dict[str, Node] = {

@@ -14,11 +14,12 @@ import heapq
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import Pool, ResultFolder, Task, Workers, connected
 from fracslice.cluster.pieces import run as make_piece
 from fracslice.export.slices import write_slices
@@ -27,6 +28,7 @@ from fracslice.job import make_mesh
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import Renderer
 from fracslice.scene import scene
+from fracslice.scene.animation import Animation
 from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
 from fracslice.slicerecipe import SliceRecipe
@@ -36,7 +38,17 @@ from fracslice.work import Work
 from ..runner import Figures, Row, Run, Spread
 
 RUNS, THREADS = 3, [2]
-SMALLEST = {"pixels": 64, "voxels": 16, "width": 16, "empty": 4, "tasks": 8, "workers": (1, 4)}
+SMALLEST = {
+    "pixels": 64,
+    "layers": 8,
+    "voxels": 16,
+    "width": 16,
+    "frames": 1,
+    "empty": 4,
+    "tasks": 8,
+    "workers": (1,),
+}
+SAMPLES = 16
 SCENE = scene(mandelbulb(), size="80mm")
 VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
 Job = Callable[[Work, Path], object]
@@ -78,18 +90,28 @@ class Timed(Pool):
             yield index
 
 
-def jobs(pixels: int, voxels: int, width: int) -> dict[str, Job]:
+def jobs(pixels: int, layers: int, voxels: int, width: int, frames: int) -> dict[str, Job]:
     """A job of each kind."""
     size = 80 / pixels
-    recipe = SliceRecipe(to_xml(SCENE), "bulb", SliceJob(80.0, 80 / 640, (size, size)), None, "a.cli", "cli")
+    recipe = SliceRecipe(
+        to_xml(SCENE), "bulb", SliceJob(80.0, 80 / layers, (size, size)), None, "a.cli", "cli"
+    )
+    shape = width, width * 9 // 16
 
     def rendered(work: Work, _: Path) -> None:
-        for _ in Renderer(SCENE.root, VIEW, (width, width * 9 // 16), work, "cpu").passes(16):
+        for _ in Renderer(SCENE.root, VIEW, shape, work, "cpu").passes(SAMPLES):
             pass
+
+    def filmed(work: Work, folder: Path) -> None:
+        timeline = Timeline(replace(SCENE, view=VIEW, animation=Animation(duration=frames / 24)))
+        write_frames(
+            FilmJob(timeline, shape, SAMPLES, 24.0, device="cpu"), range(frames), folder / "film", False, work
+        )
 
     return {
         "slice": lambda work, folder: write_slices(recipe.run(work), folder / "a.cli"),
-        "render": rendered,
+        "frames": filmed,
+        "picture": rendered,
         "mesh": lambda work, folder: make_mesh(SCENE, MeshJob(resolution=voxels), work, folder / "a.stl"),
     }
 
@@ -153,16 +175,18 @@ def simulated(workers: int, tasks: int, seconds: float, cost: float) -> float:
 
 def rows(
     run: Run,
-    pixels: int = 8192,
-    voxels: int = 320,
-    width: int = 1280,
+    pixels: int = 16384,
+    layers: int = 80,
+    voxels: int = 512,
+    width: int = 640,
+    frames: int = 8,
     empty: int = 200,
     tasks: int = 10_000,
     workers: tuple[int, ...] = (1, 10, 100, 300, 1000),
     plot: str = "",
 ) -> Iterator[Row]:
     threads = run.threads[0]
-    kinds, acts = jobs(pixels, voxels, width), dict[str, Callable[[], Any]]()
+    kinds, acts = jobs(pixels, layers, voxels, width, frames), dict[str, Callable[[], Any]]()
     nothing = [Nothing("nothing", number) for number in range(empty)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

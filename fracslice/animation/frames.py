@@ -1,0 +1,158 @@
+"""Files of the frames of a film: numbered, each whole or absent."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+from ..cluster import Shard
+from ..errors import RenderError, SharedError
+from ..files import replacing, reported
+from ..kernel.objects import toolchain
+from ..keys import key
+from ..scene.reader import reads
+from ..scene.writer import to_xml
+from ..work import Work
+from .film import FilmJob
+from .timeline import Timeline
+
+JOURNAL = "film.json"
+"""File in the folder that says whose frames these are."""
+
+
+@dataclass(frozen=True)
+class FrameTask:
+    """Frame of a film as a task of a cluster.
+
+    Attributes
+    ----------
+    scene, title : str
+        XML and name of the scene.
+    size, samples, fps, ending, layers
+        As for `FilmJob`.
+    job : str
+        Key of the film.
+    number : int
+        Number of the frame, from 0.
+    """
+
+    scene: str
+    title: str
+    size: tuple[int, int]
+    samples: int
+    fps: float
+    ending: str
+    layers: bool
+    job: str
+    number: int
+
+    @classmethod
+    def all(cls, job: FilmJob, numbers: Sequence[int]) -> list[FrameTask]:
+        """Tasks of some frames.
+
+        Parameters
+        ----------
+        job : FilmJob
+            The film.
+        numbers : sequence of int
+            Numbers of the frames, from 0.
+
+        Returns
+        -------
+        list of FrameTask
+        """
+        scene, film = job.timeline.scene, key(toolchain(), job.key)
+        about = job.size, job.samples, job.fps, job.ending, job.layers, film
+        return [cls(to_xml(scene), scene.name, *about, number) for number in numbers]
+
+    @property
+    def name(self) -> str:
+        """Name of the frame."""
+        return f"frame-{self.number:05}"
+
+    def make(self, work: Work) -> bytes:
+        """File of the frame; see `Task.make`."""
+        about = self.size, self.samples, self.fps, self.ending, "cpu", self.layers
+        return FilmJob(_timeline(self.scene, self.title), *about).file(self.number, work)
+
+
+@lru_cache(maxsize=1)
+def _timeline(scene: str, title: str) -> Timeline:
+    """Timeline of a scene, read once in a process."""
+    return Timeline(reads(scene, title))
+
+
+def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: bool, work: Work) -> list[Path]:
+    """Write frames into a folder.
+
+    Parameters
+    ----------
+    job : FilmJob
+        The film.
+    numbers : sequence of int
+        Numbers of the frames, from 0.
+    folder : Path
+        Folder, made if it is missing.
+    resume : bool
+        True to keep frames that are there; False to make them again.
+    work : Work
+        Threads or pool, progress and cancellation.
+
+    Returns
+    -------
+    list of Path
+        The frames, in order.
+
+    Raises
+    ------
+    RenderError
+        If the folder has the frames of another film, or files that are no frames of a film.
+    SharedError
+        For a shard that does not write the frames, when its own are made.
+    """
+    if isinstance(work.cluster, Shard) and not work.cluster.first:
+        count = work.cluster.share(FrameTask.all(job, numbers), work)
+        raise SharedError(f"{count} frames are made; shard 1 writes them")
+    _claim(job, folder, resume)
+    missing = [number for number in numbers if not (resume and job.path(folder, number).exists())]
+    for number, data in zip(missing, _files(job, missing, work), strict=True):
+        with replacing(job.path(folder, number)) as file:
+            file.write(data)
+    return [job.path(folder, number) for number in numbers]
+
+
+def _files(job: FilmJob, numbers: Sequence[int], work: Work) -> Iterator[bytes]:
+    """Files of frames, in order, made here or by the pool of the work."""
+    if (pool := work.cluster) is None:
+        alone = replace(work, progress=lambda *_: None)
+        for done, number in enumerate(numbers):
+            work.progress("frames", done / len(numbers))
+            yield job.file(number, alone)
+        work.progress("frames", 1.0)
+        return
+    tasks = FrameTask.all(job, numbers)
+    yield from pool.results(tasks, work, "frames")
+    if tasks:
+        pool.finished(tasks[0].job)
+
+
+def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
+    """Make the folder this film's; frames of an earlier film are removed, unless it is to be resumed."""
+    journal = folder / JOURNAL
+    if journal.exists():
+        known = json.loads(journal.read_text())["key"]
+        if known == job.key:
+            return
+        if resume:
+            raise RenderError(f"{folder}: has frames of another film: expected those of this one, to resume")
+        for path in folder.glob("frame?????.*"):
+            path.unlink()
+    elif folder.exists() and any(folder.iterdir()):
+        raise RenderError(f"{folder}: expected an empty folder, or one with the frames of a film")
+    with reported(folder):
+        folder.mkdir(exist_ok=True)
+    with replacing(journal) as file:
+        file.write(json.dumps({"key": job.key, "fps": job.fps}).encode())
