@@ -95,9 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Modules are no garbage: looking for it among them takes a fifth of a small job.
     gc.set_threshold(FEWEST)
-    status = run(arguments)
-    gc.freeze()
-    sys.exit(status)
+    sys.exit(run(arguments))
 
 
 def run(arguments: Sequence[str] | None = None) -> int:

@@ -254,6 +254,8 @@ class _Job:
 
     def joined(self, surface: Surface, finish: Finish) -> _Made | None:
         """Write the file from the pieces of a pool; None for a surface that was made here."""
+        if self.clock.work.cluster is None:
+            return None
         from .export import FORMATS
         from .export.stl import write_blocks
         from .sharedmesh import SharedSurface, finished, whole

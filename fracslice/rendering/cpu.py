@@ -20,6 +20,8 @@ TILE = 2048
 """Maximum rays per tile; their workspace stays in the cache."""
 LEAST, TILES, RAYS = 128, 8, 1 << 14
 """Minimum pixels per tile, tiles per thread in a pass over few pixels, and maximum rays per tile."""
+CONES = 512
+"""Maximum cones per task; the workspace holds `TILE` of them."""
 STEPS = {"float32": 1600, "float64": 10_000}
 """Maximum steps of a ray, which then hits. At the magnification that needs float64, one in ten takes more
 than 1600; in float32 those that do creep along a surface, and a packet waits for them.
@@ -92,12 +94,13 @@ class CpuTracer:
         starts, coarser = np.zeros(blocks * rows, self.dtype), (self._shift - shift, self._blocks)
         ids = np.arange(len(starts), dtype=np.int32)
 
-        def task(part: np.ndarray) -> None:
-            m = -(-len(part) // self.lanes) * self.lanes
-            arrays = self._parameters, starts, self._starts, part, *self._workspace
-            cones(*arrays, len(part), m, shift, blocks, *coarser, self.steps)
+        def task(part: slice) -> None:
+            own = ids[part]
+            m = -(-len(own) // self.lanes) * self.lanes
+            arrays = self._parameters, starts, self._starts, own, *self._workspace
+            cones(*arrays, len(own), m, shift, blocks, *coarser, self.steps)
 
-        work.map(task, np.array_split(ids, max(1, len(ids) // 512)))
+        work.map(task, chunks(len(ids), min(CONES, TILE)))
         self._shift, self._blocks, self._starts = shift, blocks, starts
 
     def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:

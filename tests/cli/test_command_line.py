@@ -36,6 +36,23 @@ def test_mesh_writes_the_model_and_its_report(ball, tmp_path, capfd):
     assert err == "", "no progress where nobody looks"
 
 
+def test_quiet_layers_print_nothing_at_exit_either(ball, tmp_path):
+    """Not even of what native code was left with."""
+    arguments = [
+        "slice",
+        ball,
+        "-o",
+        tmp_path / "ball.sl1s",
+        "--printer",
+        "sl1s",
+        "--layer",
+        "1mm",
+        "--quiet",
+    ]
+    done = subprocess.run([*COMMAND, *map(str, arguments)], check=True, capture_output=True, text=True)
+    assert done.stdout == done.stderr == ""
+
+
 def test_a_mesh_larger_than_memory_goes_to_stl(ball, tmp_path, capfd, monkeypatch):
     model, report = tmp_path / "ball.stl", tmp_path / "ball.json"
     monkeypatch.setattr("fracslice.surfaces.available_bytes", lambda: 1 << 20)
