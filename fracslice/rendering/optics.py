@@ -62,15 +62,16 @@ def footprint(camera: Camera, size: tuple[int, int]) -> tuple[float, float]:
 
 
 ESTIMATE = 0.5
-"""Lipschitz bound of rays, as part of the guaranteed one, for escape-time fractals."""
+"""Lipschitz bound of rays, as part of the guaranteed one, for fractals with a potential."""
 
 
 def ray_bound(root: Node) -> float:
     """Return the Lipschitz bound that rays step by.
 
-    Half of the guaranteed bound of an escape-time fractal is for sets like a needle, by Koebe's theorem. Its
-    field estimates the distance (`formulas.escape`), and rays step by that: a ray that steps too far comes to
-    lie inside the solid and returns. No other field has such a half.
+    Half of the guaranteed bound of a fractal with a potential is for sets like a needle, by Koebe's theorem.
+    Its field estimates the distance (`formulas.escape`), and rays step by that: a ray that steps too far
+    comes to lie inside the solid and returns. No other field has such a half: not that of folds, of a hybrid
+    with them, or of a fractal beside other shapes.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def ray_bound(root: Node) -> float:
         Bound.
     """
     bounds = root.bounds
-    return bounds.lipschitz * (ESTIMATE if bounds.exterior_only else 1.0)
+    return bounds.lipschitz * (ESTIMATE if bounds.exterior_only and root.escape_time_only else 1.0)
 
 
 def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> Optics:

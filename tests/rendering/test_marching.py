@@ -7,7 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fracslice.formulas import Node, box, get, mandelbulb, menger, plane, sphere, torus, transform, union
+from fracslice.formulas import (
+    Node,
+    box,
+    get,
+    mandelbox,
+    mandelbulb,
+    menger,
+    plane,
+    sphere,
+    torus,
+    transform,
+    union,
+)
 from fracslice.kernel import compile_scene, reference
 from fracslice.rendering import Renderer, optics
 from fracslice.scene import library, read
@@ -71,6 +83,8 @@ def test_rays_step_by_the_estimate_of_an_escape_time_fractal(monkeypatch: pytest
     chosen = optics.ESTIMATE
     assert steps(mandelbulb(iterations=6), chosen) < 0.75 * steps(mandelbulb(iterations=6), 1.0)
     assert steps(menger(level=2), chosen) == steps(menger(level=2), 1.0)
+    for other in (mandelbox(), union(mandelbulb(), sphere())):
+        assert optics.ray_bound(other) == other.bounds.lipschitz
 
 
 FAR = 50.0
