@@ -90,10 +90,12 @@ def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Window]:
 @pytest.fixture
 def first(window: Window) -> Camera:
     """The first camera, to which the window has returned."""
-    window.server.key("v")
-    camera = window.camera(first)
-    assert camera.eye == (4, 0, 0)
-    return camera
+    for _ in range(5):  # a window under load may still fly when it is told to return
+        window.server.key("v")
+        camera = window.camera(first)
+        if camera.eye == (4, 0, 0):
+            return camera
+    raise AssertionError("the camera does not return")
 
 
 @real
