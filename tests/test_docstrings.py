@@ -8,7 +8,11 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-NATIVE = "".join(p.read_text(encoding="utf-8") for p in (ROOT / "fracslice/native").rglob("*.[hc]*"))
+NATIVE = "".join(
+    p.read_text(encoding="utf-8")
+    for p in (ROOT / "fracslice/native").rglob("*")
+    if p.suffix in (".h", ".cpp")
+)
 
 
 def test_every_name_in_backticks_exists() -> None:
