@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 import numpy as np
 
 from . import surfaces
+from .checking import Check
 from .clock import Clock
 from .errors import SceneError, SharedError, TooLargeError
-from .finishing import Check, Finish
+from .finishing import Finish
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
 from .meshresult import MeshResult
