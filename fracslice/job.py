@@ -282,9 +282,9 @@ class _Job:
     @contextmanager
     def file(self, path: Path) -> Iterator[tuple[BinaryIO, dict[str, str]]]:
         """Open the file, and return what it says about itself."""
-        from .export import application, replacing
+        from .export import application, flushing, replacing
 
-        with replacing(path) as file:
+        with replacing(path) as file, flushing(file):
             yield file, {"Application": application()} | metadata(self.scene)
 
     def written(
