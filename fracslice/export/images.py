@@ -17,6 +17,8 @@ from fracslice.files import replacing
 from fracslice.work import Work, chunks
 
 IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".tif", ".tiff")
+LINEAR = (".exr", ".tif", ".tiff")
+"""Extensions of linear light."""
 LOSSY = {".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
 QUALITY = 95
 """Quality of JPEG and WebP."""
@@ -29,7 +31,7 @@ LAYERS = {
     "samples": ("Samples.V",),
 }
 """Channels of the layers of an OpenEXR file, by the names that Blender and Nuke know."""
-STRIP, LEVEL = 64, 6
+STRIP, LEVEL = 32, 6
 """Rows of a PNG that are compressed as one, and the level of compression."""
 ZLIB = b"\x78\x9c"
 """Header of a zlib stream (RFC 1950)."""
