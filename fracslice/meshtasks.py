@@ -9,8 +9,9 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .checking import off_surface, on_the_plate
 from .cluster import Contents, ResultFolder
-from .finishing import off_surface, on_the_plate, placing
+from .finishing import placing
 from .mesh.extract import layers
 from .mesh.halo import WAITS, SelectedPiece, finished_piece
 from .mesh.missed import NEARBY, nearest

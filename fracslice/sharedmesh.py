@@ -13,10 +13,11 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from .checking import stride
 from .clock import Clock
 from .cluster import Pool, Shard
 from .errors import SharedError
-from .finishing import Finish, stride
+from .finishing import Finish
 from .keys import key
 from .mesh.components import Shells
 from .mesh.missed import distances, surface_samples

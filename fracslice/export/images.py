@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections.abc import Mapping
-from functools import reduce
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +11,9 @@ import numpy as np
 
 from fracslice.errors import ExportError
 from fracslice.files import replacing
-from fracslice.work import Work, chunks
+from fracslice.work import Work
+
+from .colour_png import levels, png
 
 IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".tif", ".tiff")
 LOSSY = {".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
@@ -29,10 +28,6 @@ LAYERS = {
     "samples": ("Samples.V",),
 }
 """Channels of the layers of an OpenEXR file, by the names that Blender and Nuke know."""
-STRIP, LEVEL = 64, 6
-"""Rows of a PNG that are compressed as one, and the level of compression."""
-ZLIB = b"\x78\x9c"
-"""Header of a zlib stream (RFC 1950)."""
 
 
 def check_image(path: str | Path) -> str:
@@ -161,7 +156,7 @@ def lossy(shown: np.ndarray, kind: str, text: Mapping[str, str]) -> bytes:
     from PIL import Image
 
     pixels = shown[..., :3] if kind == "JPEG" else shown
-    image, file = Image.fromarray(_levels(pixels, 8)), BytesIO()
+    image, file = Image.fromarray(levels(pixels, 8)), BytesIO()
     exif = image.getexif()
     exif[0x010E] = "\n".join(f"{k}: {v}" for k, v in text.items())  # ImageDescription
     try:
@@ -169,75 +164,6 @@ def lossy(shown: np.ndarray, kind: str, text: Mapping[str, str]) -> bytes:
     except (OSError, ValueError) as error:
         raise ExportError(f"{kind}: {error}") from None
     return file.getvalue()
-
-
-def _levels(shown: np.ndarray, bits: int) -> np.ndarray:
-    """Levels of 8 or 16 bits, big-endian."""
-    levels = np.round(np.clip(shown, 0, 1) * np.float64(2**bits - 1))
-    return np.asarray(levels, ">u2" if bits == 16 else np.uint8)
-
-
-def png(shown: np.ndarray, bits: int, text: Mapping[str, str], work: Work | None = None) -> bytes:
-    """Encode a PNG file (ISO/IEC 15948) with filtered rows, sRGB and text chunks.
-
-    Parameters
-    ----------
-    shown : ndarray, float [height, width, 3 or 4]
-        sRGB in [0, 1], and unassociated alpha.
-    bits : {8, 16}
-        Bits per channel.
-    text : mapping of str to str
-        Keywords and texts of the metadata.
-    work : Work, optional
-        Threads; one by default.
-
-    Returns
-    -------
-    bytes
-    """
-    height, width, channels = shown.shape
-
-    def compressed(rows: slice) -> tuple[bytes, bytes]:
-        """Filtered rows, and the same as blocks of a deflate stream that end at a byte."""
-        part = shown[max(rows.start - 1, 0) : rows.stop]
-        levels = _levels(part, bits)
-        filtered = _filtered(levels.reshape(len(part), -1).view(np.uint8), channels * bits // 8)
-        data = filtered[rows.start > 0 :].tobytes()
-        packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
-        return data, packer.compress(data) + packer.flush(
-            zlib.Z_FINISH if rows.stop == height else zlib.Z_FULL_FLUSH
-        )
-
-    strips = (work or Work(1)).collect(compressed, chunks(height, STRIP))
-    checksum = reduce(lambda sum_, strip: zlib.adler32(strip[0], sum_), strips, 1)
-    stream = ZLIB + b"".join(blocks for _, blocks in strips) + struct.pack(">I", checksum)
-    parts = [
-        (b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 6 if channels == 4 else 2, 0, 0, 0)),
-        (b"sRGB", b"\0"),
-    ]
-    parts += [(b"iTXt", f"{k}\0\0\0\0\0{v}".encode()) for k, v in text.items()]
-    parts += [(b"IDAT", stream), (b"IEND", b"")]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in parts)
-
-
-def _filtered(rows: np.ndarray, pixel: int) -> np.ndarray:
-    """Filter rows of bytes, each by the PNG filter with the smallest sum of absolute differences."""
-    value = rows.astype(np.int16)
-    above = np.vstack([np.zeros_like(value[:1]), value[:-1]])
-    left = np.pad(value, ((0, 0), (pixel, 0)))[:, : value.shape[1]]
-    corner = np.pad(above, ((0, 0), (pixel, 0)))[:, : value.shape[1]]
-    guess = left + above - corner
-    a, b, c = abs(guess - left), abs(guess - above), abs(guess - corner)
-    paeth = np.where((a <= b) & (a <= c), left, np.where(b <= c, above, corner))
-    tried = np.stack(
-        [value - p for p in (np.zeros_like(value), left, above, (left + above) // 2, paeth)]
-    ).astype(np.uint8)
-    best = np.abs(tried.view(np.int8).astype(np.int32)).sum(2).argmin(0)
-    return np.hstack([best[:, None].astype(np.uint8), tried[best, np.arange(len(rows))]])
-
-
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def exr(light: np.ndarray, text: Mapping[str, str], layers: Mapping[str, np.ndarray]) -> bytes:

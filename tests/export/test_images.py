@@ -9,7 +9,8 @@ import pytest
 from PIL import Image
 
 from fracslice.errors import ExportError
-from fracslice.export.images import png, write_image
+from fracslice.export.colour_png import png
+from fracslice.export.images import write_image
 
 RNG = np.random.default_rng(0)
 SHOWN = RNG.uniform(0, 1, (13, 21, 3)).astype(np.float32)
