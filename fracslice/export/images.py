@@ -16,6 +16,8 @@ from fracslice.work import Work
 from .colour_png import levels, png
 
 IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".tif", ".tiff")
+LINEAR = (".exr", ".tif", ".tiff")
+"""Extensions of linear light."""
 LOSSY = {".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
 QUALITY = 95
 """Quality of JPEG and WebP."""

@@ -22,12 +22,33 @@ COUNT, GOAL, COVER = 5, 6, 7
 TRUSTED = 8
 """Samples below which a pixel's variance estimate is not used."""
 COARSE = 4
-"""Grid spacing of the first pass, pixels."""
+"""Ratio of the grid spacings of the first passes."""
+FIRST = 1 << 16
+"""Maximum samples of the first pass, so that a large picture shows something soon."""
 NEARLY = 0.999
 """Safety factor: a mean times this does not exceed the largest value, despite rounding."""
 FEW = 1 / 16
 """Fraction of unfinished pixels up to which all of them are sampled: a pass has a fixed cost even for one
 pixel."""
+
+
+def grids(width: int, height: int) -> tuple[int, ...]:
+    """Return the grid spacings of the first passes, which take one sample in each pixel of their grids.
+
+    Parameters
+    ----------
+    width, height : int
+        Picture size, pixels.
+
+    Returns
+    -------
+    tuple of int
+        Spacings, pixels; the last one is 1.
+    """
+    spacings = [1, COARSE]
+    while width * height > FIRST * spacings[-1] ** 2:
+        spacings.append(spacings[-1] * COARSE)
+    return tuple(reversed(spacings))
 
 
 @dataclass(frozen=True)
@@ -69,9 +90,9 @@ class Accumulator(Protocol):
     def plan(self, most: int, tolerance: float) -> PassPlan:
         """Set the goals of the next pass, or return the rest of an interrupted one.
 
-        The first pass takes one sample on a grid of pixels, the second one of all other pixels. Later passes
-        double the samples of all pixels with fewer than TRUSTED. A pixel then gets as many samples again, up
-        to `most`, if two conditions hold:
+        The first passes take one sample on finer and finer grids of pixels, see `grids`. Later passes double
+        the samples of all pixels with fewer than TRUSTED. A pixel then gets as many samples again, up to
+        `most`, if two conditions hold:
 
         - its error or a neighbour's is above the tolerance;
         - the samples reduce the error of the picture by at least the mean over all unfinished pixels.

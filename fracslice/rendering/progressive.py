@@ -18,7 +18,7 @@ from ..keys import key, program
 from ..memory import available_bytes
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import CHANNELS, Accumulator, PassPlan
+from .accumulator import CHANNELS, Accumulator, PassPlan, grids
 from .cpu import BLOCK, CpuTracer
 from .host_accumulator import HostAccumulator
 from .linking import Frame, link_frame
@@ -193,9 +193,9 @@ class Renderer:
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
         """Yield the picture after every pass until all pixels have converged.
 
-        A pixel is finished when it has `samples` samples or its error is within `tolerance`. The first pass
-        samples one pixel in 16, the second all others; `Accumulator.plan` chooses the pixels of later
-        passes.
+        A pixel is finished when it has `samples` samples or its error is within `tolerance`. The first passes
+        sample grids of pixels, one pixel in 16 and then all others of a picture of up to 1024 x 1024;
+        `Accumulator.plan` chooses the pixels of later passes.
 
         Parameters
         ----------
@@ -239,7 +239,8 @@ class Renderer:
         passes : int
             Completed passes.
         """
-        wanted = min(passes, self.tracer.prepasses)
+        coarse = len(grids(self.width, self.height)) - 2  # of passes with a pixel a block or less
+        wanted = min(max(passes - coarse, 0), self.tracer.prepasses)
         if wanted < self._prepasses:
             self.tracer.aim(self._frame)
             self._prepasses = 0
