@@ -23,11 +23,11 @@ TRUSTED = 8
 """Samples below which a pixel's variance estimate is not used."""
 COARSE = 4
 """Grid spacing of the first pass, pixels."""
-NEARLY = 0.999
-"""Safety factor: a mean times this does not exceed the largest value, despite rounding."""
-FEW = 1 / 16
-"""Fraction of unfinished pixels up to which all of them are sampled: a pass has a fixed cost even for one
-pixel."""
+FIRST, DECAY = 2.0**-10, 4.0
+"""Least gain of the first pass that chooses pixels, and the ratio of the least gains of consecutive passes: a
+net of twice as many samples has a quarter of the gain."""
+UNIFORM = 5
+"""Passes before it: a grid, all pixels, then nets of 2, 4 and `TRUSTED` samples."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,41 @@ class PassPlan:
     last: int
 
 
+def least_gain(passes: int) -> float:
+    """Return the least reduction of the squared error for which a pass takes a sample.
+
+    Parameters
+    ----------
+    passes : int
+        Completed passes.
+
+    Returns
+    -------
+    float
+        Squared displayed brightness per sample.
+    """
+    return FIRST / DECAY ** (passes - UNIFORM)
+
+
+def next_choice(passes: int, largest: float) -> int:
+    """Return the number of passes after which the next one chooses a pixel.
+
+    Parameters
+    ----------
+    passes : int
+        Completed passes.
+    largest : float
+        Largest gain of an unfinished pixel, above zero.
+
+    Returns
+    -------
+    int
+    """
+    while least_gain(passes) > largest:
+        passes += 1
+    return passes
+
+
 class Accumulator(Protocol):
     """Picture in progress, in host or device memory.
 
@@ -57,12 +92,16 @@ class Accumulator(Protocol):
 
     Attributes
     ----------
+    width, height : int
+        Picture size, pixels.
     sums : array of real, shape (height * width * CHANNELS,)
         Sums of the picture.
     passes : int
         Completed passes.
     """
 
+    width: int
+    height: int
     sums: Any
     passes: int
 
@@ -74,10 +113,12 @@ class Accumulator(Protocol):
         to `most`, if two conditions hold:
 
         - its error or a neighbour's is above the tolerance;
-        - the samples reduce the error of the picture by at least the mean over all unfinished pixels.
+        - a sample reduces the squared error of the picture by at least `least_gain` of the pass.
 
         Samples thus go where the gain is largest (after Mitchell 1987, "Generating Antialiased Images at Low
-        Sampling Densities"), and every pixel has a complete net of them.
+        Sampling Densities"), and every pixel has a complete net of them. A pass depends on a pixel and its
+        neighbours only, so that a part of a picture has the samples of the whole one. Passes that choose no
+        pixel are counted and skipped.
 
         Parameters
         ----------

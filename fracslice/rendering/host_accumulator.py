@@ -8,7 +8,7 @@ import numpy as np
 
 from ..scene.view import View
 from ..work import Work, chunks
-from .accumulator import CHANNELS, COARSE, COUNT, COVER, FEW, GOAL, NEARLY, TRUSTED, PassPlan
+from .accumulator import CHANNELS, COARSE, COUNT, COVER, GOAL, TRUSTED, PassPlan, least_gain, next_choice
 from .film import BAND, develop, levels
 from .tiles import band_order
 from .units.pixel import UNKNOWN, squared_error
@@ -156,23 +156,25 @@ class HostAccumulator:
         """Set the goals of the unfinished pixels with the largest gain."""
         gains = np.empty((self.height, self.width))
 
-        def judged(rows: slice) -> tuple[float, int]:
+        def judged(rows: slice) -> float:
             seen = slice(max(rows.start - 1, 0), rows.stop + 1)
             own = slice(rows.start - seen.start, rows.stop - seen.start)
             n, squares = self._errors(seen)
             trusted = np.where(n < TRUSTED, UNKNOWN, squares)
             unfinished = (n < most) & (around(trusted) > tolerance * tolerance)
             gains[rows] = np.where(unfinished, around(trusted / n), -1.0)[own]
-            known = gains[rows][unfinished[own]]
-            return float(known.sum()), known.size
+            return float(gains[rows].max())
 
         def aimed(rows: slice) -> None:
             n = self.counts[rows]
             goals = np.minimum(np.ldexp(1.0, np.frexp(n)[1]), most)  # the next power of two
             self.channels[rows, :, GOAL] = np.where(gains[rows] >= least, goals, n)
 
-        total, count = map(sum, zip(*self.work.collect(judged, self._bands()), strict=True))
-        least = NEARLY * total / count if count > FEW * gains.size else 0.0
+        largest = max(self.work.collect(judged, self._bands()))
+        if largest <= 0:
+            return
+        self.passes = next_choice(self.passes, largest)
+        least = least_gain(self.passes)
         self.work.map(aimed, self._bands())
 
     def _wanted(self) -> PassPlan:

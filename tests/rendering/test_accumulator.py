@@ -15,12 +15,12 @@ WIDTH, HEIGHT = 37, 23
 
 
 def begun(threads: int = 1) -> HostAccumulator:
-    """A picture of 70 passes."""
+    """A picture of 5 passes."""
     rng = np.random.default_rng(3)
     n = 2.0 ** rng.integers(3, 6, WIDTH * HEIGHT)
     bright = rng.beta(0.3, 0.5, n.size)
     sums = np.stack([*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n, n, n], 1)
-    return HostAccumulator(WIDTH, HEIGHT, sums.astype(np.float32).ravel(), 70, work=Work(threads))
+    return HostAccumulator(WIDTH, HEIGHT, sums.astype(np.float32).ravel(), 5, work=Work(threads))
 
 
 def test_pixels_are_chosen_alike_by_any_number_of_threads() -> None:
