@@ -5,8 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import tempfile
+import threading
 import warnings
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
@@ -17,6 +19,9 @@ from .errors import ExportError, FracsliceWarning
 from .private import NO_LINK, OWNER_ONLY, NotPrivateError, opened, private_folder
 
 T = TypeVar("T")
+
+FLUSH_S = 0.05
+"""Seconds between two flushes of a file that is being written; small ones are complete before the first."""
 
 
 @contextmanager
@@ -111,6 +116,35 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
                 os.unlink(part)
             raise
         _flush_folder(target.parent)
+
+
+@contextmanager
+def flushing(file: BinaryIO) -> Iterator[None]:
+    """Flush a file to disk again and again while a block writes it, so that little is left for the end.
+
+    Parameters
+    ----------
+    file
+        File, open for writing.
+
+    Raises
+    ------
+    OSError
+        For an error of the file system.
+    """
+    ended = threading.Event()
+
+    def flush() -> None:
+        while not ended.wait(FLUSH_S):
+            os.fsync(file.fileno())
+
+    with ThreadPoolExecutor(1) as pool:
+        flushed = pool.submit(flush)
+        try:
+            yield
+        finally:
+            ended.set()
+    flushed.result()
 
 
 def put(path: str, data: bytes) -> None:

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 import numpy as np
 
 from . import surfaces
+from .checking import Check
 from .clock import Clock
 from .errors import SceneError, SharedError, TooLargeError
-from .finishing import Check, Finish
+from .finishing import Finish
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
 from .meshresult import MeshResult
@@ -281,9 +282,9 @@ class _Job:
     @contextmanager
     def file(self, path: Path) -> Iterator[tuple[BinaryIO, dict[str, str]]]:
         """Open the file, and return what it says about itself."""
-        from .export import application, replacing
+        from .export import application, flushing, replacing
 
-        with replacing(path) as file:
+        with replacing(path) as file, flushing(file):
             yield file, {"Application": application()} | metadata(self.scene)
 
     def written(

@@ -8,8 +8,9 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from .checking import off_surface, on_the_plate
 from .cluster import ResultFolder
-from .finishing import off_surface, on_the_plate, placing
+from .finishing import placing
 from .mesh.extract import layers
 from .mesh.halo import SelectedPiece, finished_piece
 from .mesh.missed import NEARBY, nearest

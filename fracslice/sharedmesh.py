@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .checking import stride
 from .clock import Clock
 from .cluster import Pool, Shard
 from .errors import SharedError
-from .finishing import Finish, stride
+from .finishing import Finish
 from .keys import key
 from .mesh.components import Shells
 from .mesh.missed import NEARBY, distances, surface_samples

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .mesh.refine import Refined
     from .mesh.survey import WholeShells
     from .volume import Plan, SignBricks
-    from .volume.sampler import Evaluate
+    from .volume.exploration import Evaluate
 
 BYTES_A_BRICK = 30_000
 """Peak memory per brick of samples, its triangles at all stages included, bytes; measured."""

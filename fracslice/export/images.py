@@ -12,7 +12,8 @@ from fracslice.errors import ExportError
 from fracslice.files import replacing
 from fracslice.work import Work
 
-from .scanlines import levels, write_exr, write_png, write_tiff
+from .colour_png import levels, write_png
+from .scanlines import write_exr, write_tiff
 
 IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".tif", ".tiff")
 LOSSY = {".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}

@@ -62,7 +62,7 @@ class HostAccumulator:
         return self.empty(self.width, self.height, self.sums.dtype, self.work)
 
     def host(self) -> HostAccumulator:
-        """Return the accumulator itself."""
+        """Return the accumulator itself; see `Accumulator.host`."""
         return self
 
     @property
