@@ -15,6 +15,7 @@ from fracslice.work import chunks
 
 from .colour_png import STRIP
 
+
 @contextmanager
 def _named(file: BinaryIO, folder: Path | None) -> Iterator[Path]:
     """Temporary file, for libraries that only write to named ones; its contents are copied to the file."""

@@ -13,8 +13,8 @@ from .accumulator import CHANNELS, COARSE
 BYTES = 4 * (CHANNELS + 4 + 3)
 """Memory of a pixel: its sums, their mean and the developed picture."""
 MARGIN = 16
-"""Pixels around a crop that are rendered with it: errors decide on the samples of neighbours, one pixel farther
-in every pass that chooses pixels."""
+"""Pixels around a crop that are rendered with it: errors decide on the samples of neighbours, one pixel
+farther in every pass that chooses pixels."""
 CROP = Vector(None, "left, top, width and height, pixels", sizes=(4,), least=0, most=32768, whole=True)
 
 
