@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .mesh.components import Shells
     from .mesh.pieces import Pieces
     from .mesh.refine import Refined
-    from .mesh.survey import WholeShells
+    from .mesh.whole_shells import WholeShells
     from .volume import Plan, SignBricks
     from .volume.exploration import Evaluate
 
@@ -169,7 +169,8 @@ def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None,
     Surface
         The surface with tips, labelled.
     """
-    from .mesh.extract import Piece, contour, contour_pieces
+    from .mesh.contouring import Piece
+    from .mesh.extract import contour, contour_pieces
     from .mesh.pieces import Pieces
     from .mesh.pointed_vertices import Pointed
     from .mesh.survey import survey
@@ -209,7 +210,7 @@ def refined(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refi
     Refined
         Result, with lengths in scene units.
     """
-    from .mesh.extract import Piece
+    from .mesh.contouring import Piece
     from .mesh.pieces import Pieces
     from .mesh.refine import refine
     from .mesh.survey import survey
