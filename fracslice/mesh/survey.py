@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rows import gathered
+from ..work import ahead
 from .model import Mesh
 from .pieces import Pieces, near_plane, rows
 from .whole_shells import WholeShells
@@ -33,9 +34,12 @@ def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
     WholeShells
         The shells.
     """
-    joined, start = Survey(), -np.inf
-    for number, mesh in enumerate(pieces.meshes()):
-        labels, sums = components(mesh, start, start := pieces.ends[number], voxel, threads)
+    joined, ends = Survey(), [-np.inf, *pieces.ends]
+    parts = (
+        components(mesh, ends[number], ends[number + 1], voxel, threads)
+        for number, mesh in enumerate(pieces.meshes())
+    )
+    for number, (labels, sums) in enumerate(ahead(parts)):
         first = joined.add(sums)
         pieces.label(number, labels + np.int32(first) if first else labels)
     return joined.shells()
@@ -184,16 +188,18 @@ class Survey:
         own = np.arange(self.starts[-1], dtype=np.int32)
         pairs = np.concatenate([np.stack([own, own], axis=1), *self.same])
         of_label, count = connected_components(pairs[:, [0, 1, 1]], len(own))
-        extremes = self._all("extremes")
+        extremes, volumes = self._all("extremes"), self._all("volumes")
         outermost = np.empty((count, 6), np.int64)
+        outermost[of_label] = own[:, None]
+        (several,) = np.nonzero((np.bincount(of_label) > 1)[of_label])  # mostly few: dust is within a piece
         for side in range(6):
-            height: NDArray[np.float64] = extremes[:, side, side % 3] * (1 if side < 3 else -1)
-            order = np.lexsort((height, of_label))
-            outermost[:, side] = order[np.searchsorted(of_label[order], np.arange(count))]
+            height: NDArray[np.float64] = extremes[several, side, side % 3] * (1 if side < 3 else -1)
+            order = several[np.lexsort((height, of_label[several]))[::-1]]
+            outermost[of_label[order], side] = order  # the last one stays: the lowest, the first of equals
         # Cones over a component's own vertex, moved to one of its shell: precise even for dust.
-        tips = extremes[outermost[:, 0], 0]
-        moved = ((extremes[:, 0] - tips[of_label]) * self._all("vectors")).sum(axis=1) / 3
-        volumes = np.bincount(of_label, self._all("volumes") + moved).astype(np.float64)
+        tips = extremes[outermost[of_label[several], 0], 0]
+        volumes[several] += ((extremes[several, 0] - tips) * self._all("vectors")[several]).sum(axis=1) / 3
+        volumes = np.bincount(of_label, volumes).astype(np.float64)
         areas = np.bincount(of_label, self._all("areas")).astype(np.float64)
         return WholeShells(
             of_label,
