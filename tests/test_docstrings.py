@@ -77,7 +77,7 @@ def lacking(thing: Any, name: str) -> list[str]:
         return []
     signature = inspect.signature(thing)
     known = {"self", "cls"}.union(*(documented(doc, "Parameters", "Attributes") for doc in docs))
-    returned = inspect.isclass(thing) or signature.return_annotation in (None, "None")
+    returned = inspect.isclass(thing) or signature.return_annotation in (None, "None", "Iterator[None]")
     whole = returned or re.search(r"^(Returns|Yields)\n---", docs[0], re.M)
     missing = [p for p in signature.parameters if p not in known and not p.startswith("_")]
     return [f"{name}: {p}" for p in missing] + [f"{name}: Returns"] * (not whole)
