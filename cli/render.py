@@ -13,6 +13,7 @@ import click
 
 from fracslice.errors import Cancelled, SharedError
 
+from .bands import announced, check_options, light_of, render_to
 from .cluster import cluster_options, pooled
 from .families import families
 from .inputs import check_folder, check_targets, load_scene
@@ -139,6 +140,7 @@ def render(
     """Render a picture of SCENE, as its camera, lights and materials say."""
     from fracslice.export.images import check_image
     from fracslice.rendering import Renderer
+    from fracslice.rendering.bands import rows_of_bands
     from fracslice.rendering.layers import layers as rendered_layers
     from fracslice.rendering.sequence import SampleRange
     from fracslice.work import Work
@@ -151,6 +153,17 @@ def render(
     scene, start = load_scene(source, settings), time.monotonic()
     if denoise and scene.view.shading.mode != "light":
         raise click.BadParameter('expected a scene with shading mode="light"', param_hint="--denoise")
+    film = size or (scene.view.film.width, scene.view.film.height)
+    if crop is None and (rows := rows_of_bands(film)) < film[1]:
+        whole = {"--layers": layers, "--denoise": denoise, "--time": limit, "--pass-images": pass_images}
+        check_options(output, {**whole, "--state": state, "--cluster": cluster, "--shard": shard})
+        click.echo(announced(film, rows), err=True)
+        with working(threads, quiet) as work:
+            made = work, device, SampleRange(seed=seed), samples, int(bits)
+            line = render_to(output, scene, film, rows, *made, text_of(scene))
+        if not quiet:
+            click.echo(f"{line}, {time.monotonic() - start:.1f} s")
+        return
     with (
         pooled(output, threads, cluster, shard, store) as pool,
         working(Work(threads, cluster=pool), quiet) as work,
@@ -261,21 +274,19 @@ def save(
     layers: dict[str, np.ndarray] | None = None,
 ) -> None:
     """Write the picture of a pass, with the scene and the samples in its metadata."""
-    from fracslice.export import application
     from fracslice.export.images import LINEAR, check_image, write_image
     from fracslice.work import Work
 
-    text = {
-        "Title": scene.name,
-        "Software": application(),
-        "scene_hash": scene.hash,
-        "samples": f"{done.samples:.2f}",
-    }
-    if check_image(path) in LINEAR:
-        picture = done.mean if done.view.film.transparent else done.image
-    else:
-        picture = done.developed
+    text = {**text_of(scene), "samples": f"{done.samples:.2f}"}
+    picture = light_of(done) if check_image(path) in LINEAR else done.developed
     write_image(path, picture, picture, int(bits), text, Work(threads), layers)  # looks at one of both
+
+
+def text_of(scene: Scene) -> dict[str, str]:
+    """Metadata of every picture of a scene."""
+    from fracslice.export import application
+
+    return {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
 
 
 def save_state(renderer: Renderer, path: str) -> None:

@@ -78,12 +78,11 @@ def judge(P, N, E, R, G, T, first, rows, width, stride, most):
     G : pointer to float
         Gains of the picture, written: -1 for a finished pixel.
     T : pointer to float
-        Written: gain, unfinished pixels.
+        Written: largest gain.
     first, rows, width, stride, most : int
         First row and rows of the band, picture width, numbers per row, maximum samples per pixel.
     """
-    total = 0.0
-    unconverged = 0.0
+    largest = 0.0
     for y in range(rows):
         for x in range(0, width, WIDTH):
             e = y * stride + x
@@ -98,10 +97,8 @@ def judge(P, N, E, R, G, T, first, rows, width, stride, most):
             G[g] = -1.0
             if N[(y + 1) * stride + x + 1] < most and R[y * stride + x] >= 0.0:
                 G[g] = R[y * stride + x]
-                total += G[g]
-                unconverged += 1.0
-    T[0] = total
-    T[1] = unconverged
+                largest = max(largest, G[g])
+    T[0] = largest
 
 
 @loop("rrrnnnn")

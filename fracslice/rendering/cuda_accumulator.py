@@ -12,7 +12,7 @@ from ..formulas.field import Precision
 from ..kernel.cuda import launched, load_loops, require
 from ..kernel.linker import Linked
 from ..scene.view import View
-from .accumulator import FEW, NEARLY, TRUSTED, PassPlan, grids
+from .accumulator import TRUSTED, PassPlan, grids, least_gain, next_choice
 from .cuda_accumulator_loops import LOOPS
 from .film import shows_background
 from .host_accumulator import HostAccumulator
@@ -92,8 +92,10 @@ class CudaAccumulator:
         real = self.dtype.type
         judged = (self.sums, self._squares, self._gains, self._parts, self.width)
         limits = (real(TRUSTED), real(most), real(tolerance * tolerance))
-        total, unfinished, _ = self._summed(self._loops.judge, *judged, *limits).sum(0)
-        least = real(NEARLY * total / unfinished if unfinished > FEW * self.width * self.height else 0.0)
+        largest = self._summed(self._loops.judge, *judged, *limits)[:, 0].max()
+        if largest > 0:
+            self.passes = len(spacings) + next_choice(self.passes - len(spacings), largest)
+        least = real(least_gain(self.passes - len(spacings)))
         return self._plan(self._loops.choose, self.sums, self._gains, self._parts, real(most), least)
 
     def _plan(self, loop: Any, *arguments: Any) -> PassPlan:

@@ -14,7 +14,7 @@ from ..kernel.linker import Linked
 from ..kernel.machine import Function
 from ..scene.view import View
 from ..work import Work, chunks
-from .accumulator import CHANNELS, COARSE, COUNT, COVER, FEW, GOAL, NEARLY, PassPlan, grids
+from .accumulator import CHANNELS, COARSE, COUNT, COVER, GOAL, PassPlan, grids, least_gain, next_choice
 from .accumulator_loops import LOOPS
 from .film import BAND, develop, levels
 from .tiles import band_order
@@ -194,8 +194,12 @@ class HostAccumulator:
         def chosen(first: int, rows: int, _: np.ndarray) -> None:
             loops["choose"](least, self.sums, gains, first, rows, self.width, most)
 
-        total, count, *_ = self._banded(judged).sum(0)
-        least = np.array([NEARLY * total / count if count > FEW * pixels else 0.0], real)
+        largest = float(self._banded(judged)[:, 0].max())
+        if largest <= 0:
+            return
+        grid_passes = len(grids(self.width, self.height))
+        self.passes = grid_passes + next_choice(self.passes - grid_passes, largest)
+        least = np.array([least_gain(self.passes - grid_passes)], real)
         self._banded(chosen)
 
     def _unfinished(self) -> PassPlan:

@@ -14,8 +14,9 @@ import pytest
 from fracslice.cli.main import run
 from PIL import Image
 
-from fracslice.rendering import Pass, Renderer, cpu
+from fracslice.rendering import Pass, Renderer, bands, cpu
 from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, PassPlan
+from fracslice.rendering.crops import BYTES
 
 SCENE = """<scene version="1">
   <solid size="80mm"><material colour="0.9 0.3 0.2"><sphere/></material></solid>
@@ -76,6 +77,39 @@ def test_a_part_of_a_picture_is_that_part(
     assert (cut == whole[6:15, 13:29]).all()
     assert run([*common, "-o", str(tmp_path / "b.png"), "--crop", "30,6,16,9"]) == 2
     assert "crop=30,6,16,9: expected a part of 40 x 24 pixels" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", ["png", "exr"])
+def test_a_picture_larger_than_the_memory_is_rendered_in_bands(
+    scene: Path,
+    tmp_path: Path,
+    ending: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    common = ["render", str(scene), "-q", "--device", "cpu", "--samples", "16", "--size", "40x150"]
+    whole, banded = tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"
+    assert run([*common, "-o", str(whole)]) == 0
+    monkeypatch.setattr(bands, "available_bytes", lambda: BYTES * 40 * 149)
+    assert run([*common, "-o", str(banded)]) == 0
+    assert "40 x 150 pixels need 0.0 GB of memory, more than is free: rendered in 3 bands of 64 rows" in (
+        capsys.readouterr().err
+    )
+    assert (picture(banded) == picture(whole)).all()
+    assert run([*common, "-o", str(tmp_path / "b.jpg")]) == 2
+    assert run([*common, "-o", str(banded), "--denoise"]) == 2
+    assert run([*common, "-o", str(tmp_path / "b.png"), "--set", "film.bloom=0.1"]) == 2
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == sorted([f".{ending}"] * 2 + [".xml"])
+
+
+def picture(path: Path) -> np.ndarray:
+    """Pixels of a PNG or an OpenEXR file."""
+    import OpenEXR
+
+    if path.suffix == ".png":
+        return np.asarray(Image.open(path))
+    with OpenEXR.File(str(path)) as file:
+        return np.array(file.channels()["RGB"].pixels)
 
 
 def test_a_seed_changes_the_noise_alone(scene: Path, tmp_path: Path) -> None:

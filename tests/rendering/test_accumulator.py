@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, FIRST, GOAL, NEARLY, grids
+from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, GOAL, SOON, UNIFORM, grids, least_gain
 from fracslice.rendering.host_accumulator import HostAccumulator, filled
 from fracslice.rendering.tiles import ordered
 from fracslice.rendering.units.pixel import squared_error
@@ -18,12 +18,12 @@ WIDTH, HEIGHT = 37, 23
 
 
 def begun(threads: int = 1) -> HostAccumulator:
-    """A picture of 70 passes."""
+    """A picture of 5 passes."""
     rng = np.random.default_rng(3)
     n = 2.0 ** rng.integers(3, 6, WIDTH * HEIGHT)
     bright = rng.beta(0.3, 0.5, n.size)
     sums = np.stack([*(n * bright * s for s in (1, 3, 0.2)), n * bright, n * bright**1.5, n, n, n], 1)
-    return HostAccumulator(WIDTH, HEIGHT, sums.astype(np.float32).ravel(), 70, work=Work(threads))
+    return HostAccumulator(WIDTH, HEIGHT, sums.astype(np.float32).ravel(), 5, work=Work(threads))
 
 
 def test_pixels_are_chosen_alike_by_any_number_of_threads() -> None:
@@ -88,7 +88,7 @@ def test_samples_go_where_they_take_most_from_the_error() -> None:
     ]
     worst, gain = np.max(around[:9], 0), np.max(around[9:], 0)
     unfinished = (n < most) & (worst > tolerance**2)
-    chosen = unfinished & (gain >= NEARLY * gain[unfinished].mean())
+    chosen = unfinished & (gain >= least_gain(UNIFORM))
     assert 0.1 < chosen.mean() < 0.9
     picture.plan(most, tolerance)
     np.testing.assert_array_equal(picture.channels[..., GOAL], np.where(chosen, 2 * n, n))
@@ -98,7 +98,7 @@ def test_samples_go_where_they_take_most_from_the_error() -> None:
 def test_the_first_pass_of_a_large_picture_is_short(size: tuple[int, int]) -> None:
     spacings = grids(*size)
     assert spacings[-2:] == (COARSE, 1)
-    assert size[0] * size[1] / spacings[0] ** 2 <= FIRST
+    assert size[0] * size[1] / spacings[0] ** 2 <= SOON
     assert {a // b for a, b in pairwise(spacings)} == {COARSE}
 
 
