@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cluster import ResultFolder
-from .mesh.extract import Piece
+from .mesh.contouring import Piece
 from .mesh.halo import Strip, strip
 from .mesh.model import Mesh
 from .mesh.pieces import Pieces as MeshPieces
