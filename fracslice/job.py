@@ -258,7 +258,7 @@ class _Job:
         if self.clock.work.cluster is None:
             return None
         from .export import FORMATS
-        from .export.stl import write_blocks
+        from .export.stl import concatenate
         from .sharedmesh import SharedSurface, finished, whole
 
         if not isinstance(surface, SharedSurface):
@@ -267,12 +267,12 @@ class _Job:
         ending = STL if self.path is None else self.path.suffix.lower()
         mesh = None
         if not self.path or ending != STL:
-            mesh = whole(list(blocks))
+            mesh = whole(blocks)
             finish.count_near()
         if self.path:
             with self.file(self.path) as (file, about):
                 if mesh is None:
-                    write_blocks(blocks, file, about)
+                    concatenate(blocks, file, about)
                 else:
                     FORMATS[ending](mesh, file, about)
         check.end()

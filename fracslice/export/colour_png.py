@@ -11,7 +11,7 @@ import numpy as np
 
 from fracslice.work import Work, chunks
 
-STRIP, LEVEL = 64, 6
+STRIP, LEVEL = 32, 6
 """Rows that are stored as one, and the level of compression of a PNG."""
 ZLIB = b"\x78\x9c"
 """Header of a zlib stream (RFC 1950)."""

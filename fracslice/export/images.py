@@ -16,6 +16,8 @@ from .colour_png import levels, write_png
 from .scanlines import write_exr, write_tiff
 
 IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".tif", ".tiff")
+LINEAR = (".exr", ".tif", ".tiff")
+"""Extensions of linear light."""
 LOSSY = {".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
 BANDED = (".png", ".exr", ".tif", ".tiff")
 """Kinds of pictures that are written while they are made."""

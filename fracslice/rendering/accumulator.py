@@ -22,12 +22,33 @@ COUNT, GOAL, COVER = 5, 6, 7
 TRUSTED = 8
 """Samples below which a pixel's variance estimate is not used."""
 COARSE = 4
-"""Grid spacing of the first pass, pixels."""
+"""Ratio of the grid spacings of the first passes."""
+SOON = 1 << 16
+"""Maximum samples of the first pass, so that a large picture shows something soon."""
 FIRST, DECAY = 2.0**-10, 4.0
 """Least gain of the first pass that chooses pixels, and the ratio of the least gains of consecutive passes: a
 net of twice as many samples has a quarter of the gain."""
-UNIFORM = 5
-"""Passes before it: a grid, all pixels, then nets of 2, 4 and `TRUSTED` samples."""
+UNIFORM = 3
+"""Passes before it, after those over grids: nets of 2, 4 and `TRUSTED` samples."""
+
+
+def grids(width: int, height: int) -> tuple[int, ...]:
+    """Return the grid spacings of the first passes, which take one sample in each pixel of their grids.
+
+    Parameters
+    ----------
+    width, height : int
+        Picture size, pixels.
+
+    Returns
+    -------
+    tuple of int
+        Spacings, pixels; the last one is 1.
+    """
+    spacings = [1, COARSE]
+    while width * height > SOON * spacings[-1] ** 2:
+        spacings.append(spacings[-1] * COARSE)
+    return tuple(reversed(spacings))
 
 
 @dataclass(frozen=True)
@@ -55,7 +76,7 @@ def least_gain(passes: int) -> float:
     Parameters
     ----------
     passes : int
-        Completed passes.
+        Completed passes after those over grids.
 
     Returns
     -------
@@ -71,7 +92,7 @@ def next_choice(passes: int, largest: float) -> int:
     Parameters
     ----------
     passes : int
-        Completed passes.
+        Completed passes after those over grids.
     largest : float
         Largest gain of an unfinished pixel, above zero.
 
@@ -108,9 +129,9 @@ class Accumulator(Protocol):
     def plan(self, most: int, tolerance: float) -> PassPlan:
         """Set the goals of the next pass, or return the rest of an interrupted one.
 
-        The first pass takes one sample on a grid of pixels, the second one of all other pixels. Later passes
-        double the samples of all pixels with fewer than TRUSTED. A pixel then gets as many samples again, up
-        to `most`, if two conditions hold:
+        The first passes take one sample on finer and finer grids of pixels, see `grids`. Later passes double
+        the samples of all pixels with fewer than TRUSTED. A pixel then gets as many samples again, up to
+        `most`, if two conditions hold:
 
         - its error or a neighbour's is above the tolerance;
         - a sample reduces the squared error of the picture by at least `least_gain` of the pass.

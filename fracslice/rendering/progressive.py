@@ -18,7 +18,7 @@ from ..keys import key, program
 from ..memory import available_bytes
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import Accumulator, PassPlan
+from .accumulator import Accumulator, PassPlan, grids
 from .cpu import BLOCK, CpuTracer
 from .crops import Crop
 from .host_accumulator import HostAccumulator
@@ -182,9 +182,9 @@ class Renderer:
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
         """Yield the picture after every pass until all pixels have converged.
 
-        A pixel is finished when it has `samples` samples or its error is within `tolerance`. The first pass
-        samples one pixel in 16, the second all others; `Accumulator.plan` chooses the pixels of later
-        passes.
+        A pixel is finished when it has `samples` samples or its error is within `tolerance`. The first passes
+        sample grids of pixels, one pixel in 16 and then all others of a picture of up to 1024 x 1024;
+        `Accumulator.plan` chooses the pixels of later passes.
 
         Parameters
         ----------
@@ -214,21 +214,22 @@ class Renderer:
 
     def _pass(self, plan: PassPlan) -> Pass:
         start = time.perf_counter()
-        self.prepare(self.accumulator.passes)
+        coarse = len(grids(*self.crop.size)) - 2  # passes with a pixel a block, or less: no prepass pays
+        self.prepare(max(self.accumulator.passes - coarse, 0))
         self.tracer.add(self.accumulator.sums, plan, self.work)
         self.accumulator.passes += 1
         samples, error = self.accumulator.statistics()
         return self._seen(samples, error, plan.samples, plan.samples / (time.perf_counter() - start))
 
-    def prepare(self, passes: int) -> None:
-        """Run the cone prepasses, which pay if a block gets several rays: one more after each pass.
+    def prepare(self, prepasses: int) -> None:
+        """Run cone prepasses.
 
         Parameters
         ----------
-        passes : int
-            Completed passes.
+        prepasses : int
+            Prepasses to have run, or all if there are fewer.
         """
-        wanted = min(passes, self.tracer.prepasses)
+        wanted = min(prepasses, self.tracer.prepasses)
         if wanted < self._prepasses:
             self.tracer.aim(self._frame)
             self._prepasses = 0
