@@ -113,6 +113,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     metavar="FILE.npz",
     help="Resume from this file if it exists, and save to it after every pass.",
 )
+@click.option("--watch", is_flag=True, help="Show the picture in a window while it is rendered.")
 @cluster_options
 @run_options
 @families("output", "state", "pass_images")
@@ -130,6 +131,7 @@ def render(
     bits: str,
     pass_images: str | None,
     state: str | None,
+    watch: bool,
     cluster: str | None,
     shard: str | None,
     store: str | None,
@@ -156,7 +158,9 @@ def render(
     film = size or (scene.view.film.width, scene.view.film.height)
     if crop is None and (rows := rows_of_bands(film)) < film[1]:
         whole = {"--layers": layers, "--denoise": denoise, "--time": limit, "--pass-images": pass_images}
-        check_options(output, {**whole, "--state": state, "--cluster": cluster, "--shard": shard})
+        check_options(
+            output, {**whole, "--watch": watch, "--state": state, "--cluster": cluster, "--shard": shard}
+        )
         click.echo(announced(film, rows), err=True)
         with working(threads, quiet) as work:
             made = work, device, SampleRange(seed=seed), samples, int(bits)
@@ -180,7 +184,8 @@ def render(
             return described(path, renderer, done)
 
         try:
-            for done in timed(renderer, samples, limit):
+            passes = timed(renderer, samples, limit)
+            for done in shown(passes, renderer, scene.name) if watch else passes:
                 rate = f"{reached(done)}, {done.rate / 1e6:.2f} M samples/s"
                 work.progress(rate, fraction(done, renderer, samples))
                 if pass_images:
@@ -208,6 +213,13 @@ def render(
         took = time.monotonic() - start
         about = f"{renderer.setup.precision}, {renderer.device}, {took:.1f} s"
         click.echo(f"{described(output, renderer, done)}, {about}")
+
+
+def shown(passes: Iterator[Pass], renderer: Renderer, name: str) -> Iterator[Pass]:
+    """Passes that are shown in a window."""
+    from fracslice.viewer import previewed
+
+    return previewed(passes, f"fracslice  {name}", (renderer.width, renderer.height))
 
 
 def without_noise(renderer: Renderer) -> Pass:
