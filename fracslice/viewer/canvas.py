@@ -94,7 +94,7 @@ class Canvas:
         self.window.Finalize()
 
     def show(self) -> None:
-        """Show the window and return; `handle_events` is to be called from time to time, and `hide` at the end."""
+        """Show the window and return; `handle_events` must be called from time to time, `hide` at the end."""
         self.shown = True
         self.on("ExitEvent", self.hide)
         self.interactor.Initialize()
