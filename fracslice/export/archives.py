@@ -18,7 +18,7 @@ from fracslice.errors import ExportError
 from fracslice.export import png
 from fracslice.export.jobs import SliceRun
 from fracslice.export.prints import PrintData, one_height, printing
-from fracslice.files import replacing
+from fracslice.files import flushing, replacing
 from fracslice.version import __version__
 
 MOST_MEMBERS = 65_535
@@ -102,7 +102,7 @@ def _pictures(run: SliceRun, path: str | Path) -> AbstractContextManager[PrintDa
 
 def _archive(path: str | Path, members: Members) -> Path:
     """Write members that are not compressed and carry no time."""
-    with replacing(path) as file, zipfile.ZipFile(file, "w") as archive:
+    with replacing(path) as file, flushing(file), zipfile.ZipFile(file, "w") as archive:
         for name, data in members:
             archive.writestr(zipfile.ZipInfo(name), data)
     return Path(path)

@@ -56,8 +56,8 @@ class PrintData:
     @cached_property
     def _read(self) -> tuple[NDArray[np.float64], list[int]]:
         """Areas of all layers and sizes of their pictures."""
-        records = [(_AREA.unpack_from(record)[0], len(record) - _AREA.size) for record in self.journal]
-        return np.array([area for area, _ in records]), [size for _, size in records]
+        areas, sizes = zip(*self.journal.heads(_AREA.size), strict=True)
+        return np.frombuffer(b"".join(areas), "<f8"), [size - _AREA.size for size in sizes]
 
     @property
     def areas(self) -> NDArray[np.float64]:
