@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import tempfile
 import threading
 import warnings
@@ -116,6 +117,29 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
                 os.unlink(part)
             raise
         _flush_folder(target.parent)
+
+
+def appended(source: BinaryIO, target: BinaryIO) -> int:
+    """Append a file to another one, by the kernel where it can.
+
+    Parameters
+    ----------
+    source, target : file
+        Binary files, open for reading and for writing.
+
+    Returns
+    -------
+    int
+        Number of bytes.
+    """
+    count, copy = os.fstat(source.fileno()).st_size, getattr(os, "copy_file_range", None)
+    with suppress(OSError):  # of memory, on other file systems, or in an old kernel
+        target.flush()
+        while copy and (done := copy(source.fileno(), target.fileno(), count, source.tell(), target.tell())):
+            source.seek(done, os.SEEK_CUR)
+            target.seek(done, os.SEEK_CUR)
+    shutil.copyfileobj(source, target, 1 << 22)
+    return count
 
 
 @contextmanager

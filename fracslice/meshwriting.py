@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
+from .checking import Check
 from .clock import Clock
-from .finishing import Check, Finish
+from .finishing import Finish
 from .meshjob import MeshJob
 from .scene import Scene
 from .work import ahead
@@ -97,7 +98,7 @@ class Writing:
         if self.clock.work.cluster is None:
             return None
         from .export import FORMATS
-        from .export.stl import write_blocks
+        from .export.stl import concatenate
         from .sharedmesh import SharedSurface, finished, whole
 
         if not isinstance(surface, SharedSurface):
@@ -106,12 +107,12 @@ class Writing:
         ending = STL if self.path is None else self.path.suffix.lower()
         mesh = None
         if not self.path or ending != STL:
-            mesh = whole(list(blocks))
+            mesh = whole(blocks)
             finish.count_near()
         if self.path:
             with self._file(self.path) as (file, about):
                 if mesh is None:
-                    write_blocks(blocks, file, about)
+                    concatenate(blocks, file, about)
                 else:
                     FORMATS[ending](mesh, file, about)
         check.end()

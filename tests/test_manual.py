@@ -54,6 +54,12 @@ def test_links_and_anchors_resolve(page: Path) -> None:
         assert not anchor or anchor in anchors(file), target
 
 
+@each_page
+def test_table_cells_hold_no_paragraphs(page: Path) -> None:
+    cells = re.findall(r"(?<=\|)(?:[^|\n\\]|\\.)+(?=\|)", BARE[page])
+    assert [cell for cell in cells if len(cell.strip()) > 120] == []
+
+
 def test_every_page_is_in_one_table_of_contents() -> None:
     listed = []
     for page, text in TEXT.items():

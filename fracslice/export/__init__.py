@@ -34,7 +34,12 @@ FORMATS: dict[str, Write] = {
 
 
 def application() -> str:
-    """Name and version of this program, for file metadata."""
+    """Name and version of this program, for file metadata.
+
+    Returns
+    -------
+    str
+    """
     return f"fracslice {__version__}"
 
 

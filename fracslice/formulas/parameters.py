@@ -64,11 +64,38 @@ class Parameter(ABC):
         """
 
     def read(self, text: str) -> Any:
-        """Parse a value; see `check`."""
+        """Parse a value.
+
+        Parameters
+        ----------
+        text : str
+            Text of a scene file.
+
+        Returns
+        -------
+        object
+            The value in the type of this kind.
+
+        Raises
+        ------
+        ValueError
+            With `expects`, for any other text.
+        """
         return self.check(text.strip())
 
     def text(self, value: Any) -> str:
-        """Format a value."""
+        """Format a value.
+
+        Parameters
+        ----------
+        value : object
+            A valid value.
+
+        Returns
+        -------
+        str
+            Text that `read` parses to the same value.
+        """
         return str(value)
 
 
