@@ -14,9 +14,11 @@ from llvmlite import ir
 
 from . import lanes_math
 from .intervals import Interval, Possible
+from .kinds import Kind, as_kind, joined, kind_of, made_of, parts_of, types_of
+from .memory import Memory
 from .registers import Vec
 from .scalars import BOOL, DOUBLE, WHOLE, MismatchError, common, compare, number, operate, truth, widened
-from .values import LANES, Kind, Lanes, Value, as_kind, is_mask, joined, kind_of, made_of, parts_of, types_of
+from .values import LANES, Value, is_mask
 
 if TYPE_CHECKING:
     from .emitter import Emitter
@@ -52,12 +54,10 @@ _OWN = {
 _EXTREMES = {"min": ast.Lt(), "max": ast.Gt()}
 
 
-class Expressions:
+class Expressions(Memory):
     """Emits the expressions of a function at its builder's position."""
 
     emitter: Emitter
-    lanes: Lanes
-    builder: Any
     names: dict[str, Value]
     blocks: dict[str, Any]
 
@@ -184,10 +184,6 @@ class Expressions:
                 phi.add_incoming(part, block)
         return made_of(kind, phis, self.lanes, self.builder)
 
-    def address(self, place: Any, index: Value) -> Any:
-        """Emit the address of an array element."""
-        return self.builder.gep(place, [number(self.builder, index, WHOLE)])
-
     def element(self, place: Value, index: Value) -> Value:
         """Emit an access to an array element in memory or to a tuple element."""
         if not isinstance(place, tuple):
@@ -288,36 +284,3 @@ class Expressions:
         """Emit the upper bound of an interval."""
         end: Vec = self.lanes.interval(self.builder, value).hi
         return end
-
-    def intrinsic_load(self, place: Any, index: Value) -> Vec:
-        """Load lanes from memory."""
-        align = self.lanes.bits // 8
-        return Vec(
-            self.builder,
-            tuple(self.builder.load(a, align=align) for a in self.registers(place, index)),
-        )
-
-    def intrinsic_store(self, place: Any, index: Value, value: Value) -> None:
-        """Store lanes to memory."""
-        parts = self.lanes.vec(self.builder, value).parts
-        for address, part in zip(self.registers(place, index), parts, strict=True):
-            self.builder.store(part, address, align=self.lanes.bits // 8)
-
-    def intrinsic_gather(self, index: Value, place: Any) -> Vec:
-        """Load an element from memory for each lane."""
-        like = self.lanes.register
-        parts = []
-        for register in self.lanes.vec(self.builder, index).to_whole().parts:
-            loaded = ir.Constant(like, ir.Undefined)
-            for k in range(like.count):
-                lane = ir.Constant(ir.IntType(32), k)
-                address = self.builder.gep(place, [self.builder.extract_element(register, lane)])
-                loaded = self.builder.insert_element(loaded, self.builder.load(address), lane)
-            parts.append(loaded)
-        return Vec(self.builder, tuple(parts))
-
-    def registers(self, place: Any, index: Value) -> list[Any]:
-        """Addresses of the registers of lanes, starting at an array element."""
-        first, kind = self.address(place, index), self.lanes.register
-        steps = (ir.Constant(WHOLE, k * kind.count) for k in range(self.lanes.registers))
-        return [self.builder.bitcast(self.builder.gep(first, [step]), kind.as_pointer()) for step in steps]

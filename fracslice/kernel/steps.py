@@ -9,37 +9,19 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FunctionType
 from typing import Any, NoReturn
 
 from ..errors import KernelError
 from . import functions, language
-from .parsing import parse, parse_expression
+from .parsing import parse_expression
 from .source import specialised
+from .straight_line import Step
 from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector3, as_number
 
 Value = Any
 """Scalar, Vector or tuple of these."""
-
-
-@dataclass
-class Step:
-    """Code of a step.
-
-    Attributes
-    ----------
-    lines
-        Assignments.
-    point
-        Expressions of the next point.
-    stretch
-        Expressions of the stretch by w and by c.
-    """
-
-    lines: list[str]
-    point: tuple[str, str, str]
-    stretch: tuple[str, str]
 
 
 def traced(
@@ -84,8 +66,8 @@ def traced(
     if declared is not None:
         stretch = declared.atom, stretch[1]
     point = tuple(part.atom for part in vector.parts)
-    lines = _used(tape.lines, {*point, *filter(None, stretch)})
-    return Step(lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
+    made = Step(tape.lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
+    return replace(made, lines=made.needed(*made.point, *made.stretch))
 
 
 def _argument(name: str, size: int) -> Value:
@@ -94,17 +76,6 @@ def _argument(name: str, size: int) -> Value:
         return Scalar(name)
     parts = tuple(Scalar(f"{name}_{k}") for k in range(size))
     return Vector3(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
-
-
-def _used(lines: Sequence[str], wanted: set[str]) -> list[str]:
-    """Assignments that the wanted names depend on."""
-    kept, live = [], set(wanted)
-    for line in reversed(lines):
-        target, value = line.split(" = ", 1)
-        if target in live:
-            live |= {n.id for n in ast.walk(parse(value)) if isinstance(n, ast.Name)}
-            kept.append(line)
-    return kept[::-1]
 
 
 def _followed(

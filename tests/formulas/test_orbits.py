@@ -12,7 +12,7 @@ from fracslice.formulas.registry import _REGISTRY
 from fracslice.formulas.verbs import ball, fold, positive, power, turn
 from fracslice.kernel import compile_scene, link, reference
 from fracslice.kernel.depth import resolve_depths
-from fracslice.kernel.growth import image
+from fracslice.kernel.orbit_samples import image
 from fracslice.kernel.steps import traced
 
 SHIFT = (0.3, -0.2, 0.1)
