@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 import numpy as np
 
 from . import surfaces
+from .checking import Check
 from .clock import Clock
 from .errors import SceneError, SharedError, TooLargeError
-from .finishing import Check, Finish
+from .finishing import Finish
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
 from .meshresult import MeshResult
@@ -257,7 +258,7 @@ class _Job:
         if self.clock.work.cluster is None:
             return None
         from .export import FORMATS
-        from .export.stl import write_blocks
+        from .export.stl import concatenate
         from .sharedmesh import SharedSurface, finished, whole
 
         if not isinstance(surface, SharedSurface):
@@ -266,12 +267,12 @@ class _Job:
         ending = STL if self.path is None else self.path.suffix.lower()
         mesh = None
         if not self.path or ending != STL:
-            mesh = whole(list(blocks))
+            mesh = whole(blocks)
             finish.count_near()
         if self.path:
             with self.file(self.path) as (file, about):
                 if mesh is None:
-                    write_blocks(blocks, file, about)
+                    concatenate(blocks, file, about)
                 else:
                     FORMATS[ending](mesh, file, about)
         check.end()
@@ -281,9 +282,9 @@ class _Job:
     @contextmanager
     def file(self, path: Path) -> Iterator[tuple[BinaryIO, dict[str, str]]]:
         """Open the file, and return what it says about itself."""
-        from .export import application, replacing
+        from .export import application, flushing, replacing
 
-        with replacing(path) as file:
+        with replacing(path) as file, flushing(file):
             yield file, {"Application": application()} | metadata(self.scene)
 
     def written(

@@ -10,7 +10,7 @@ from .clock import Clock
 from .cluster import ResultFolder
 from .errors import ClusterError
 from .keys import key, program
-from .mesh.extract import SurfaceContours
+from .mesh.contouring import SurfaceContours
 from .meshfiles import unpacked
 from .meshjob import MeshJob
 from .planning import edited, planned

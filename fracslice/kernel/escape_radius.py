@@ -139,7 +139,8 @@ def constant_stretch(steps: Round, first: int, values: Mapping[str, Any]) -> flo
         step, names = code.traced(place), code.arguments(place)
         if not step.is_steady or not code.is_fixed(place):
             return None
-        body = [*code.unpacked(place), *step.needed(step.stretch[0]), f"return {step.stretch[0]}"]
+        before = code.before(place, ("0.0",) * 3)
+        body = [*before, *step.needed(step.stretch[0]), f"return {step.stretch[0]}"]
         spread = values[f"spread{place}"] if code.moved else 1.0
         product *= spread * float(written(steps, names, body)(*(values[name] for name in names)))
     return product * (1 + MARGIN)
@@ -164,7 +165,7 @@ def _last_size(steps: Round, first: int) -> Callable[..., Any]:
         start = ("0.0" if added else "size * unit",) * 3
         lines, assigned = code.around(place, step.lines)
         spread = f"spread{place} * " if code.moved else ""
-        body += [*code.unpacked(place), code.constant(place, start)]
+        body += code.before(place, start)
         if step.is_torn:
             body += [*code.image(place), "mx, my, mz, reach = x, y, z, 0.0 * reach"]
         else:

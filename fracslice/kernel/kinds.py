@@ -1,4 +1,4 @@
-"""Kinds of values: their form as LLVM values, between functions and where paths join."""
+"""Kinds of values: their LLVM types between functions, and the common kind where paths join."""
 
 from __future__ import annotations
 

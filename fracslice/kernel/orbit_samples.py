@@ -90,7 +90,7 @@ def image(steps: Round, place: int, values: Mapping[str, Any]) -> Image:
     """
     code = steps[place]
     names = code.arguments(place)
-    body = [*code.unpacked(place), code.constant(place, ("px", "py", "pz")), *code.image(place)]
+    body = [*code.before(place, ("px", "py", "pz")), *code.image(place)]
     function = written(steps, ["x", "y", "z", "px", "py", "pz", *names], [*body, "return x, y, z"])
     given = [values[name] for name in names]
 

@@ -17,7 +17,7 @@ from ..errors import KernelError
 from . import functions, language
 from .parsing import parse_expression
 from .source import specialised
-from .straight_line import Step
+from .straight_line import Step, named
 from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector3, as_number
 
 Value = Any
@@ -66,8 +66,9 @@ def traced(
     if declared is not None:
         stretch = declared.atom, stretch[1]
     point = tuple(part.atom for part in vector.parts)
-    made = Step(tape.lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
-    return replace(made, lines=made.needed(*made.point, *made.stretch))
+    made = Step([], tape.lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
+    before, lines = _divided(made.needed(*made.point, *made.stretch))
+    return replace(made, before=before, lines=lines)
 
 
 def _argument(name: str, size: int) -> Value:
@@ -76,6 +77,19 @@ def _argument(name: str, size: int) -> Value:
         return Scalar(name)
     parts = tuple(Scalar(f"{name}_{k}") for k in range(size))
     return Vector3(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
+
+
+def _divided(lines: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Assignments that do not depend on the point x, y, z, and the others."""
+    before: list[str] = []
+    others: list[str] = []
+    changing = {"x", "y", "z"}
+    for line in lines:
+        target, value = line.split(" = ", 1)
+        changes = not changing.isdisjoint(named(value))
+        (others if changes else before).append(line)
+        changing |= {target} if changes else set()
+    return before, others
 
 
 def _followed(

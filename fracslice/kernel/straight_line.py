@@ -20,44 +20,49 @@ class Step:
 
     Attributes
     ----------
+    before
+        Assignments that do not depend on the last point.
     lines
-        Assignments.
+        The other assignments.
     point
         Expressions of the next point.
     stretch
         Expressions of the stretch by w and by c.
     """
 
+    before: list[str]
     lines: list[str]
     point: tuple[str, str, str]
     stretch: tuple[str, str]
 
     @cached_property
     def image(self) -> list[str]:
-        """Assignments that the next point depends on."""
-        return self.needed(*self.point)
+        """Assignments of `lines` that the next point depends on."""
+        before = {*self.before}
+        return [line for line in self.needed(*self.point) if line not in before]
 
     def needed(self, *names: str) -> list[str]:
         """Assignments that some names depend on."""
-        kept, live = [], {*names}
-        for line in reversed(self.lines):
+        kept, live = [], {name.removeprefix("-") for name in names}
+        for line in reversed([*self.before, *self.lines]):
             target, value = line.split(" = ", 1)
             if target in live:
-                live |= {n.id for n in ast.walk(parse(value)) if isinstance(n, ast.Name)}
+                live |= named(value)
                 kept.append(line)
         return kept[::-1]
 
     @property
     def constants(self) -> list[str]:
         """Coordinates of the constant, wherever the next point depends on them."""
-        return CONSTANTS.findall("\n".join([*self.image, *self.point]))
+        return CONSTANTS.findall("\n".join([*self.needed(*self.point), *self.point]))
 
     @property
     def is_added(self) -> bool:
-        """True if the constant is the last summand of the next point and nowhere else."""
+        """True if the constant is a summand of the next point and nowhere else."""
         values = dict(line.split(" = ", 1) for line in self.image)
-        summands = [values.get(name, "").rpartition(" + ")[2] for name in self.point]
-        return len(self.constants) == 3 and summands == sorted(self.constants)
+        summands = [values.get(name, "").split(" + ") for name in self.point]
+        constants = sorted(self.constants)
+        return len(constants) == 3 and all(c in two for c, two in zip(constants, summands, strict=True))
 
     @property
     def is_torn(self) -> bool:
@@ -69,3 +74,8 @@ class Step:
         """True if the stretch is the same at all points, and space is not torn."""
         stretch = "\n".join([*self.needed(self.stretch[0]), self.stretch[0]])
         return not self.is_torn and not POINTS.search(stretch)
+
+
+def named(value: str) -> set[str]:
+    """Return the names in an expression."""
+    return {n.id for n in ast.walk(parse(value)) if isinstance(n, ast.Name)}
