@@ -29,16 +29,14 @@ from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
 from fracslice.slicerecipe import SliceRecipe
 from fracslice.slicing import SliceJob
-from fracslice.volume import sampler
+from fracslice.volume import exploration
 from fracslice.work import Work
 
 from .processes import SECONDS, Cluster, wait_until
 
 pytest.importorskip("distributed")
 ROOT = mandelbulb(iterations=4)
-RECIPE = SliceRecipe(
-    to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "a.cli", "cli"
-)
+RECIPE = SliceRecipe(to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "cli")
 MESHED = scene(mandelbulb(iterations=4) | sphere(radius=0.1).translate((-1.5, 0.0, 0.0)), size="20mm")
 VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
 SIZE, SAMPLES = (96, 72), 6
@@ -104,7 +102,7 @@ def no_workers_of_other_tests(cluster: Cluster) -> Iterator[None]:
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "PIXELS", 1024)
     monkeypatch.setattr(meshtasks, "LEAST", 1)
-    monkeypatch.setattr(sampler, "MANY", 1)
+    monkeypatch.setattr(exploration, "MANY", 1)
     monkeypatch.setattr(meshsampling, "BRICKS", 32)
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
 
