@@ -185,8 +185,10 @@ def render(
         raise SharedError("the samples are made; shard 1 writes the file")
     more = rendered_layers(renderer) if layers else None
     save(output, without_noise(renderer) if denoise else renderer.seen(), scene, bits, threads, more)
-    if aside:
+    if pool and aside:
         Path(aside).unlink(missing_ok=True)
+        if not shard:
+            pool.pieces.tidy()
     if not quiet:
         took = time.monotonic() - start
         click.echo(
