@@ -13,6 +13,7 @@ import click
 
 from fracslice.errors import Cancelled, SharedError
 
+from .bands import announced, check_options, light_of, render_to
 from .cluster import cluster_options, pooled
 from .families import families
 from .inputs import check_folder, check_targets, load_scene
@@ -139,6 +140,7 @@ def render(
     """Render a picture of SCENE, as its camera, lights and materials say."""
     from fracslice.export.images import check_image
     from fracslice.rendering import Renderer
+    from fracslice.rendering.bands import rows_of_bands
     from fracslice.rendering.layers import layers as rendered_layers
     from fracslice.rendering.sequence import SampleRange
     from fracslice.work import Work
@@ -151,6 +153,17 @@ def render(
     scene, start = load_scene(source, settings), time.monotonic()
     if denoise and scene.view.shading.mode != "light":
         raise click.BadParameter('expected a scene with shading mode="light"', param_hint="--denoise")
+    film = size or (scene.view.film.width, scene.view.film.height)
+    if crop is None and (rows := rows_of_bands(film)) < film[1]:
+        whole = {"--layers": layers, "--denoise": denoise, "--time": limit, "--pass-images": pass_images}
+        check_options(output, {**whole, "--state": state, "--cluster": cluster, "--shard": shard})
+        click.echo(announced(film, rows), err=True)
+        with working(threads, quiet) as work:
+            made = work, device, SampleRange(seed=seed), samples, int(bits)
+            line = render_to(output, scene, film, rows, *made, text_of(scene))
+        if not quiet:
+            click.echo(f"{line}, {time.monotonic() - start:.1f} s")
+        return
     with (
         pooled(output, threads, cluster, shard, store) as pool,
         working(Work(threads, cluster=pool), quiet) as work,
@@ -164,7 +177,7 @@ def render(
 
         def write(path: str | Path, done: Pass, bits: str) -> str:
             save(path, done, scene, bits, threads)
-            return described(path, renderer)
+            return described(path, renderer, done)
 
         try:
             for done in timed(renderer, samples, limit):
@@ -175,25 +188,28 @@ def render(
                     write(Path(pass_images) / f"pass{done.number:04}.png", done, "8")
                 if state and first:
                     save_state(renderer, state)
+            if limit and state and first:
+                save_state(renderer, state)  # of a pass that the limit interrupted
         except Cancelled:
-            if not first or not renderer.seen().samples:
+            kept = renderer.seen()
+            if not first or not kept.samples:
                 raise
             if state:
                 save_state(renderer, state)
-            raise KeptError(write(output, renderer.seen(), bits)) from None
+            raise KeptError(write(output, kept, bits)) from None
     if not first:
         raise SharedError("the samples are made; shard 1 writes the file")
     more = rendered_layers(renderer) if layers else None
-    save(output, without_noise(renderer) if denoise else renderer.seen(), scene, bits, threads, more)
+    done = without_noise(renderer) if denoise else renderer.seen()
+    save(output, done, scene, bits, threads, more)
     if pool and aside:
         Path(aside).unlink(missing_ok=True)
         if not shard:
             pool.pieces.tidy()
     if not quiet:
         took = time.monotonic() - start
-        click.echo(
-            f"{described(output, renderer)}, {renderer.setup.precision}, {renderer.device}, {took:.1f} s"
-        )
+        about = f"{renderer.setup.precision}, {renderer.device}, {took:.1f} s"
+        click.echo(f"{described(output, renderer, done)}, {about}")
 
 
 def without_noise(renderer: Renderer) -> Pass:
@@ -206,32 +222,39 @@ def without_noise(renderer: Renderer) -> Pass:
 
 
 def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
-    """Iterate over passes until a time limit, in seconds, which interrupts all passes but the first."""
-    start, expired, timer = time.monotonic(), threading.Event(), None
+    """Iterate over passes until a time limit, in seconds, which interrupts a pass.
+
+    A limit that ends before the first sample is doubled.
+    """
+    cancel, expired = renderer.work.cancel, threading.Event()
 
     def expire() -> None:
         expired.set()
-        renderer.work.cancel.set()
+        cancel.set()
 
+    if limit is None:
+        yield from renderer.passes(samples)
+        return
+    timer = threading.Timer(limit, expire)
+    timer.start()
     try:
-        for done in renderer.passes(samples):
-            yield done
-            if limit is not None and timer is None:
-                timer = threading.Timer(max(start + limit - time.monotonic(), 0.0), expire)
-                timer.start()
+        yield from renderer.passes(samples)
+        return
     except Cancelled:
         if not expired.is_set():
             raise
     finally:
-        if timer:
-            timer.cancel()
+        timer.cancel()
         if expired.is_set():
-            renderer.work.cancel.clear()
+            cancel.clear()
+    if not renderer.seen().samples:
+        yield from timed(renderer, samples, 2 * limit)
 
 
 def reached(done: Pass) -> str:
     """Samples per pixel and error of a pass, as text."""
-    return f"{done.samples:.1f} samples a pixel, error {done.error:.2g}"
+    samples = f"{done.samples:.1f}" if done.samples >= 1 else f"{done.samples:.1g}"
+    return f"{samples} samples a pixel, error {done.error:.2g}"
 
 
 def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
@@ -239,9 +262,9 @@ def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
     return min(done.samples / (samples or renderer.setup.view.film.samples), 1.0)
 
 
-def described(path: str | Path, renderer: Renderer) -> str:
+def described(path: str | Path, renderer: Renderer, done: Pass) -> str:
     """Line on a written picture."""
-    return f"{path}: {renderer.width} x {renderer.height} pixels, {reached(renderer.seen())}"
+    return f"{path}: {renderer.width} x {renderer.height} pixels, {reached(done)}"
 
 
 def save(
@@ -253,18 +276,19 @@ def save(
     layers: dict[str, np.ndarray] | None = None,
 ) -> None:
     """Write the picture of a pass, with the scene and the samples in its metadata."""
-    from fracslice.export import application
-    from fracslice.export.images import write_image
+    from fracslice.export.images import LINEAR, check_image, write_image
     from fracslice.work import Work
 
-    text = {
-        "Title": scene.name,
-        "Software": application(),
-        "scene_hash": scene.hash,
-        "samples": f"{done.samples:.2f}",
-    }
-    light = done.mean if done.view.film.transparent else done.image
-    write_image(path, done.developed, light, int(bits), text, Work(threads), layers)
+    text = {**text_of(scene), "samples": f"{done.samples:.2f}"}
+    picture = light_of(done) if check_image(path) in LINEAR else done.developed
+    write_image(path, picture, picture, int(bits), text, Work(threads), layers)  # looks at one of both
+
+
+def text_of(scene: Scene) -> dict[str, str]:
+    """Metadata of every picture of a scene."""
+    from fracslice.export import application
+
+    return {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
 
 
 def save_state(renderer: Renderer, path: str) -> None:

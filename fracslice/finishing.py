@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .clock import Clock
 from .placement import Placement
+from .rows import gathered
 from .scene import Print
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def placing(planned: Plan, signs: SignBricks, place: Placement) -> tuple[NDArray
     Frame
         Scale, translation and height of the bed.
     """
-    from .mesh.extract import minimum_edge_parameter
+    from .mesh.contouring import minimum_edge_parameter
     from .mesh.quantisation import grid_planes
 
     bed = FLAT * minimum_edge_parameter(signs) * planned.voxel * place.scale
@@ -171,4 +172,5 @@ class Finish:
         mesh, labels = self.pieces.mesh(number), self.pieces.labels(number)
         self.near.add(mesh.vertices, labels, self.pieces.ends[number])
         fresh = np.arange(len(mesh.triangles) - self.pieces.fresh[number], len(mesh.triangles))
-        return SelectedPiece(mesh, self.stays[self.shells.of_label][labels], fresh)
+        keep = gathered(self.stays[self.shells.of_label], labels, self.clock.work.threads)
+        return SelectedPiece(mesh, keep, fresh)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cluster import Files, ResultFolder, packed, unpacked
-from .mesh.extract import Piece
+from .mesh.contouring import Piece
 from .mesh.halo import Strip, strip
 from .mesh.model import Mesh
 from .mesh.pieces import Pieces as MeshPieces

@@ -10,7 +10,7 @@ from .clock import Clock
 from .cluster import ResultFolder, unpacked
 from .errors import ClusterError
 from .keys import key, program
-from .mesh.extract import SurfaceContours
+from .mesh.contouring import SurfaceContours
 from .meshjob import MeshJob
 from .planning import edited, planned
 from .scene.reader import reads

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from .checking import off_surface, on_the_plate
 from .cluster import Contents, ResultFolder, packed, unpacked
 from .finishing import placing
-from .mesh.extract import layers
+from .mesh.contouring import layers
 from .mesh.halo import WAITS, SelectedPiece, finished_piece
 from .mesh.missed import NEARBY, nearest
 from .mesh.pointed_vertices import pointed_in
-from .mesh.survey import WholeShells, components
+from .mesh.survey import components
 from .mesh.tally import Tally
 from .mesh.tip_triangles import at_tips
+from .mesh.whole_shells import WholeShells
 from .meshfiles import Selection, StoredPieces, read_choice
 from .meshrecipe import MeshRecipe, sampled
 from .volume import SignBricks

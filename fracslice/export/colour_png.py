@@ -1,82 +1,98 @@
-"""PNG in colour, with 8 or 16 bits per channel; strips of rows are compressed in parallel."""
+"""PNG in colour, with 8 or 16 bits per channel, written while the rows of the picture are made."""
 
 from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping
-from functools import reduce
+from collections.abc import Iterable, Mapping
+from typing import BinaryIO
 
 import numpy as np
 
 from fracslice.work import Work, chunks
 
-STRIP, LEVEL = 64, 6
-"""Rows of a PNG that are compressed as one, and the level of compression."""
+STRIP, LEVEL = 32, 6
+"""Rows that are stored as one, and the level of compression of a PNG."""
 ZLIB = b"\x78\x9c"
 """Header of a zlib stream (RFC 1950)."""
 
 
 def levels(shown: np.ndarray, bits: int) -> np.ndarray:
-    """Quantise colours to integers, big-endian.
+    """Quantise display values.
 
     Parameters
     ----------
-    shown : ndarray, float
+    shown : ndarray of float
         Values in [0, 1].
     bits : {8, 16}
-        Bits of an integer.
+        Bits of a level.
 
     Returns
     -------
-    ndarray of uint8 or uint16
-        Integers from 0 to 2^bits - 1.
+    ndarray of uint8, or of uint16, big-endian
     """
-    scaled = np.round(np.clip(shown, 0, 1) * np.float64(2**bits - 1))
-    return np.asarray(scaled, ">u2" if bits == 16 else np.uint8)
+    quantised = np.round(np.clip(shown, 0, 1) * np.float64(2**bits - 1))
+    return np.asarray(quantised, ">u2" if bits == 16 else np.uint8)
 
 
-def png(shown: np.ndarray, bits: int, text: Mapping[str, str], work: Work | None = None) -> bytes:
-    """Encode a PNG file (ISO/IEC 15948) with filtered rows, sRGB and text chunks.
+def write_png(
+    file: BinaryIO,
+    shape: tuple[int, ...],
+    bands: Iterable[np.ndarray],
+    bits: int,
+    text: Mapping[str, str],
+    work: Work | None = None,
+) -> None:
+    """Write a PNG file (ISO/IEC 15948) with filtered rows, sRGB and text chunks.
+
+    The bytes do not depend on the bands.
 
     Parameters
     ----------
-    shown : ndarray, float [height, width, 3 or 4]
-        sRGB in [0, 1], and unassociated alpha.
+    file : BinaryIO
+        Writable binary file.
+    shape : tuple of int
+        Height, width, and 3 or 4 channels of the picture.
+    bands : iterable of ndarray, float [rows, width, channels]
+        sRGB in [0, 1], and unassociated alpha, from the top; all but the last have a multiple of `STRIP`
+        rows.
     bits : {8, 16}
         Bits per channel.
     text : mapping of str to str
         Keywords and texts of the metadata.
     work : Work, optional
         Threads; one by default.
-
-    Returns
-    -------
-    bytes
     """
-    height, width, channels = shown.shape
+    height, width, channels = shape
+    header = struct.pack(">IIBBBBB", width, height, bits, 6 if channels == 4 else 2, 0, 0, 0)
+    file.write(b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", header) + _chunk(b"sRGB", b"\0"))
+    for keyword, value in text.items():
+        file.write(_chunk(b"iTXt", f"{keyword}\0\0\0\0\0{value}".encode()))
+    start, checksum, above = ZLIB, 1, np.zeros((1, width, channels))
+    done = 0
+    for band in bands:
+        done += len(band)
+        for data, blocks in _compressed(np.concatenate([above, band]), bits, done == height, work or Work(1)):
+            checksum = zlib.adler32(data, checksum)
+            file.write(_chunk(b"IDAT", start + blocks))
+            start = b""
+        above = band[-1:]
+    file.write(_chunk(b"IDAT", struct.pack(">I", checksum)) + _chunk(b"IEND", b""))
+
+
+def _compressed(shown: np.ndarray, bits: int, last: bool, work: Work) -> list[tuple[bytes, bytes]]:
+    """Filtered rows of the strips of a band after its first row, which is that above it; and the same as
+    blocks of a deflate stream that end at a byte."""
+    height, pixel = len(shown) - 1, shown.shape[2] * bits // 8
 
     def compressed(rows: slice) -> tuple[bytes, bytes]:
-        """Filtered rows, and the same as blocks of a deflate stream that end at a byte."""
-        part = shown[max(rows.start - 1, 0) : rows.stop]
-        pixels = levels(part, bits).reshape(len(part), -1)
-        filtered = _filtered(pixels.view(np.uint8), channels * bits // 8)
-        data = filtered[rows.start > 0 :].tobytes()
+        part = levels(shown[rows.start : rows.stop + 1], bits)
+        data = _filtered(part.reshape(len(part), -1).view(np.uint8), pixel)[1:].tobytes()
         packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
-        return data, packer.compress(data) + packer.flush(
-            zlib.Z_FINISH if rows.stop == height else zlib.Z_FULL_FLUSH
-        )
+        end = zlib.Z_FINISH if last and rows.stop == height else zlib.Z_FULL_FLUSH
+        return data, packer.compress(data) + packer.flush(end)
 
-    strips = (work or Work(1)).collect(compressed, chunks(height, STRIP))
-    checksum = reduce(lambda sum_, strip: zlib.adler32(strip[0], sum_), strips, 1)
-    stream = ZLIB + b"".join(blocks for _, blocks in strips) + struct.pack(">I", checksum)
-    parts = [
-        (b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 6 if channels == 4 else 2, 0, 0, 0)),
-        (b"sRGB", b"\0"),
-    ]
-    parts += [(b"iTXt", f"{k}\0\0\0\0\0{v}".encode()) for k, v in text.items()]
-    parts += [(b"IDAT", stream), (b"IEND", b"")]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in parts)
+    return work.collect(compressed, chunks(height, STRIP))
 
 
 def _filtered(rows: np.ndarray, pixel: int) -> np.ndarray:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -13,10 +12,15 @@ from fracslice.errors import ExportError
 from fracslice.files import replacing
 from fracslice.work import Work
 
-from .colour_png import levels, png
+from .colour_png import levels, write_png
+from .scanlines import write_exr, write_tiff
 
 IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".tif", ".tiff")
+LINEAR = (".exr", ".tif", ".tiff")
+"""Extensions of linear light."""
 LOSSY = {".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
+BANDED = (".png", ".exr", ".tif", ".tiff")
+"""Kinds of pictures that are written while they are made."""
 QUALITY = 95
 """Quality of JPEG and WebP."""
 LAYERS = {
@@ -125,11 +129,17 @@ def encoded_image(
     bytes
     """
     metadata = text or {}
-    if ending == ".png":
-        return png(shown, bits, metadata, work)
     if ending in LOSSY:
         return lossy(shown, LOSSY[ending], metadata)
-    return exr(light, metadata, layers or {}) if ending == ".exr" else tiff(light, metadata)
+    file = BytesIO()
+    if ending == ".png":
+        write_png(file, shown.shape, [shown], bits, metadata, work)
+    elif ending == ".exr":
+        channels, names = _layered(light, layers or {})
+        write_exr(file, channels.shape, [channels], names, metadata)
+    else:
+        write_tiff(file, light.shape, [light], metadata)
+    return file.getvalue()
 
 
 def lossy(shown: np.ndarray, kind: str, text: Mapping[str, str]) -> bytes:
@@ -166,63 +176,41 @@ def lossy(shown: np.ndarray, kind: str, text: Mapping[str, str]) -> bytes:
     return file.getvalue()
 
 
-def exr(light: np.ndarray, text: Mapping[str, str], layers: Mapping[str, np.ndarray]) -> bytes:
-    """Encode an OpenEXR file (Academy Software Foundation): 32-bit floats, losslessly compressed.
+def _layered(light: np.ndarray, layers: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[str]]:
+    """Linear light and the layers of `LAYERS` as channels, and their names."""
+    names = [*"RGBA"[: light.shape[2]], *(name for layer in layers for name in LAYERS[layer])]
+    return np.concatenate([light, *map(np.atleast_3d, layers.values())], 2), names
+
+
+def write_bands(
+    path: str | Path,
+    size: tuple[int, int],
+    bands: Iterable[tuple[np.ndarray, np.ndarray]],
+    channels: int,
+    bits: int,
+    text: Mapping[str, str],
+    work: Work,
+) -> None:
+    """Write an image to a file while it is made; the file is the same as that of `write_image`.
 
     Parameters
     ----------
-    light : ndarray, float32 [height, width, 3 or 4]
-        Linear red, green and blue, and alpha that they are multiplied by.
-    text : mapping of str to str
-        Keywords and texts of the metadata.
-    layers : mapping of str to ndarray, float32 [height, width] or [height, width, 3]
-        Layers of `LAYERS`.
-
-    Returns
-    -------
-    bytes
+    path : str or path
+        The file to write, of a kind of `BANDED`.
+    size : tuple of int
+        Width and height, pixels.
+    bands : iterable of tuple of ndarray
+        Consecutive rows: sRGB and light, as for `write_image`.
+    channels : {3, 4}
+        Channels of the image.
+    bits, text, work
+        As for `write_image`.
     """
-    import OpenEXR
-
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **text}
-    channels = {name: light[..., k] for k, name in enumerate("RGBA"[: light.shape[2]])}
-    for layer, values in layers.items():
-        parts = np.atleast_3d(values)
-        channels |= {name: parts[..., k] for k, name in enumerate(LAYERS[layer])}
-    with TemporaryDirectory() as folder:  # the library only writes to named files
-        path = Path(folder) / "picture.exr"
-        arrays = {name: np.ascontiguousarray(part, np.float32) for name, part in channels.items()}
-        with OpenEXR.File(header, arrays) as file:
-            file.write(str(path))
-        return path.read_bytes()
-
-
-def tiff(light: np.ndarray, text: Mapping[str, str]) -> bytes:
-    """Encode a TIFF file by tifffile: 32-bit floats, uncompressed.
-
-    Parameters
-    ----------
-    light : ndarray, float32 [height, width, 3 or 4]
-        Linear red, green and blue, and alpha that they are multiplied by.
-    text : mapping of str to str
-        Keywords and texts of the metadata, in the description.
-
-    Returns
-    -------
-    bytes
-    """
-    from tifffile import imwrite
-
-    file, note = BytesIO(), "\n".join(f"{k}: {v}" for k, v in text.items())
-    pixels = np.ascontiguousarray(light, np.float32)
-    alpha = ["assocalpha"] if light.shape[2] == 4 else None
-    imwrite(
-        file,
-        pixels,
-        photometric="rgb",
-        extrasamples=alpha,
-        description=note.encode(),
-        metadata=None,
-        software=False,
-    )
-    return file.getvalue()
+    shape, ending, folder = (size[1], size[0], channels), check_image(path), Path(path).parent
+    with replacing(path) as file:
+        if ending == ".png":
+            write_png(file, shape, (shown for shown, _ in bands), bits, text, work)
+        elif ending == ".exr":
+            write_exr(file, shape, (light for _, light in bands), "RGBA"[:channels], text, folder)
+        else:
+            write_tiff(file, shape, (light for _, light in bands), text, folder)

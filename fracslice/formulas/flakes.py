@@ -7,19 +7,19 @@ import math
 from .box import Box
 from .parameters import Choice, Count
 from .registry import Fixed, Node, shape
-from .vocabulary import minimum, orbit
+from .verbs import mirror
+from .vocabulary import orbit
 
 Triple = tuple[float, float, float]
 
 GOLDEN = (1 + math.sqrt(5)) / 2
-HALF = math.sqrt(0.5)
 OCTANT: tuple[Triple, ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 TURNED = (-GOLDEN / 2, (GOLDEN - 1) / 2, -0.5)
 """Normal of the mirror of the icosahedral group that is no coordinate plane."""
 
 MIRRORS: dict[str, tuple[Triple, ...]] = {
-    "tetrahedron": ((HALF, HALF, 0), (HALF, 0, HALF), (0, HALF, HALF), (-HALF, HALF, 0), (-HALF, 0, HALF)),
-    "octahedron": (*OCTANT, (HALF, -HALF, 0), (HALF, 0, -HALF)),
+    "tetrahedron": ((1, 1, 0), (1, 0, 1), (0, 1, 1), (-1, 1, 0), (-1, 0, 1)),
+    "octahedron": (*OCTANT, (1, -1, 0), (1, 0, -1)),
     "dodecahedron": (*OCTANT, TURNED, *OCTANT, TURNED, *OCTANT, TURNED, *OCTANT),
     "icosahedron": (*OCTANT, TURNED, *OCTANT, TURNED, *OCTANT, TURNED, *OCTANT),
 }
@@ -47,11 +47,9 @@ SCALES = {"tetrahedron": 2.0, "octahedron": 2.0, "dodecahedron": 2 + GOLDEN, "ic
 
 def folded(solid: str, point: Triple) -> Triple:
     """Image of a point in the part of space nearest to one corner."""
-    x, y, z = point
-    for a, b, c in MIRRORS[solid]:
-        s = 2.0 * min(a * x + b * y + c * z, 0.0)
-        x, y, z = x - s * a, y - s * b, z - s * c
-    return x, y, z
+    for normal in MIRRORS[solid]:
+        point, _ = mirror(point, normal)
+    return point
 
 
 def _unit(point: Triple) -> Triple:
@@ -76,14 +74,12 @@ def flake(x, y, z, level, scale, corner, face, height, mirrors):  # type: ignore
     size = 1.0
     for _ in range(level):
         for a, b, c in mirrors:
-            s = 2.0 * minimum(a * x + b * y + c * z, 0.0)
-            x, y, z = x - s * a, y - s * b, z - s * c
+            (x, y, z), _ = mirror((x, y, z), (a, b, c))
         size = size / scale
         x, y, z = x - size * vx, y - size * vy, z - size * vz
         orbit((x * x + y * y + z * z) / size, x == x, x / size, y / size, z / size)
     for a, b, c in mirrors:
-        s = 2.0 * minimum(a * x + b * y + c * z, 0.0)
-        x, y, z = x - s * a, y - s * b, z - s * c
+        (x, y, z), _ = mirror((x, y, z), (a, b, c))
     return fx * x + fy * y + fz * z - height * size
 
 

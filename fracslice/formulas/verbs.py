@@ -111,10 +111,10 @@ def inversion_over(w, e, radius):  # type: ignore[no-untyped-def]
 
 
 def mirror(w, normal):  # type: ignore[no-untyped-def]
-    """Reflect the points behind a plane through the origin to its front; the normal has length 1."""
+    """Reflect the points behind a plane through the origin to its front; the normal has any length."""
     x, y, z = w
     a, b, c = normal
-    s = 2.0 * minimum(a * x + b * y + c * z, 0.0)
+    s = 2.0 / (a * a + b * b + c * c) * minimum(a * x + b * y + c * z, 0.0)
     return (x - s * a, y - s * b, z - s * c), 1.0
 
 
@@ -129,11 +129,11 @@ def turn(w, axis, degrees):  # type: ignore[no-untyped-def]
     x, y, z = w
     a, b, c = axis
     cosine, sine = cos(degrees * 0.017453292519943295), sin(degrees * 0.017453292519943295)
-    along = (a * x + b * y + c * z) * (1.0 - cosine)
+    u, v, s = (1.0 - cosine) * a, (1.0 - cosine) * b, (1.0 - cosine) * c
     image = (
-        x * cosine + (b * z - c * y) * sine + a * along,
-        y * cosine + (c * x - a * z) * sine + b * along,
-        z * cosine + (a * y - b * x) * sine + c * along,
+        (cosine + u * a) * x + (u * b - sine * c) * y + (u * c + sine * b) * z,
+        (u * b + sine * c) * x + (cosine + v * b) * y + (v * c - sine * a) * z,
+        (u * c - sine * b) * x + (v * c + sine * a) * y + (cosine + s * c) * z,
     )
     return image, 1.0
 

@@ -238,7 +238,7 @@ def image(steps: Round, place: int, values: Mapping[str, Any]) -> Image:
     code = steps[place]
     names = code.arguments(place)
     lines, assigned = code.image(place)
-    body = [*code.unpacked(place), code.constant(place, ("px", "py", "pz")), *lines, *assigned]
+    body = [*code.before(place, ("px", "py", "pz")), *lines, *assigned]
     function = written(steps, ["x", "y", "z", "px", "py", "pz", *names], [*body, "return x, y, z"])
     given = [values[name] for name in names]
 

@@ -53,20 +53,20 @@ class Code:
         names = [f"v{place}_{name}" for name, _ in self.sizes]
         return [*names, *self._flagged(place, julia=["c"], moved=["back", "forth", "spread"])]
 
-    def unpacked(self, place: int) -> list[str]:
-        """Lines that take its vectors apart, and its constant."""
+    def before(self, place: int, start: Sequence[str]) -> list[str]:
+        """Lines before the first round: those that take vectors apart, set the constant of the step, from the
+        start point if it has none of its own, and do not depend on the last point.
+        """
         lines = [
             f"{', '.join(f'v{place}_{name}_{k}' for k in range(size))} = v{place}_{name}"
             for name, size in self.sizes
             if size > 1
         ]
         matrices = self._flagged(place, moved=["back", "forth"])
-        return lines + [f"{', '.join(f'{name}_{k}' for k in range(12))} = {name}" for name in matrices]
-
-    def constant(self, place: int, start: Sequence[str]) -> str:
-        """Line that sets the constant of the step, from the start point if it has none of its own."""
+        lines += [f"{', '.join(f'{name}_{k}' for k in range(12))} = {name}" for name in matrices]
         given = ", ".join(_mapped(f"back{place}", start) if self.moved else start)
-        return f"cx{place}, cy{place}, cz{place} = {f'c{place}' if self.julia else given}"
+        constant = f"cx{place}, cy{place}, cz{place} = {f'c{place}' if self.julia else given}"
+        return [*lines, constant, *self.traced(place).before]
 
     def image(self, place: int) -> tuple[list[str], list[str]]:
         """Lines that take the point x, y, z to its image: those of the calculation, then the assignments."""
@@ -128,7 +128,7 @@ def _field(steps: Round, by_power: bool, scaled: bool, _: object) -> Callable[..
         given += [*code.arguments(place), f"stop{place}", *([f"scale{place}"] if scaled else [])]
         given += [f"rate{place}"] if by_power else []
         given += [f"least{place}"] if by_power and code.julia else []
-        setup += [*code.unpacked(place), code.constant(place, ("x", "y", "z"))]
+        setup += code.before(place, ("x", "y", "z"))
         loop += _taken(code, place, by_power, f"scale{place}" if scaled else "")
     last = len(steps) - 1
     body = [
@@ -179,7 +179,7 @@ def _sign(steps: Round, scaled: bool, _: object) -> Callable[..., Any]:
     for place, code in enumerate(steps):
         lines, assigned = code.image(place)
         given += [*code.arguments(place), f"stop{place}"]
-        setup += [*code.unpacked(place), code.constant(place, ("x", "y", "z"))]
+        setup += code.before(place, ("x", "y", "z"))
         loop += [*lines, *assigned, "r2 = x * x + y * y + z * z"]
         loop += [f"alive = alive & (r2 < stop{place})"]
     body = [

@@ -29,14 +29,17 @@ class Step:
 
     Attributes
     ----------
+    before
+        Assignments that do not depend on the last point.
     lines
-        Assignments.
+        The other assignments.
     point
         Expressions of the next point.
     stretch
         Expressions of the stretch by w and by c.
     """
 
+    before: list[str]
     lines: list[str]
     point: tuple[str, str, str]
     stretch: tuple[str, str]
@@ -84,8 +87,8 @@ def traced(
     if declared is not None:
         stretch = declared.atom, stretch[1]
     point = tuple(part.atom for part in vector.parts)
-    lines = _used(tape.lines, {*point, *filter(None, stretch)})
-    return Step(lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
+    before, lines = _divided(_used(tape.lines, {*point, *filter(None, stretch)}))
+    return Step(before, lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
 
 
 def _argument(name: str, size: int) -> Value:
@@ -98,13 +101,31 @@ def _argument(name: str, size: int) -> Value:
 
 def _used(lines: Sequence[str], wanted: set[str]) -> list[str]:
     """Assignments that the wanted names depend on."""
-    kept, live = [], set(wanted)
+    kept, live = [], {atom.removeprefix("-") for atom in wanted}
     for line in reversed(lines):
         target, value = line.split(" = ", 1)
         if target in live:
-            live |= {n.id for n in ast.walk(parse(value)) if isinstance(n, ast.Name)}
+            live |= _named(value)
             kept.append(line)
     return kept[::-1]
+
+
+def _divided(lines: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Assignments that do not depend on the point x, y, z, and the others."""
+    before: list[str] = []
+    others: list[str] = []
+    changing = {"x", "y", "z"}
+    for line in lines:
+        target, value = line.split(" = ", 1)
+        changes = not changing.isdisjoint(_named(value))
+        (others if changes else before).append(line)
+        changing |= {target} if changes else set()
+    return before, others
+
+
+def _named(value: str) -> set[str]:
+    """Names in an expression."""
+    return {n.id for n in ast.walk(parse(value)) if isinstance(n, ast.Name)}
 
 
 def _followed(

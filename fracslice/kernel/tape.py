@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 
 from .parsing import parse_expression
 
@@ -21,7 +22,7 @@ FLAT: Slopes = (None,) * 6
 
 @dataclass(frozen=True)
 class Scalar:
-    """Expression that is a name or a number, and its derivatives."""
+    """Atom, which is a name or a number with or without a minus, and its derivatives."""
 
     atom: str
     slopes: Slopes = FLAT
@@ -71,8 +72,8 @@ class Tape:
         return Vector3(tuple(parts), (None, "1.0") if first else ("1.0", None))  # type: ignore[arg-type]
 
     def name(self, code: str | None) -> str | None:
-        """Name of an expression; equal expressions have one."""
-        if code is None or code.isidentifier() or as_number(code) is not None:
+        """Name of an expression; equal expressions have one. That of a name with a minus is itself."""
+        if code is None or code.removeprefix("-").isidentifier() or as_number(code) is not None:
             return code
         if code not in self.names:
             self.names[code] = f"{self.prefix}{len(self.names)}"
@@ -80,18 +81,33 @@ class Tape:
         return self.names[code]
 
     def times(self, a: str | None, b: str | None) -> str | None:
-        """Product of two expressions."""
+        """Product of two atoms; None is zero."""
         if a is None or b is None:
             return None
-        if as_number(a) == 1 or as_number(b) == 1:
-            return b if as_number(a) == 1 else a
-        return self.name(f"{a} * {b}")
+        (p, q), (m, n) = (as_number(a), as_number(b)), (a.removeprefix("-"), b.removeprefix("-"))
+        if 0 in (p, q):
+            return None
+        if p is not None and q is not None and isfinite(p * q):
+            return repr(p * q)
+        size = self.name(_product(*sorted((m, n), key=_numbers_first)))
+        return size if (m == a) == (n == b) else _negative(size)
 
     def plus(self, a: str | None, b: str | None, sign: str = "+") -> str | None:
-        """Sum or difference of two expressions."""
-        if b is None:
-            return a
-        return self.name(f"{a} {sign} {b}" if a is not None else b if sign == "+" else f"-{b}")
+        """Sum or difference of two atoms; None is zero."""
+        b = b if sign == "+" else _negative(b)
+        p, q = (0 if e is None else as_number(e) for e in (a, b))
+        if a is None or b is None or 0 in (p, q):
+            return b if p == 0 else a
+        if p is not None and q is not None and isfinite(abs(p) + abs(q)):
+            return repr(p + q) if p + q else None
+        if a == b:
+            return self.times("2.0", a)
+        if a == _negative(b):
+            return None
+        if a[0] == b[0] == "-":
+            return _negative(self.plus(a[1:], b[1:]))
+        a, b = (b, a) if a[0] == "-" else (a, b)
+        return self.name(f"{a} - {b[1:]}" if b[0] == "-" else " + ".join(sorted((a, b))))
 
     def scalar(self, code: str, *slopes: tuple[str | None, Scalar]) -> Scalar:
         """Scalar of an expression, with factors of the derivatives of others."""
@@ -103,7 +119,7 @@ class Tape:
     def sum(self, a: Scalar, b: Scalar, sign: str) -> Scalar:
         """Sum or difference of two scalars."""
         slopes = [self.plus(x, y, sign) for x, y in zip(a.slopes, b.slopes, strict=True)]
-        return Scalar(str(self.plus(a.atom, b.atom, sign)), tuple(slopes))
+        return Scalar(self.plus(a.atom, b.atom, sign) or "0.0", tuple(slopes))
 
     def vector_sum(self, a: Vector3, b: Vector3, sign: str) -> Vector3:
         """Sum or difference of two vectors; the stretch of both is at most the sum."""
@@ -115,15 +131,13 @@ class Tape:
 
     def product(self, a: Scalar, b: Scalar) -> Scalar:
         """Product of two scalars."""
-        product = str(self.times(a.atom, b.atom))
-        return Scalar(product, self.scalar(product, (b.atom, a), (a.atom, b)).slopes)
+        return self.scalar(self.times(a.atom, b.atom) or "0.0", (b.atom, a), (a.atom, b))
 
     def scaled(self, a: Scalar, b: Vector3) -> Vector3:
         """Vector times a scalar."""
         stretch = None
         if a.constant and b.stretch:
-            number = as_number(a.atom)
-            size = self.name(f"absolute({a.atom})" if number is None else repr(abs(number)))
+            size = self.size(a.atom)
             stretch = self.times(size, b.stretch[0]), self.times(size, b.stretch[1])
         return Vector3(tuple(self.product(a, part) for part in b.parts), stretch)  # type: ignore[arg-type]
 
@@ -163,26 +177,27 @@ class Tape:
         return self.norm([r[:3] for r in rows]), self.norm([r[3:] for r in rows])
 
     def norm(self, rows: Sequence[Slopes]) -> str | None:
-        """Bound of the norm of a matrix.
+        """Bound of the norm of a matrix J.
 
-        The largest eigenvalue of J J^T is at most its mean plus sqrt(2) deviations (Wolkowicz and Styan 1980,
-        "Bounds for eigenvalues using traces"), which is exact for similarities and for rank one.
+        The largest eigenvalue of J J^T is at most the largest sum of absolute values in a row (Gershgorin
+        1931), which is exact for similarities.
         """
-        if all(entry is None for row in rows for entry in row):
-            return None
         if all(as_number(rows[i][k] or "0") == (i == k) for i in range(3) for k in range(3)):
             return "1.0"
-        gram = {(i, k): self.dot(rows[i], rows[k]) for i in range(3) for k in range(i, 3)}
-        trace = self.plus(self.plus(gram[0, 0], gram[1, 1]), gram[2, 2])
-        mean = self.name(f"minimum(maximum({trace} * 0.3333333333333333, 1e-30), 1e30)")
-        inverse = self.name(f"ratio(1.0, {mean})")
-        spread: str | None = None
-        for (i, k), entry in gram.items():
-            part = self.times(entry, inverse)
-            part = self.plus(part or "0.0", "1.0", "-") if i == k else part
-            square = self.times(part, part)
-            spread = self.plus(spread, square if i == k else self.times("2.0", square))
-        return self.name(f"sqrt({mean} * (1.0 + sqrt(minimum(0.6666666666666666 * {spread}, 4.0))))")
+        largest: str | None = None
+        for i, row in enumerate(rows):
+            total = self.dot(row, row)
+            for other in (*rows[:i], *rows[i + 1 :]):
+                total = self.plus(total, self.size(self.dot(row, other)))
+            largest = self.name(f"maximum({largest}, {total})") if largest and total else largest or total
+        return largest and self.name(f"sqrt({largest})")
+
+    def size(self, a: str | None) -> str | None:
+        """Absolute value of an atom."""
+        magnitude = a and a.removeprefix("-")
+        if magnitude is None or as_number(magnitude) is not None:
+            return magnitude
+        return self.name(f"absolute({magnitude})")
 
     def dot(self, a: Slopes, b: Slopes) -> str | None:
         """Dot product of two rows."""
@@ -215,6 +230,20 @@ def _filled(text: str, places: Mapping[str, str]) -> str:
         if isinstance(node, ast.Name) and node.id in places:
             node.id = places[node.id]
     return ast.unparse(tree)
+
+
+def _product(a: str, b: str) -> str:
+    """Expression of a product whose first factor is a number if one is."""
+    return b if as_number(a) == 1 else f"{a} * {b}"
+
+
+def _numbers_first(atom: str) -> tuple[bool, str]:
+    return as_number(atom) is None, atom
+
+
+def _negative(atom: str | None) -> str | None:
+    """Atom with the other sign."""
+    return atom and (atom[1:] if atom[0] == "-" else f"-{atom}")
 
 
 def as_number(code: str) -> float | None:

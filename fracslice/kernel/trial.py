@@ -121,9 +121,8 @@ def _derivative(root: Node, points: np.ndarray) -> tuple[bool, str]:
     taken, values = steps(root)
     code = taken[0]
     made, names = code.traced(0), code.arguments(0)
-    start = code.constant(0, ("px", "py", "pz"))
     image = f"return ({', '.join(made.point)}), {made.stretch[0]}"
-    body = [*code.unpacked(0), start, *made.lines, image]
+    body = [*code.before(0, ("px", "py", "pz")), *made.lines, image]
     step = written(taken, ["x", "y", "z", "px", "py", "pz", *names], body)
     given = [values[name] for name in names]
     offset = np.random.default_rng(1).normal(size=points.shape)

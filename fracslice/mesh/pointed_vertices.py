@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import pointed, touching
-from .extract import Piece
+from .contouring import Piece
 from .model import Mesh
 from .pieces import NOTHING, joined
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..formulas.registry import Fixed, Node
-from ..kernel import functions
 from ..kernel.dialects import FieldDialect
 from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
@@ -19,6 +17,7 @@ from .haze import fogged
 from .optics import Optics, ray_bound
 from .scattering import divided, lacquered
 from .surroundings import Surroundings, seen_as_disc
+from .trace_syntax import text_of
 from .units import lights, march, shade
 from .units.glossy import highlight
 from .units.intrinsics import background, blocker, transparent
@@ -282,22 +281,3 @@ class Lighting:
             if self.weighted and seen_as_disc(light):
                 lines += self.around.disc(k, light)
         return text_of(background, [*lines, "return r, g, b"])
-
-
-def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:
-    """Assemble the source of a function.
-
-    Parameters
-    ----------
-    function : callable
-        Function whose name and parameters are used.
-    lines : sequence of str
-        Body.
-
-    Returns
-    -------
-    str
-        Source text.
-    """
-    names = ", ".join(functions.parameters(function))
-    return "\n    ".join([f"def {function.__name__}({names}):", *lines])

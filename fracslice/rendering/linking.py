@@ -14,9 +14,10 @@ from ..scene.view import Camera, View
 from .cameras import camera_unit
 from .colours import Look
 from .drawn import Drawn
-from .lighting import Lighting, text_of
+from .lighting import Lighting
 from .optics import Optics, ray_bound
 from .scattering import onward
+from .trace_syntax import text_of
 from .units import march
 from .units.intrinsics import GIVEN, surface
 from .units.normal import normal

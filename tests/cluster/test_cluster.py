@@ -36,9 +36,7 @@ from .processes import SECONDS, Cluster, wait_until
 
 pytest.importorskip("distributed")
 ROOT = mandelbulb(iterations=4)
-RECIPE = SliceRecipe(
-    to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "a.cli", "cli"
-)
+RECIPE = SliceRecipe(to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "cli")
 MESHED = scene(mandelbulb(iterations=4) | sphere(radius=0.1).translate((-1.5, 0.0, 0.0)), size="20mm")
 VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
 SIZE, SAMPLES = (96, 72), 6

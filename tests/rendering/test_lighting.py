@@ -12,8 +12,8 @@ from PIL import Image
 from fracslice.errors import RenderError
 from fracslice.formulas import Node, box, material, plane, repeat, sphere, union
 from fracslice.rendering import Pass, Renderer, develop, progressive
+from fracslice.rendering.units.fog import height_fog
 from fracslice.rendering.units.pixel import linear
-from fracslice.rendering.units.shade import height_fog
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
 

@@ -130,9 +130,7 @@ def jobs(
 ) -> dict[str, Job]:
     """A job of each kind."""
     size = 80 / pixels
-    recipe = SliceRecipe(
-        to_xml(SCENE), "bulb", SliceJob(80.0, 80 / layers, (size, size)), None, "a.cli", "cli"
-    )
+    recipe = SliceRecipe(to_xml(SCENE), "bulb", SliceJob(80.0, 80 / layers, (size, size)), None, "cli")
     shape = width, width * 9 // 16
 
     def rendered(work: Work, _: Path) -> None:

@@ -1,0 +1,129 @@
+"""Fields of escape-time fractals as an expert writes them, without `@orbit`: the derivative by hand.
+
+Each takes the radii that its step has in the package, so that both fields are of the same solid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from inspect import signature
+from types import MappingProxyType
+from typing import Any
+
+from fracslice.formulas import Formula, Node
+from fracslice.formulas.escape import CORE, potential_distance
+from fracslice.formulas.orbits import orbit_arguments
+from fracslice.formulas.vocabulary import any_of, maximum, minimum, ratio, sqrt, where
+
+BRISTOR, LEAST = 2.985, 2 * CORE**0.5
+"""Most that the Bristorbrot's step stretches, per |w|; least derivative of a disconnected Julia set."""
+
+
+def mandelbox(x, y, z, scale, size, inner2, iterations, bailout, stop):  # type: ignore[no-untyped-def]
+    a, b, c = x, y, z
+    r2 = x * x + y * y + z * z
+    dr = 0.0 * x + 1.0
+    end_r2, slope = r2, dr
+    alive = r2 < stop
+    for _ in range(iterations):
+        if not any_of(alive):
+            break
+        x = 2.0 * minimum(maximum(x, -1.0), 1.0) - x
+        y = 2.0 * minimum(maximum(y, -1.0), 1.0) - y
+        z = 2.0 * minimum(maximum(z, -1.0), 1.0) - z
+        k = maximum(ratio(1.0, maximum(x * x + y * y + z * z, inner2)), 1.0)
+        s = scale * k
+        x, y, z = s * x + a, s * y + b, s * z + c
+        dr = (size * k) * dr + 1.0
+        r2 = x * x + y * y + z * z
+        end_r2 = where(alive, r2, end_r2)
+        slope = where(alive, maximum(dr, slope), slope)
+        alive = alive & (r2 < stop)
+    return (sqrt(minimum(end_r2, 1e30)) - bailout) / minimum(slope, 1e30)
+
+
+def kifs(x, y, z, scale, cosine, sine, iterations, bailout, stop):  # type: ignore[no-untyped-def]
+    r2 = x * x + y * y + z * z
+    size = 0.0 * x + 1.0
+    end_r2, slope = r2, size
+    alive = r2 < stop
+    for _ in range(iterations):
+        if not any_of(alive):
+            break
+        s = minimum(x + y, 0.0)
+        x, y = x - s, y - s
+        s = minimum(x + z, 0.0)
+        x, z = x - s, z - s
+        s = minimum(y + z, 0.0)
+        y, z = y - s, z - s
+        s = minimum(y - x, 0.0)
+        x, y = x + s, y - s
+        s = minimum(z - x, 0.0)
+        x, z = x + s, z - s
+        along = (x + y + z) * ((1.0 - cosine) / 3.0)
+        s = sine * 0.5773502691896258
+        x, y, z = (
+            x * cosine + (z - y) * s + along,
+            y * cosine + (x - z) * s + along,
+            z * cosine + (y - x) * s + along,
+        )
+        shift = (scale - 1.0) * 0.5773502691896258
+        x, y, z = scale * x - shift, scale * y - shift, scale * z - shift
+        size = size * scale
+        r2 = x * x + y * y + z * z
+        end_r2 = where(alive, r2, end_r2)
+        slope = where(alive, size, slope)
+        alive = alive & (r2 < stop)
+    return (sqrt(minimum(end_r2, 1e30)) - bailout) / minimum(slope, 1e30)
+
+
+def bristorbrot(x, y, z, iterations, levels, stop):  # type: ignore[no-untyped-def]
+    a, b, c = x, y, z
+    first_level, last_level, least = levels
+    level = 0.0 * x + first_level
+    r2 = x * x + y * y + z * z
+    dr = 0.0 * x + 1.0
+    end_r2, slope = r2, dr
+    alive = r2 < stop
+    for _ in range(iterations):
+        if not any_of(alive):
+            break
+        dr = (BRISTOR * sqrt(r2)) * dr + 1.0
+        x, y, z = x * x - y * y - z * z + a, y * (2.0 * x - z) + b, z * (2.0 * x + y) + c
+        r2 = x * x + y * y + z * z
+        end_r2 = where(alive, r2, end_r2)
+        slope = where(alive, maximum(dr, slope), slope)
+        level = where(alive, level + level, level)
+        alive = alive & (r2 < stop)
+    return potential_distance(end_r2, slope * slope, level, first_level, last_level, least)
+
+
+def julia(x, y, z, constant, iterations, levels, stop):  # type: ignore[no-untyped-def]
+    a, b, c = constant
+    first_level, last_level, least = levels
+    level = 0.0 * x + first_level
+    r2 = x * x + y * y + z * z
+    dr = 0.0 * x + 1.0
+    end_r2, slope = r2, dr
+    alive = r2 < stop
+    for _ in range(iterations):
+        if not any_of(alive):
+            break
+        dr = maximum(2.0 * sqrt(r2), LEAST) * dr
+        x, y, z = x * x - y * y - z * z + a, 2.0 * x * y + b, 2.0 * x * z + c
+        r2 = x * x + y * y + z * z
+        end_r2 = where(alive, r2, end_r2)
+        slope = where(alive, maximum(dr, slope), slope)
+        level = where(alive, level + level, level)
+        alive = alive & (r2 < stop)
+    return potential_distance(end_r2, slope * slope, level, first_level, last_level, least)
+
+
+def made(function: Callable[..., Any], node: Node, **values: Any) -> Node:
+    """Solid of a field by hand, with the radii of a node whose step is the same."""
+    given = {**orbit_arguments(node), **values}
+    given["stop"] = given["stop0"]
+    own = {name: given[name] for name in list(signature(function).parameters)[3:]}
+    hooks = {"arguments": lambda _: own, "bounds": lambda _: node.bounds.box}
+    known = {"lipschitz": 2.0, "exterior_only": True, "hooks": hooks}
+    return Formula(function.__name__, "shape", function, MappingProxyType({}), **known)()
