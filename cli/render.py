@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 import time
 from collections.abc import Iterator
@@ -18,6 +17,7 @@ from .cluster import cluster_options, pooled
 from .families import families
 from .inputs import check_folder, check_targets, load_scene
 from .options import NAME, Whole, device_option, output_option, run_options, samples_option, source_argument
+from .sizes import duration, part, pixels
 from .working import KeptError, working
 
 if TYPE_CHECKING:
@@ -25,41 +25,6 @@ if TYPE_CHECKING:
 
     from fracslice.rendering import Pass, Renderer
     from fracslice.scene import Scene
-
-SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-
-
-def pixels(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int] | None:
-    """Parse a size such as 1280x720 into pixels across and down."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"\s*(\d{1,5})\s*x\s*(\d{1,5})\s*", value)
-    if not match or not all(1 <= int(n) <= 32768 for n in match.groups()):
-        raise click.BadParameter(
-            f"{value!r}: expected pixels across and down, such as 1280x720, from 1 to 32768"
-        )
-    return int(match[1]), int(match[2])
-
-
-def part(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int, int, int] | None:
-    """Parse a part of a picture such as 100,50,640,480."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"\s*(\d{1,5})\s*,\s*(\d{1,5})\s*,\s*(\d{1,5})\s*,\s*(\d{1,5})\s*", value)
-    if not match:
-        raise click.BadParameter(f"{value!r}: expected left, top, width and height, such as 100,50,640,480")
-    x, y, width, height = map(int, match.groups())
-    return x, y, width, height
-
-
-def duration(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
-    """Parse a time such as 10s into seconds."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", value)
-    if not match or not 0 < float(match[1]) < 1e6:
-        raise click.BadParameter(f"{value!r}: expected a time above zero, such as 10s, 2min or 1h")
-    return float(match[1]) * SECONDS[match[2] or "s"]
 
 
 @click.command(short_help="Render a picture of SCENE.")
@@ -113,6 +78,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     metavar="FILE.npz",
     help="Resume from this file if it exists, and save to it after every pass.",
 )
+@click.option("--watch", is_flag=True, help="Show the picture in a window while it is rendered.")
 @cluster_options
 @run_options
 @families("output", "state", "pass_images")
@@ -130,6 +96,7 @@ def render(
     bits: str,
     pass_images: str | None,
     state: str | None,
+    watch: bool,
     cluster: str | None,
     shard: str | None,
     store: str | None,
@@ -156,7 +123,8 @@ def render(
     film = size or (scene.view.film.width, scene.view.film.height)
     if crop is None and (rows := rows_of_bands(film)) < film[1]:
         whole = {"--layers": layers, "--denoise": denoise, "--time": limit, "--pass-images": pass_images}
-        check_options(output, {**whole, "--state": state, "--cluster": cluster, "--shard": shard})
+        whole |= {"--watch": watch, "--state": state, "--cluster": cluster, "--shard": shard}
+        check_options(output, whole)
         click.echo(announced(film, rows), err=True)
         with working(threads, quiet) as work:
             made = work, device, SampleRange(seed=seed), samples, int(bits)
@@ -180,7 +148,8 @@ def render(
             return described(path, renderer, done)
 
         try:
-            for done in timed(renderer, samples, limit):
+            passes = timed(renderer, samples, limit)
+            for done in shown(passes, renderer, scene.name) if watch else passes:
                 rate = f"{reached(done)}, {done.rate / 1e6:.2f} M samples/s"
                 work.progress(rate, fraction(done, renderer, samples))
                 if pass_images:
@@ -210,6 +179,13 @@ def render(
         took = time.monotonic() - start
         about = f"{renderer.setup.precision}, {renderer.device}, {took:.1f} s"
         click.echo(f"{described(output, renderer, done)}, {about}")
+
+
+def shown(passes: Iterator[Pass], renderer: Renderer, name: str) -> Iterator[Pass]:
+    """Passes that are shown in a window."""
+    from fracslice.viewer import previewed
+
+    return previewed(passes, f"fracslice  {name}", (renderer.width, renderer.height))
 
 
 def without_noise(renderer: Renderer) -> Pass:

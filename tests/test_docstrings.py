@@ -6,6 +6,7 @@ import ast
 import builtins
 import inspect
 import re
+from collections import Counter
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -22,12 +23,23 @@ NATIVE = "".join(
 )
 
 
-def test_every_name_in_backticks_exists() -> None:
-    trees = {
+@pytest.fixture(scope="module")
+def trees() -> dict[Path, ast.Module]:
+    """The program's text."""
+    return {
         p: ast.parse(p.read_text(encoding="utf-8"))
         for f in ("fracslice", "cli")
         for p in (ROOT / f).rglob("*.py")
     }
+
+
+def test_no_two_public_classes_have_one_name(trees: dict[Path, ast.Module]) -> None:
+    classes = [n.name for tree in trees.values() for n in tree.body if isinstance(n, ast.ClassDef)]
+    public = Counter(name for name in classes if not name.startswith("_"))
+    assert [name for name, count in public.items() if count > 1] == []
+
+
+def test_every_name_in_backticks_exists(trees: dict[Path, ast.Module]) -> None:
     known = {part for path in trees for part in (path.stem, *path.parent.parts)}
     known |= set(re.findall(r"\w+", NATIVE)) | set(dir(builtins)) | {"docs", "md"}
     imported = set()
@@ -77,7 +89,7 @@ def lacking(thing: Any, name: str) -> list[str]:
         return []
     signature = inspect.signature(thing)
     known = {"self", "cls"}.union(*(documented(doc, "Parameters", "Attributes") for doc in docs))
-    returned = inspect.isclass(thing) or signature.return_annotation in (None, "None")
+    returned = inspect.isclass(thing) or signature.return_annotation in (None, "None", "Iterator[None]")
     whole = returned or re.search(r"^(Returns|Yields)\n---", docs[0], re.M)
     missing = [p for p in signature.parameters if p not in known and not p.startswith("_")]
     return [f"{name}: {p}" for p in missing] + [f"{name}: Returns"] * (not whole)

@@ -17,9 +17,10 @@ from ..providers import provider
 from . import verbs, vocabulary
 from .box import Box, Triple
 from .hooks import Hook
-from .orbits import HOOKS, LIPSCHITZ, OWN, orbit_step
+from .orbits import HOOKS, LIPSCHITZ
 from .parameters import Parameter
 from .registry import Formula, Node, names
+from .rounds import OWN, orbit_step
 from .white_list import checked, is_name
 
 POINTS = {"step": ("w", "c"), "distance": ("x", "y", "z")}

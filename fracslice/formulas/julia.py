@@ -8,9 +8,10 @@ from typing import Any
 
 from .box import Box
 from .escape import CORE, levels, potential_distance
-from .orbits import REPEAT, Stepped, escape_sign, single
-from .parameters import AUTO, Count, Number, Vector
+from .orbits import escape_sign, single
+from .parameters import AUTO, Number, Vector
 from .registry import Fixed, Node, shape
+from .rounds import ITERATIONS, REPEAT, Stepped
 from .vocabulary import any_of, maximum, orbit, sqrt, where
 
 ESCAPED = 256.0
@@ -27,12 +28,7 @@ ESCAPED = 256.0
         least=-4,
         most=4,
     ),
-    iterations=Count(
-        AUTO,
-        'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
-        least=1,
-        auto=True,
-    ),
+    iterations=ITERATIONS,
     bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
     repeat=REPEAT,
 )

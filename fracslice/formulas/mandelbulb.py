@@ -9,9 +9,10 @@ from typing import Any
 from . import escape
 from .box import Box, Triple
 from .escape import CORE, potential_distance, sure_distance
-from .orbits import REPEAT, Stepped, escape_sign, single
-from .parameters import AUTO, Count, Number, Vector
+from .orbits import escape_sign, single
+from .parameters import AUTO, Number, Vector
 from .registry import Fixed, Node, shape
+from .rounds import ITERATIONS, REPEAT, Stepped
 from .verbs import power as raised
 from .verbs import products, raise_whole
 from .vocabulary import (
@@ -46,12 +47,7 @@ counts. A smaller value costs fewer evaluations, but makes the level sets steepe
     power=Number(
         8.0, "the exponent; whole numbers need no trigonometry and are several times faster", least=2, most=32
     ),
-    iterations=Count(
-        AUTO,
-        'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
-        least=1,
-        auto=True,
-    ),
+    iterations=ITERATIONS,
     bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
     julia=Vector(
         None,

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from ..providers import provider
+from .axes import Axis, direction, three
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from .registry import Node
-
-Axis = Literal["x", "y", "z"]
-AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 
 
 class Operators:
@@ -140,7 +138,7 @@ class Operators:
         -------
         Node
         """
-        return _made("transform", self, rotate=(*_direction(axis), degrees))
+        return _made("transform", self, rotate=(*direction(axis), degrees))
 
     def mirror(self, axis: Axis) -> Node:
         """Union of the half of the shape on the positive side of an axis and its mirror image.
@@ -170,7 +168,7 @@ class Operators:
         -------
         Node
         """
-        return _made("repeat", self, period=_three(period), count=_three(count))
+        return _made("repeat", self, period=three(period), count=three(count))
 
     def twist(self, degrees: float, axis: Axis = "z") -> Node:
         """Twist the shape about an axis.
@@ -296,15 +294,3 @@ def _elements(name: str, shape: Operators) -> tuple[Node, ...]:
     node = cast("Node", shape)
     same = node.formula.name == name and node["smooth"] == 0 and node.place is None
     return node.children if same else (node,)
-
-
-def _direction(axis: Any) -> tuple[Any, ...]:
-    """Direction of an axis that is given by a letter or by three numbers."""
-    if isinstance(axis, str):
-        return AXES.get(axis, (axis,))
-    return tuple(axis) if hasattr(axis, "__len__") else (axis,)
-
-
-def _three(value: Any) -> Any:
-    """One value for each axis."""
-    return value if hasattr(value, "__len__") else (value,) * 3

@@ -64,38 +64,11 @@ class Parameter(ABC):
         """
 
     def read(self, text: str) -> Any:
-        """Parse a value.
-
-        Parameters
-        ----------
-        text : str
-            Text of a scene file.
-
-        Returns
-        -------
-        object
-            The value in the type of this kind.
-
-        Raises
-        ------
-        ValueError
-            With `expects`, for any other text.
-        """
+        """Parse a value; see `check`."""
         return self.check(text.strip())
 
     def text(self, value: Any) -> str:
-        """Format a value.
-
-        Parameters
-        ----------
-        value : object
-            A valid value.
-
-        Returns
-        -------
-        str
-            Text that `read` parses to the same value.
-        """
+        """Format a value as text for `read`; see `read`."""
         return str(value)
 
 

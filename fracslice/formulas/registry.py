@@ -18,6 +18,7 @@ from typing import Any, Literal, TypeVar
 
 from ..errors import SceneError
 from . import signatures
+from .fixed import Fixed as Fixed
 from .hooks import Hook, Hooks
 from .node import Node as Node
 from .parameters import REQUIRED, Parameter, validated
@@ -28,20 +29,6 @@ DEEPEST = 100
 """Maximum nesting of elements: far above any use, far below Python's recursion limit."""
 
 TOO_DEEP = f"is nested too deeply: expected at most {DEEPEST} elements inside each other"
-
-
-@dataclass(frozen=True)
-class Fixed:
-    """An argument that is compiled into the kernel instead of being passed to it, because the code depends on
-    it.
-
-    Attributes
-    ----------
-    value : object
-        The constant.
-    """
-
-    value: Any
 
 
 @dataclass(frozen=True, eq=False, repr=False)

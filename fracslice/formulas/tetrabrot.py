@@ -5,8 +5,8 @@ from __future__ import annotations
 from .box import Box
 from .escape import levels, potential_distance
 from .julia import ESCAPED
-from .parameters import AUTO, Count
 from .registry import Node, shape
+from .rounds import ITERATIONS
 from .vocabulary import any_of, maximum, orbit, sqrt, where
 
 BAILOUT, HALF = 2.0, 0.7071067811865476
@@ -15,12 +15,7 @@ BAILOUT, HALF = 2.0, 0.7071067811865476
 @shape(
     lipschitz=2.0,
     exterior_only=True,
-    iterations=Count(
-        AUTO,
-        'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
-        least=1,
-        auto=True,
-    ),
+    iterations=ITERATIONS,
 )
 def tetrabrot(x, y, z, iterations, first_level, last_level, escape2, least):  # type: ignore[no-untyped-def]
     """The Tetrabrot (Rochon 2000, "A generalized Mandelbrot set for bicomplex numbers").

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
-from ..formulas.orbits import steps
 from ..formulas.parameters import AUTO, REQUIRED
 from ..formulas.registry import Formula, Node, get
+from ..formulas.rounds import steps
 from .cpu import compile_scene
 from .orbits import written
 from .reference import reference

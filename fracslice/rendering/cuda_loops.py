@@ -112,7 +112,7 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
             tr, tg, tb = tr * er, tg * eg, tb * eb
             path = path + t
             start, end = span_box(ox, oy, oz, dx, dy, dz, P)
-            if not tr + tg + tb > real(0.002):
+            if not tr + tg + tb > real(frame.faintest):
                 start = real(1e30)
         gather(A, a, r, g, b, covered, frame)
 

@@ -7,8 +7,9 @@ import pytest
 
 from fracslice.errors import KernelError, SceneError
 from fracslice.formulas import Number, Vector, bristorbrot, julia, mandelbox, quaternion_mandelbrot, verbs
-from fracslice.formulas.orbits import grown, orbit, steps
+from fracslice.formulas.orbits import grown, orbit
 from fracslice.formulas.registry import _REGISTRY
+from fracslice.formulas.rounds import steps
 from fracslice.formulas.verbs import ball, fold, positive, power, turn
 from fracslice.kernel import compile_scene, link, reference
 from fracslice.kernel.depth import resolve_depths

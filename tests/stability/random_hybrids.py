@@ -8,8 +8,8 @@ import numpy as np
 
 from fracslice.errors import SceneError, VolumeError
 from fracslice.formulas import Formula, Node, orbit, transform
-from fracslice.formulas.orbits import ITERATIONS
 from fracslice.formulas.parameters import REQUIRED, Choice, Count, Number, Vector
+from fracslice.formulas.rounds import ITERATIONS
 from fracslice.kernel import compile_scene, reference
 from fracslice.scene.layout import formulas
 from fracslice.volume import Plan, plan, sample_scene
@@ -27,13 +27,16 @@ def random_hybrid(seed: int) -> Node:
     rng = np.random.default_rng(seed)
     for _ in range(TRIES):
         with suppress(SceneError):
-            count = int(rng.integers(1, 4))
-            root = orbit(
-                *(_step(rng) for _ in range(count)), iterations=int(rng.integers(2, 5)), **_julia(rng)
-            )
+            root = hybrid(rng)
             if _inside(root):
                 return root
     raise AssertionError(f"seed {seed}: no hybrid escapes")
+
+
+def hybrid(rng: np.random.Generator) -> Node:
+    """A hybrid of one to three steps, whose orbits may stay."""
+    count = int(rng.integers(1, 4))
+    return orbit(*(_step(rng) for _ in range(count)), iterations=int(rng.integers(2, 5)), **_julia(rng))
 
 
 def _inside(root: Node) -> bool:
