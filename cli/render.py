@@ -171,8 +171,10 @@ def render(
     more = rendered_layers(renderer) if layers else None
     done = without_noise(renderer) if denoise else renderer.seen()
     save(output, done, scene, bits, threads, more)
-    if aside:
+    if pool and aside:
         Path(aside).unlink(missing_ok=True)
+        if not shard:
+            pool.pieces.tidy()
     if not quiet:
         took = time.monotonic() - start
         about = f"{renderer.setup.precision}, {renderer.device}, {took:.1f} s"

@@ -186,9 +186,9 @@ def slice_(
             off = layers_amount(run.slicer, work)[1]
             last = list(of_layers(run, options["price"]).lines())
         if options["html"]:
-            from fracslice.slicing.checks import check_layers
+            from fracslice.slicechecks import check_run
 
-            report = check_layers(stack, printer=options["machine"], work=work)
+            report = check_run(run)
             write_page(stack, report, last, output, options["html"], work)
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)

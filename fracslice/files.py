@@ -146,6 +146,11 @@ def flushing(file: BinaryIO) -> Iterator[None]:
     file
         File, open for writing.
 
+    Yields
+    ------
+    None
+        While the file is flushed.
+
     Raises
     ------
     OSError

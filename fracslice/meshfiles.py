@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .cluster import ResultFolder
+from .cluster import Files, ResultFolder, packed, unpacked
 from .mesh.contouring import Piece
 from .mesh.halo import Strip, strip
 from .mesh.model import Mesh
@@ -19,63 +17,11 @@ from .mesh.survey import PieceComponents
 from .placement import Placement
 from .store import Arrays
 
-Files = dict[str, NDArray[Any]]
-"""Arrays by name."""
-
 SIDES = "head", "tail"
 """Names of the strips at the begin and at the end of a piece."""
 
 CHOICE = "choice"
 """File of a job with what stays of its surface."""
-
-
-ALIGNED = 64
-"""Bytes to whose multiples arrays are aligned in a file."""
-
-
-def packed(**arrays: NDArray[Any]) -> list[bytes | memoryview]:
-    """Blocks of arrays: a header line of JSON, then the arrays, without copies and checksums.
-
-    Parameters
-    ----------
-    **arrays : ndarray
-        Arrays by name.
-
-    Returns
-    -------
-    list of bytes-like
-        For `unpacked`, one after another; they view the arrays.
-    """
-    about, end = dict[str, tuple[str, tuple[int, ...], int]](), 0
-    blocks = list[bytes | memoryview]()
-    for name, array in arrays.items():
-        plain = np.ascontiguousarray(array)
-        about[name] = plain.dtype.str, np.shape(array), end
-        blocks += [plain.reshape(-1).view(np.uint8).data, bytes(-plain.nbytes % ALIGNED)]
-        end += plain.nbytes + len(blocks[-1])
-    head = json.dumps(about).encode()
-    return [head + b" " * (-len(head) % ALIGNED + ALIGNED - 1) + b"\n", *blocks]
-
-
-def unpacked(data: bytes) -> Files:
-    """Arrays from bytes of `packed`.
-
-    Parameters
-    ----------
-    data : bytes
-        The blocks in one, which the arrays view.
-
-    Returns
-    -------
-    dict
-        Arrays by name, read-only.
-    """
-    start = data.index(b"\n") + 1
-    arrays: Files = {}
-    for name, (kind, shape, begin) in json.loads(data[:start]).items():
-        count = math.prod(shape)
-        arrays[name] = np.frombuffer(data, kind, count, start + begin).reshape(shape)
-    return arrays
 
 
 class StoredPieces(MeshPieces):

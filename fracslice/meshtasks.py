@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .checking import off_surface, on_the_plate
-from .cluster import Contents, ResultFolder
+from .cluster import Contents, ResultFolder, packed, unpacked
 from .finishing import placing
 from .mesh.contouring import layers
 from .mesh.halo import WAITS, SelectedPiece, finished_piece
@@ -20,7 +20,7 @@ from .mesh.survey import components
 from .mesh.tally import Tally
 from .mesh.tip_triangles import at_tips
 from .mesh.whole_shells import WholeShells
-from .meshfiles import Selection, StoredPieces, packed, read_choice, unpacked
+from .meshfiles import Selection, StoredPieces, read_choice
 from .meshrecipe import MeshRecipe, sampled
 from .volume import SignBricks
 from .volume.lattice import BRICK

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .checking import stride
 from .clock import Clock
-from .cluster import Pool, Shard
+from .cluster import Files, Pool, Shard, packed, unpacked
 from .errors import SharedError
 from .finishing import Finish
 from .keys import key
@@ -28,7 +28,7 @@ from .mesh.survey import Survey, survey
 from .mesh.tally import Tally
 from .mesh.tip_triangles import by_tip
 from .mesh.tips import with_tips
-from .meshfiles import CHOICE, Files, StoredPieces, packed, read_components, read_seam, unpacked
+from .meshfiles import CHOICE, StoredPieces, read_components, read_seam
 from .meshrecipe import SAMPLES, MeshRecipe, samples_key
 from .meshtasks import (
     HALO,

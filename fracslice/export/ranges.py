@@ -150,12 +150,27 @@ def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iter
     pool.finished(run.key(form))
 
 
+def range_size(run: SliceRun) -> int:
+    """Layers of a range, the same for any number of workers.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The run.
+
+    Returns
+    -------
+    int
+        Whole slabs.
+    """
+    return max(SLAB, min(PIXELS // max(run.stack.shape), run.layers // MOST) // SLAB * SLAB)
+
+
 def _tasks(run: SliceRun, form: str, start: int) -> list[RangeTask]:
     """Ranges of layers from the one of `start` on, the same for any number of workers."""
     if run.recipe is None:
         raise ExportError("a cluster needs the scene of the layers; these are planned by hand")
-    size = max(SLAB, min(PIXELS // max(run.stack.shape), run.layers // MOST) // SLAB * SLAB)
-    job = run.key(form)
+    size, job = range_size(run), run.key(form)
     return [
         RangeTask(run.recipe, job, first, min(first + size, run.layers))
         for first in range(start // size * size, run.layers, size)
