@@ -18,7 +18,7 @@ from .options import (
     samples_option,
     source_argument,
 )
-from .render import pixels
+from .sizes import pixels
 from .working import StoppedError, working
 
 SMALLER, FEWER = 4, 4

@@ -17,6 +17,7 @@ from .layers import (
     ending,
     heights,
     html_option,
+    pixel_of,
     printer_option,
     write_page,
 )
@@ -202,11 +203,8 @@ def examined(
     from fracslice.slicing.checks import check_layers
     from fracslice.slicing.problems import misfit
 
-    pixel, machine = options["pixel"], options["machine"]
-    if pixel is not None and machine is not None:
-        raise click.UsageError("--pixel and --printer: expected one of them")
-    square = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
-    sides = size.side, options["layer"][0], square, options["up"], how, size.factors, size.unit
+    machine, pixel = options["machine"], pixel_of(options)
+    sides = size.side, options["layer"][0], pixel, options["up"], how, size.factors, size.unit
     stack = plan_stack(root, SliceJob(*sides), work)
     if machine and (unfit := misfit(stack, machine)):
         return (

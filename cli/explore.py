@@ -12,7 +12,7 @@ import click
 
 from .inputs import check_folder, check_targets, load_scene
 from .options import Whole, output_option, run_options, source_argument
-from .render import pixels
+from .sizes import pixels
 from .working import working
 
 if TYPE_CHECKING:

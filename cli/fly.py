@@ -6,7 +6,7 @@ import click
 
 from .inputs import scene_path
 from .options import device_option, run_options, source_argument
-from .render import pixels
+from .sizes import pixels
 from .working import working
 
 

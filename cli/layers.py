@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import NAME, length
+from .options import NAME, length, parsed
 
 if TYPE_CHECKING:
     from fracslice.slicing import Stack
@@ -23,10 +23,8 @@ def shift(_: click.Context, __: click.Parameter, text: str) -> float:
     """Parse a length, zero or negative ones included, into mm."""
     from fracslice.scene.lengths import Shift
 
-    try:
-        return Shift(0.0, "").read(text)
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r}: expected {error}") from None
+    distance: float = parsed(text, Shift(0.0, ""))
+    return distance
 
 
 def heights(
@@ -62,6 +60,14 @@ def ending(*endings: str) -> Callable[..., str | None]:
         return path
 
     return checked
+
+
+def pixel_of(options: dict[str, Any]) -> tuple[float, float]:
+    """Pixel size, mm: that of --pixel or of --printer, which exclude each other."""
+    pixel, machine = options["pixel"], options["machine"]
+    if pixel is not None and machine is not None:
+        raise click.UsageError("--pixel and --printer: expected one of them")
+    return (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
 
 
 def printer_option(text: str) -> Callable[..., Any]:

@@ -5,11 +5,13 @@ Exit status: 0 success; 1 failure; 2 bad input or usage; 128 + n when stopped by
 
 from __future__ import annotations
 
+import builtins
 import gc
 import os
 import sys
 import warnings
 from collections.abc import Sequence
+from importlib import import_module
 from typing import NoReturn, TextIO
 
 import click
@@ -28,19 +30,23 @@ from fracslice.errors import (
 )
 from fracslice.version import __version__
 
-from .animate import animate
-from .bench import bench
-from .check import check
-from .explore import explore
-from .fly import fly
-from .formulas import formulas
-from .mesh import mesh
-from .print import print_
-from .render import render
-from .scenes import scenes
-from .show import show
-from .slice import slice_
 from .working import StoppedError
+
+NAMES = (
+    "animate",
+    "bench",
+    "check",
+    "explore",
+    "fly",
+    "formulas",
+    "mesh",
+    "print",
+    "render",
+    "scenes",
+    "show",
+    "slice",
+)
+"""Commands: functions in modules of their names, with an underscore behind the name of a builtin."""
 
 FEWEST = 50_000
 """New objects between two garbage collections; the modules of a command are about four times as many."""
@@ -49,7 +55,24 @@ BAD_INPUT = (DeviceError, SceneError, RenderError, VolumeError, ExportError, Sli
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 
 
+class Commands(click.Group):
+    """Commands that are imported when they are asked for: all of them take a tenth of a small job."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of all commands."""
+        return list(NAMES)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of a name, with the options of all commands."""
+        if cmd_name in NAMES and cmd_name not in self.commands:
+            module = import_module(f".{cmd_name}", __package__)
+            name = f"{cmd_name}_" if hasattr(builtins, cmd_name) else cmd_name
+            self.add_command(with_formulas(getattr(module, name)))
+        return super().get_command(ctx, cmd_name)
+
+
 @click.group(
+    cls=Commands,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
@@ -74,7 +97,8 @@ def run_formulas(context: click.Context, option: click.Parameter, files: Sequenc
         run_file(file)
 
 
-for command in (mesh, render, animate, explore, slice_, print_, check, show, fly, formulas, scenes, bench):
+def with_formulas(command: click.Command) -> click.Command:
+    """Add the option --formulas to a command."""
     command.params.append(
         click.Option(
             ["--formulas"],
@@ -86,7 +110,7 @@ for command in (mesh, render, animate, explore, slice_, print_, check, show, fly
             help="A Python file that registers formulas of your own; it is run. Repeatable.",
         )
     )
-    commands.add_command(command)
+    return command
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

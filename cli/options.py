@@ -13,6 +13,7 @@ import click
 from fracslice.errors import SceneError
 
 if TYPE_CHECKING:
+    from fracslice.formulas.parameters import Parameter
     from fracslice.meshjob import MeshJob
     from fracslice.scene import Print, Scene
 
@@ -79,14 +80,19 @@ def length(_: click.Context, __: click.Parameter, value: str | None) -> float | 
         raise click.BadParameter(str(error)) from None
 
 
+def parsed(text: str, kind: Parameter) -> Any:
+    """Value that a text spells, of a parameter kind."""
+    try:
+        return kind.read(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: expected {error}") from None
+
+
 def moment(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
     """Parse a time of an animation into seconds."""
     from fracslice.scene.animation import Seconds
 
-    try:
-        return None if text is None else Seconds(0.0, "").read(text)
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r}: expected {error}") from None
+    return None if text is None else parsed(text, Seconds(0.0, ""))
 
 
 def amount(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
@@ -109,10 +115,8 @@ def factors(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     """Parse the compensation of shrinkage into factors along x, y and z."""
     from fracslice.scene.lengths import Percent
 
-    try:
-        return Percent(None, "").read(text or "100%")
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r}: expected {error}") from None
+    factors: tuple[float, ...] = parsed(text or "100%", Percent(None, ""))
+    return factors
 
 
 def job_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -187,10 +191,7 @@ def print_value(context: click.Context, option: click.Parameter, text: str | Non
         return None
     from fracslice.scene import Print
 
-    try:
-        return Print.kinds()[str(option.name)].read(text)
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r}: expected {error}") from None
+    return parsed(text, Print.kinds()[str(option.name)])
 
 
 def print_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 import time
 from collections.abc import Iterator
@@ -13,10 +12,12 @@ import click
 
 from fracslice.errors import Cancelled, SharedError
 
+from .bands import announced, check_options, light_of, render_to
 from .cluster import cluster_options, pooled
 from .families import families
 from .inputs import check_folder, check_targets, load_scene
 from .options import NAME, Whole, device_option, output_option, run_options, samples_option, source_argument
+from .sizes import duration, part, pixels
 from .working import KeptError, working
 
 if TYPE_CHECKING:
@@ -24,41 +25,6 @@ if TYPE_CHECKING:
 
     from fracslice.rendering import Pass, Renderer
     from fracslice.scene import Scene
-
-SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-
-
-def pixels(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int] | None:
-    """Parse a size such as 1280x720 into pixels across and down."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"\s*(\d{1,5})\s*x\s*(\d{1,5})\s*", value)
-    if not match or not all(1 <= int(n) <= 32768 for n in match.groups()):
-        raise click.BadParameter(
-            f"{value!r}: expected pixels across and down, such as 1280x720, from 1 to 32768"
-        )
-    return int(match[1]), int(match[2])
-
-
-def part(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int, int, int] | None:
-    """Parse a part of a picture such as 100,50,640,480."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"\s*(\d{1,5})\s*,\s*(\d{1,5})\s*,\s*(\d{1,5})\s*,\s*(\d{1,5})\s*", value)
-    if not match:
-        raise click.BadParameter(f"{value!r}: expected left, top, width and height, such as 100,50,640,480")
-    x, y, width, height = map(int, match.groups())
-    return x, y, width, height
-
-
-def duration(_: click.Context, __: click.Parameter, value: str | None) -> float | None:
-    """Parse a time such as 10s into seconds."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", value)
-    if not match or not 0 < float(match[1]) < 1e6:
-        raise click.BadParameter(f"{value!r}: expected a time above zero, such as 10s, 2min or 1h")
-    return float(match[1]) * SECONDS[match[2] or "s"]
 
 
 @click.command(short_help="Render a picture of SCENE.")
@@ -112,6 +78,7 @@ def duration(_: click.Context, __: click.Parameter, value: str | None) -> float 
     metavar="FILE.npz",
     help="Resume from this file if it exists, and save to it after every pass.",
 )
+@click.option("--watch", is_flag=True, help="Show the picture in a window while it is rendered.")
 @cluster_options
 @run_options
 @families("output", "state", "pass_images")
@@ -129,6 +96,7 @@ def render(
     bits: str,
     pass_images: str | None,
     state: str | None,
+    watch: bool,
     cluster: str | None,
     shard: str | None,
     store: str | None,
@@ -139,6 +107,7 @@ def render(
     """Render a picture of SCENE, as its camera, lights and materials say."""
     from fracslice.export.images import check_image
     from fracslice.rendering import Renderer
+    from fracslice.rendering.bands import rows_of_bands
     from fracslice.rendering.layers import layers as rendered_layers
     from fracslice.rendering.sequence import SampleRange
     from fracslice.work import Work
@@ -151,6 +120,18 @@ def render(
     scene, start = load_scene(source, settings), time.monotonic()
     if denoise and scene.view.shading.mode != "light":
         raise click.BadParameter('expected a scene with shading mode="light"', param_hint="--denoise")
+    film = size or (scene.view.film.width, scene.view.film.height)
+    if crop is None and (rows := rows_of_bands(film)) < film[1]:
+        whole = {"--layers": layers, "--denoise": denoise, "--time": limit, "--pass-images": pass_images}
+        whole |= {"--watch": watch, "--state": state, "--cluster": cluster, "--shard": shard}
+        check_options(output, whole)
+        click.echo(announced(film, rows), err=True)
+        with working(threads, quiet) as work:
+            made = work, device, SampleRange(seed=seed), samples, int(bits)
+            line = render_to(output, scene, film, rows, *made, text_of(scene))
+        if not quiet:
+            click.echo(f"{line}, {time.monotonic() - start:.1f} s")
+        return
     with (
         pooled(output, threads, cluster, shard, store) as pool,
         working(Work(threads, cluster=pool), quiet) as work,
@@ -164,10 +145,11 @@ def render(
 
         def write(path: str | Path, done: Pass, bits: str) -> str:
             save(path, done, scene, bits, threads)
-            return described(path, renderer)
+            return described(path, renderer, done)
 
         try:
-            for done in timed(renderer, samples, limit):
+            passes = timed(renderer, samples, limit)
+            for done in shown(passes, renderer, scene.name) if watch else passes:
                 rate = f"{reached(done)}, {done.rate / 1e6:.2f} M samples/s"
                 work.progress(rate, fraction(done, renderer, samples))
                 if pass_images:
@@ -175,23 +157,35 @@ def render(
                     write(Path(pass_images) / f"pass{done.number:04}.png", done, "8")
                 if state and first:
                     save_state(renderer, state)
+            if limit and state and first:
+                save_state(renderer, state)  # of a pass that the limit interrupted
         except Cancelled:
-            if not first or not renderer.seen().samples:
+            kept = renderer.seen()
+            if not first or not kept.samples:
                 raise
             if state:
                 save_state(renderer, state)
-            raise KeptError(write(output, renderer.seen(), bits)) from None
+            raise KeptError(write(output, kept, bits)) from None
     if not first:
         raise SharedError("the samples are made; shard 1 writes the file")
     more = rendered_layers(renderer) if layers else None
-    save(output, without_noise(renderer) if denoise else renderer.seen(), scene, bits, threads, more)
-    if aside:
+    done = without_noise(renderer) if denoise else renderer.seen()
+    save(output, done, scene, bits, threads, more)
+    if pool and aside:
         Path(aside).unlink(missing_ok=True)
+        if not shard:
+            pool.pieces.tidy()
     if not quiet:
         took = time.monotonic() - start
-        click.echo(
-            f"{described(output, renderer)}, {renderer.setup.precision}, {renderer.device}, {took:.1f} s"
-        )
+        about = f"{renderer.setup.precision}, {renderer.device}, {took:.1f} s"
+        click.echo(f"{described(output, renderer, done)}, {about}")
+
+
+def shown(passes: Iterator[Pass], renderer: Renderer, name: str) -> Iterator[Pass]:
+    """Passes that are shown in a window."""
+    from fracslice.viewer import previewed
+
+    return previewed(passes, f"fracslice  {name}", (renderer.width, renderer.height))
 
 
 def without_noise(renderer: Renderer) -> Pass:
@@ -204,32 +198,39 @@ def without_noise(renderer: Renderer) -> Pass:
 
 
 def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
-    """Iterate over passes until a time limit, in seconds, which interrupts all passes but the first."""
-    start, expired, timer = time.monotonic(), threading.Event(), None
+    """Iterate over passes until a time limit, in seconds, which interrupts a pass.
+
+    A limit that ends before the first sample is doubled.
+    """
+    cancel, expired = renderer.work.cancel, threading.Event()
 
     def expire() -> None:
         expired.set()
-        renderer.work.cancel.set()
+        cancel.set()
 
+    if limit is None:
+        yield from renderer.passes(samples)
+        return
+    timer = threading.Timer(limit, expire)
+    timer.start()
     try:
-        for done in renderer.passes(samples):
-            yield done
-            if limit is not None and timer is None:
-                timer = threading.Timer(max(start + limit - time.monotonic(), 0.0), expire)
-                timer.start()
+        yield from renderer.passes(samples)
+        return
     except Cancelled:
         if not expired.is_set():
             raise
     finally:
-        if timer:
-            timer.cancel()
+        timer.cancel()
         if expired.is_set():
-            renderer.work.cancel.clear()
+            cancel.clear()
+    if not renderer.seen().samples:
+        yield from timed(renderer, samples, 2 * limit)
 
 
 def reached(done: Pass) -> str:
     """Samples per pixel and error of a pass, as text."""
-    return f"{done.samples:.1f} samples a pixel, error {done.error:.2g}"
+    samples = f"{done.samples:.1f}" if done.samples >= 1 else f"{done.samples:.1g}"
+    return f"{samples} samples a pixel, error {done.error:.2g}"
 
 
 def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
@@ -237,9 +238,9 @@ def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
     return min(done.samples / (samples or renderer.setup.view.film.samples), 1.0)
 
 
-def described(path: str | Path, renderer: Renderer) -> str:
+def described(path: str | Path, renderer: Renderer, done: Pass) -> str:
     """Line on a written picture."""
-    return f"{path}: {renderer.width} x {renderer.height} pixels, {reached(renderer.seen())}"
+    return f"{path}: {renderer.width} x {renderer.height} pixels, {reached(done)}"
 
 
 def save(
@@ -251,18 +252,19 @@ def save(
     layers: dict[str, np.ndarray] | None = None,
 ) -> None:
     """Write the picture of a pass, with the scene and the samples in its metadata."""
-    from fracslice.export import application
-    from fracslice.export.images import write_image
+    from fracslice.export.images import LINEAR, check_image, write_image
     from fracslice.work import Work
 
-    text = {
-        "Title": scene.name,
-        "Software": application(),
-        "scene_hash": scene.hash,
-        "samples": f"{done.samples:.2f}",
-    }
-    light = done.mean if done.view.film.transparent else done.image
-    write_image(path, done.developed, light, int(bits), text, Work(threads), layers)
+    text = {**text_of(scene), "samples": f"{done.samples:.2f}"}
+    picture = light_of(done) if check_image(path) in LINEAR else done.developed
+    write_image(path, picture, picture, int(bits), text, Work(threads), layers)  # looks at one of both
+
+
+def text_of(scene: Scene) -> dict[str, str]:
+    """Metadata of every picture of a scene."""
+    from fracslice.export import application
+
+    return {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
 
 
 def save_state(renderer: Renderer, path: str) -> None:

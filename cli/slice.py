@@ -14,7 +14,7 @@ from .closing import of_layers
 from .cluster import cluster_options, pooled
 from .families import families
 from .inputs import check_targets, load_scene
-from .layers import LAYER, PIXEL_MM, ending, heights, html_option, printer_option, shift, write_page
+from .layers import LAYER, ending, heights, html_option, pixel_of, printer_option, shift, write_page
 from .options import (
     NAME,
     NUMBER,
@@ -166,7 +166,6 @@ def slice_(
             scene.name,
             job(scene, options, work),
             options["layer"][1],
-            Path(output).name,
             kind,
             options["machine"],
             options["compensation"],
@@ -187,9 +186,9 @@ def slice_(
             off = layers_amount(run.slicer, work)[1]
             last = list(of_layers(run, options["price"]).lines())
         if options["html"]:
-            from fracslice.slicing.checks import check_layers
+            from fracslice.slicechecks import check_run
 
-            report = check_layers(stack, printer=options["machine"], work=work)
+            report = check_run(run)
             write_page(stack, report, last, output, options["html"], work)
     if not quiet:
         size = " x ".join(f"{s:.2f}" for s in stack.size)
@@ -271,13 +270,9 @@ def job(scene: Scene, options: dict[str, Any], work: Work) -> SliceJob:
     from fracslice.slicing import SliceJob
     from fracslice.volume.sizing import sizing
 
-    pixel, machine = options["pixel"], options["machine"]
-    if pixel is not None and machine is not None:
-        raise click.UsageError("--pixel and --printer: expected one of them")
-    given = (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
-    size = sizing(scene, options["size"], options["scale"], work)
+    pixel, size = pixel_of(options), sizing(scene, options["size"], options["scale"], work)
     how = printing_of(scene, options), size.factors, size.unit
-    return SliceJob(size.side, options["layer"][0], given, options["up"], *how)
+    return SliceJob(size.side, options["layer"][0], pixel, options["up"], *how)
 
 
 def write_preview(stack: Stack, path: str, work: Work) -> None:

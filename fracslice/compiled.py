@@ -9,7 +9,7 @@ from typing import Any
 
 import numba
 
-from .files import Kept
+from .cachefiles import Kept
 from .kernel.objects import cache_folder
 from .keys import HERE, texts
 

@@ -1,22 +1,23 @@
-"""Atomic file writes, and cache files."""
+"""Atomic and flushed file writes, with errors of one line."""
 
 from __future__ import annotations
 
 import errno
 import os
+import shutil
 import tempfile
-import warnings
-from collections.abc import Callable, Iterator
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import BinaryIO
 
-from .errors import ExportError, FracsliceWarning
-from .private import NO_LINK, OWNER_ONLY, NotPrivateError, opened, private_folder
+from .errors import ExportError
+from .private import NO_LINK
 
-T = TypeVar("T")
+FLUSH_S = 0.05
+"""Seconds between two flushes of a file that is being written; small ones are complete before the first."""
 
 
 @contextmanager
@@ -113,6 +114,63 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
         _flush_folder(target.parent)
 
 
+def appended(source: BinaryIO, target: BinaryIO) -> int:
+    """Append a file to another one, by the kernel where it can.
+
+    Parameters
+    ----------
+    source, target : file
+        Binary files, open for reading and for writing.
+
+    Returns
+    -------
+    int
+        Number of bytes.
+    """
+    count, copy = os.fstat(source.fileno()).st_size, getattr(os, "copy_file_range", None)
+    with suppress(OSError):  # of memory, on other file systems, or in an old kernel
+        target.flush()
+        while copy and (done := copy(source.fileno(), target.fileno(), count, source.tell(), target.tell())):
+            source.seek(done, os.SEEK_CUR)
+            target.seek(done, os.SEEK_CUR)
+    shutil.copyfileobj(source, target, 1 << 22)
+    return count
+
+
+@contextmanager
+def flushing(file: BinaryIO) -> Iterator[None]:
+    """Flush a file to disk again and again while a block writes it, so that little is left for the end.
+
+    Parameters
+    ----------
+    file
+        File, open for writing.
+
+    Yields
+    ------
+    None
+        While the file is flushed.
+
+    Raises
+    ------
+    OSError
+        For an error of the file system.
+    """
+    ended = threading.Event()
+
+    def flush() -> None:
+        while not ended.wait(FLUSH_S):
+            os.fsync(file.fileno())
+
+    with ThreadPoolExecutor(1) as pool:
+        flushed = pool.submit(flush)
+        try:
+            yield
+        finally:
+            ended.set()
+    flushed.result()
+
+
 def put(path: str, data: bytes) -> None:
     """Write one of many files with as few system calls as possible, neither atomically nor flushed to disk.
 
@@ -154,115 +212,3 @@ def _flush_folder(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
-
-
-@dataclass(frozen=True)
-class Kept:
-    """Cache files in a folder that no other user can write to.
-
-    A folder or file that others can write to is ignored, with one warning.
-
-    Attributes
-    ----------
-    folder
-        Cache folder, created at first use for this user alone.
-    """
-
-    folder: Path
-
-    def get(self, name: str, read: Callable[[BinaryIO], T]) -> T | None:
-        """Read a cached file.
-
-        Parameters
-        ----------
-        name
-            File name.
-        read
-            Reads the open file.
-
-        Returns
-        -------
-        object
-            Result of `read`; None if the file is missing or not trusted.
-        """
-        return self._trusted(lambda here: self._read(name, read, here))
-
-    def place(self) -> Path | None:
-        """Return the path of the folder, for code that needs one.
-
-        Returns
-        -------
-        Path
-            Resolved path; None if the folder cannot be opened or is not trusted.
-        """
-        return self._trusted(lambda _: Path(os.path.realpath(self.folder)))
-
-    def put(self, name: str, write: Callable[[BinaryIO], object]) -> None:
-        """Write a cached file atomically; ignore a folder that is not trusted.
-
-        Parameters
-        ----------
-        name
-            File name.
-        write
-            Writes to the open file.
-
-        Raises
-        ------
-        ExportError
-            If writing fails for another reason than that.
-        """
-        target = Path(os.path.realpath(self.folder), name)
-        with (
-            reported(self.folder),
-            suppress(NotPrivateError),
-            private_folder(self.folder),
-            replacing(target, OWNER_ONLY) as file,
-        ):
-            write(file)
-
-    def _read(self, name: str, read: Callable[[BinaryIO], T], here: int | None) -> T:
-        with opened(self.folder / name, "rb", folder=here) as file:
-            return read(file)
-
-    def _trusted(self, use: Callable[[int | None], T]) -> T | None:
-        """Result for the open folder; None if it cannot be opened or is not trusted."""
-        try:
-            with private_folder(self.folder) as here:
-                return use(here)
-        except NotPrivateError as error:
-            warn(f"{error}: what is kept in {self.folder} is not used")
-        except OSError:
-            pass
-        return None
-
-
-@cache
-def warn(text: str) -> None:
-    """Issue a `FracsliceWarning` once.
-
-    Parameters
-    ----------
-    text
-        Message of one line.
-    """
-    warnings.warn(text, FracsliceWarning, stacklevel=2)
-
-
-def users_folder(variable: str, default: str) -> Path:
-    """Return the folder of this program within one of the user's folders.
-
-    Parameters
-    ----------
-    variable
-        Environment variable that names the user's folder.
-    default
-        Folder used if the variable is not set.
-
-    Returns
-    -------
-    Path
-        Folder; a path that cannot exist if the user has no home.
-    """
-    base = os.path.expanduser(os.environ.get(variable) or default)
-    return Path(base if os.path.isabs(base) else os.devnull, "fracslice")

@@ -2,74 +2,26 @@
 
 from __future__ import annotations
 
-import json
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .cluster import ResultFolder
+from .cluster import Files, ResultFolder, packed, unpacked
+from .mesh.contouring import Piece
+from .mesh.halo import Strip, strip
 from .mesh.model import Mesh
 from .mesh.pieces import Pieces as MeshPieces
 from .mesh.survey import PieceComponents
 from .placement import Placement
 from .store import Arrays
 
-Files = dict[str, NDArray[Any]]
-"""Arrays by name."""
+SIDES = "head", "tail"
+"""Names of the strips at the begin and at the end of a piece."""
 
 CHOICE = "choice"
 """File of a job with what stays of its surface."""
-
-
-ALIGNED = 64
-"""Bytes to whose multiples arrays are aligned in a file."""
-
-
-def packed(**arrays: NDArray[Any]) -> bytes:
-    """Bytes of arrays: a header line of JSON, then the arrays, without copies and checksums.
-
-    Parameters
-    ----------
-    **arrays : ndarray
-        Arrays by name.
-
-    Returns
-    -------
-    bytes
-        For `unpacked`.
-    """
-    about, parts, end = dict[str, tuple[str, tuple[int, ...], int]](), list[Any](), 0
-    for name, array in arrays.items():
-        plain = np.ascontiguousarray(array)
-        about[name] = plain.dtype.str, np.shape(array), end
-        parts += [plain.reshape(-1).view(np.uint8), bytes(-plain.nbytes % ALIGNED)]
-        end += plain.nbytes + len(parts[-1])
-    head = json.dumps(about).encode()
-    return b"".join([head, b" " * (-len(head) % ALIGNED + ALIGNED - 1), b"\n", *parts])
-
-
-def unpacked(data: bytes) -> Files:
-    """Arrays from bytes of `packed`.
-
-    Parameters
-    ----------
-    data : bytes
-        The bytes, which the arrays view.
-
-    Returns
-    -------
-    dict
-        Arrays by name, read-only.
-    """
-    start = data.index(b"\n") + 1
-    arrays: Files = {}
-    for name, (kind, shape, begin) in json.loads(data[:start]).items():
-        count = math.prod(shape)
-        arrays[name] = np.frombuffer(data, kind, count, start + begin).reshape(shape)
-    return arrays
 
 
 class StoredPieces(MeshPieces):
@@ -81,25 +33,32 @@ class StoredPieces(MeshPieces):
         Files.
     job : str
         Key of the job.
+    halo : float, optional
+        Width of the strips at the seams, which the neighbours read; scene units.
     prefix : str, optional
         Begin of their names.
     """
 
-    def __init__(self, store: ResultFolder, job: str, prefix: str = "") -> None:
+    def __init__(self, store: ResultFolder, job: str, halo: float = 0.0, prefix: str = "") -> None:
         super().__init__()
-        self.store, self.job, self.prefix = store, job, prefix
+        self.store, self.job, self.halo, self.prefix = store, job, halo, prefix
         self.first_labels = list[int]()
 
     def anew(self) -> StoredPieces:
         """Return an empty collection with other names; see `Pieces.anew`."""
-        return StoredPieces(self.store, self.job, "tipped-")
+        return StoredPieces(self.store, self.job, self.halo, "tipped-")
+
+    def add(self, piece: Piece, fresh: int = 0) -> None:
+        """Append a piece; see `Pieces.add`."""
+        self.put(len(self), piece.mesh, self.ends[-1] if self.ends else -np.inf, piece.end)
+        self.count(piece.end, len(piece.mesh.triangles), fresh)
 
     def labels(self, number: int) -> NDArray[np.int32]:
         """Load the labels of a piece, which its file counts from 0; see `Pieces.labels`."""
         return super().labels(number) + np.int32(self.first_labels[number] if self.first_labels else 0)
 
-    def put(self, number: int, mesh: Mesh) -> None:
-        """Store a piece that another process counts.
+    def put(self, number: int, mesh: Mesh, start: float, end: float) -> None:
+        """Store a piece that another process counts, and its strips.
 
         Parameters
         ----------
@@ -107,8 +66,43 @@ class StoredPieces(MeshPieces):
             Index of the piece.
         mesh : Mesh
             The piece.
+        start, end : float
+            x at which it begins and ends.
         """
         self._put(f"mesh{number}", vertices=mesh.vertices, triangles=mesh.triangles)
+        x = mesh.vertices[:, 0]
+        for side, near in zip(SIDES, (x < start + self.halo, x > end - self.halo), strict=True):
+            part = strip(mesh, near, threads=1)
+            self._put(
+                f"{side}{number}",
+                vertices=part.mesh.vertices,
+                triangles=part.mesh.triangles,
+                numbers=part.numbers,
+                from_end=len(mesh.triangles) - part.rows,
+            )
+
+    def beside(self, number: int, side: str, fresh: int) -> tuple[Strip, NDArray[np.int64]]:
+        """Load the strip at a seam of a piece.
+
+        Parameters
+        ----------
+        number : int
+            Index of the piece.
+        side : {"head", "tail"}
+            Its begin or its end.
+        fresh : int
+            Trailing triangles of the piece that were not made by contouring.
+
+        Returns
+        -------
+        Strip
+            Triangles at the seam.
+        ndarray of int64, shape (k,)
+            Those of them that were not made by contouring, ascending.
+        """
+        files = self._get(f"{side}{number}")
+        part = Strip(Mesh(files["vertices"], files["triangles"]), files["numbers"], -files["from_end"])
+        return part, np.flatnonzero(files["from_end"] <= fresh)
 
     def _put(self, name: str, **arrays: NDArray[Any]) -> None:
         self.store.write(self.job, self.prefix + name, packed(**arrays))
@@ -148,6 +142,22 @@ class Selection:
     points: NDArray[np.float64]
     tips: NDArray[np.float64]
     stride: int
+
+    def stored(self, pieces: ResultFolder, job: str) -> StoredPieces:
+        """Pieces of the surface.
+
+        Parameters
+        ----------
+        pieces : ResultFolder
+            Folder with the files of the job.
+        job : str
+            Key of the job.
+
+        Returns
+        -------
+        StoredPieces
+        """
+        return StoredPieces(pieces, job, prefix=self.prefix)
 
     @property
     def place(self) -> Placement:

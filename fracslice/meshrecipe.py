@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from .clock import Clock
-from .cluster import ResultFolder
+from .cluster import ResultFolder, unpacked
 from .errors import ClusterError
 from .keys import key, program
-from .mesh.extract import SurfaceContours
-from .meshfiles import unpacked
+from .mesh.contouring import SurfaceContours
 from .meshjob import MeshJob
 from .planning import edited, planned
 from .scene.reader import reads

@@ -13,8 +13,8 @@ from .errors import ClusterError
 from .keys import key, program
 from .meshrecipe import MeshRecipe, plan_of
 from .volume import Plan
+from .volume.exploration import Evaluate, brick_signs
 from .volume.lattice import BRICK
-from .volume.sampler import Evaluate, brick_signs
 from .work import Work, chunks
 
 BRICKS = 1 << 17

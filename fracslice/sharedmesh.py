@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import count
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .checking import stride
 from .clock import Clock
-from .cluster import Pool, Shard
+from .cluster import Files, Pool, Shard, packed, unpacked
 from .errors import SharedError
-from .finishing import Finish, stride
+from .finishing import Finish
 from .keys import key
 from .mesh.components import Shells
-from .mesh.missed import NEARBY, distances, surface_samples
+from .mesh.missed import distances, surface_samples
 from .mesh.model import Mesh
 from .mesh.nesting import Nesting
 from .mesh.pointed_vertices import Pointed, PointedPiece
@@ -23,9 +28,20 @@ from .mesh.survey import Survey, survey
 from .mesh.tally import Tally
 from .mesh.tip_triangles import by_tip
 from .mesh.tips import with_tips
-from .meshfiles import CHOICE, Files, StoredPieces, packed, read_components, read_seam, unpacked
+from .meshfiles import CHOICE, StoredPieces, read_components, read_seam
 from .meshrecipe import SAMPLES, MeshRecipe, samples_key
-from .meshtasks import SHELLS, ContourTask, FinishTask, MeshTask, NestTask, cuts
+from .meshtasks import (
+    HALO,
+    SHELLS,
+    ContourTask,
+    FinishTask,
+    MeshTask,
+    MissedTask,
+    NestTask,
+    cuts,
+    far_file,
+    triangles_file,
+)
 from .surfaces import Surface
 from .volume import Plan, SignBricks
 
@@ -126,7 +142,8 @@ def shared_surface(
     job = key(own, pieces)
     arrays = packed(ijk=signs.ijk, signs=signs.signs, index=signs.index, key=np.array(own))
     pool.pieces.write(job, SAMPLES, arrays)
-    stored, joined, pointed = StoredPieces(pool.pieces, job), Survey(), Pointed(planned.voxel, work.threads)
+    stored = StoredPieces(pool.pieces, job, HALO * planned.voxel)
+    joined, pointed = Survey(), Pointed(planned.voxel, work.threads)
     abouts = ((number, *layers) for number, layers in enumerate(pieces))
     with clock("meshing"):
         for files in results(ContourTask, (recipe, pool, job), abouts, "meshing", clock):
@@ -176,14 +193,33 @@ class SharedCheck:
 
     def end(self) -> None:
         """Measure the distances of points without triangles nearby; remove the files of the job."""
-        surface, voxel = self.surface, self.surface.planned.voxel
-        far = self.back > (NEARBY - np.sqrt(3)) * voxel
-        if far.any():
-            self.back[far] = distances(surface.pieces.meshes, self.points[far], voxel, surface.clock.work)
+        surface, turns = self.surface, count()
+        ends, margin = np.array(surface.pieces.ends), surface.planned.voxel
+
+        def search(points: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+            turn, x = next(turns), points[:, :1]
+            surface.pool.pieces.write(
+                surface.job, far_file(turn), packed(points=points, reach=np.array(reach))
+            )
+            begins = np.concatenate([[-np.inf], ends[:-1]])
+            near = (x > begins - reach - margin) & (x < ends + reach + margin)
+            abouts = [(int(number), turn) for number in np.flatnonzero(near.any(axis=0))]
+            of = surface.recipe, surface.pool, surface.job
+            made = results(MissedTask, of, abouts, "checking", surface.clock)
+            result = np.full(len(points), np.inf)
+            for files in made:
+                np.minimum(result, files["distances"], out=result)
+            return result
+
+        self.back = distances(search, self.points, margin, self.back)
         surface.pool.finished(surface.job)
 
 
-def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Iterator[bytes]]:
+Append = Callable[[BinaryIO], int]
+"""Appends encoded triangles to a file; returns the number of bytes."""
+
+
+def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Iterator[Append]]:
     """Finish the pieces.
 
     Parameters
@@ -197,8 +233,8 @@ def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Itera
     -------
     SharedCheck
         Checks and measures, complete after the last block.
-    iterator of bytes
-        Blocks of triangles, in order, as an STL file holds them.
+    iterator of callable
+        Append blocks of triangles, in order, as an STL file holds them.
 
     Raises
     ------
@@ -228,26 +264,27 @@ def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Itera
     return check, _blocks(surface, check)
 
 
-def _blocks(surface: SharedSurface, check: SharedCheck) -> Iterator[bytes]:
+def _blocks(surface: SharedSurface, check: SharedCheck) -> Iterator[Append]:
     from ._native import stl
 
     late: list[tuple[int, NDArray[np.float64]]] = []
-    for files in surface.results(FinishTask, range(len(surface.pieces)), "finishing"):
+    for number, files in enumerate(surface.results(FinishTask, range(len(surface.pieces)), "finishing")):
         check.add(files)
         late += zip(files["late"].tolist(), np.asarray(files["corners"]), strict=True)
-        yield np.asarray(files["stl"]).tobytes()
+        yield partial(surface.pool.pieces.append, surface.job, triangles_file(number))
     if late:
         last = by_tip(late)
-        yield bytes(stl(last.vertices, last.triangles).data)
+        surface.pool.pieces.write(surface.job, "tips", [stl(last.vertices, last.triangles).data])
+        yield partial(surface.pool.pieces.append, surface.job, "tips")
 
 
-def whole(blocks: Sequence[bytes]) -> Mesh:
+def whole(blocks: Iterable[Append]) -> Mesh:
     """Mesh of the triangles of an STL file; its vertices are in the order of their first use.
 
     Parameters
     ----------
-    blocks : sequence of bytes
-        Blocks of triangles.
+    blocks : iterable of callable
+        Append blocks of triangles.
 
     Returns
     -------
@@ -257,6 +294,9 @@ def whole(blocks: Sequence[bytes]) -> Mesh:
     from ._native import weld
 
     kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-    corners = np.concatenate([np.frombuffer(block, kind)["corners"] for block in blocks]).reshape(-1, 3)
+    file = io.BytesIO()
+    for block in blocks:
+        block(file)
+    corners = np.frombuffer(file.getbuffer(), kind)["corners"].reshape(-1, 3)
     first, labels = weld(np.ascontiguousarray(corners))
     return Mesh(corners[first].astype(np.float64), labels.reshape(-1, 3)).in_order()

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass, replace
 from datetime import datetime
-from pathlib import Path
 
 from . import slicing
 from .export.jobs import EPOCH, SliceRun
+from .export.ranges import Encode
 from .export.resins import Resin
-from .export.slices import write_slices
+from .export.slices import FORMATS
 from .scene.reader import reads
 from .slicing.printers import Printer
 from .slicing.raster import Screen
@@ -30,8 +29,8 @@ class SliceRecipe:
         Size, layers and pixels.
     most : float or None
         Greatest layer height of adaptive layers, mm.
-    file, form : str
-        Name and format of the file.
+    form : str
+        Name of the format.
     printer : Printer or None
         Printer whose screen the layers are for.
     compensation, gamma, mirror, levels, blur
@@ -44,7 +43,6 @@ class SliceRecipe:
     name: str
     job: slicing.SliceJob
     most: float | None = None
-    file: str = "layers"
     form: str = "png"
     printer: Printer | None = None
     compensation: float = 0.0
@@ -85,12 +83,17 @@ class SliceRecipe:
         files = about, model.mesh, model.picture, self.created
         return SliceRun(stack, screen, work, self.resin, *files, self.sections, self)
 
-    def write(self, run: SliceRun) -> None:
-        """Begin to write a run, so that its format shows how it encodes layers; see `ranges.Encoding`.
+    def encoder(self, run: SliceRun) -> Encode:
+        """Return the function that encodes the layers of a run in this format.
 
         Parameters
         ----------
         run : SliceRun
             The run.
+
+        Returns
+        -------
+        callable
+            Function of a layer.
         """
-        write_slices(run, Path(tempfile.gettempdir()) / self.file, self.form)
+        return FORMATS[self.form].encoder(run)

@@ -12,8 +12,8 @@ from typing import BinaryIO
 
 import numpy as np
 
+from .cachefiles import Kept
 from .errors import ExportError, VolumeError
-from .files import Kept
 from .kernel import Field
 from .kernel.objects import toolchain
 from .keys import key, program
@@ -26,7 +26,7 @@ class Store:
     """Cache of arrays in files named by the hash of everything that they depend on.
 
     An unreadable or incomplete file is recomputed. A folder that other users can write to is not used
-    (`files.Kept`).
+    (`cachefiles.Kept`).
 
     Attributes
     ----------

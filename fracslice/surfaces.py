@@ -13,17 +13,25 @@ from numpy.typing import NDArray
 from .clock import Clock
 from .errors import TooLargeError
 from .memory import available_bytes
+from .volume.lattice import BRICK
+from .volume.states import distinct
+from .work import ahead
 
 if TYPE_CHECKING:
     from .mesh.components import Shells
     from .mesh.pieces import Pieces
     from .mesh.refine import Refined
-    from .mesh.survey import WholeShells
+    from .mesh.whole_shells import WholeShells
     from .volume import Plan, SignBricks
-    from .volume.sampler import Evaluate
+    from .volume.exploration import Evaluate
 
-BYTES_A_BRICK = 30_000
-"""Peak memory per brick of samples, its triangles at all stages included, bytes; measured."""
+BYTES_A_CROSSING = 140
+"""Peak memory by grid edges that the surface crosses, bytes: 125 to 150 measured, on meshes of 66 and 375
+million triangles.
+"""
+
+COUNTED = 1 << 12
+"""Bricks whose crossings are counted."""
 
 BRICKS = 1 << 13
 """Bricks per piece of a mesh that does not fit in memory, and of a mesh that always fits: 256 voxels along
@@ -136,16 +144,35 @@ def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:
     TooLargeError
         With a voxel that fits.
     """
-    needed, free = len(signs) * BYTES_A_BRICK, available_bytes()
+    needed, free = len(signs) * crossings_a_brick(signs) * BYTES_A_CROSSING, available_bytes()
     if len(signs) <= BRICKS or needed <= free:
         return
-    boxes = len(np.unique(signs.ijk >> 4, axis=0))
+    boxes = len(distinct(np.ravel_multi_index((signs.ijk // (2 * BRICK)).T, signs.index.shape)))
     dimension = min(max(math.log2(len(signs) / boxes), 2.0), 3.0)
     fits = voxel * (needed / free) ** (1 / dimension)
     raise TooLargeError(
         f"a voxel of {voxel:.3g}mm needs about {needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are "
         f"free; a voxel of {fits * 1.02:.3g}mm fits"
     )
+
+
+def crossings_a_brick(signs: SignBricks) -> float:
+    """Count the grid edges that the surface crosses, in bricks that are spread evenly.
+
+    Parameters
+    ----------
+    signs : SignBricks
+        Samples of the surface.
+
+    Returns
+    -------
+    float
+        Mean per brick. Edges between bricks count as often as those within.
+    """
+    some = signs.signs[:: max(len(signs) // COUNTED, 1)]
+    changes = some[:, 1:] ^ some[:, :-1], some[:, :, 1:] ^ some[:, :, :-1], (some ^ (some >> 1)) & 0x7F
+    within = sum(int(np.bitwise_count(change).sum()) for change in changes)
+    return within / len(some) * BRICK / (BRICK - 1)
 
 
 def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None, clock: Clock) -> Surface:
@@ -169,7 +196,8 @@ def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None,
     Surface
         The surface with tips, labelled.
     """
-    from .mesh.extract import Piece, contour, contour_pieces
+    from .mesh.contouring import Piece
+    from .mesh.extract import contour, contour_pieces
     from .mesh.pieces import Pieces
     from .mesh.pointed_vertices import Pointed
     from .mesh.survey import survey
@@ -181,7 +209,7 @@ def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None,
         if most >= len(signs):
             made = iter([Piece(contour(planned.root, signs, work), np.inf)])
         else:
-            made = contour_pieces(planned.root, signs, work, most)
+            made = ahead(contour_pieces(planned.root, signs, work, most))  # while the one before is stored
         for piece in made:
             pieces.add(piece)
             pointed.add(piece)
@@ -209,7 +237,7 @@ def refined(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refi
     Refined
         Result, with lengths in scene units.
     """
-    from .mesh.extract import Piece
+    from .mesh.contouring import Piece
     from .mesh.pieces import Pieces
     from .mesh.refine import refine
     from .mesh.survey import survey

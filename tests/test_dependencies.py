@@ -26,7 +26,7 @@ MODULES = {
 }
 """Of packages, where it has another name."""
 
-WITHIN = {"vtkmodules": "pyvista"}
+WITHIN = {"vtkmodules": "pyvista", "Imath": "OpenEXR"}
 """Modules that come with a package, and no other way."""
 
 BLOCKED = (

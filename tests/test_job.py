@@ -9,7 +9,7 @@ import threading
 import numpy as np
 import pytest
 
-from fracslice import MeshJob, Work, make_mesh, memory
+from fracslice import MeshJob, Work, make_mesh, memory, surfaces
 from fracslice.errors import Cancelled, SceneError, VolumeError
 from fracslice.formulas import (
     box,
@@ -163,13 +163,21 @@ def test_scenes_without_a_finite_surface_are_refused(node, message):
 
 
 def test_what_does_not_fit_in_memory_is_refused_before_it_is_meshed(monkeypatch):
-    monkeypatch.setattr("fracslice.surfaces.available_bytes", lambda: 1 << 28)
+    monkeypatch.setattr("fracslice.surfaces.available_bytes", lambda: 1 << 27)
     with pytest.raises(
         VolumeError, match=r"a voxel of .*mm needs about .* GB .* a voxel of ([0-9.]+)mm fits"
     ) as caught:
         make_mesh(BALL, MeshJob(resolution=600))
     fits = float(str(caught.value).split("a voxel of ")[2].split("mm")[0])
     assert 40 / 600 < fits < 1
+
+
+def test_the_memory_of_a_mesh_follows_its_vertices():
+    """All vertices of a ball but a few are on grid edges."""
+    result = make_mesh(BALL, MeshJob(resolution=96))
+    signs = result.bricks.signs
+    counted = surfaces.crossings_a_brick(signs) * len(signs)
+    assert counted == pytest.approx(result.report.mesh.vertices, rel=0.05)
 
 
 def test_there_is_memory():

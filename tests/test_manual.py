@@ -9,8 +9,9 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
+import click
 import pytest
-from fracslice.cli.main import commands, run
+from fracslice.cli.main import NAMES, commands, run
 
 from fracslice.export import write
 
@@ -53,6 +54,12 @@ def test_links_and_anchors_resolve(page: Path) -> None:
         assert not anchor or anchor in anchors(file), target
 
 
+@each_page
+def test_table_cells_hold_no_paragraphs(page: Path) -> None:
+    cells = re.findall(r"(?<=\|)(?:[^|\n\\]|\\.)+(?=\|)", BARE[page])
+    assert [cell for cell in cells if len(cell.strip()) > 120] == []
+
+
 def test_every_page_is_in_one_table_of_contents() -> None:
     listed = []
     for page, text in TEXT.items():
@@ -69,8 +76,13 @@ def typed(program: str) -> list[str]:
     return list(dict.fromkeys(line for line in lines if line.startswith(f"{program} ")))
 
 
+def every_command() -> list[click.Command]:
+    context = click.Context(commands)
+    return [command for name in NAMES if (command := commands.get_command(context, name))]
+
+
 def test_every_command_is_shown() -> None:
-    assert {shlex.split(line)[1] for line in typed("fracslice")} >= {*commands.commands} - {"formulas"}
+    assert {shlex.split(line)[1] for line in typed("fracslice")} >= {*NAMES} - {"formulas"}
     assert "`fracslice formulas`" in TEXT[DOCS / "start.md"]
 
 
@@ -144,7 +156,7 @@ def test_options_exist(page: Path) -> None:
     spans = re.findall(r"`([^`\n]*)`", BARE[page])
     quoted = " ".join(span for span in spans if not span.startswith("python -m tests."))
     named = set(re.findall(r"(?<!\S)--[a-z-]+", quoted))
-    parameters = [p for command in commands.commands.values() for p in command.params]
+    parameters = [p for command in every_command() for p in command.params]
     known = {option for p in parameters for option in (*p.opts, *p.secondary_opts)}
     others = {"--help", "--write", "--info"}  # click's, the benchmarks' and a slicer's
     assert named - known - others == set()

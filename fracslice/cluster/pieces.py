@@ -10,13 +10,18 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from secrets import token_hex
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 from ..errors import ClusterError
 from ..extras import lacking
+from ..files import appended
 
 if TYPE_CHECKING:
     from ..work import Work
+
+
+Contents = bytes | Sequence[bytes | memoryview]
+"""Contents of a file, in one block or several."""
 
 
 class Task(Protocol):
@@ -30,7 +35,7 @@ class Task(Protocol):
     def name(self) -> str:
         """Name within the job: of the file, and on Dask's dashboard."""
 
-    def make(self, work: Work) -> bytes:
+    def make(self, work: Work) -> Contents:
         """Make the result.
 
         Parameters
@@ -40,7 +45,7 @@ class Task(Protocol):
 
         Returns
         -------
-        bytes
+        bytes, or a sequence of blocks
             The same on every machine.
         """
 
@@ -135,7 +140,37 @@ class ResultFolder:
         except OSError as error:
             raise ClusterError(f"{self.url}: {job}/{name}: {error}") from None
 
-    def write(self, job: str, name: str, data: bytes) -> None:
+    def append(self, job: str, name: str, file: BinaryIO) -> int:
+        """Append a file of a job to another file; the kernel copies between files of this machine.
+
+        Parameters
+        ----------
+        job : str
+            Key of the job.
+        name : str
+            Name of the file.
+        file : file
+            Binary file, open for writing.
+
+        Returns
+        -------
+        int
+            Number of bytes.
+
+        Raises
+        ------
+        ClusterError
+            If it cannot be read.
+        """
+        if "://" in self.url:
+            return file.write(self.read(job, name))
+        try:
+            with open(f"{self._place[1]}/{job}/{name}", "rb") as source:
+                return appended(source, file)
+        except FileNotFoundError as error:
+            raise ClusterError(f"{self.url}: {job}/{name}: {error}") from None
+
+    def write(self, job: str, name: str, data: Contents) -> None:
         """Write a file of a job atomically: beside and moved, or by a conditional put of an object store.
 
         Parameters
@@ -144,7 +179,7 @@ class ResultFolder:
             Key of the job.
         name : str
             Name of the file.
-        data : bytes
+        data : bytes, or a sequence of blocks
             Contents.
 
         Raises
@@ -158,9 +193,10 @@ class ResultFolder:
             system.makedirs(f"{root}/{job}", exist_ok=True)
             if "://" in self.url:
                 with suppress(FileExistsError):  # the same bytes
-                    system.pipe_file(path, data, mode="create")
+                    system.pipe_file(path, data if isinstance(data, bytes) else b"".join(data), mode="create")
             else:
-                system.pipe_file(part, data)
+                with system.open(part, "wb") as file:
+                    file.writelines([data] if isinstance(data, bytes) else data)
                 system.mv(part, path)
         except OSError as error:
             raise ClusterError(f"{self.url}: {error}") from None

@@ -8,11 +8,11 @@ from typing import BinaryIO
 
 from fracslice.errors import ExportError
 from fracslice.export import glb, obj, ply, stl, threemf
-from fracslice.files import check_target, replacing
+from fracslice.files import check_target, flushing, replacing
 from fracslice.mesh.model import Mesh
 from fracslice.version import __version__
 
-__all__ = ["FORMATS", "application", "check_format", "check_target", "replacing", "write"]
+__all__ = ["FORMATS", "application", "check_format", "check_target", "flushing", "replacing", "write"]
 
 Write = Callable[[Mesh, BinaryIO, Mapping[str, str]], None]
 
@@ -34,7 +34,12 @@ FORMATS: dict[str, Write] = {
 
 
 def application() -> str:
-    """Name and version of this program, for file metadata."""
+    """Name and version of this program, for file metadata.
+
+    Returns
+    -------
+    str
+    """
     return f"fracslice {__version__}"
 
 

@@ -7,14 +7,11 @@ has its own height and exposure. PrusaSlicer writes the same layout since versio
 from __future__ import annotations
 
 import struct
-from functools import partial
 from itertools import accumulate
-from pathlib import Path
+from typing import BinaryIO
 
 from fracslice._slices import Encoding
-from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import PrintData, printing, rgb565
-from fracslice.files import replacing
+from fracslice.export.prints import PrintData, PrintFormat, by_pixels, rgb565
 
 PREVIEW = 224, 168
 """Width and height of the preview, pixels."""
@@ -32,32 +29,9 @@ _LAYER = struct.Struct("<2I4f8x")
 _MACHINE = struct.Struct("<96s24s3f2I")
 
 
-def write_photon(run: SliceRun, path: str | Path) -> Path:
-    """Write a .pwmx file or one of its family; an interrupted job resumes.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write, with a printer and a resin.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        Without a printer or a resin, or for an error of the file system.
-    """
-    with (
-        printing(run, path, "pwmx", partial(run.screen.encoded, encoding=Encoding.RLE4)) as job,
-        replacing(path) as file,
-    ):
-        file.write(_before_pictures(job))
-        file.writelines(job)
-    return Path(path)
+def _assemble(job: PrintData, file: BinaryIO) -> None:
+    file.write(_before_pictures(job))
+    file.writelines(job)
 
 
 def _before_pictures(job: PrintData) -> bytes:
@@ -121,3 +95,6 @@ def _machine(job: PrintData) -> bytes:
     size, name = (*job.printer.screen, job.printer.height), job.title
     contents = _MACHINE.pack(name[:95], b"pw0Img", *size, 516, BOARD)
     return _section("MACHINE", contents, 16)
+
+
+FORMAT = PrintFormat("pwmx", by_pixels(Encoding.RLE4), _assemble)

@@ -7,18 +7,16 @@ import json
 import math
 import zipfile
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
-from functools import partial
 from itertools import chain
-from pathlib import Path
+from typing import BinaryIO
 
 from PIL import Image
 
 from fracslice.errors import ExportError
 from fracslice.export import png
 from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import PrintData, one_height, printing
-from fracslice.files import replacing
+from fracslice.export.prints import PrintData, PrintFormat
+from fracslice.export.ranges import Encode
 from fracslice.version import __version__
 
 MOST_MEMBERS = 65_535
@@ -27,85 +25,53 @@ SL1_PREVIEWS = (400, 400), (800, 480)
 NANODLP_PREVIEW = 200, 100
 """Width and height of the previews, pixels."""
 
-Members = Iterator[tuple[str, bytes]]
+
+class ArchiveFormat(PrintFormat):
+    """Archive with a PNG file for each layer."""
+
+    def encoder(self, run: SliceRun) -> Encode:
+        if run.layers + 100 > MOST_MEMBERS:
+            raise ExportError(f"{run.layers} layers are too many for an archive")
+        return super().encoder(run)
 
 
-def write_sl1(run: SliceRun, path: str | Path) -> Path:
-    """Write an archive for the SL1 family: config.ini, prusaslicer.ini, previews and a PNG for each layer.
+class Sl1Format(ArchiveFormat):
+    """Archive for the SL1 family, whose layers have one height."""
 
-    PrusaSlicer opens the archive. An interrupted job resumes.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write, with a printer and a resin.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        Without a printer or a resin, for layers of unequal heights, which the format cannot express, for too
-        many layers, or for an error of the file system.
-    """
-    one_height(run, path, "an SL1 archive")
-    name = Path(path).stem
-    with _pictures(run, path) as job:
-        about = {
-            "config.ini": _ini(_config(job, name)),
-            "fracslice.json": run.describe(),
-            "prusaslicer.ini": _ini(_settings(job)),
-        }
-        previews = {
-            f"thumbnail/thumbnail{width}x{height}.png": _preview(job, width, height)
-            for width, height in SL1_PREVIEWS
-        }
-        layers = ((f"{name}{k:05d}.png", data) for k, data in enumerate(job))
-        return _archive(path, chain(about.items(), previews.items(), layers))
+    def encoder(self, run: SliceRun) -> Encode:
+        heights = run.stack.heights
+        if heights.max() - heights.min() > 1e-9:
+            raise ExportError("an SL1 archive has layers of one height; .goo takes a range of heights")
+        return super().encoder(run)
 
 
-def write_nanodlp(run: SliceRun, path: str | Path) -> Path:
-    """Write a .nanodlp archive (docs.nanodlp.com/manual/format); an interrupted job resumes.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write, with a printer and a resin.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        Without a printer or a resin, for too many layers, or for an error of the file system.
-    """
-    with _pictures(run, path) as job:
-        about = {f"{name}.json": _json(values) for name, values in _plate(job).items()}
-        about["3d.png"] = _preview(job, *NANODLP_PREVIEW)
-        layers = ((f"{k}.png", data) for k, data in enumerate(job, 1))
-        return _archive(path, chain(about.items(), layers))
+def _assemble_sl1(job: PrintData, file: BinaryIO) -> None:
+    """Write config.ini, prusaslicer.ini, previews and pictures; PrusaSlicer opens the archive."""
+    about = {
+        "config.ini": _ini(_config(job)),
+        "fracslice.json": job.run.describe(),
+        "prusaslicer.ini": _ini(_settings(job)),
+    }
+    previews = {
+        f"thumbnail/thumbnail{width}x{height}.png": _preview(job, width, height)
+        for width, height in SL1_PREVIEWS
+    }
+    layers = ((f"{job.name}{k:05d}.png", data) for k, data in enumerate(job))
+    _archive(file, chain(about.items(), previews.items(), layers))
 
 
-def _pictures(run: SliceRun, path: str | Path) -> AbstractContextManager[PrintData]:
-    if run.layers + 100 > MOST_MEMBERS:
-        raise ExportError(f"{path}: {run.layers} layers are too many for an archive")
-    return printing(run, path, "png", partial(png.encode_layer, run.screen))
+def _assemble_nanodlp(job: PrintData, file: BinaryIO) -> None:
+    """Write the members that docs.nanodlp.com/manual/format lists."""
+    about = {f"{name}.json": _json(values) for name, values in _plate(job).items()}
+    about["3d.png"] = _preview(job, *NANODLP_PREVIEW)
+    _archive(file, chain(about.items(), ((f"{k}.png", data) for k, data in enumerate(job, 1))))
 
 
-def _archive(path: str | Path, members: Members) -> Path:
+def _archive(file: BinaryIO, members: Iterator[tuple[str, bytes]]) -> None:
     """Write members that are not compressed and carry no time."""
-    with replacing(path) as file, zipfile.ZipFile(file, "w") as archive:
+    with zipfile.ZipFile(file, "w") as archive:
         for name, data in members:
             archive.writestr(zipfile.ZipInfo(name), data)
-    return Path(path)
 
 
 def _preview(job: PrintData, width: int, height: int) -> bytes:
@@ -122,7 +88,7 @@ def _json(values: object) -> bytes:
     return json.dumps(values, indent=1).encode()
 
 
-def _config(job: PrintData, name: str) -> dict[str, object]:
+def _config(job: PrintData) -> dict[str, object]:
     """Settings for the printer, with the keys of PrusaSlicer 2.5."""
     printer, resin = job.printer, job.resin
     return {
@@ -132,7 +98,7 @@ def _config(job: PrintData, name: str) -> dict[str, object]:
         "expUserProfile": 0,
         "fileCreationTimestamp": f"{job.run.created:%Y-%m-%d at %H:%M:%S UTC}",
         "hollow": 0,
-        "jobDir": name,
+        "jobDir": job.name,
         "layerHeight": f"{job.heights[0]:g}",
         "materialName": resin.name,
         "numFade": min(resin.transition_layers, job.layers),
@@ -246,3 +212,9 @@ def _plate(job: PrintData) -> dict[str, object]:
             for k, (area, height) in enumerate(zip(areas, heights, strict=True))
         ],
     }
+
+
+FORMATS = (
+    Sl1Format("sl1", png.encode_layer, _assemble_sl1),
+    ArchiveFormat("nanodlp", png.encode_layer, _assemble_nanodlp),
+)

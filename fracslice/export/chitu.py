@@ -9,19 +9,16 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
-from functools import partial
 from itertools import accumulate
-from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fracslice._slices import Encoding
 from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import PrintData, printing, rgb565
-from fracslice.files import replacing
+from fracslice.export.prints import PrintData, PrintFormat, by_pixels, rgb565
 from fracslice.slicing import Layer
-from fracslice.slicing.raster import Screen
 
 CTB, CBDDLP = 0x12FD0086, 0x12FD0019
 LEVELS = 4
@@ -42,71 +39,31 @@ _LAYER_MOTION = struct.Struct("<I11f")
 """Version 3: after a copy of the layer's entry in the table."""
 
 
-def write_ctb(run: SliceRun, path: str | Path) -> Path:
-    """Write a .ctb file; an interrupted job resumes.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write, with a printer and a resin.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        Without a printer or a resin, or for an error of the file system.
-    """
-    version = 2 if run.screen.printer and run.screen.printer.version == 2 else 3
-    with printing(run, path, "ctb", partial(run.screen.encoded, encoding=Encoding.RLE7)) as job:
-        sizes = np.array([job.sizes])
-        return _write(job, path, CTB, version, sizes, job)
+def _assemble_ctb(job: PrintData, file: BinaryIO) -> None:
+    _write(job, file, CTB, 2 if job.printer.version == 2 else 3, np.array([job.sizes]), job)
 
 
-def write_cbddlp(run: SliceRun, path: str | Path) -> Path:
-    """Write a .cbddlp file; an interrupted job resumes.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write, with a printer and a resin.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        Without a printer or a resin, or for an error of the file system.
-    """
-    with printing(run, path, "cbddlp", partial(_level_sets, run.screen)) as job:
-        sizes = np.array([struct.unpack_from(f"<{LEVELS}I", picture) for picture in job]).T
-        return _write(job, path, CBDDLP, 2, sizes, (picture[4 * LEVELS :] for picture in job))
+def _assemble_cbddlp(job: PrintData, file: BinaryIO) -> None:
+    sizes = np.array([struct.unpack_from(f"<{LEVELS}I", picture) for picture in job]).T
+    _write(job, file, CBDDLP, 2, sizes, (picture[4 * LEVELS :] for picture in job))
 
 
-def _level_sets(screen: Screen, layer: Layer) -> bytes:
+def _level_sets(run: SliceRun, layer: Layer) -> bytes:
     """Sizes of the pictures of a layer, then the pictures, the one of the highest level first."""
     levels = np.arange(256)
     tables = [np.uint8(255) * (levels >= 256 * (k + 0.5) / LEVELS) for k in reversed(range(LEVELS))]
-    pictures = [screen.encoded(layer, Encoding.RLE1, table) for table in tables]
+    pictures = [run.screen.encoded(layer, Encoding.RLE1, table) for table in tables]
     return struct.pack(f"<{LEVELS}I", *map(len, pictures)) + b"".join(pictures)
 
 
 def _write(
     job: PrintData,
-    path: str | Path,
+    file: BinaryIO,
     magic: int,
     version: int,
     sizes: NDArray[np.int64],
     data: Iterable[bytes],
-) -> Path:
+) -> None:
     """Write header, previews, settings, layer table and layers. sizes: of the pictures, [levels, layers]."""
     previews = [_preview(job.preview(*size)) for size in (LARGE, SMALL)]
     name = job.title
@@ -126,17 +83,15 @@ def _write(
         for level in range(len(sizes))
         for k in range(job.layers)
     ]
-    with replacing(path) as file:
-        file.write(_header(job, magic, version, len(sizes), (large, small, motion, slicer, table)))
-        for (width, height), at, preview in zip((LARGE, SMALL), (large, small), previews, strict=True):
-            file.write(_PREVIEW.pack(width, height, at + _PREVIEW.size, len(preview)) + preview)
-        file.write(_motion(job) + _slicer(job, magic, version, len(sizes), machine, len(name)) + name)
-        file.writelines(entries)
-        for entry, picture in zip(entries, data, strict=False):
-            if extra:
-                file.write(entry + _layer_motion(job, extra + len(picture)))
-            file.write(picture)
-    return Path(path)
+    file.write(_header(job, magic, version, len(sizes), (large, small, motion, slicer, table)))
+    for (width, height), at, preview in zip((LARGE, SMALL), (large, small), previews, strict=True):
+        file.write(_PREVIEW.pack(width, height, at + _PREVIEW.size, len(preview)) + preview)
+    file.write(_motion(job) + _slicer(job, magic, version, len(sizes), machine, len(name)) + name)
+    file.writelines(entries)
+    for entry, picture in zip(entries, data, strict=False):
+        if extra:
+            file.write(entry + _layer_motion(job, extra + len(picture)))
+        file.write(picture)
 
 
 def _header(job: PrintData, magic: int, version: int, levels: int, places: tuple[int, ...]) -> bytes:
@@ -182,3 +137,9 @@ def _preview(picture: NDArray[np.uint8]) -> bytes:
             more = min(int(length) - begin, 0xFFE) - 1
             words += [int(value) | 0x20, 0x3000 | more] if more else [int(value)]
     return np.array(words, "<u2").tobytes()
+
+
+FORMATS = (
+    PrintFormat("ctb", by_pixels(Encoding.RLE7), _assemble_ctb),
+    PrintFormat("cbddlp", _level_sets, _assemble_cbddlp),
+)

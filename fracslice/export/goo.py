@@ -6,13 +6,10 @@ All numbers are big-endian; pixels have 8 bits; each layer has its own height an
 from __future__ import annotations
 
 import struct
-from functools import partial
-from pathlib import Path
+from typing import BinaryIO
 
 from fracslice._slices import Encoding
-from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import PrintData, printing, rgb565
-from fracslice.files import replacing
+from fracslice.export.prints import PrintData, PrintFormat, by_pixels, rgb565
 from fracslice.version import __version__
 
 MAGIC = b"\x07\0\0\0DLP\0"
@@ -28,35 +25,12 @@ HEADER = 4 + len(MAGIC) + 32 + 24 + 24 + 3 * 32 + 3 * 2 + 2 * (SMALL**2 + LARGE*
 _LAYER = struct.Struct(">H15fH2sI")
 
 
-def write_goo(run: SliceRun, path: str | Path) -> Path:
-    """Write a .goo file; an interrupted job resumes.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write, with a printer and a resin.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        Without a printer or a resin, or for an error of the file system.
-    """
-    with (
-        printing(run, path, "goo", partial(run.screen.encoded, encoding=Encoding.GOO)) as job,
-        replacing(path) as file,
-    ):
-        file.write(_header(job))
-        for index, picture in enumerate(job):
-            file.write(_layer(job, index, len(picture)))
-            file.write(picture + DELIMITER)
-        file.write(END)
-    return Path(path)
+def _assemble(job: PrintData, file: BinaryIO) -> None:
+    file.write(_header(job))
+    for index, picture in enumerate(job):
+        file.write(_layer(job, index, len(picture)))
+        file.write(picture + DELIMITER)
+    file.write(END)
 
 
 def _header(job: PrintData) -> bytes:
@@ -94,3 +68,6 @@ def _layer(job: PrintData, index: int, size: int) -> bytes:
         *(resin.lift, resin.lift_speed, 0, 0, resin.lift, resin.retract_speed, 0, 0),
         *(255, DELIMITER, size),
     )
+
+
+FORMAT = PrintFormat("goo", by_pixels(Encoding.GOO), _assemble)

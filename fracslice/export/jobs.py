@@ -1,27 +1,23 @@
-"""Slice runs, and how their layers are written to a file or a folder."""
+"""Slice runs: a planned stack, and what its files hold besides layers."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fracslice.errors import SliceError
-from fracslice.export.ranges import Recipe, begin, encoded_layers
+from fracslice.export.ranges import Recipe
 from fracslice.export.resins import Resin
-from fracslice.export.resuming import Journal, journal, resumable_folder
-from fracslice.files import put, replacing
 from fracslice.kernel.objects import toolchain
 from fracslice.keys import key, program
 from fracslice.mesh.model import Mesh
-from fracslice.slicing import Layer, Slicer, Stack
+from fracslice.slicing import Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.slicing.sublayers import COUNTS, MeanSlicer
 from fracslice.work import Work
@@ -102,13 +98,13 @@ class SliceRun:
         """Number of layers."""
         return len(self.stack.z)
 
-    def key(self, form: str | bytes) -> str:
+    def key(self, form: str) -> str:
         """Key of everything that determines the bytes of encoded layers.
 
         Parameters
         ----------
-        form : str or bytes
-            File format.
+        form : str
+            Name of the format.
 
         Returns
         -------
@@ -142,105 +138,3 @@ class SliceRun:
             ],
         }
         return json.dumps(manifest, indent=1).encode()
-
-    @contextmanager
-    def encoded(
-        self, path: str | Path, form: str | bytes, encode: Callable[[Layer], bytes]
-    ) -> Iterator[Journal]:
-        """Encode all layers of a file; an interrupted job resumes.
-
-        Parameters
-        ----------
-        path : str or path
-            The file that the layers are for.
-        form : str or bytes
-            File format.
-        encode : callable
-            Encodes a layer.
-
-        Yields
-        ------
-        Journal
-            The encoded layers, to be written before the block ends.
-
-        Raises
-        ------
-        ExportError
-            For an error of the file system.
-        """
-        begin(self, form, encode)
-        with journal(path, self.key(form)) as layers:
-            for data in encoded_layers(self, form, encode, layers.count):
-                layers.append(data)
-            yield layers
-
-    def into_file(self, path: str | Path, head: bytes, encode: Callable[[Layer], bytes], tail: bytes) -> Path:
-        """Write a head, the encoded layers and a tail to one file; an interrupted job resumes.
-
-        Parameters
-        ----------
-        path : str or path
-            The file to write.
-        head, tail : bytes
-            Text before and after the layers.
-        encode : callable
-            Encodes a layer.
-
-        Returns
-        -------
-        Path
-
-        Raises
-        ------
-        ExportError
-            For an error of the file system.
-        """
-        with self.encoded(path, head, encode) as layers, replacing(path) as file:
-            file.write(head)
-            file.writelines(layers)
-            file.write(tail)
-        return Path(path)
-
-    def into_folder(
-        self,
-        path: str | Path,
-        ending: str,
-        encode: Callable[[Layer], bytes],
-        is_whole: Callable[[bytes], bool],
-        also: Mapping[str, bytes],
-    ) -> Path:
-        """Write a folder of files 00000.png, ..., one for each layer.
-
-        A folder left by an interrupted run of the same job is resumed after its last complete layer.
-
-        Parameters
-        ----------
-        path : str or path
-            The folder; it must be new, empty, or left by an interrupted job.
-        ending : str
-            Extension of the files.
-        encode : callable
-            Encodes a layer.
-        is_whole : callable
-            True if the bytes are a complete file.
-        also : mapping of str to bytes
-            Further files by name, written last.
-
-        Returns
-        -------
-        Path
-
-        Raises
-        ------
-        ExportError
-            For a folder with other files, or an error of the file system.
-        """
-        begin(self, ending, encode)
-        folder, name = Path(path), f"{{:05d}}.{ending}".format
-        with resumable_folder(folder, self.key(ending), name, is_whole) as start:
-            for index, data in enumerate(encoded_layers(self, ending, encode, start), start):
-                put(f"{folder}/{name(index)}", data)
-            for other, data in also.items():
-                with replacing(folder / other) as file:
-                    file.write(data)
-        return folder

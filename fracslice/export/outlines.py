@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterable
+from itertools import chain
+from typing import BinaryIO
 
 import numpy as np
 from isal.isal_zlib import crc32
 
 from fracslice.export.jobs import SliceRun
+from fracslice.export.layerformats import FileFormat, FolderFormat
 from fracslice.slicing import Contours, Layer
 
 MICRON = 0.001
@@ -50,36 +52,13 @@ def _head(run: SliceRun, namespaces: str = "") -> str:
     )
 
 
-def write_svg_folder(run: SliceRun, path: str | Path) -> Path:
-    """Write a folder with an SVG file for each layer: one path with all contours, in mm.
-
-    An interrupted job resumes.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write.
-    path : str or path
-        The folder; it must be new, empty, or left by an interrupted job.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        For a folder with other files, or an error of the file system.
-    """
-
-    def make(layer: Layer) -> bytes:
-        rings = layer.contours
-        d = " ".join("M" + _pairs(_down(run, rings[i]), "%.4f,%.4f", " ") + "z" for i in range(len(rings)))
-        title = f"<title>top {layer.top:.6g} mm, height {layer.height:.6g} mm</title>"
-        data = f'{_head(run)}{title}\n<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
-        return data + _checksum(data)
-
-    return run.into_folder(path, "svg", make, _is_whole, {})
+def _svg(run: SliceRun, layer: Layer) -> bytes:
+    """An SVG file: one path with all contours, in mm."""
+    rings = layer.contours
+    d = " ".join("M" + _pairs(_down(run, rings[i]), "%.4f,%.4f", " ") + "z" for i in range(len(rings)))
+    title = f"<title>top {layer.top:.6g} mm, height {layer.height:.6g} mm</title>"
+    data = f'{_head(run)}{title}\n<path fill-rule="evenodd" d="{d}"/>\n</svg>\n'.encode()
+    return data + _checksum(data)
 
 
 def _checksum(data: bytes) -> bytes:
@@ -93,84 +72,22 @@ def _is_whole(data: bytes) -> bool:
     return data[-end:] == _checksum(data[:-end])
 
 
-def write_svg_layers(run: SliceRun, path: str | Path) -> Path:
-    """Write one SVG file with a group for each layer, as Slic3r writes it and DLP software reads it.
+def _slic3r_head(run: SliceRun) -> bytes:
+    return _head(run, ' xmlns:slic3r="http://slic3r.org/namespaces/slic3r"').encode()
 
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write.
-    path : str or path
-        The file to write.
 
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        For an error of the file system.
-    """
-
-    def make(layer: Layer) -> bytes:
-        rings = layer.contours
-        lines = [f'<g id="layer{layer.index}" slic3r:z="{layer.top:.6g}">']
-        for i, hole in enumerate(_holes(rings)):
-            kind, fill = ("hole", "black") if hole else ("contour", "white")
-            points = _pairs(_down(run, rings[i]), "%.4f,%.4f", " ")
-            lines.append(f'<polygon slic3r:type="{kind}" points="{points}" style="fill: {fill}"/>')
-        return ("\n".join([*lines, "</g>"]) + "\n").encode()
-
-    head = _head(run, ' xmlns:slic3r="http://slic3r.org/namespaces/slic3r"')
-    return run.into_file(path, head.encode(), make, b"</svg>\n")
+def _slic3r(run: SliceRun, layer: Layer) -> bytes:
+    """A group, as Slic3r writes it and DLP software reads it."""
+    rings = layer.contours
+    lines = [f'<g id="layer{layer.index}" slic3r:z="{layer.top:.6g}">']
+    for i, hole in enumerate(_holes(rings)):
+        kind, fill = ("hole", "black") if hole else ("contour", "white")
+        points = _pairs(_down(run, rings[i]), "%.4f,%.4f", " ")
+        lines.append(f'<polygon slic3r:type="{kind}" points="{points}" style="fill: {fill}"/>')
+    return ("\n".join([*lines, "</g>"]) + "\n").encode()
 
 
 # --- Common Layer Interface, version 2.0 (1994)
-def write_cli(run: SliceRun, path: str | Path) -> Path:
-    """Write a Common Layer Interface file as text.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        For an error of the file system.
-    """
-    return run.into_file(path, _cli_head(run, "ASCII") + b"$$GEOMETRYSTART\n", _cli_text, b"$$GEOMETRYEND\n")
-
-
-def write_cli_binary(run: SliceRun, path: str | Path) -> Path:
-    """Write a binary Common Layer Interface file with long layer and polyline commands.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        For an error of the file system.
-    """
-    return run.into_file(path, _cli_head(run, "BINARY").rstrip(b"\n"), _cli_bytes, b"")
-
-
 def _cli_head(run: SliceRun, kind: str) -> bytes:
     x, y = (s / 2 for s in run.stack.size[:2])
     box = ",".join(f"{v:.6f}" for v in (-x, -y, 0.0, x, y, float(run.stack.tops[-1])))
@@ -182,14 +99,14 @@ def _cli_head(run: SliceRun, kind: str) -> bytes:
         f"$$DIMENSION/{box}",
     ]
     lines.append(f"$$LAYERS/{run.layers:06d}")
-    return "\n".join(["$$HEADERSTART", *lines, "$$HEADEREND\n"]).encode()
+    return "\n".join(["$$HEADERSTART", *lines, "$$HEADEREND"]).encode()
 
 
 def _closed(points: np.ndarray) -> np.ndarray:
     return np.concatenate([points, points[:1]]) / MICRON
 
 
-def _cli_text(layer: Layer) -> bytes:
+def _cli_text(_: SliceRun, layer: Layer) -> bytes:
     rings = layer.contours
     lines = [f"$$LAYER/{layer.top / MICRON:.3f}"]
     for i, hole in enumerate(_holes(rings)):
@@ -198,7 +115,7 @@ def _cli_text(layer: Layer) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _cli_bytes(layer: Layer) -> bytes:
+def _cli_bytes(_: SliceRun, layer: Layer) -> bytes:
     rings = layer.contours
     commands = [struct.pack("<Hf", 127, layer.top / MICRON)]
     for i, hole in enumerate(_holes(rings)):
@@ -211,46 +128,44 @@ def _cli_bytes(layer: Layer) -> bytes:
 
 
 # --- JSON
-def write_json(run: SliceRun, path: str | Path) -> Path:
-    """Write contours as JSON: for each layer its top, height and polygons with their parents, in mm.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        For an error of the file system.
-    """
+def _json_head(run: SliceRun) -> bytes:
     head = json.loads(run.describe())
     del head["layers"]
-    opening = json.dumps(head)[:-1] + ', "unit": "mm", "layers": ['
-
-    def make(layer: Layer) -> bytes:
-        rings = layer.contours
-        polygons = ", ".join(
-            f'{{"parent": {parent}, "points": [{_pairs(rings[i], "[%.6g,%.6g]", ",")}]}}'
-            for i, parent in enumerate(rings.parent)
-        )
-        comma = "," if layer.index else ""
-        begin = f'{comma}\n{{"top": {layer.top:.6g}, "height": {layer.height:.6g}'
-        return f'{begin}, "contours": [{polygons}]}}'.encode()
-
-    return run.into_file(path, opening.encode(), make, b"\n]}\n")
+    return (json.dumps(head)[:-1] + ', "unit": "mm", "layers": [').encode()
 
 
-WRITERS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
-    "svg": write_svg_folder,
-    "slic3r": write_svg_layers,
-    "cli": write_cli,
-    "cli-binary": write_cli_binary,
-    "json": write_json,
-}
+def _json(_: SliceRun, layer: Layer) -> bytes:
+    """Top, height, and polygons with their parents, in mm."""
+    rings = layer.contours
+    polygons = ", ".join(
+        f'{{"parent": {parent}, "points": [{_pairs(rings[i], "[%.6g,%.6g]", ",")}]}}'
+        for i, parent in enumerate(rings.parent)
+    )
+    comma = "," if layer.index else ""
+    begin = f'{comma}\n{{"top": {layer.top:.6g}, "height": {layer.height:.6g}'
+    return f'{begin}, "contours": [{polygons}]}}'.encode()
+
+
+def _between(
+    name: str,
+    encode: Callable[[SliceRun, Layer], bytes],
+    head: Callable[[SliceRun], bytes],
+    tail: bytes,
+) -> FileFormat:
+    """Format of a file with the layers between a head and a tail."""
+
+    def assemble(run: SliceRun, layers: Iterable[bytes], file: BinaryIO) -> None:
+        file.writelines(chain([head(run)], layers, [tail]))
+
+    return FileFormat(name, encode, assemble)
+
+
+FORMATS = (
+    FolderFormat("svg", _svg, _is_whole, lambda _: {}),
+    _between("slic3r", _slic3r, _slic3r_head, b"</svg>\n"),
+    _between(
+        "cli", _cli_text, lambda run: _cli_head(run, "ASCII") + b"\n$$GEOMETRYSTART\n", b"$$GEOMETRYEND\n"
+    ),
+    _between("cli-binary", _cli_bytes, lambda run: _cli_head(run, "BINARY"), b""),
+    _between("json", _json, _json_head, b"\n]}\n"),
+)

@@ -8,8 +8,8 @@ import numpy as np
 from isal.isal_zlib import crc32
 
 from fracslice._slices import Encoding, encoded
+from fracslice.export.jobs import SliceRun
 from fracslice.slicing import Layer
-from fracslice.slicing.raster import Screen
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -29,13 +29,13 @@ def encode(image: np.ndarray) -> bytes:
     return _file((image.shape[0], image.shape[1]), encoded(image, Encoding.PNG))
 
 
-def encode_layer(screen: Screen, layer: Layer) -> bytes:
+def encode_layer(run: SliceRun, layer: Layer) -> bytes:
     """Encode the picture of a layer as a PNG file.
 
     Parameters
     ----------
-    screen : Screen
-        Conversion of layers to pictures.
+    run : SliceRun
+        The run of the layer.
     layer : Layer
         The layer.
 
@@ -43,7 +43,7 @@ def encode_layer(screen: Screen, layer: Layer) -> bytes:
     -------
     bytes
     """
-    return _file(screen.shape, screen.encoded(layer, Encoding.PNG))
+    return _file(run.screen.shape, run.screen.encoded(layer, Encoding.PNG))
 
 
 def _file(shape: tuple[int, int], rows: bytes) -> bytes:

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
+from fracslice._slices import Encoding
 from fracslice.errors import ExportError
 from fracslice.export.jobs import SliceRun
+from fracslice.export.layerformats import LayerFormat
+from fracslice.export.ranges import Encode
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal
+from fracslice.files import flushing, replacing
 from fracslice.slicing import Layer
 from fracslice.slicing.printers import Printer
 from fracslice.work import in_background
@@ -33,6 +38,8 @@ class PrintData:
     ----------
     run : SliceRun
         Layers, screen and metadata.
+    name : str
+        Name of the file without its extension.
     printer : Printer
         The printer.
     resin : Resin
@@ -44,6 +51,7 @@ class PrintData:
     """
 
     run: SliceRun
+    name: str
     printer: Printer
     resin: Resin
     journal: Journal
@@ -56,8 +64,8 @@ class PrintData:
     @cached_property
     def _read(self) -> tuple[NDArray[np.float64], list[int]]:
         """Areas of all layers and sizes of their pictures."""
-        records = [(_AREA.unpack_from(record)[0], len(record) - _AREA.size) for record in self.journal]
-        return np.array([area for area, _ in records]), [size for _, size in records]
+        areas, sizes = zip(*self.journal.heads(_AREA.size), strict=True)
+        return np.frombuffer(b"".join(areas), "<f8"), [size - _AREA.size for size in sizes]
 
     @property
     def areas(self) -> NDArray[np.float64]:
@@ -139,67 +147,56 @@ class PrintData:
         return np.asarray(ImageOps.fit(whole, (width, height), Image.Resampling.LANCZOS))
 
 
-@contextmanager
-def printing(
-    run: SliceRun, path: str | Path, form: str, encode: Callable[[Layer], bytes]
-) -> Iterator[PrintData]:
-    """Encode the pictures of all layers; an interrupted job resumes.
+@dataclass(frozen=True)
+class PrintFormat(LayerFormat):
+    """Format of a printer's file, for runs with a printer and a resin.
+
+    Attributes
+    ----------
+    assemble : callable
+        Writes a print job to an open file.
+    """
+
+    assemble: Callable[[PrintData, BinaryIO], None]
+
+    def encoder(self, run: SliceRun) -> Encode:
+        if run.screen.printer is None:
+            raise ExportError("a print file needs a printer")
+        if run.resin is None:
+            raise ExportError("a print file needs an exposure: none is known for this printer")
+
+        def record(layer: Layer) -> bytes:
+            data = self.encode(run, layer)
+            return _AREA.pack(layer.area) + data
+
+        return record
+
+    def write(self, run: SliceRun, path: Path) -> None:
+        drawn = nullcontext(None) if run.picture is None else in_background(run.picture, run.work.threads)
+        with (
+            drawn as picture,
+            self.encoded(run, path) as journal,
+            replacing(path) as file,
+            flushing(file),
+        ):
+            assert run.screen.printer and run.resin
+            self.assemble(PrintData(run, path.stem, run.screen.printer, run.resin, journal, picture), file)
+
+
+def by_pixels(encoding: Encoding) -> Callable[[SliceRun, Layer], bytes]:
+    """Return the function that encodes the picture of a layer of a run.
 
     Parameters
     ----------
-    run : SliceRun
-        The layers, with a printer and a resin.
-    path : str or path
-        The file to write.
-    form : str
-        File format.
-    encode : callable
-        Encodes the picture of a layer.
+    encoding : Encoding
+        Encoding of the pixels.
 
-    Yields
-    ------
-    Print
-        The print job, to be written before the block ends.
-
-    Raises
-    ------
-    ExportError
-        Without a printer or a resin, or for an error of the file system.
+    Returns
+    -------
+    callable
+        `PrintFormat.encode`.
     """
-    if run.screen.printer is None:
-        raise ExportError(f"{path}: a print file needs a printer")
-    if run.resin is None:
-        raise ExportError(f"{path}: a print file needs an exposure: none is known for this printer")
-
-    def record(layer: Layer) -> bytes:
-        data = encode(layer)
-        return _AREA.pack(layer.area) + data
-
-    drawn = nullcontext(None) if run.picture is None else in_background(run.picture, run.work.threads)
-    with drawn as picture, run.encoded(path, form, record) as journal:
-        yield PrintData(run, run.screen.printer, run.resin, journal, picture)
-
-
-def one_height(run: SliceRun, path: str | Path, form: str) -> None:
-    """Check that all layers have one height, for a format that cannot express others.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers.
-    path : str or path
-        The file to write.
-    form : str
-        Name of the format in the message.
-
-    Raises
-    ------
-    ExportError
-        For layers of unequal heights.
-    """
-    heights = run.stack.heights
-    if heights.max() - heights.min() > 1e-9:
-        raise ExportError(f"{path}: {form} has layers of one height; .goo takes a range of heights")
+    return lambda run, layer: run.screen.encoded(layer, encoding)
 
 
 def rgb565(picture: NDArray[np.uint8]) -> NDArray[np.uint16]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import io
 import threading
 from collections.abc import Callable, Hashable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from fracslice.cluster import Shard
 from fracslice.errors import ClusterError, ExportError, SharedError
 from fracslice.export.resuming import Journal
-from fracslice.keys import key
 from fracslice.slicing import Layer
 from fracslice.slicing.layers import SLAB
 from fracslice.work import Work
@@ -48,13 +47,18 @@ class Recipe(Hashable, Protocol):
             The same in every process.
         """
 
-    def write(self, run: SliceRun) -> None:
-        """Write a run in its format, which calls `begin` before anything else.
+    def encoder(self, run: SliceRun) -> Encode:
+        """Return the function that encodes the layers of a run in this format.
 
         Parameters
         ----------
         run : SliceRun
             The run.
+
+        Returns
+        -------
+        callable
+            Function of a layer.
         """
 
 
@@ -84,73 +88,46 @@ class RangeTask:
 
     def make(self, work: Work) -> bytes:
         """Records of the encoded layers; see `Task.make`."""
-        planned = _planned(self.recipe)
-        if planned.job != self.job:
+        run, encode, job = _planned(self.recipe)
+        if job != self.job:
             raise ClusterError("the layers planned here are others than those of the job")
         file = io.BytesIO()
         journal = Journal(file)
-        for data in planned.run.slicer_with(work).map(planned.encode, range(self.first, self.end)):
+        for data in run.slicer_with(work).map(encode, range(self.first, self.end)):
             journal.append(data)
         return file.getvalue()
 
 
-class Encoding(Exception):  # noqa: N818  no error: it ends the writing of a file that a worker does not write
-    """How a format encodes the layers of a run.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The run.
-    job : str
-        Key of the encoded layers.
-    encode : callable
-        Encodes a layer.
-    """
-
-    def __init__(self, run: SliceRun, job: str, encode: Encode) -> None:
-        self.run, self.job, self.encode = run, job, encode
-
-
-class Asking:
-    """In the place of a pool: a run asks its format how it encodes layers."""
-
-
-def begin(run: SliceRun, form: str | bytes, encode: Encode) -> None:
+def begin(run: SliceRun, form: str) -> None:
     """Begin to encode the layers of a run, before any file is touched.
 
     Parameters
     ----------
     run : SliceRun
         The run.
-    form : str or bytes
-        File format.
-    encode : callable
-        Encodes a layer.
+    form : str
+        Name of the format.
 
     Raises
     ------
     SharedError
         For a shard that does not write the output, when its ranges are made.
-    Encoding
-        If the run asks.
     """
-    pool: Any = run.work.cluster
-    if isinstance(pool, Asking):
-        raise Encoding(run, _key(run, form), encode)
+    pool = run.work.cluster
     if isinstance(pool, Shard) and not pool.first:
         count = pool.share(_tasks(run, form, 0), run.work)
         raise SharedError(f"{count} ranges of layers are made; shard 1 writes the file")
 
 
-def encoded_layers(run: SliceRun, form: str | bytes, encode: Encode, start: int) -> Iterator[bytes]:
+def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iterator[bytes]:
     """Encoded layers of a run in order, made by threads here or by the pool of its work.
 
     Parameters
     ----------
     run : SliceRun
         The run.
-    form : str or bytes
-        File format.
+    form : str
+        Name of the format.
     encode : callable
         Encodes a layer.
     start : int
@@ -170,20 +147,30 @@ def encoded_layers(run: SliceRun, form: str | bytes, encode: Encode, start: int)
         for index, layer in enumerate(Journal(io.BytesIO(data), task.end - task.first), task.first):
             if index >= start:
                 yield layer
-    pool.finished(_key(run, form))
+    pool.finished(run.key(form))
 
 
-def _key(run: SliceRun, form: str | bytes) -> str:
-    """Key of the encoded layers of a run; files of other formats may name theirs alike."""
-    return key(run.recipe.form if run.recipe else "", run.key(form))
+def range_size(run: SliceRun) -> int:
+    """Layers of a range, the same for any number of workers.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The run.
+
+    Returns
+    -------
+    int
+        Whole slabs.
+    """
+    return max(SLAB, min(PIXELS // max(run.stack.shape), run.layers // MOST) // SLAB * SLAB)
 
 
-def _tasks(run: SliceRun, form: str | bytes, start: int) -> list[RangeTask]:
+def _tasks(run: SliceRun, form: str, start: int) -> list[RangeTask]:
     """Ranges of layers from the one of `start` on, the same for any number of workers."""
     if run.recipe is None:
         raise ExportError("a cluster needs the scene of the layers; these are planned by hand")
-    size = max(SLAB, min(PIXELS // max(run.stack.shape), run.layers // MOST) // SLAB * SLAB)
-    job = _key(run, form)
+    size, job = range_size(run), run.key(form)
     return [
         RangeTask(run.recipe, job, first, min(first + size, run.layers))
         for first in range(start // size * size, run.layers, size)
@@ -193,17 +180,13 @@ def _tasks(run: SliceRun, form: str | bytes, start: int) -> list[RangeTask]:
 _PLANNING = threading.Lock()
 
 
-def _planned(recipe: Recipe) -> Encoding:
-    """The run of a recipe and its encoding, planned once in a process."""
+def _planned(recipe: Recipe) -> tuple[SliceRun, Encode, str]:
+    """The run of a recipe, how its layers are encoded, and their key, planned once in a process."""
     with _PLANNING:
         return _kept(recipe)
 
 
 @lru_cache(maxsize=2)
-def _kept(recipe: Recipe) -> Encoding:
+def _kept(recipe: Recipe) -> tuple[SliceRun, Encode, str]:
     run = recipe.run(Work(threads=1))
-    try:
-        recipe.write(replace(run, work=replace(run.work, cluster=Asking())))  # type: ignore[arg-type]
-    except Encoding as encoding:
-        return encoding
-    raise ExportError("this format has no layers of its own")
+    return run, recipe.encoder(run), run.key(recipe.form)

@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from fracslice.errors import ExportError
-from fracslice.export import anycubic, archives, chitu, goo, outlines, pictures, slices3mf
+from fracslice.export import anycubic, archives, chitu, goo, outlines, png, slices3mf
 from fracslice.export.jobs import SliceRun
+from fracslice.export.layerformats import FolderFormat, LayerFormat
 from fracslice.files import check_target
 from fracslice.slicing.printers import Printer
 
-PRINTS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
-    "sl1": archives.write_sl1,
-    "goo": goo.write_goo,
-    "ctb": chitu.write_ctb,
-    "cbddlp": chitu.write_cbddlp,
-    "pwmx": anycubic.write_photon,
-    "nanodlp": archives.write_nanodlp,
-}
+PRINTS = {form.name: form for form in (*archives.FORMATS, goo.FORMAT, *chitu.FORMATS, anycubic.FORMAT)}
 """Formats of printers; they need a printer and a resin."""
 
-FORMATS: dict[str, Callable[[SliceRun, str | Path], Path]] = {
-    "png": pictures.write_folder,
+PNG = FolderFormat("png", png.encode_layer, png.is_whole, lambda run: {"manifest.json": run.describe()})
+FORMATS: dict[str, LayerFormat] = {
+    "png": PNG,
     **PRINTS,
-    "3mf": slices3mf.write_3mf,
-    **outlines.WRITERS,
+    "3mf": slices3mf.FORMAT,
+    **{form.name: form for form in outlines.FORMATS},
 }
 PICTURES = {"png", *PRINTS}
-FOLDERS = {"png", "svg"}
+FOLDERS = {name for name, form in FORMATS.items() if isinstance(form, FolderFormat)}
 PHOTON = "pwmx pwmo pwms pmsq pwma pwmb pmx2 pm3 pm3m pm3r dlp dl2p pw0 pwx"
 """Extensions of one format, one for each model."""
 
@@ -141,4 +135,5 @@ def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Pa
     form = slice_format(path, name)
     if run.sections > 1 and form not in PICTURES:
         raise ExportError(f"{path}: contours are of one section per layer")
-    return FORMATS[form](run, path)
+    FORMATS[form].write(run, Path(path))
+    return Path(path)

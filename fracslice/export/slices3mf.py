@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import chain
-from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from fracslice.errors import ExportError
 from fracslice.export.jobs import SliceRun
+from fracslice.export.layerformats import FileFormat
+from fracslice.export.ranges import Encode
 from fracslice.export.text import rows
 from fracslice.export.threemf import mesh_element, package
-from fracslice.files import replacing
 from fracslice.slicing import Layer
 
 LEVEL = 1
@@ -30,37 +32,23 @@ BUILD = (
 """Tail of the model. Objects are centred; coordinates of the build must not be negative."""
 
 
-def write_3mf(run: SliceRun, path: str | Path) -> Path:
-    """Write the slice stack of an object, streamed, and its mesh for programs that do not read slices.
+class SlicesAndMesh(FileFormat):
+    """The slice stack of an object, and its mesh for programs that do not read slices."""
 
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write, with a mesh.
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ExportError
-        Without a mesh, or for an error of the file system.
-    """
-    if run.mesh is None:
-        raise ExportError(f"{path}: a 3MF file needs the mesh of the object")
-    with run.encoded(path, "3mf", _slice) as layers:
-        middle = np.array(run.stack.shape[::-1]) * run.stack.pixel / 2
-        build, mesh = BUILD.format(*middle).encode(), run.mesh()
-        model = chain([HEAD.encode()], layers, [OBJECT.encode()], mesh_element(mesh), [build])
-        with replacing(path) as file:
-            package(file, model, run.layers > 1000, LEVEL)
-    return Path(path)
+    def encoder(self, run: SliceRun) -> Encode:
+        if run.mesh is None:
+            raise ExportError("a 3MF file needs the mesh of the object")
+        return super().encoder(run)
 
 
-def _slice(layer: Layer) -> bytes:
+def _assemble(run: SliceRun, layers: Iterable[bytes], file: BinaryIO) -> None:
+    assert run.mesh
+    middle = np.array(run.stack.shape[::-1]) * run.stack.pixel / 2
+    build, mesh = BUILD.format(*middle).encode(), mesh_element(run.mesh())
+    package(file, chain([HEAD.encode()], layers, [OBJECT.encode()], mesh, [build]), run.layers > 1000, LEVEL)
+
+
+def _slice(_: SliceRun, layer: Layer) -> bytes:
     rings = layer.contours
     texts = [f'<s:slice ztop="{layer.top:.6f}">\n'.encode()]
     if len(rings):
@@ -74,3 +62,6 @@ def _slice(layer: Layer) -> bytes:
             b"</s:polygon>\n",
         ]
     return b"".join([*texts, b"</s:slice>\n"])
+
+
+FORMAT = SlicesAndMesh("3mf", _slice, _assemble)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import BinaryIO
 
 import numpy as np
@@ -72,12 +73,38 @@ def write_blocks(blocks: Iterable[bytes | memoryview], file: BinaryIO, metadata:
     ExportError
         For more than 4294967295 triangles.
     """
+
+    def written(block: bytes | memoryview, file: BinaryIO) -> int:
+        file.write(block)
+        return memoryview(block).nbytes
+
+    concatenate((partial(written, block) for block in blocks), file, metadata)
+
+
+def concatenate(
+    blocks: Iterable[Callable[[BinaryIO], int]], file: BinaryIO, metadata: Mapping[str, str]
+) -> None:
+    """Write a mesh from functions that append encoded triangles.
+
+    Parameters
+    ----------
+    blocks : iterable of callable
+        Appends triangles of 50 bytes to the file; returns the number of bytes.
+    file : file
+        Binary file, open for writing and able to seek.
+    metadata : mapping of str to str
+        Names and values; the header holds Application.
+
+    Raises
+    ------
+    ExportError
+        For more than 4294967295 triangles.
+    """
     start, count = file.tell(), 0
     header = f"binary STL, units: mm, {metadata['Application']}".encode("ascii", "replace")
     file.write(header[:80].ljust(80) + bytes(4))
     for block in blocks:
-        file.write(block)
-        count += memoryview(block).nbytes // TRIANGLE
+        count += block(file) // TRIANGLE
         if count >= 2**32:
             raise ExportError("STL cannot hold more than 4294967295 triangles")
     file.seek(start + 80)

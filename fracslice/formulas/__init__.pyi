@@ -250,7 +250,7 @@ def cells(keep: float | Sequence[int] = (1, 2, 3), level: int = 3) -> Node:
     Parameters
     ----------
     keep : 1 or 2 or 3 whole numbers >= 0 and <= 3, default (1, 2, 3)
-        cells kept, by how many of their coordinates are in the middle third: 0 at a corner, 1 at an edge, 2 at a face, 3 at the centre
+        cells kept: 0 at a corner, 1 at an edge, 2 at a face, 3 at the centre
     level : a whole number from 0 to 20, default 3
         how often every cell is cut into 27
 
@@ -541,7 +541,7 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
     """
 
 def kifs_dodecahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
-    """The dodecahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
+    """The dodecahedron in a kaleidoscope (Knighty 2010). L = 1.
 
     Parameters
     ----------
@@ -562,7 +562,7 @@ def kifs_dodecahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[
     """
 
 def kifs_icosahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
-    """The icosahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
+    """The icosahedron in a kaleidoscope (Knighty 2010). L = 1.
 
     Parameters
     ----------
@@ -583,7 +583,7 @@ def kifs_icosahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[i
     """
 
 def kifs_octahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
-    """The octahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
+    """The octahedron in a kaleidoscope (Knighty 2010). L = 1.
 
     Parameters
     ----------
@@ -604,7 +604,7 @@ def kifs_octahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[in
     """
 
 def kifs_tetrahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
-    """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 2 is measured.
+    """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 1.
 
     Parameters
     ----------
@@ -646,11 +646,12 @@ def koch(radius: float = 1.0, height: float = 0.5, level: int = 4) -> Node:
 
 def lambda_bulb(power: float = 4.0, factor: float = 1.1, angle: float = 30.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The filled Julia set of lambda (w - w^n) in the triplex numbers, after the logistic map (May 1976,
-    "Simple mathematical models with very complicated dynamics"). L = 2 is measured.
+    "Simple mathematical models with very complicated dynamics"). L = 2 is measured for powers up to 12, L = 3
+    beyond.
 
     Parameters
     ----------
-    power : a number >= 2 and <= 8, default 4.0
+    power : a number >= 2 and <= 16, default 4.0
         the exponent
     factor : a number > 0 and <= 4, default 1.1
         size of lambda
@@ -748,6 +749,9 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
 def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', texture: float | None = None, tile: float = 1.0, repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, roughness: float = 0.0, vary: float = 0.0, coat: float = 0.0, metallic: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """The appearance of the element in pictures. A material nested deeper takes precedence.
 
+    A palette shows the smallest distance of the orbit to the origin (point), to the axes, to the coordinate
+    planes or to the unit sphere, its number of steps, or its last angle about the z axis (direction).
+
     The field is that of the element: L = the element's.
 
     Parameters
@@ -759,7 +763,7 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette
     palette : colours, viridis, plasma, inferno, magma, cividis or twilight, default 'colours'
         a palette by name in place of the colours
     trap : point, axes, planes, sphere, steps or direction, default 'point'
-        property of the orbit that the palette shows: its smallest distance to the origin, to the axes, to the coordinate planes or the unit sphere, its number of steps, or its last angle about the z axis
+        property of the orbit that the palette shows
     texture : the name of a file
         a picture that multiplies the colour, seen along the three axes
     tile : a number > 0, default 1.0

@@ -43,12 +43,27 @@ class Box:
 
     @classmethod
     def everywhere(cls) -> Box:
-        """Box of all space."""
+        """Box of all space.
+
+        Returns
+        -------
+        Box
+        """
         return cls.centred(math.inf)
 
     @classmethod
     def around(cls, points: Iterable[Triple]) -> Box:
-        """Bounding box of points."""
+        """Bounding box of points.
+
+        Parameters
+        ----------
+        points : iterable of (float, float, float)
+            At least one point.
+
+        Returns
+        -------
+        Box
+        """
         axes = list(zip(*points, strict=True))
         return cls(_triple(min(a) for a in axes), _triple(max(a) for a in axes))
 
@@ -88,7 +103,17 @@ class Box:
         return Box(_triple(map(max, self.lo, other.lo)), _triple(map(min, self.hi, other.hi)))
 
     def grown(self, by: float) -> Box:
-        """Box with every face moved outwards by a distance."""
+        """Box with every face moved outwards.
+
+        Parameters
+        ----------
+        by : float
+            Distance, scene units; negative to move the faces inwards.
+
+        Returns
+        -------
+        Box
+        """
         return Box(_triple(a - by for a in self.lo), _triple(b + by for b in self.hi))
 
     def about(self, middle: Triple) -> Box:

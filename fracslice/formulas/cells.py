@@ -13,8 +13,7 @@ from .vocabulary import absolute, floor, maximum, minimum, orbit
 @shape(
     keep=Vector(
         (1, 2, 3),
-        "cells kept, by how many of their coordinates are in the middle third: 0 at a corner, 1 at an edge, "
-        "2 at a face, 3 at the centre",
+        "cells kept: 0 at a corner, 1 at an edge, 2 at a face, 3 at the centre",
         sizes=(1, 2, 3),
         least=0,
         most=3,

@@ -22,8 +22,7 @@ TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
     palette=Choice(OWN, "a palette by name in place of the colours", (OWN, *PALETTES)),
     trap=Choice(
         "point",
-        "property of the orbit that the palette shows: its smallest distance to the origin, to the axes, to "
-        "the coordinate planes or the unit sphere, its number of steps, or its last angle about the z axis",
+        "property of the orbit that the palette shows",
         TRAPS,
     ),
     texture=File(None, "a picture that multiplies the colour, seen along the three axes"),
@@ -50,6 +49,9 @@ TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
 )
 def material(child, x, y, z):  # type: ignore[no-untyped-def]
     """The appearance of the element in pictures. A material nested deeper takes precedence.
+
+    A palette shows the smallest distance of the orbit to the origin (point), to the axes, to the coordinate
+    planes or to the unit sphere, its number of steps, or its last angle about the z axis (direction).
 
     The field is that of the element: L = the element's.
     """

@@ -65,7 +65,12 @@ class Node(Operators, Field):
         return _restored, (self.formula, dict(self.values), self.children, self.place, self.is_conservative)
 
     def walk(self) -> Iterator[Node]:
-        """Iterate over this node and all below it, parents first."""
+        """Iterate over this node and all below it, parents first.
+
+        Yields
+        ------
+        Node
+        """
         left = [self]
         while left:
             node = left.pop()
@@ -78,7 +83,12 @@ class Node(Operators, Field):
         return () if self.formula.kind == "shape" else self.children
 
     def solids(self) -> Iterator[Node]:
-        """Iterate over this node and all fields below it, parents first."""
+        """Iterate over this node and all fields below it, parents first.
+
+        Yields
+        ------
+        Node
+        """
         left = [self]
         while left:
             node = left.pop()
@@ -155,33 +165,28 @@ class Node(Operators, Field):
 
     @property
     def tree(self) -> Node:
-        """See `Field.tree`."""
         return self
 
     @property
     def escape_time_only(self) -> bool:
-        """See `Field.escape_time_only`."""
         shapes = (node for node in self.solids() if node.formula.kind == "shape")
         return all(shape._hooked("potential", shape.formula.exterior_only) for shape in shapes)
 
     @property
     def key(self) -> str:
-        """See `Field.key`. All depths must be resolved, as for kernels and loops."""
+        # all depths must be resolved, as for kernels and loops
         text: str = provider("compiler").key(self)
         return text
 
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
-        """See `Field.kernel`."""
         kernel: Kernel = provider("compiler").kernel(self, device, precision)
         return kernel
 
     def cells(self, precision: Precision = "float32") -> Cells | None:
-        """See `Field.cells`."""
         cells: Cells = provider("compiler").cells(self, precision)
         return cells
 
     def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
-        """See `Field.loops`."""
         linked: Loops = provider("compiler").loops(self, loops, precision, device)
         return linked
 
@@ -229,7 +234,6 @@ class Node(Operators, Field):
 
     @property
     def proved_box(self) -> Box:
-        """See `Field.proved_box`."""
         return self._boxed().bounds.box
 
     def _boxed(self) -> Node:

@@ -68,7 +68,7 @@ class Parameter(ABC):
         return self.check(text.strip())
 
     def text(self, value: Any) -> str:
-        """Format a value."""
+        """Format a value as text for `read`; see `read`."""
         return str(value)
 
 

@@ -296,5 +296,11 @@ def get(name: str) -> Formula:
 
 
 def names() -> list[str]:
-    """Names of all formulas, sorted."""
+    """Names of all formulas.
+
+    Returns
+    -------
+    list of str
+        Sorted.
+    """
     return sorted(_REGISTRY)

@@ -112,10 +112,27 @@ def docstring(formula: Formula) -> str:
         lines += ["", "Parameters", "----------"]
     if formula.children[1] != 0:
         lines += ["*elements : Node", f"    {_ELEMENTS[formula.children[1] == 1]}"]
-    for name, parameter in ordered(formula).items():
+    return "\n".join([*lines, *parameter_lines(ordered(formula)), "", "Returns", "-------", "Node"])
+
+
+def parameter_lines(parameters: Mapping[str, Any]) -> list[str]:
+    """Describe parameters in numpydoc style.
+
+    Parameters
+    ----------
+    parameters : mapping of str to Parameter
+        Kinds by name.
+
+    Returns
+    -------
+    list of str
+        Lines of a section.
+    """
+    lines = []
+    for name, parameter in parameters.items():
         default = "" if parameter.default in (REQUIRED, None) else f", default {parameter.default!r}"
         lines += [f"{python_name(name)} : {parameter.expects}{default}", f"    {parameter.doc}"]
-    return "\n".join([*lines, "", "Returns", "-------", "Node"])
+    return lines
 
 
 _ELEMENTS = {True: "What it is applied to; several are a union.", False: "What it is made of."}

@@ -26,18 +26,52 @@ absolute = np.abs
 
 
 def any_of(mask: np.ndarray) -> bool:
-    """True if the condition holds at any point: the only way for points to affect control flow."""
+    """Whether a condition holds at any point: the only way for points to affect control flow.
+
+    Parameters
+    ----------
+    mask
+        Condition at each point.
+
+    Returns
+    -------
+    bool
+    """
     return bool(np.any(mask))
 
 
 def rsqrt(a: np.ndarray) -> np.ndarray:
-    """1/sqrt(a) of a positive, finite argument; SIMD units have an instruction for it."""
+    """Reciprocal square root; SIMD units have an instruction for it.
+
+    Parameters
+    ----------
+    a
+        Positive, finite numbers.
+
+    Returns
+    -------
+    ndarray
+        1/sqrt(a).
+    """
     result: np.ndarray = 1.0 / np.sqrt(a)
     return result
 
 
 def ratio(a: np.ndarray | float, b: np.ndarray) -> np.ndarray:
-    """a/b for a normal, finite b whose inverse is normal, too; GPUs have an instruction for the inverse."""
+    """Quotient; GPUs have an instruction for the reciprocal.
+
+    Parameters
+    ----------
+    a
+        Dividend.
+    b
+        Divisor: normal, finite numbers whose reciprocal is normal, too.
+
+    Returns
+    -------
+    ndarray
+        a/b.
+    """
     result: np.ndarray = a / b
     return result
 

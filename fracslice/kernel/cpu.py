@@ -55,18 +55,6 @@ class CpuKernel(Kernel):
         return self._points, self._parameters
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Evaluate the field at points.
-
-        Parameters
-        ----------
-        x, y, z
-            Coordinates in scene units: arrays of one shape, of any float type.
-
-        Returns
-        -------
-        ndarray
-            Values of that shape in the kernel's dtype; NaN at a point with a NaN.
-        """
         shape, n = np.shape(x), np.size(x)
         padded = -(-max(n, 1) // self.width) * self.width
         coordinates = np.empty((4, padded), self.dtype)
@@ -80,17 +68,6 @@ class CpuKernel(Kernel):
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """Evaluate the field on bricks of 8 x 8 x 8 grid points.
-
-        Parameters
-        ----------
-        corners
-            Grid index of the first sample of each brick, int32 [n, 3], C-contiguous.
-        origin, voxel
-            Position of grid point (0, 0, 0) and grid spacing, scene units.
-        out
-            Receives the values, [n, 512] of the kernel's dtype, C-contiguous.
-        """
         assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
         frame = np.array([*origin, voxel], self.dtype)
         self._bricks(self._parameters, frame, *self._offsets, corners, out, len(corners))

@@ -8,14 +8,11 @@ source text.
 from __future__ import annotations
 
 import math
-import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -23,11 +20,12 @@ import numpy as np
 
 from ..formulas.field import Kernel, Loops, Precision
 from ..formulas.registry import Node
-from ..keys import key, texts
+from ..keys import key
 from . import cuda_source
 from .cuda_driver import available as available
 from .cuda_driver import missing as missing
 from .cuda_driver import require as require
+from .cuda_driver import toolchain
 from .cuda_loops import bricks, points
 from .linker import Linked, link
 from .loops import Loop
@@ -80,18 +78,6 @@ class CudaKernel(Kernel):
         self._parameters = parameters(linked, precision)
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Evaluate the field at points.
-
-        Parameters
-        ----------
-        x, y, z
-            Coordinates in scene units: arrays of one shape, of any float type.
-
-        Returns
-        -------
-        ndarray
-            Values of that shape in the kernel's dtype; NaN at a point with a NaN.
-        """
         shape = np.shape(x)
         if np.size(x) == 0:
             return np.empty(shape, self.dtype)
@@ -108,19 +94,6 @@ class CudaKernel(Kernel):
     def bricks(
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
-        """Evaluate the field on bricks of 8 x 8 x 8 grid points.
-
-        Values can differ from those of `points` in the last place.
-
-        Parameters
-        ----------
-        corners
-            Grid index of the first sample of each brick, int32 [n, 3], C-contiguous.
-        origin, voxel
-            Position of grid point (0, 0, 0) and grid spacing, scene units.
-        out
-            Receives the values, [n, 512] of the kernel's dtype, C-contiguous.
-        """
         assert corners.dtype == np.int32 and corners.flags.c_contiguous and out.flags.c_contiguous
         assert out.dtype == self.dtype and out.shape == (len(corners), 512)
         if len(corners):
@@ -315,23 +288,5 @@ def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> M
     """
     require()
     text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)
-    name = f"cuda_{key(text, _toolchain())}"
+    name = f"cuda_{key(text, toolchain())}"
     return sys.modules.get(name) or imported(name, text)
-
-
-@lru_cache(maxsize=1)
-def _toolchain() -> str:
-    """Key of everything that the machine code depends on besides the module's own text."""
-    from importlib.metadata import version  # imports an e-mail parser
-
-    source = texts(Path(__file__).parent / "cuda_intrinsics.py")
-    versions = (version(name) for name in ("numba-cuda", "numba", "llvmlite"))
-    return key(source, *versions, *_numba_settings())
-
-
-def _numba_settings() -> list[str]:
-    """Numba's settings: its environment variables and its file in the current folder."""
-    settings = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
-    with suppress(OSError):
-        settings.append(repr(Path(".numba_config.yaml").read_bytes()))
-    return settings

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import os
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from ..errors import KernelError
 from ..extras import lacking
+from ..keys import key, texts
 
 NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
 """Message for a missing GPU or driver."""
@@ -65,3 +69,21 @@ def require() -> Any:
     from . import cuda_intrinsics
 
     return cuda_intrinsics.cuda
+
+
+@lru_cache(maxsize=1)
+def toolchain() -> str:
+    """Return the key of everything besides a module's own text that its machine code depends on."""
+    from importlib.metadata import version  # imports an e-mail parser
+
+    source = texts(Path(__file__).parent / "cuda_intrinsics.py")
+    versions = (version(name) for name in ("numba-cuda", "numba", "llvmlite"))
+    return key(source, *versions, *_numba_settings())
+
+
+def _numba_settings() -> list[str]:
+    """Numba's settings: its environment variables and its file in the current folder."""
+    settings = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
+    with suppress(OSError):
+        settings.append(repr(Path(".numba_config.yaml").read_bytes()))
+    return settings

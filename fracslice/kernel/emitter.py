@@ -18,10 +18,11 @@ from llvmlite import ir
 
 from ..errors import KernelError
 from .expressions import Expressions
+from .kinds import Kind, as_kind, joined, kind_of, made_of, parts_of, types_of
 from .parsing import parse_expression
 from .scalars import WHOLE, MismatchError, number
 from .syntax import assigned_names
-from .values import Kind, Lanes, Value, as_kind, joined, kind_of, made_of, parts_of, types_of
+from .values import Lanes, Value
 
 Names = dict[str, Value]
 
@@ -84,9 +85,7 @@ class Body(Expressions):
         self.name, self.tree = name, emitter.functions[name]
         self.returned: Kind = ()
         self.returns: list[tuple[Any, Value]] = []
-        self.exits: list[
-            list[tuple[Any, Names]]
-        ] = []  # exits of the loops around: a block and the names there
+        self.exits: list[list[tuple[Any, Names]]] = []  # of the loops around: a block and the names there
         self.blocks: dict[str, Any] = {}
 
     def written(self, kinds: Sequence[Kind], name: str) -> ir.Function:
@@ -163,9 +162,8 @@ class Body(Expressions):
             case ast.While(test):
                 return self.loop(node, (), lambda: self.condition(test))
             case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), limits), body):
-                return self.counted(
-                    node, counter, [number(self.builder, self.value(v), WHOLE) for v in limits]
-                )
+                ends = [number(self.builder, self.value(v), WHOLE) for v in limits]
+                return self.counted(node, counter, ends)
             case ast.Pass():
                 pass
             case _:

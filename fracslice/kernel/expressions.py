@@ -14,9 +14,11 @@ from llvmlite import ir
 
 from . import lanes_math
 from .intervals import Interval, Possible
+from .kinds import Kind, as_kind, joined, kind_of, made_of, parts_of, types_of
 from .registers import Vec
-from .scalars import BOOL, DOUBLE, WHOLE, MismatchError, common, compare, number, operate, truth, widened
-from .values import LANES, Kind, Lanes, Value, as_kind, is_mask, joined, kind_of, made_of, parts_of, types_of
+from .scalars import BOOL, DOUBLE, WHOLE, MismatchError, compare, number, operate, truth, widened
+from .special_intrinsics import SPECIAL, SpecialIntrinsics
+from .values import Value, is_mask
 
 if TYPE_CHECKING:
     from .emitter import Emitter
@@ -34,30 +36,12 @@ _INTRINSICS = {
     )
     for name in names
 }
-_OWN = {
-    "where": 3,
-    "any_of": 1,
-    "int": 1,
-    "min": 2,
-    "max": 2,
-    "load": 2,
-    "store": 3,
-    "around": 2,
-    "lower": 1,
-    "upper": 1,
-    "gather": 2,
-}
-"""Intrinsics with a method of their own, and their numbers of arguments."""
-
-_EXTREMES = {"min": ast.Lt(), "max": ast.Gt()}
 
 
-class Expressions:
+class Expressions(SpecialIntrinsics):
     """Emits the expressions of a function at its builder's position."""
 
     emitter: Emitter
-    lanes: Lanes
-    builder: Any
     names: dict[str, Value]
     blocks: dict[str, Any]
 
@@ -148,12 +132,6 @@ class Expressions:
             raise MismatchError("this is for numbers that are the same everywhere")
         return _ON_LANES[type(op)](*self.numbers(a, b))
 
-    def numbers(self, *values: Value) -> list[Value]:
-        """Values as lanes; as intervals if one of them is an interval."""
-        cells = any(isinstance(v, (Interval, Possible)) for v in values)
-        made = self.lanes.interval if cells else self.lanes.vec
-        return [made(self.builder, value) for value in values]
-
     def short(self, op: ast.boolop, a: Any, node: ast.expr) -> Any:
         """Emit ``and`` or ``or``; evaluate the second operand only if the first does not decide."""
 
@@ -184,10 +162,6 @@ class Expressions:
                 phi.add_incoming(part, block)
         return made_of(kind, phis, self.lanes, self.builder)
 
-    def address(self, place: Any, index: Value) -> Any:
-        """Emit the address of an array element."""
-        return self.builder.gep(place, [number(self.builder, index, WHOLE)])
-
     def element(self, place: Value, index: Value) -> Value:
         """Emit an access to an array element in memory or to a tuple element."""
         if not isinstance(place, tuple):
@@ -209,8 +183,8 @@ class Expressions:
         """Emit a call of a function or an intrinsic."""
         if name in self.emitter.functions:
             count = len(self.emitter.functions[name].args.args)
-        elif name in _INTRINSICS or name in _OWN:
-            count = _INTRINSICS[name][1] if name in _INTRINSICS else _OWN[name]
+        elif name in _INTRINSICS or name in SPECIAL:
+            count = _INTRINSICS[name][1] if name in _INTRINSICS else SPECIAL[name]
         else:
             raise MismatchError(f"{name!r} is no function")
         if len(given) != count:
@@ -232,92 +206,3 @@ class Expressions:
         count = len(types_of(kind, self.lanes))
         parts = [self.builder.extract_value(result, k) for k in range(count)]
         return made_of(kind, parts, self.lanes, self.builder)
-
-    # --- intrinsics that are not functions of lanes only ---
-    def intrinsic_where(self, mask: Value, yes: Value, no: Value) -> Value:
-        """Emit `where`."""
-        if any(isinstance(v, (Interval, Possible)) for v in (mask, yes, no)):
-            yes, no = (self.lanes.interval(self.builder, v) for v in (yes, no))
-            return self.lanes.possible(self.builder, mask).where(yes, no)
-        yes, no = (self.lanes.vec(self.builder, v) for v in (yes, no))
-        return self.lanes.condition(self.builder, mask).choose(yes, no)
-
-    def intrinsic_any_of(self, mask: Value) -> Any:
-        """Emit `any_of`: one bit test of the joined mask registers."""
-        if isinstance(mask, Possible):
-            return self.intrinsic_any_of(mask.may)
-        if not isinstance(mask, Vec):
-            return truth(self.builder, mask)
-        parts = self.lanes.condition(self.builder, mask).parts
-        word = ir.IntType(parts[0].type.count)
-        bits = reduce(self.builder.or_, [self.builder.bitcast(part, word) for part in parts])
-        return self.builder.icmp_unsigned("!=", bits, word(0))
-
-    def intrinsic_int(self, value: Value) -> Any:
-        """Emit a conversion to an integer."""
-        return number(self.builder, value, WHOLE)
-
-    def intrinsic_min(self, a: Value, b: Value) -> Any:
-        """Emit the minimum of two scalars."""
-        return self.extreme("min", a, b)
-
-    def intrinsic_max(self, a: Value, b: Value) -> Any:
-        """Emit the maximum of two scalars."""
-        return self.extreme("max", a, b)
-
-    def extreme(self, which: str, a: Any, b: Any) -> Any:
-        """Emit the minimum or maximum of two scalars."""
-        if any(isinstance(v, (Vec, tuple)) for v in (a, b)):
-            raise MismatchError("this is for numbers that are the same everywhere")
-        kind = common(a.type, b.type)
-        a, b = number(self.builder, a, kind), number(self.builder, b, kind)
-        return self.builder.select(compare(self.builder, _EXTREMES[which], b, a), b, a)
-
-    def intrinsic_around(self, centre: Value, half: Value) -> Interval:
-        """Emit the interval around a centre."""
-        middle, reach = self.numbers(centre, half)
-        of = LANES[self.lanes.bits]
-        return Interval(middle - reach, middle + reach, of).outward()
-
-    def intrinsic_lower(self, value: Value) -> Vec:
-        """Emit the lower bound of an interval."""
-        end: Vec = self.lanes.interval(self.builder, value).lo
-        return end
-
-    def intrinsic_upper(self, value: Value) -> Vec:
-        """Emit the upper bound of an interval."""
-        end: Vec = self.lanes.interval(self.builder, value).hi
-        return end
-
-    def intrinsic_load(self, place: Any, index: Value) -> Vec:
-        """Load lanes from memory."""
-        align = self.lanes.bits // 8
-        return Vec(
-            self.builder,
-            tuple(self.builder.load(a, align=align) for a in self.registers(place, index)),
-        )
-
-    def intrinsic_store(self, place: Any, index: Value, value: Value) -> None:
-        """Store lanes to memory."""
-        parts = self.lanes.vec(self.builder, value).parts
-        for address, part in zip(self.registers(place, index), parts, strict=True):
-            self.builder.store(part, address, align=self.lanes.bits // 8)
-
-    def intrinsic_gather(self, index: Value, place: Any) -> Vec:
-        """Load an element from memory for each lane."""
-        like = self.lanes.register
-        parts = []
-        for register in self.lanes.vec(self.builder, index).to_whole().parts:
-            loaded = ir.Constant(like, ir.Undefined)
-            for k in range(like.count):
-                lane = ir.Constant(ir.IntType(32), k)
-                address = self.builder.gep(place, [self.builder.extract_element(register, lane)])
-                loaded = self.builder.insert_element(loaded, self.builder.load(address), lane)
-            parts.append(loaded)
-        return Vec(self.builder, tuple(parts))
-
-    def registers(self, place: Any, index: Value) -> list[Any]:
-        """Addresses of the registers of lanes, starting at an array element."""
-        first, kind = self.address(place, index), self.lanes.register
-        steps = (ir.Constant(WHOLE, k * kind.count) for k in range(self.lanes.registers))
-        return [self.builder.bitcast(self.builder.gep(first, [step]), kind.as_pointer()) for step in steps]

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import BinaryIO
 
+from ..cachefiles import Kept
 from ..errors import ExportError
-from ..files import Kept
 from ..keys import key
 
 DIGEST = hashlib.sha256().digest_size

@@ -14,8 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import BinaryIO
 
+from ..cachefiles import Kept
 from ..errors import ExportError
-from ..files import Kept
 from .objects import cache_folder
 
 

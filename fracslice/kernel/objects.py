@@ -12,8 +12,8 @@ from typing import BinaryIO
 
 import llvmlite
 
+from ..cachefiles import Kept, users_folder
 from ..errors import ExportError
-from ..files import Kept, users_folder
 from ..formulas import vocabulary
 from ..keys import key, texts
 from .host import REGISTERS, host

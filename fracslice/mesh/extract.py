@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
 
-import numpy as np
-
-from ..errors import MeshError
 from ..kernel import Field
 from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
-from ..volume.lattice import BRICK
 from ..work import Work
-from .crossings import Refiner
+from .contouring import Piece, SurfaceContours, called, layers, placement
 from .model import Mesh
-from .projection import TrustRegions, project
-
-if TYPE_CHECKING:
-    from .._native import Cells
 
 
 def extract(bricks: Bricks, threads: int = 0) -> Mesh:
@@ -49,8 +38,8 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
     """
     from .._native import marching_cubes
 
-    vertices, triangles = _called(
-        marching_cubes, bricks.ijk, bricks.values, bricks.index, *_placement(bricks), threads
+    vertices, triangles = called(
+        marching_cubes, bricks.ijk, bricks.values, bricks.index, *placement(bricks), threads
     )
     return Mesh(vertices, triangles)
 
@@ -95,22 +84,6 @@ def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) 
     return Mesh(arrays["vertices"], arrays["triangles"])
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """Part of a surface in some layers of bricks.
-
-    Attributes
-    ----------
-    mesh : Mesh
-        Triangles, scene units; open at the seams. Adjacent pieces have bitwise equal points at their seam.
-    end : float
-        x at which the piece ends; infinite for the last one.
-    """
-
-    mesh: Mesh
-    end: float
-
-
 def contour_pieces(
     root: Field, bricks: Bricks | SignBricks, work: Work | None = None, most: int = 1 << 14
 ) -> Iterator[Piece]:
@@ -142,179 +115,3 @@ def contour_pieces(
     refiner = made.refiner(work)
     for first, last in layers(made.signs, most):
         yield made.piece(first, last, refiner, work)
-
-
-class SurfaceContours:
-    """Pieces of the exact surface of a scene, in any order.
-
-    Parameters
-    ----------
-    root : Field
-        Field that `signs` were sampled from.
-    signs : SignBricks
-        Samples, scene units.
-    threads : int
-        Threads; 0 for all cores.
-
-    Raises
-    ------
-    MeshError
-        If the surface leaves the samples.
-    """
-
-    def __init__(self, root: Field, signs: SignBricks, threads: int) -> None:
-        from .._native import Cells
-
-        self.root, self.signs = root, signs
-        self._cells = _called(Cells, signs.ijk, signs.signs, signs.index, threads)
-        self._placement = _placement(signs)
-
-    def refiner(self, work: Work) -> Refiner:
-        """Return a root finder for pieces by ascending x.
-
-        Parameters
-        ----------
-        work : Work
-            Threads and cancellation.
-
-        Returns
-        -------
-        Refiner
-            Root finder without roots.
-        """
-        origin, voxel, _ = self._placement
-        return Refiner(self.root, self._cells, origin, voxel, work)
-
-    def piece(self, first: int, last: int, refiner: Refiner, work: Work) -> Piece:
-        """Contour some layers of bricks.
-
-        Parameters
-        ----------
-        first, last : int
-            Layers, last excluded; see `layers`.
-        refiner : Refiner
-            Root finder; one that made the piece before has the roots at the seam.
-        work : Work
-            Threads and cancellation.
-
-        Returns
-        -------
-        Piece
-            Bitwise the same for any refiner.
-
-        Raises
-        ------
-        MeshError, Cancelled
-            As `contour`.
-        """
-        from .._native import Contouring
-
-        cells, signs = self._cells, self.signs
-        surface = Contouring(cells, first, last, *self._placement)
-        for begin, end in _batches(cells, first - 1, last + 1, work.threads << 16):
-            known = refiner.between(*map(cells.crossings_before, (min(begin, last - 1), end + 1)))
-            _called(surface.advance, end, known.first, known.t, known.normals)
-        vertices, triangles, count, cases, to_means = surface.finish()
-        features = vertices[count:]
-        regions = partial(_trust_regions, (features, cases, to_means), self._placement)
-        project(self.root, features, regions, signs.voxel, work)
-        mesh, border = Mesh(vertices, triangles), np.inf
-        if last < len(signs.index):  # Unused vertices belong to the next piece.
-            mesh = mesh.compact()
-            border = signs.origin[0] + signs.voxel * BRICK * last
-        return Piece(mesh, border)
-
-
-def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[int, int]]:
-    """Split layers first to last - 1 into ranges (begin, end), end excluded, of at least `least` crossings,
-    so that the crossings of a range are still in the cache when used.
-    """
-    begin = first
-    for end in range(first + 1, last + 1):
-        if end == last or cells.crossings_before(end) - cells.crossings_before(begin) >= least:
-            yield begin, end
-            begin = end
-
-
-def layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
-    """Split layers of bricks into pieces.
-
-    Parameters
-    ----------
-    bricks : SignBricks
-        Samples.
-    most : int
-        Approximate bricks per piece.
-
-    Returns
-    -------
-    list of tuple of int
-        First and last layer, last excluded. The pieces at both ends include the layer beside the samples,
-        which may have cells of the surface.
-    """
-    counts = np.bincount(bricks.ijk[:, 0] // BRICK, minlength=bricks.index.shape[0])
-    cuts, size = [-1], 0
-    for layer, count in enumerate(counts):
-        if size and size + count > most:
-            cuts.append(layer)
-            size = 0
-        size += count
-    return list(zip(cuts, [*cuts[1:], len(counts)], strict=True))
-
-
-def _trust_regions(
-    features: tuple[np.ndarray, np.ndarray, np.ndarray],
-    placement: tuple[tuple[float, float, float], float, float],
-    which: np.ndarray,
-    inside: np.ndarray,
-) -> TrustRegions:
-    """Trust regions of feature vertices."""
-    from .._native import trust_regions
-
-    return TrustRegions(*trust_regions(*features, which, inside, *placement))
-
-
-def _placement(bricks: Bricks | SignBricks) -> tuple[tuple[float, float, float], float, float]:
-    """Origin, voxel and minimum edge parameter as plain numbers."""
-    x, y, z = bricks.origin
-    return (float(x), float(y), float(z)), float(bricks.voxel), minimum_edge_parameter(bricks)
-
-
-def minimum_edge_parameter(bricks: Bricks | SignBricks) -> float:
-    """Minimum distance of a vertex from a grid point, in voxels, that keeps vertices distinct in float32.
-
-    Vertices of one cell differ by at least this distance along some axis; four float32 steps survive any
-    rounding.
-
-    Parameters
-    ----------
-    bricks : Bricks or SignBricks
-        Samples.
-
-    Returns
-    -------
-    float
-        Minimum edge parameter.
-
-    Raises
-    ------
-    MeshError
-        If the voxel is too fine for float32 coordinates.
-    """
-    low = np.asarray(bricks.origin, dtype=np.float64)
-    high = low + bricks.voxel * 8 * np.asarray(bricks.index.shape)
-    extent = np.float32(max(np.abs(low).max(), np.abs(high).max()))
-    share = max(1e-4, 4 * float(np.spacing(extent)) / bricks.voxel)
-    if share >= 0.5:
-        raise MeshError(
-            f"a voxel of {bricks.voxel:g} at a distance of {extent:g} is too fine for float32 coordinates"
-        )
-    return share
-
-
-def _called(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a native function; its `ValueError` becomes a `MeshError`."""
-    try:
-        return function(*arguments)
-    except ValueError as error:
-        raise MeshError(f"cannot mesh the samples: {error}") from None

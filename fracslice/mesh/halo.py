@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +78,48 @@ class Finished:
         return vertices if self.counted.all() else vertices[self.counted]
 
 
+class Strip(NamedTuple):
+    """Some triangles of a mesh.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The triangles and their vertices.
+    numbers : ndarray of int64, shape (n,)
+        Indices of the vertices in the mesh, ascending.
+    rows : ndarray of int64, shape (k,)
+        Indices of the triangles, ascending.
+    """
+
+    mesh: Mesh
+    numbers: NDArray[np.int64]
+    rows: NDArray[np.int64]
+
+
+def strip(mesh: Mesh, vertices: NDArray[np.bool_], threads: int = 0) -> Strip:
+    """Triangles that use some vertices.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    vertices : ndarray of bool, shape (n,)
+        The vertices.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Returns
+    -------
+    Strip
+        The triangles.
+    """
+    rows = touching(mesh.triangles, vertices, threads)
+    triangles, used = mesh.triangles[rows], np.zeros(len(mesh.vertices), bool)
+    used[triangles] = True
+    numbers, place = np.flatnonzero(used), np.cumsum(used, dtype=np.int32) - 1
+    return Strip(Mesh(mesh.vertices[numbers], place[triangles]), numbers, rows)
+
+
 @dataclass(frozen=True, eq=False)
 class SelectedPiece:
     """A piece with the choice of its bodies.
@@ -108,14 +151,11 @@ class SelectedPiece:
         Returns
         -------
         SelectedPiece
-            The triangles, with all vertices of the piece; unused ones do not stay.
+            The triangles and their vertices.
         """
-        rows = touching(self.mesh.triangles, vertices, threads)
-        triangles = self.mesh.triangles[rows]
-        used = np.zeros(len(self.keep), bool)
-        used[triangles] = True
-        fresh = np.flatnonzero(np.isin(rows, self.fresh))
-        return SelectedPiece(Mesh(self.mesh.vertices, triangles), self.keep & used, fresh)
+        part = strip(self.mesh, vertices, threads)
+        fresh = np.flatnonzero(np.isin(part.rows, self.fresh))
+        return SelectedPiece(part.mesh, self.keep[part.numbers], fresh)
 
     def then(self, other: SelectedPiece, seam: float, near: float) -> SelectedPiece:
         """Join the next piece; the triangles of this one come first.
@@ -178,12 +218,12 @@ def finished_piece(
     """
     (start, end), whole, first, last = ends, piece, 0, len(piece.mesh.triangles)
     if before is not None:
-        strip = before.near(before.mesh.vertices[:, 0] > start - WAITS * voxel, threads)
-        first, last = (n + len(strip.mesh.triangles) for n in (first, last))
-        whole = strip.then(whole, start, voxel / 2)
+        beside = before.near(before.mesh.vertices[:, 0] > start - WAITS * voxel, threads)
+        first, last = (n + len(beside.mesh.triangles) for n in (first, last))
+        whole = beside.then(whole, start, voxel / 2)
     if after is not None:
-        strip = after.near(after.mesh.vertices[:, 0] < end + WAITS * voxel, threads)
-        whole = whole.then(strip, end, voxel / 2)
+        beside = after.near(after.mesh.vertices[:, 0] < end + WAITS * voxel, threads)
+        whole = whole.then(beside, end, voxel / 2)
     between = start - MENDS * voxel, end + MENDS * voxel
     mesh, keep = whole.mesh, whole.keep
     final, suspects, edits = cleaned(

@@ -47,7 +47,12 @@ def surface_to_mesh(
     Cancelled
         If the work is cancelled.
     """
-    return scale * distances(pieces, surface_samples(planned, work), planned.voxel, work)
+
+    def search(points: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+        return nearest(pieces(), points, reach, work)
+
+    points, voxel = surface_samples(planned, work), planned.voxel
+    return scale * distances(search, points, voxel, search(points, NEARBY * voxel))
 
 
 def surface_samples(planned: Plan, work: Work) -> NDArray[np.float64]:
@@ -72,39 +77,36 @@ def surface_samples(planned: Plan, work: Work) -> NDArray[np.float64]:
 
 
 def distances(
-    pieces: Callable[[], Iterable[Mesh]], points: NDArray[np.float64], voxel: float, work: Work
+    search: Callable[[NDArray[np.float64], float], NDArray[np.float64]],
+    points: NDArray[np.float64],
+    voxel: float,
+    nearby: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Distances from points to a mesh.
 
-    Triangles near the points are searched; then, for points without a triangle nearby, those farther away.
+    For points without a triangle nearby, those farther away are searched.
 
     Parameters
     ----------
-    pieces : callable
-        Iterates over the pieces of the mesh; called repeatedly.
+    search : callable
+        Distances from points to the triangles within reach; see `nearest`.
     points : ndarray of float64, shape (n, 3)
         Points, in the units of the mesh.
     voxel : float
         Spacing of the samples that the mesh was made from.
-    work : Work
-        Threads and cancellation.
+    nearby : ndarray of float64, shape (n,)
+        Distances to the triangles within `NEARBY` voxels.
 
     Returns
     -------
     ndarray of float64, shape (n,)
         Distances.
-
-    Raises
-    ------
-    Cancelled
-        If the work is cancelled.
     """
-    result, far, reach = np.full(len(points), np.inf), np.arange(len(points)), NEARBY * voxel
-    while len(far):
-        result[far] = nearest(pieces(), points[far], reach, work)
-        # Triangles lie within a grid cell: any nearer one has its corners in reach.
-        far = far[result[far] > reach - np.sqrt(3) * voxel]
+    result, reach = nearby.copy(), NEARBY * voxel
+    # Triangles lie within a grid cell: any nearer one has its corners in reach.
+    while (far := result > reach - np.sqrt(3) * voxel).any():
         reach *= FARTHER
+        result[far] = search(points[far], reach)
     return result
 
 

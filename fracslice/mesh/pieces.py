@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .._native import near
 from ..store import Arrays
-from .extract import Piece
+from .contouring import Piece
 from .model import Mesh
 
 NOTHING = Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))

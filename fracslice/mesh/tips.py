@@ -14,7 +14,7 @@ from ..volume.climbing import SLANTS, climb
 from ..volume.values import values_at
 from ..work import Work
 from .caps import Cap, Rings, best, capped, disjoint
-from .extract import Piece
+from .contouring import Piece
 from .fit import Fit
 from .model import Mesh
 from .pieces import Pieces

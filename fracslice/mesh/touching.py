@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import near_bodies
-from .survey import WholeShells
+from .whole_shells import WholeShells
 
 REACH = 2
 """Edge length of the cubes in which bodies meet, voxels."""

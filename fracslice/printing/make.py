@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import VolumeError
-from ..formulas import Box, box, plane, transform
 from ..kernel import Field
 from ..meshjob import DUST
 from ..scene import Print
@@ -21,6 +20,7 @@ from ..volume import Bricks, Plan, extent, sample_scene
 from ..volume.sizing import Sizing
 from ..work import Work
 from .edits import edited_field
+from .standing import standing
 
 # Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
         job.work.progress(stage, 0.0)
         job.put(change())
         job.work.progress(stage, 1.0)
-    return _standing(job.planned, how, job.scale), job.scale
+    return standing(job.planned, how, job.scale), job.scale
 
 
 @dataclass
@@ -127,7 +127,10 @@ class _Preparation:
             before = self.root
             yield "keeping the largest", self.largest
             if self.root is not before:
+                voxel_mm = self.planned.voxel * self.sizing.scale(self.planned.box)
                 self.bound()
+                voxel = voxel_mm / self.sizing.scale(self.planned.box)
+                self.planned = replace(self.planned, voxel=voxel)
         self.scale = self.sizing.scale(self.planned.box)
         if how.gap:
             yield "closing gaps", self.closed
@@ -291,29 +294,3 @@ def _large(components: Components) -> np.ndarray:
     """Numbers of the bodies that are not dust."""
     bodies = components.bodies
     return np.asarray(bodies[components.count[bodies] > DUST * components.count[components.inside].sum()])
-
-
-def _standing(made: Plan, how: Print, scale: float) -> Plan:
-    """Cut off the base and add the raft.
-
-    The raft extends a tenth of the longest side beyond the object, and half its height into it.
-    """
-    root, extents, outer = made.root, made.box, made.outer
-    (x0, y0, z0), (x1, y1, z1) = extents.lo, extents.hi
-    base, raft = how.base / scale, how.raft / scale
-    if 0 < raft < made.voxel:
-        raise VolumeError(
-            f"a raft of {how.raft:g} mm: expected at least a voxel, {made.voxel * scale:.4g} mm"
-        )
-    if base:
-        z0 += base
-        if z0 >= z1:
-            raise VolumeError(f"a base of {base * scale:g} mm leaves nothing of the object")
-        root = edited_field(root, "keep", plane(normal=(0, 0, -1), offset=-z0))
-        extents = Box((x0, y0, z0), (x1, y1, z1))
-    if raft:
-        rim = max(extents.size) / 10
-        lying = Box((x0 - rim, y0 - rim, z0 - raft / 2), (x1 + rim, y1 + rim, z0 + raft / 2))
-        root = edited_field(root, "add", transform(box(size=lying.size), translate=lying.centre))
-        extents, outer = extents | lying, (outer | lying).about(outer.centre)
-    return replace(made, root=root, box=extents, outer=outer)

@@ -22,12 +22,33 @@ COUNT, GOAL, COVER = 5, 6, 7
 TRUSTED = 8
 """Samples below which a pixel's variance estimate is not used."""
 COARSE = 4
-"""Grid spacing of the first pass, pixels."""
-NEARLY = 0.999
-"""Safety factor: a mean times this does not exceed the largest value, despite rounding."""
-FEW = 1 / 16
-"""Fraction of unfinished pixels up to which all of them are sampled: a pass has a fixed cost even for one
-pixel."""
+"""Ratio of the grid spacings of the first passes."""
+SOON = 1 << 16
+"""Maximum samples of the first pass, so that a large picture shows something soon."""
+FIRST, DECAY = 2.0**-10, 4.0
+"""Least gain of the first pass that chooses pixels, and the ratio of the least gains of consecutive passes: a
+net of twice as many samples has a quarter of the gain."""
+UNIFORM = 3
+"""Passes before it, after those over grids: nets of 2, 4 and `TRUSTED` samples."""
+
+
+def grids(width: int, height: int) -> tuple[int, ...]:
+    """Return the grid spacings of the first passes, which take one sample in each pixel of their grids.
+
+    Parameters
+    ----------
+    width, height : int
+        Picture size, pixels.
+
+    Returns
+    -------
+    tuple of int
+        Spacings, pixels; the last one is 1.
+    """
+    spacings = [1, COARSE]
+    while width * height > SOON * spacings[-1] ** 2:
+        spacings.append(spacings[-1] * COARSE)
+    return tuple(reversed(spacings))
 
 
 @dataclass(frozen=True)
@@ -49,6 +70,41 @@ class PassPlan:
     last: int
 
 
+def least_gain(passes: int) -> float:
+    """Return the least reduction of the squared error for which a pass takes a sample.
+
+    Parameters
+    ----------
+    passes : int
+        Completed passes after those over grids.
+
+    Returns
+    -------
+    float
+        Squared displayed brightness per sample.
+    """
+    return FIRST / DECAY ** (passes - UNIFORM)
+
+
+def next_choice(passes: int, largest: float) -> int:
+    """Return the number of passes after which the next one chooses a pixel.
+
+    Parameters
+    ----------
+    passes : int
+        Completed passes after those over grids.
+    largest : float
+        Largest gain of an unfinished pixel, above zero.
+
+    Returns
+    -------
+    int
+    """
+    while least_gain(passes) > largest:
+        passes += 1
+    return passes
+
+
 class Accumulator(Protocol):
     """Picture in progress, in host or device memory.
 
@@ -57,27 +113,33 @@ class Accumulator(Protocol):
 
     Attributes
     ----------
+    width, height : int
+        Picture size, pixels.
     sums : array of real, shape (height * width * CHANNELS,)
         Sums of the picture.
     passes : int
         Completed passes.
     """
 
+    width: int
+    height: int
     sums: Any
     passes: int
 
     def plan(self, most: int, tolerance: float) -> PassPlan:
         """Set the goals of the next pass, or return the rest of an interrupted one.
 
-        The first pass takes one sample on a grid of pixels, the second one of all other pixels. Later passes
-        double the samples of all pixels with fewer than TRUSTED. A pixel then gets as many samples again, up
-        to `most`, if two conditions hold:
+        The first passes take one sample on finer and finer grids of pixels, see `grids`. Later passes double
+        the samples of all pixels with fewer than TRUSTED. A pixel then gets as many samples again, up to
+        `most`, if two conditions hold:
 
         - its error or a neighbour's is above the tolerance;
-        - the samples reduce the error of the picture by at least the mean over all unfinished pixels.
+        - a sample reduces the squared error of the picture by at least `least_gain` of the pass.
 
         Samples thus go where the gain is largest (after Mitchell 1987, "Generating Antialiased Images at Low
-        Sampling Densities"), and every pixel has a complete net of them.
+        Sampling Densities"), and every pixel has a complete net of them. A pass depends on a pixel and its
+        neighbours only, so that a part of a picture has the samples of the whole one. Passes that choose no
+        pixel are counted and skipped.
 
         Parameters
         ----------

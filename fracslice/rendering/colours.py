@@ -8,6 +8,7 @@ from ..formulas.material import material, stops
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
+from .glow import glowing_bodies
 from .pictures import load_picture
 from .tracing import TraceDialect, traps
 from .units import shade
@@ -100,6 +101,7 @@ class Look:
         self.varies = any(n["vary"] for n in self.all)
         self.coated = any(n["coat"] for n in self.all)
         self.glows = any(n["glow"] for n in self.all)
+        self.bodies = glowing_bodies(self.root) if self.paths else []
         self.inside = any(n["clear"] for n in self.all)
         rough = any(n["roughness"] or n["vary"] or n["metallic"] for n in self.all)
         self.glossy = self.paths or self.coated or rough

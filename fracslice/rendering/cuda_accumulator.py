@@ -12,7 +12,7 @@ from ..formulas.field import Precision
 from ..kernel.cuda import launched, load_loops, require
 from ..kernel.linker import Linked
 from ..scene.view import View
-from .accumulator import COARSE, FEW, NEARLY, TRUSTED, PassPlan
+from .accumulator import TRUSTED, PassPlan, grids, least_gain, next_choice
 from .cuda_accumulator_loops import LOOPS
 from .film import shows_background
 from .host_accumulator import HostAccumulator
@@ -83,17 +83,19 @@ class CudaAccumulator:
 
     def plan(self, most: int, tolerance: float) -> PassPlan:
         """Set the goals of the next pass; see `Accumulator.plan`."""
-        if self.passes < 2:
-            step = COARSE if self.passes == 0 else 1
-            plan = self._plan(self._loops.grid, self.sums, self._parts, self.width, step)
+        spacings = grids(self.width, self.height)
+        if self.passes < len(spacings):
+            plan = self._plan(self._loops.grid, self.sums, self._parts, self.width, spacings[self.passes])
             if plan.samples:
                 return plan
         self.statistics()
         real = self.dtype.type
         judged = (self.sums, self._squares, self._gains, self._parts, self.width)
         limits = (real(TRUSTED), real(most), real(tolerance * tolerance))
-        total, unfinished, _ = self._summed(self._loops.judge, *judged, *limits).sum(0)
-        least = real(NEARLY * total / unfinished if unfinished > FEW * self.width * self.height else 0.0)
+        largest = self._summed(self._loops.judge, *judged, *limits)[:, 0].max()
+        if largest > 0:
+            self.passes = len(spacings) + next_choice(self.passes - len(spacings), largest)
+        least = real(least_gain(self.passes - len(spacings)))
         return self._plan(self._loops.choose, self.sums, self._gains, self._parts, real(most), least)
 
     def _plan(self, loop: Any, *arguments: Any) -> PassPlan:
@@ -106,7 +108,8 @@ class CudaAccumulator:
         film = view.film
         if film.bloom or film.transparent or view.shading.mode != "light":
             return self.host().shown(view)
-        coarse = COARSE if self.passes == 1 else 1
+        spacings = grids(self.width, self.height)
+        coarse = spacings[self.passes - 1] if 0 < self.passes < len(spacings) else 1
         behind = linear(film.background) if shows_background(view) else (0, 0, 0)
         given = (2.0**film.exposure, *behind)
         launched(

@@ -102,7 +102,7 @@ def judge(A, E, G, T, width, trusted, most, tolerance):
     G : array of real, shape (pixels,)
         Gains, written: -1 for a finished pixel.
     T : array of real, shape (threads, 3)
-        Partial sums, written: gain, unfinished pixels.
+        Partial results, written: largest gain of an unfinished pixel.
     width : int
         Picture width, pixels.
     trusted : real
@@ -114,7 +114,7 @@ def judge(A, E, G, T, width, trusted, most, tolerance):
     """
     b = thread()
     if b < T.shape[0]:
-        total, unfinished = real(0), real(0)
+        largest = real(0)
         height = E.size // width
         k = b
         while k < E.size:
@@ -130,12 +130,10 @@ def judge(A, E, G, T, width, trusted, most, tolerance):
                     gain = maximum(gain, divide(square, n))
             G[k] = real(-1)
             if A[k * CHANNELS + COUNT] < most and worst > tolerance:
-                total += gain
-                unfinished += real(1)
+                largest = maximum(largest, gain)
                 G[k] = gain
             k += T.shape[0]
-        T[b, 0] = total
-        T[b, 1] = unfinished
+        T[b, 0] = largest
 
 
 @kernel

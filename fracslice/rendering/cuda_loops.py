@@ -63,14 +63,15 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
     a = (row * width + column) * CHANNELS
     if k < pixels.size and A[a + COUNT] < A[a + GOAL]:
         q = whole(A[a + COUNT])
-        px = real(column) + centred(whole(Q[q, 0]), pixel, 0)
-        py = real(row) + centred(whole(Q[q, 1]), pixel, 1)
+        place = pixel + (whole(P[frame.far + 2]) << 16) + whole(P[frame.far + 1])
+        px = real(place & 65535) + centred(whole(Q[q, 0]), place, 0)
+        py = real(place >> 16) + centred(whole(Q[q, 1]), place, 1)
         u, v = (
             (real(0.0), real(0.0))
             if frame.sharp
-            else (sample(whole(Q[q, 2]), pixel, 2), sample(whole(Q[q, 3]), pixel, 3))
+            else (sample(whole(Q[q, 2]), place, 2), sample(whole(Q[q, 3]), place, 3))
         )
-        ox, oy, oz, dx, dy, dz = camera_ray(px + P[frame.far + 1], py + P[frame.far + 2], u, v, P)
+        ox, oy, oz, dx, dy, dz = camera_ray(px, py, u, v, P)
         start, end = span_box(ox, oy, oz, dx, dy, dz, P)
         start = maximum(start, S[(row >> frame.shift) * blocks + (column >> frame.shift)])
         r, g, b = real(0.0), real(0.0), real(0.0)
@@ -99,7 +100,7 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
             x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
             first = frame.camera_samples + bounce * frame.bounce_samples
             chance = tuple(
-                sample(whole(Q[q, first + d]), pixel, first + d) for d in range(frame.bounce_samples)
+                sample(whole(Q[q, first + d]), place, first + d) for d in range(frame.bounce_samples)
             )
             last = real(1.0) if bounce == frame.bounces else real(0.0)
             light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, last, chance, P)
@@ -111,7 +112,7 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
             tr, tg, tb = tr * er, tg * eg, tb * eb
             path = path + t
             start, end = span_box(ox, oy, oz, dx, dy, dz, P)
-            if not tr + tg + tb > real(0.002):
+            if not tr + tg + tb > real(frame.faintest):
                 start = real(1e30)
         gather(A, a, r, g, b, covered, frame)
 

@@ -9,6 +9,7 @@ from scipy.ndimage import uniform_filter
 
 from ..extras import lacking
 from .accumulator import COUNT, COVER, GOAL
+from .crops import Crop
 from .host_accumulator import HostAccumulator
 from .layers import layer
 from .passes import Pass
@@ -48,8 +49,8 @@ def denoised(renderer: Renderer) -> Pass:
     Pass
         The picture without noise. The renderer keeps its own.
     """
-    done, host = renderer.seen(), renderer.accumulator.host()
-    mean = host.mean()
+    done, host, cut = renderer.seen(), renderer.accumulator.host(), renderer.crop.within
+    mean = done.mean
     albedo, normal = (layer(renderer, mode) for mode in GUIDES)
     light = np.ascontiguousarray(mean[..., :3])
     if not advice():
@@ -57,15 +58,15 @@ def denoised(renderer: Renderer) -> Pass:
 
         clean = pyoidn.denoise(light, albedo=np.clip(albedo, 0, 1), normal=normal, hdr=True)
     else:
-        bright, squares, n = np.moveaxis(host.channels[..., 3 : COUNT + 1], -1, 0).astype(np.float64)
+        bright, squares, n = np.moveaxis(cut(host.channels[..., 3 : COUNT + 1]), -1, 0).astype(np.float64)
         variance = squared_error(bright, squares, n)
         clean = non_local_means(light, np.where(variance < UNKNOWN, variance, 1.0), albedo, normal)
-    picture = HostAccumulator.empty(host.width, host.height, np.dtype(np.float32), host.work)
+    picture = HostAccumulator.empty(renderer.width, renderer.height, np.dtype(np.float32), host.work)
     picture.passes = done.number
     picture.channels[..., :3] = np.maximum(clean, 0)
     picture.channels[..., (COUNT, GOAL)] = 1
     picture.channels[..., COVER] = mean[..., 3]
-    return replace(done, source=picture)
+    return replace(done, source=picture, crop=Crop.of((renderer.width, renderer.height), None))
 
 
 def non_local_means(

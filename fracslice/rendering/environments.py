@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from .pictures import Picture
+from .pictures import LinearImage
 
 PIXELS = 2048 * 1024
 """Maximum number of pixels of a sky."""
@@ -27,12 +27,12 @@ _FACTORS = (
 
 
 @lru_cache(maxsize=2)
-def environment(picture: Picture) -> Environment:
+def environment(picture: LinearImage) -> Environment:
     """Return the environment of a picture.
 
     Parameters
     ----------
-    picture : Picture
+    picture : LinearImage
         Linear light.
 
     Returns
@@ -49,11 +49,11 @@ class Environment:
 
     Attributes
     ----------
-    picture : Picture
+    picture : LinearImage
         Linear light.
     """
 
-    picture: Picture
+    picture: LinearImage
 
     @property
     def steps(self) -> tuple[int, ...]:

@@ -64,22 +64,27 @@ def develop(mean: np.ndarray, view: View, work: Work | None = None) -> np.ndarra
     if mode != "light":
         return layered(displayed(picture(mean, mode), mode), alpha, film)
     behind = np.array(linear(film.background if shows_background(view) else (0, 0, 0)), np.float32)
-    if film.transparent:
-        light = light / np.maximum(alpha, LEAST)
-    light = np.maximum(light - (1 - alpha) * behind, 0) * np.float32(2.0**film.exposure)
+    exposure, bands = np.float32(2.0**film.exposure), chunks(len(mean), BAND)
+    shown = np.empty(light.shape, np.float32)
+
+    def exposed(rows: slice) -> None:
+        part = light[rows] / np.maximum(alpha[rows], LEAST) if film.transparent else light[rows]
+        shown[rows] = np.maximum(part - (1 - alpha[rows]) * behind, 0) * exposure
+
+    work.map(exposed, bands)
     if film.bloom:
-        light = bloomed(light, film.bloom, work)
+        shown = bloomed(shown, film.bloom, work)
 
     def toned(rows: slice) -> None:
-        part = light[rows]
+        part = shown[rows]
         if film.tone == "filmic":
             part = filmic(part)
         elif film.tone == "reinhard":
             part = part * reinhard(*np.moveaxis(part, -1, 0))[..., None]
-        light[rows] = encoded(part + (1 - alpha[rows]) * behind)
+        shown[rows] = encoded(part + (1 - alpha[rows]) * behind)
 
-    work.map(toned, chunks(len(light), BAND))
-    return np.concatenate([light, alpha], 2) if film.transparent else np.asarray(light, np.float32)
+    work.map(toned, bands)
+    return np.concatenate([shown, alpha], 2) if film.transparent else shown
 
 
 def shows_background(view: View) -> bool:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..scene.view import Fog
 from .surroundings import tint
-from .units import shade
+from .units import fog as units
 from .units.pixel import linear
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ def fogged(lighting: Lighting, fog: Fog, onward: bool) -> list[str]:
     """
     linker, values = lighting.linker, {"density": fog.density}
     if fog.height is None:
-        linker.bind("clearness", shade.fog, values)
+        linker.bind("clearness", units.fog, values)
         lines = ["air = clearness(t, P)"]
     else:
         values |= {"level": fog.level, "height": fog.height}
-        linker.bind("clearness", shade.height_fog, values)
+        linker.bind("clearness", units.height_fog, values)
         lines = ["air = clearness(t, z, dz, P)"]
     if lighting.inside:
         lines.append("air = where(side < 0.0, 1.0 + 0.0 * t, air)")
@@ -66,7 +66,7 @@ def _scattered(lighting: Lighting, fog: Fog, values: dict[str, float]) -> list[s
     if fog.height is None:
         lines.append(f"haze = t * clearness(along, P) * {linker.argument(fog.density)}")
     else:
-        linker.bind("thickness_", shade.thickness, values)
+        linker.bind("thickness_", units.thickness, values)
         lines.append("haze = t * clearness(along, pz, dz, P) * thickness_(pz, P)")
     if lighting.inside:
         lines.append("haze = where(side < 0.0, 0.0, haze)")

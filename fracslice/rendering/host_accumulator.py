@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
+from ..kernel.cpu import load_functions
+from ..kernel.host import lane_count
+from ..kernel.linker import Linked
+from ..kernel.machine import Function
 from ..scene.view import View
 from ..work import Work, chunks
-from .accumulator import CHANNELS, COARSE, COUNT, COVER, FEW, GOAL, NEARLY, TRUSTED, PassPlan
+from .accumulator import CHANNELS, COARSE, COUNT, COVER, GOAL, PassPlan, grids, least_gain, next_choice
+from .accumulator_loops import LOOPS
 from .film import BAND, develop, levels
 from .tiles import band_order
-from .units.pixel import UNKNOWN, squared_error
+
+
+@lru_cache
+def _loops(dtype: np.dtype) -> dict[str, Function]:
+    """Compiled loops of a float type."""
+    bits = dtype.itemsize * 8
+    return load_functions(Linked("", np.zeros(1)), bits, lane_count(bits), LOOPS)
 
 
 @dataclass(eq=False)
@@ -62,7 +75,7 @@ class HostAccumulator:
         return self.empty(self.width, self.height, self.sums.dtype, self.work)
 
     def host(self) -> HostAccumulator:
-        """Return the accumulator itself."""
+        """Return the accumulator itself; see `Accumulator.host`."""
         return self
 
     @property
@@ -82,7 +95,7 @@ class HostAccumulator:
         -------
         ndarray of float32, shape (height, width, 4)
             Linear light, and the fraction of the samples whose camera ray hit; pixels without samples have
-            those of the first pass's grid, if any.
+            the mean of the smallest block around them that has some.
         """
         return self._spread(self._known())
 
@@ -95,14 +108,13 @@ class HostAccumulator:
         return self._spread(develop(self._known(), view, self.work))
 
     def _known(self) -> np.ndarray:
-        """Mean of the sampled pixels, float32: after the first pass its grid, later the whole picture."""
-        if self.passes != 1:
-            return self._means(1)
-        grid = self._means(COARSE)
-        if not self.channels.reshape(-1, CHANNELS)[1:2, GOAL].any():
-            return grid
-        sampled = self.counts[..., None] > 0  # the second pass was interrupted
-        return np.where(sampled, self._means(1), self._spread(grid))
+        """Mean of the pixels, float32: between passes over grids that of the finer grid's pixels."""
+        spacings = grids(self.width, self.height)
+        if 0 < self.passes < len(spacings):
+            step, finer = spacings[self.passes - 1 : self.passes + 1]
+            if not self.channels[: finer + 1 : finer, : finer + 1 : finer, GOAL].all():
+                return self._means(step)
+        return filled(self._means(1), self.counts > 0, self.work)
 
     def _means(self, step: int) -> np.ndarray:
         sums = self.channels[::step, ::step]
@@ -115,99 +127,129 @@ class HostAccumulator:
         return means
 
     def _spread(self, known: np.ndarray) -> np.ndarray:
-        """Expand the grid of the first pass to the whole picture."""
+        """Expand the pixels of a grid to the whole picture."""
         if known.shape[:2] == (self.height, self.width):
             return known
-        wide = known.repeat(COARSE, 0).repeat(COARSE, 1)
+        step = grids(self.width, self.height)[self.passes - 1]
+        wide = known.repeat(step, 0).repeat(step, 1)
         return np.ascontiguousarray(wide[: self.height, : self.width])
 
-    def _bands(self) -> list[slice]:
-        return chunks(self.height, BAND)
+    def _banded(self, task: Callable[[int, int, np.ndarray], None]) -> np.ndarray:
+        """Run a task on every band, given its first row and rows, and return the sums of each."""
+        bands = chunks(self.height, BAND)
+        sums = np.zeros((len(bands), 4), self.sums.dtype)
 
-    def _errors(self, rows: slice) -> tuple[np.ndarray, np.ndarray]:
-        """Samples and squared errors of some rows, float64."""
-        bright, squares, n = np.moveaxis(self.channels[rows, :, 3 : COUNT + 1], -1, 0).astype(np.float64)
-        return n, squared_error(bright, squares, n)
+        def run(band: int) -> None:
+            task(bands[band].start, bands[band].stop - bands[band].start, sums[band])
+
+        self.work.map(run, range(len(bands)))
+        return sums.astype(np.float64)
+
+    def _measure(self, first: int, rows: int, result: np.ndarray) -> tuple[np.ndarray, int]:
+        """Planes of `accumulator_loops.measure` of a band, and numbers per row; its sums go to `result`."""
+        real = self.sums.dtype
+        lanes, none = lane_count(8 * real.itemsize), np.zeros(1, real)
+        stride = -(-self.width // lanes) * lanes + max(lanes, 2)
+        planes = np.zeros((3, (rows + 2) * stride + lanes), real)
+        numbers = first, rows, self.width, self.height, stride
+        _loops(real)["measure"](none, self.sums, *planes, result, *numbers)
+        return planes, stride
+
+    def _totals(self) -> np.ndarray:
+        """The sums of `accumulator_loops.measure` over the picture."""
+
+        def measured(first: int, rows: int, result: np.ndarray) -> None:
+            self._measure(first, rows, result)
+
+        return np.asarray(self._banded(measured).sum(0))
 
     def statistics(self) -> tuple[float, float]:
         """Return the statistics of the picture; see `Accumulator.statistics`."""
-
-        def measured(rows: slice) -> tuple[float, float, int]:
-            n, squares = self._errors(rows)
-            known = squares[squares < UNKNOWN]
-            return float(n.sum()), float(known.sum()), known.size
-
-        samples, total, known = map(sum, zip(*self.work.collect(measured, self._bands()), strict=True))
-        return samples / (self.width * self.height), float(np.sqrt(total / known)) if known else float("inf")
+        total, known, samples, _ = self._totals()
+        return float(samples) / (self.width * self.height), float(np.sqrt(total / known)) if known else np.inf
 
     def plan(self, most: int, tolerance: float) -> PassPlan:
         """Set the goals of the next pass; see `Accumulator.plan`."""
-        plan = self._wanted()
-        if not plan.samples and self.passes < 2:
-            step = COARSE if self.passes == 0 else 1
-            self.channels[::step, ::step, GOAL] = 1
-            plan = self._wanted()
-        if not plan.samples and self.counts.min() < most:
-            self._judge(most, tolerance)
-            plan = self._wanted()
-        return plan
+        *_, left = self._totals()
+        if left:
+            return self._unfinished()
+        if self.passes < len(spacings := grids(self.width, self.height)):
+            step = spacings[self.passes]
+            goals = self.channels[::step, ::step, GOAL]
+            np.maximum(goals, 1, out=goals)
+            if (plan := self._unfinished()).samples:
+                return plan
+        self._judge(most, tolerance)
+        return self._unfinished()
 
     def _judge(self, most: int, tolerance: float) -> None:
         """Set the goals of the unfinished pixels with the largest gain."""
-        gains = np.empty((self.height, self.width))
+        loops, real, pixels = _loops(self.sums.dtype), self.sums.dtype, self.width * self.height
+        limit, gains = np.array([tolerance * tolerance], real), np.empty(pixels, real)
 
-        def judged(rows: slice) -> tuple[float, int]:
-            seen = slice(max(rows.start - 1, 0), rows.stop + 1)
-            own = slice(rows.start - seen.start, rows.stop - seen.start)
-            n, squares = self._errors(seen)
-            trusted = np.where(n < TRUSTED, UNKNOWN, squares)
-            unfinished = (n < most) & (around(trusted) > tolerance * tolerance)
-            gains[rows] = np.where(unfinished, around(trusted / n), -1.0)[own]
-            known = gains[rows][unfinished[own]]
-            return float(known.sum()), known.size
+        def judged(first: int, rows: int, result: np.ndarray) -> None:
+            planes, stride = self._measure(first, rows, result)
+            loops["judge"](limit, *planes, gains, result, first, rows, self.width, stride, most)
 
-        def aimed(rows: slice) -> None:
-            n = self.counts[rows]
-            goals = np.minimum(np.ldexp(1.0, np.frexp(n)[1]), most)  # the next power of two
-            self.channels[rows, :, GOAL] = np.where(gains[rows] >= least, goals, n)
+        def chosen(first: int, rows: int, _: np.ndarray) -> None:
+            loops["choose"](least, self.sums, gains, first, rows, self.width, most)
 
-        total, count = map(sum, zip(*self.work.collect(judged, self._bands()), strict=True))
-        least = NEARLY * total / count if count > FEW * gains.size else 0.0
-        self.work.map(aimed, self._bands())
+        largest = float(self._banded(judged)[:, 0].max())
+        if largest <= 0:
+            return
+        grid_passes = len(grids(self.width, self.height))
+        self.passes = grid_passes + next_choice(self.passes - grid_passes, largest)
+        least = np.array([least_gain(self.passes - grid_passes)], real)
+        self._banded(chosen)
 
-    def _wanted(self) -> PassPlan:
+    def _unfinished(self) -> PassPlan:
         """Pixels that have not reached their goals."""
-        order, places = band_order(self.width)
+        unfinished, none = _loops(self.sums.dtype)["unfinished"], np.zeros(1, self.sums.dtype)
+        order, _ = band_order(self.width)
+        pixels = np.empty((-(-self.height // BAND), len(order)), np.int32)
 
-        def chosen(rows: slice) -> tuple[np.ndarray, float, float]:
-            size = (rows.stop - rows.start) * self.width
-            left = (self.channels[rows, :, GOAL] - self.channels[rows, :, COUNT]).ravel()
-            inside = places if size == len(places) else places[places < size]
-            pixels = order if size == len(places) else order[places < size]
-            pixels = pixels[left[inside] > 0] + np.int32(rows.start << 16)
-            return pixels, float(left.sum(dtype=np.float64)), float(self.channels[rows, :, GOAL].max())
+        def listed(first: int, rows: int, result: np.ndarray) -> None:
+            numbers = first, rows, self.width, len(order)
+            left = np.empty((rows + 1) * self.width, self.sums.dtype)
+            unfinished(none, self.sums, order, pixels[first // BAND], left, result, *numbers)
 
-        pixels, samples, goals = zip(*self.work.collect(chosen, self._bands()), strict=True)
-        return PassPlan(np.concatenate(pixels), int(sum(samples)), int(max(goals)))
+        sums = self._banded(listed)
+        rows = [row[: int(n)] for row, n in zip(pixels, sums[:, 2], strict=True)]
+        return PassPlan(np.concatenate(rows), int(sums[:, 0].sum()), int(sums[:, 1].max()))
 
 
-def around(values: np.ndarray) -> np.ndarray:
-    """Return the maximum over each pixel and its eight neighbours.
+def filled(mean: np.ndarray, known: np.ndarray, work: Work) -> np.ndarray:
+    """Give each pixel without samples the mean of the smallest block around it that has some.
 
     Parameters
     ----------
-    values : ndarray, shape (height, width)
-        One value per pixel.
+    mean : ndarray of float32, shape (height, width, 4)
+        Mean of the samples of a pixel, 0 without samples; changed in place.
+    known : ndarray of bool, shape (height, width)
+        True for a pixel with samples.
+    work : Work
+        Threads.
 
     Returns
     -------
-    ndarray, shape (height, width)
-        The maxima.
+    ndarray of float32, shape (height, width, 4)
+        The same array. Blocks have sides of powers of `COARSE`.
     """
-    rows = values.copy()
-    np.maximum(rows[1:], values[:-1], out=rows[1:])
-    np.maximum(rows[:-1], values[1:], out=rows[:-1])
-    largest = rows.copy()
-    np.maximum(largest[:, 1:], rows[:, :-1], out=largest[:, 1:])
-    np.maximum(largest[:, :-1], rows[:, 1:], out=largest[:, :-1])
-    return largest
+    if known.all() or not known.any():
+        return mean
+    count = _blocks(known.astype(np.float32))
+    means = filled(_blocks(mean) / np.maximum(count, 1)[..., None], count > 0, work)
+
+    def spread(rows: slice) -> None:
+        part = means[rows.start // COARSE : -(-rows.stop // COARSE)].repeat(COARSE, 0).repeat(COARSE, 1)
+        near = part[: rows.stop - rows.start, : mean.shape[1]]
+        np.copyto(mean[rows], near, where=~known[rows, :, None])
+
+    work.map(spread, chunks(len(mean), BAND))
+    return mean
+
+
+def _blocks(values: np.ndarray) -> np.ndarray:
+    """Sums over blocks."""
+    rows, columns = (np.arange(0, n, COARSE) for n in values.shape[:2])
+    return np.asarray(np.add.reduceat(np.add.reduceat(values, columns, 1), rows, 0))

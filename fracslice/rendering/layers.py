@@ -29,7 +29,7 @@ def layers(renderer: Renderer) -> dict[str, np.ndarray]:
         no ray hits.
     """
     made = {mode: layer(renderer, mode) for mode in SAMPLES}
-    made["samples"] = renderer.accumulator.host().counts.astype(np.float32)
+    made["samples"] = renderer.crop.within(renderer.accumulator.host().counts).astype(np.float32)
     return made
 
 
@@ -48,10 +48,10 @@ def layer(renderer: Renderer, mode: str) -> np.ndarray:
     ndarray of float32, shape (height, width, 3) or (height, width)
         Linear values.
     """
-    setup, x, samples = renderer.setup, renderer.setup.optics, SAMPLES[mode]
+    setup, part, samples = renderer.setup, renderer.crop, SAMPLES[mode]
     camera = replace(setup.camera, aperture=0.0) if samples == 1 else setup.camera
     view = replace(setup.view, camera=camera, shading=replace(setup.view.shading, mode=mode))
-    crop = *x.origin, renderer.width, renderer.height
-    of = Renderer(setup.root, view, x.size, renderer.work, renderer.device, crop=crop)
+    crop = part.left, part.top, part.width, part.height
+    of = Renderer(setup.root, view, part.film, renderer.work, renderer.device, crop=crop)
     *_, last = of.passes(samples, tolerance=0.0)
     return last.image[..., 0] if mode in SINGLE else last.image

@@ -3,45 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from ..formulas.registry import Fixed, Node
-from ..kernel import functions
 from ..kernel.dialects import FieldDialect
 from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
 from ..scene.view import Camera, Light, View
+from . import glow
 from .colours import Look, opaque_part
 from .drawn import Drawn
 from .haze import fogged
+from .lamps import bind_light, casts_shadows
 from .optics import Optics, ray_bound
 from .scattering import divided, lacquered
 from .surroundings import Surroundings, seen_as_disc
+from .trace_syntax import text_of
 from .units import lights, march, shade
 from .units.glossy import highlight
 from .units.intrinsics import background, blocker, transparent
 from .units.pixel import linear
-from .units.weights import weights
+from .units.weights import mixed_weights, weights
 
 PATIENCE = 800
 """Maximum steps of a shadow ray."""
-
-
-def casts_shadows(light: Light) -> bool:
-    """Return whether the light may be blocked; the surfaces in view never block a light at the camera.
-
-    Parameters
-    ----------
-    light : Light
-        The light.
-
-    Returns
-    -------
-    bool
-    """
-    return light.shadows == "yes" and light.kind != "camera"
 
 
 @dataclass
@@ -140,7 +125,7 @@ class Lighting:
         self.linker.share(shade.phong)
         soft = light.size and light.kind != "camera"
         u, v = self.drawn.names(2) if soft else ("t", "t")
-        self.bind_light(f"light{k}", light)
+        bind_light(self.linker, f"light{k}", light, self.camera.eye, self.seen.far)
         strength = light.strength
         if light.kind == "camera":
             strength *= math.dist(self.camera.eye, self.camera.target) ** 2
@@ -160,7 +145,7 @@ class Lighting:
             shine = "where(roughness > 0.0, spot * tinted(half, k{0}), gloss)"
         if self.weighted and seen_as_disc(light):
             self.around.bind_sun(k, light)
-            lines += [f"dense = sun_density{k}(lx, ly, lz, P)", *self.weights()]
+            lines += [f"dense = sun_density{k}(lx, ly, lz, P)", *self.weights(look)]
             scattered, reflected = "scattered * ", "reflected * "
         if look.coated:
             lines += lacquered(self.linker, colour)
@@ -186,8 +171,14 @@ class Lighting:
             return [f"open = unobstructed_{ray}"]
         return [f"open = visible_{ray}", f"wr, wg, wb = tinted_shadow_{ray}"]
 
-    def weights(self) -> list[str]:
+    def weights(self, look: Look) -> list[str]:
         """Lines for the weights of a light's sample."""
+        if look.bodies:
+            self.linker.share(mixed_weights)
+            return [
+                glow.density("likely", "l"),
+                "scattered, reflected = mixed_weights(dense, likely, roughness, free)",
+            ]
         self.linker.share(weights)
         vectors = ", ".join(f"{v}{a}" for v in "ndl" for a in "xyz")
         return [f"scattered, reflected = weights(dense, diffuse, {vectors}, roughness, share, free)"]
@@ -211,26 +202,14 @@ class Lighting:
                 f"{c} = {c} + power * h{c}{w} * diffuse * c{c}" for c, w in zip("rgb", passed, strict=True)
             ]
         self.linker.share(highlight)
-        lines += ["spot, half = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, roughness)", *self.weights()]
+        lines += [
+            "spot, half = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, roughness)",
+            *self.weights(look),
+        ]
         shine = "where(roughness > 0.0, reflected * spot * tinted(half, k{0}), 0.0)"
         return lines + [
             f"{c} = {c} + power * h{c} * (scattered * diffuse * c{c} + {shine.format(c)})" for c in "rgb"
         ]
-
-    def bind_light(self, name: str, light: Light) -> None:
-        """Bind the unit of a sun or lamp, or of a light at the camera."""
-        if light.kind == "camera":
-            self.linker.bind(name, lights.sharp_lamp, {"position": self.camera.eye})
-            return
-        if light.kind == "lamp":
-            soft, function = {"radius": light.size}, lights.lamp if light.size else lights.sharp_lamp
-            self.linker.bind(name, function, {"position": light.position, **(soft if light.size else {})})
-            return
-        length = math.hypot(*light.position)
-        values: dict[str, Any] = {"towards": tuple(p / length for p in light.position), "far": self.seen.far}
-        if light.size:
-            values["spread"] = math.tan(math.radians(light.size) / 2)
-        self.linker.bind(name, lights.sun if light.size else lights.sharp_sun, values)
 
     def sky(self, light: Light) -> list[str]:
         """Lines for light from the sky: one direction per sample, or along the normal without shadows."""
@@ -282,22 +261,3 @@ class Lighting:
             if self.weighted and seen_as_disc(light):
                 lines += self.around.disc(k, light)
         return text_of(background, [*lines, "return r, g, b"])
-
-
-def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:
-    """Assemble the source of a function.
-
-    Parameters
-    ----------
-    function : callable
-        Function whose name and parameters are used.
-    lines : sequence of str
-        Body.
-
-    Returns
-    -------
-    str
-        Source text.
-    """
-    names = ", ".join(functions.parameters(function))
-    return "\n    ".join([f"def {function.__name__}({names}):", *lines])

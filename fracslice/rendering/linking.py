@@ -14,15 +14,20 @@ from ..scene.view import Camera, View
 from .cameras import camera_unit
 from .colours import Look
 from .drawn import Drawn
-from .lighting import Lighting, text_of
+from .lighting import Lighting
 from .optics import Optics, ray_bound
 from .scattering import onward
+from .trace_syntax import text_of
 from .units import march
 from .units.intrinsics import GIVEN, surface
 from .units.normal import normal
 
 CIRCLE = 1.4143 * 1.02
 """Radius of the circle around a pixel, half sides, with 2 % for the film's perspective."""
+
+
+FAINTEST = 0.002
+"""Sum of the throughputs up to which a ray of mirrors and glass ends."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,8 @@ class Frame:
         True if the light of camera rays that miss is left out.
     weighted : bool
         True if continued rays carry the density of their direction.
+    faintest : float
+        Sum of the throughputs up to which a ray ends; 0 on paths, which end at random.
     far : int
         Index in P of the far distance; the upper left pixel of the picture follows, and the half width of
         a pixel's cone at distance 1.
@@ -60,6 +67,7 @@ class Frame:
     lit: bool
     transparent: bool
     weighted: bool
+    faintest: float
     far: int
     block: int
 
@@ -133,7 +141,8 @@ class _Frame:
         linked = Linked(linker.text(), linker.numbers())
         samples = camera_samples, self.drawn.count
         kind = self.sharp, self.lit, self.view.film.transparent, self.lighting.weighted
-        return Frame(linked, *samples, self.bounces, *kind, far, self.block)
+        faintest = 0.0 if self.paths else FAINTEST
+        return Frame(linked, *samples, self.bounces, *kind, faintest, far, self.block)
 
     def marching(self) -> None:
         """Bind the units that march rays and cones."""

@@ -71,11 +71,11 @@ def shade(W, m, first, last, P, frame):
                     store(W, Row.dense * m + i, dense)
                 enter, leave = span_box(ox, oy, oz, ex, ey, ez, P)
                 store(W, Row.start * m + i, enter)
-                store(W, Row.end * m + i, where(more > 0.002, leave, 0.0))
+                store(W, Row.end * m + i, where(more > frame.faintest, leave, 0.0))
         elif frame.bounces:
             store_vector(W, Row.tr, m, i, more, more, more)
         if frame.bounces:  # start beyond end: terminated rays, whose values may be NaN, are not marched
-            store(W, Row.start * m + i, where(more > 0.002, load(W, Row.start * m + i), 1e30))
+            store(W, Row.start * m + i, where(more > frame.faintest, load(W, Row.start * m + i), 1e30))
         sr, sg, sb = load_vector(W, Row.r, m, i)
         store_vector(W, Row.r, m, i, sr + tr * r, sg + tg * g, sb + tb * b)
 

@@ -84,7 +84,7 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, shift, blocks, frame):
     left = n
     while left > 0:
         m = (left + WIDTH - 1) // WIDTH * WIDTH
-        draw(W, Q, pixels, A, left, m, width, frame)
+        draw(W, Q, P, pixels, A, left, m, width, frame)
         begin(W, m, P, frame)
         for k in range(left):
             pixel = pixels[k]
@@ -154,8 +154,8 @@ def cones(P, S, C, ids, W, L, rays, n, m, shift, blocks, coarser, parents, limit
     """
     for k in range(m):
         block = ids[min(k, n - 1)]
-        W[Row.px * m + k] = (block % blocks + 0.5) * (1 << shift)
-        W[Row.py * m + k] = (block // blocks + 0.5) * (1 << shift)
+        W[Row.px * m + k] = (block % blocks + 0.5) * (1 << shift) + P[frame.far + 1]
+        W[Row.py * m + k] = (block // blocks + 0.5) * (1 << shift) + P[frame.far + 2]
     begin(W, m, P, frame)
     for k in range(n):
         block = ids[k]
@@ -167,23 +167,27 @@ def cones(P, S, C, ids, W, L, rays, n, m, shift, blocks, coarser, parents, limit
         S[ids[k]] = W[Row.t * m + k] if W[Row.status * m + k] != 2.0 else 1e30
 
 
-def draw(W, Q, pixels, A, n, m, width, frame):
+def draw(W, Q, P, pixels, A, n, m, width, frame):
     """Draw all random numbers of the next sample of n pixels. Columns beyond n repeat the last pixel.
+
+    A pixel has the same numbers in the film and in a part of it.
 
     Parameters
     ----------
     W : pointer to float
         Workspace; rows from `Row.px` on are written.
-    Q, pixels, A : pointer
-        Sample sequence, pixels, sums of the picture.
+    Q, P, pixels, A : pointer
+        Sample sequence, scene parameters, pixels, sums of the picture.
     n, m, width : int
         Pixels, numbers per row of W, picture width.
     frame : Frame
         Linked frame.
     """
+    first = (int(P[frame.far + 2]) << 16) + int(P[frame.far + 1])
     for k in range(m):
         pixel = pixels[min(k, n - 1)]
         q = frame.samples * int(A[CHANNELS * ((pixel >> 16) * width + (pixel & 65535)) + COUNT])
+        pixel += first
         W[Row.px * m + k] = (pixel & 65535) + centred(Q[q], pixel, 0)
         W[Row.py * m + k] = (pixel >> 16) + centred(Q[q + 1], pixel, 1)
         for d in range(2, frame.samples):
@@ -208,8 +212,7 @@ def begin(W, m, P, frame):
     """
     for i in range(0, m, WIDTH):
         u, v = (0.0, 0.0) if frame.sharp else (load(W, (Row.px + 2) * m + i), load(W, (Row.px + 3) * m + i))
-        px = load(W, Row.px * m + i) + P[frame.far + 1]
-        py = load(W, Row.py * m + i) + P[frame.far + 2]
+        px, py = load(W, Row.px * m + i), load(W, Row.py * m + i)
         ox, oy, oz, dx, dy, dz = camera_ray(px, py, u, v, P)
         enter, leave = span_box(ox, oy, oz, dx, dy, dz, P)
         zero = 0.0 * dx

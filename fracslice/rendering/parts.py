@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..cluster import ResultFolder
     from .progressive import Renderer
 
-SAMPLES, PIXELS = 1 << 21, 1 << 18
+SAMPLES, PIXELS = 1 << 22, 1 << 20
 """Samples of a task, about two seconds, and most pixels."""
 
 INPUT = "input"

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import RenderError
 from ..scene.view import View
 from .accumulator import Accumulator
+from .crops import Crop
 from .film import picture
 
 
@@ -32,7 +33,9 @@ class Pass:
     view : View
         View that develops the picture, with its lights.
     source : Accumulator
-        Accumulator that holds the samples.
+        Accumulator that holds the samples, with a margin around the picture.
+    crop : Crop
+        The picture in the film.
     """
 
     number: int
@@ -42,6 +45,7 @@ class Pass:
     rate: float
     view: View = field(repr=False)
     source: Accumulator = field(repr=False)
+    crop: Crop = field(repr=False)
 
     @cached_property
     def mean(self) -> np.ndarray:
@@ -57,7 +61,7 @@ class Pass:
         RenderError
             If a later pass has replaced this picture.
         """
-        return self._current().host().mean()
+        return self.crop.within(self._current().host().mean())
 
     @property
     def image(self) -> np.ndarray:
@@ -83,7 +87,7 @@ class Pass:
         RenderError
             If a later pass has replaced this picture.
         """
-        return self._current().shown(self.view)
+        return self.crop.within(self._current().shown(self.view))
 
     @cached_property
     def developed(self) -> np.ndarray:
@@ -99,7 +103,7 @@ class Pass:
         RenderError
             If a later pass has replaced this picture.
         """
-        return self._current().host().developed(self.view)
+        return self.crop.within(self._current().host().developed(self.view))
 
     def _current(self) -> Accumulator:
         """The accumulator, if it still holds this pass."""

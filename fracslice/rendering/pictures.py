@@ -18,8 +18,8 @@ FORMATS = "a .hdr, .exr, .png, .jpg or .webp file"
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
-    """Picture of a file.
+class LinearImage:
+    """Picture of a file, in linear light.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Picture:
         return light
 
 
-def load_picture(path: str, most: int, fail: Callable[[str], SceneError]) -> Picture:
+def load_picture(path: str, most: int, fail: Callable[[str], SceneError]) -> LinearImage:
     """Read a picture; one that is too large is averaged to half its size, as often as necessary.
 
     Parameters
@@ -68,7 +68,7 @@ def load_picture(path: str, most: int, fail: Callable[[str], SceneError]) -> Pic
 
     Returns
     -------
-    Picture
+    LinearImage
         The picture; the same object while the file does not change.
 
     Raises
@@ -89,14 +89,14 @@ def load_picture(path: str, most: int, fail: Callable[[str], SceneError]) -> Pic
 
 
 @lru_cache(maxsize=4)
-def _loaded(path: str, most: int, _: tuple[int, int]) -> Picture:
+def _loaded(path: str, most: int, _: tuple[int, int]) -> LinearImage:
     kinds = {".hdr": radiance, ".exr": _openexr}
     light = np.asarray(kinds.get(Path(path).suffix.lower(), _displayed)(path), np.float32)
     if not np.isfinite(light).all():
         raise ValueError("it holds values that are not finite")
-    light = Picture(np.maximum(light, 0)).within(most)
+    light = LinearImage(np.maximum(light, 0)).within(most)
     light.flags.writeable = False
-    return Picture(light)
+    return LinearImage(light)
 
 
 def _halved(light: np.ndarray) -> np.ndarray:

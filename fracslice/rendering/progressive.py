@@ -18,24 +18,22 @@ from ..keys import key, program
 from ..memory import available_bytes
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import CHANNELS, Accumulator, PassPlan
+from .accumulator import Accumulator, PassPlan, grids
 from .cpu import BLOCK, CpuTracer
+from .crops import Crop
 from .host_accumulator import HostAccumulator
 from .linking import Frame, link_frame
 from .optics import optics
 from .parts import PoolTracer
 from .passes import Pass
 from .sequence import SampleRange
-from .setup import prepare
+from .setup import clipped, prepare
 from .state import load_state, save_state
 
 TOLERANCE = 0.002
 """Standard error of displayed brightness at which a pixel has converged: half a level of 256."""
 
 
-BYTES = 4 * (CHANNELS + 4 + 3)
-"""Memory of a pixel: its sums, their mean and the developed picture."""
-CROP = Vector(None, "left, top, width and height, pixels", sizes=(4,), least=0, most=32768, whole=True)
 SIZE = Vector(None, "pixels across and down", sizes=(2,), least=1, most=32768, whole=True)
 
 
@@ -49,22 +47,12 @@ def _backend(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator
     return CudaTracer, CudaAccumulator
 
 
-def _cropped(film: tuple[int, int], crop: tuple[int, int, int, int] | None) -> tuple[int, int, int, int]:
-    """Left and upper pixel, width and height of the picture."""
-    if crop is None:
-        return 0, 0, *film
-    x, y, width, height = validated("crop", crop, CROP, RenderError)
-    if width < 1 or height < 1 or x + width > film[0] or y + height > film[1]:
-        raise RenderError(f"crop={x},{y},{width},{height}: expected a part of {film[0]} x {film[1]} pixels")
-    return x, y, width, height
-
-
-def _check_memory(pixels: int) -> None:
+def _check_memory(crop: Crop) -> None:
     """Raise `RenderError` if a picture is larger than the memory."""
-    needed, free = BYTES * pixels, available_bytes()
-    if needed > free:
+    free, pixels = available_bytes(), crop.width * crop.height
+    if crop.bytes > free:
         raise RenderError(
-            f"size: {pixels / 1e6:,.0f} million pixels need {needed / 1e9:,.0f} GB of memory, "
+            f"size: {pixels / 1e6:,.0f} million pixels need {crop.bytes / 1e9:,.0f} GB of memory, "
             f"{free / 1e9:,.0f} GB are free; expected fewer pixels"
         )
 
@@ -111,16 +99,17 @@ class Renderer:
     ) -> None:
         pixels = (view.film.width, view.film.height) if size is None else size
         film = validated("size", pixels, SIZE, RenderError)
-        x, y, self.width, self.height = _cropped(film, crop)
-        _check_memory(self.width * self.height)
+        self.crop = Crop.of(film, crop)
+        _check_memory(self.crop)
+        self.width, self.height = self.crop.width, self.crop.height
         self.work = work or Work()
         self.device = chosen(device if self.work.cluster is None else "cpu")
         setup = prepare(root, view, film)
-        self.setup = replace(setup, optics=replace(setup.optics, origin=(x, y)))
+        self.setup = replace(setup, optics=replace(setup.optics, origin=self.crop.origin))
         self.dtype = np.dtype(self.setup.precision)
         tracer, self._placed = _backend(self.device)
         self._frame = self._linked()
-        self.tracer = tracer(self._frame, self.dtype, self.width, self.height)
+        self.tracer = tracer(self._frame, self.dtype, *self.crop.size)
         self.tracer.samples = samples or self.tracer.samples
         if self.work.cluster is not None:
             self.tracer = PoolTracer(root, view, self.tracer, film, crop)
@@ -131,7 +120,7 @@ class Renderer:
     def _empty(self) -> HostAccumulator:
         """A host accumulator without samples."""
         work = Work(self.work.threads)  # not cancelled with the passes
-        return HostAccumulator.empty(self.width, self.height, self.dtype, work=work)
+        return HostAccumulator.empty(*self.crop.size, self.dtype, work=work)
 
     @property
     def key(self) -> str:
@@ -143,7 +132,7 @@ class Renderer:
             Equal keys mean equal pictures after equal passes.
         """
         linked, samples = self._frame.linked, self.tracer.samples
-        about = self.width, self.height, self.setup.precision, samples
+        about = self.crop.size, self.setup.precision, samples
         return key(program(), *about, linked.source, linked.parameters)
 
     def look(self, camera: Camera) -> None:
@@ -193,9 +182,9 @@ class Renderer:
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:
         """Yield the picture after every pass until all pixels have converged.
 
-        A pixel is finished when it has `samples` samples or its error is within `tolerance`. The first pass
-        samples one pixel in 16, the second all others; `Accumulator.plan` chooses the pixels of later
-        passes.
+        A pixel is finished when it has `samples` samples or its error is within `tolerance`. The first passes
+        sample grids of pixels, one pixel in 16 and then all others of a picture of up to 1024 x 1024;
+        `Accumulator.plan` chooses the pixels of later passes.
 
         Parameters
         ----------
@@ -225,21 +214,22 @@ class Renderer:
 
     def _pass(self, plan: PassPlan) -> Pass:
         start = time.perf_counter()
-        self.prepare(self.accumulator.passes)
+        coarse = len(grids(*self.crop.size)) - 2  # passes with a pixel a block, or less: no prepass pays
+        self.prepare(max(self.accumulator.passes - coarse, 0))
         self.tracer.add(self.accumulator.sums, plan, self.work)
         self.accumulator.passes += 1
         samples, error = self.accumulator.statistics()
         return self._seen(samples, error, plan.samples, plan.samples / (time.perf_counter() - start))
 
-    def prepare(self, passes: int) -> None:
-        """Run the cone prepasses, which pay if a block gets several rays: one more after each pass.
+    def prepare(self, prepasses: int) -> None:
+        """Run cone prepasses.
 
         Parameters
         ----------
-        passes : int
-            Completed passes.
+        prepasses : int
+            Prepasses to have run, or all if there are fewer.
         """
-        wanted = min(passes, self.tracer.prepasses)
+        wanted = min(prepasses, self.tracer.prepasses)
         if wanted < self._prepasses:
             self.tracer.aim(self._frame)
             self._prepasses = 0
@@ -249,7 +239,8 @@ class Renderer:
 
     def _linked(self) -> Frame:
         setup = self.setup
-        return link_frame(setup.root, setup.view, setup.camera, setup.optics, BLOCK)
+        root = clipped(setup.root, setup.camera)
+        return link_frame(root, setup.view, setup.camera, setup.optics, BLOCK)
 
     def seen(self) -> Pass:
         """Return the current picture without another pass.
@@ -263,5 +254,5 @@ class Renderer:
 
     def _seen(self, samples: float, error: float, traced: int, rate: float) -> Pass:
         view, source = self.setup.view, self.accumulator
-        active = traced / (self.width * self.height)
-        return Pass(source.passes, samples, error, active, rate, view, source)
+        active = traced / (source.width * source.height)
+        return Pass(source.passes, samples, error, active, rate, view, source, self.crop)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..kernel.linker import Linker
+from . import glow
 from .colours import Look
 from .drawn import Drawn
 from .units import glossy, lights, shade, weights
@@ -37,6 +38,8 @@ def divided(linker: Linker, look: Look) -> list[str]:
             "scatters = maximum(maximum(cr, cg), cb)",
             "share = mirrors / maximum(mirrors + scatters, 1e-6)",
         ]
+    if look.bodies:
+        lines += glow.bind(linker, look.bodies)
     return lines
 
 
@@ -70,8 +73,8 @@ def onward(linker: Linker, drawn: Drawn, look: Look, weighted: bool) -> list[str
         lines.append("tr, ex, ey, ez = reflects(dx, dy, dz, nx, ny, nz, reflect)")
         lines += ["tg, tb, es = tr, tr, side", *(f"{c} = {c} * (1.0 - t{c})" for c in CHANNELS)]
     if look.paths:
-        lines += _scattered(linker, drawn)
-    if weighted:
+        lines += _scattered(linker, drawn, bool(look.bodies))
+    if weighted and not look.bodies:
         linker.share(weights.density_onward)
         lines.append("eq = density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, roughness, share)")
     if look.coated:
@@ -130,7 +133,7 @@ def _lacquered(linker: Linker, drawn: Drawn) -> list[str]:
     return lines + [f"{c} = {c} * (1.0 - lacquer_)" for c in CHANNELS]
 
 
-def _scattered(linker: Linker, drawn: Drawn) -> list[str]:
+def _scattered(linker: Linker, drawn: Drawn, bodies: bool) -> list[str]:
     """Lines that choose between the reflected ray and a scattered one, and end some rays.
 
     One sample of both (Veach 1997), and Russian roulette with the probability of the throughput (Arvo and
@@ -139,16 +142,19 @@ def _scattered(linker: Linker, drawn: Drawn) -> list[str]:
     for function in (lights.disc, lights.upward):
         linker.share(function)
     u, v, choice, life = drawn.names(4)
-    lines = [
-        f"wx, wy, wz = upward(nx, ny, nz, {u}, {v})",
-        f"chosen = {choice} < share",
-        *(f"e{a} = where(chosen, e{a}, w{a})" for a in "xyz"),
-        *(
-            f"t{c} = where(chosen, t{c} / maximum(share, 1e-6), c{c} / maximum(1.0 - share, 1e-6))"
-            for c in CHANNELS
-        ),
-        "alive = minimum(maximum(maximum(tr, tg), tb), 1.0)",
-    ]
+    lines = [f"wx, wy, wz = upward(nx, ny, nz, {u}, {v})"]
+    if bodies:
+        lines += glow.scattered(linker, drawn, u, v, choice)
+    else:
+        lines += [
+            f"chosen = {choice} < share",
+            *(f"e{a} = where(chosen, e{a}, w{a})" for a in "xyz"),
+            *(
+                f"t{c} = where(chosen, t{c} / maximum(share, 1e-6), c{c} / maximum(1.0 - share, 1e-6))"
+                for c in CHANNELS
+            ),
+            "alive = minimum(maximum(maximum(tr, tg), tb), 1.0)",
+        ]
     return lines + [f"t{c} = where({life} < alive, t{c} / maximum(alive, 1e-6), 0.0)" for c in CHANNELS]
 
 

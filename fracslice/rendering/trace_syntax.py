@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..kernel import source
+from ..kernel import functions, source
 from ..kernel.parsing import parse
 from ..kernel.structure import Run
 
@@ -67,3 +68,22 @@ class KeepChild(ast.NodeTransformer):
     def parsed(line: str) -> list[Any]:
         # `ast.parse` accepts a return statement outside a function.
         return parse(line).body
+
+
+def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:
+    """Assemble the source of a function.
+
+    Parameters
+    ----------
+    function : callable
+        Function whose name and parameters are used.
+    lines : sequence of str
+        Body.
+
+    Returns
+    -------
+    str
+        Source text.
+    """
+    names = ", ".join(functions.parameters(function))
+    return "\n    ".join([f"def {function.__name__}({names}):", *lines])

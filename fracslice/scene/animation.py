@@ -231,7 +231,10 @@ CURVES = ("auto", "smooth", "linear", "log", "step", "path", "zoom", "rotation")
 class Track(Part):
     """One attribute of one element over the time of the `<animation>`; repeatable.
 
-    Before the first and after the last keyframe, the value stays.
+    Before the first and after the last keyframe, the value stays. Between keyframes, a smooth curve does not
+    overshoot, log has equal ratios in equal times, and step no values between. For an eye, path is a curve in
+    space at a pace without jumps, and zoom leads around the target, by angle and by the logarithm of the
+    distance. Rotation is for the rotation of a transform. By default the curve suits the attribute.
     """
 
     element = "track"
@@ -241,9 +244,7 @@ class Track(Part):
     curve: str = described(
         Choice(
             "auto",
-            "smooth: no overshoot; linear; log: equal ratios in equal times; step: no values between; "
-            "path: a curve in space, at a pace without jumps; zoom: an eye around the target, by angle and "
-            "by the logarithm of the distance; rotation: of transform.rotate; auto: as the attribute needs",
+            "curve between keyframes",
             CURVES,
         )
     )

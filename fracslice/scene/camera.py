@@ -23,15 +23,19 @@ TURN = Vector((0.0, 0.0), "degrees to the right and up", sizes=(2,))
 
 @dataclass(frozen=True, kw_only=True)
 class Camera(Part):
-    """Position, direction and lens of the camera; without one, the whole object is in view."""
+    """Position, direction and lens of the camera; without one, the whole object is in view.
+
+    The projection is a perspective; orthographic, by parallel rays, with the plane of the target as in
+    perspective; a fisheye, whose equal angles are equal lengths from the middle; or equirectangular, all
+    around, 360 by 180 degrees. With two eyes, the left eye's picture is in the left half, the right eye's in
+    the right half.
+    """
 
     element = "camera"
     kind: str = described(
         Choice(
             "perspective",
-            "perspective; orthographic: parallel rays, the plane of the target as in perspective; "
-            "fisheye: equal angles are equal lengths from the middle; "
-            "equirectangular: all around, 360 by 180 degrees",
+            "projection of the scene to the picture",
             ("perspective", "orthographic", "fisheye", "equirectangular"),
         )
     )
@@ -60,8 +64,16 @@ class Camera(Part):
     stereo: float = described(
         Number(
             0.0,
-            "distance between two eyes, in scene units: above zero, the left eye's picture is in the left "
-            "half, the right eye's in the right one",
+            "distance between two eyes, in scene units; 0: one eye",
+            least=0,
+        )
+    )
+
+    clip: float = described(
+        Number(
+            0.0,
+            "distance of a plane in front of the eye, in scene units: what is nearer is cut away, and the "
+            "eye may be inside the solid; 0: none",
             least=0,
         )
     )

@@ -5,11 +5,13 @@ Every field carries a parameter kind that reads, validates, writes and documents
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields
+from inspect import cleandoc
 from typing import Any, ClassVar
 
 from ..errors import SceneError
 from ..formulas.parameters import validate
+from ..formulas.signatures import parameter_lines
 
 
 def described(kind: Any) -> Any:
@@ -38,6 +40,8 @@ class Part:
         Element name.
     many : bool
         True if the element may be repeated.
+    description : str
+        Docstring without the attributes, which are added to it.
     place : str or None
         Position in the file, "file:line".
 
@@ -49,7 +53,16 @@ class Part:
 
     element: ClassVar[str]
     many: ClassVar[bool] = False
+    description: ClassVar[str]
     place: str | None = field(default=None, compare=False, repr=False)
+
+    def __init_subclass__(cls) -> None:
+        cls.description = cleandoc(cls.__doc__ or "")
+        kinds = {
+            name: given.metadata["kind"] for name, given in vars(cls).items() if isinstance(given, Field)
+        }
+        lines = [cls.description, "", "Attributes", "----------", *parameter_lines(kinds)]
+        cls.__doc__ = "\n".join(lines)
 
     def __post_init__(self) -> None:
         validate(self, self.kinds(), self.fail)

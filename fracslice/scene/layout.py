@@ -103,7 +103,7 @@ PARAMETER = TopElement(
 
 def _section(part: type[Part]) -> TopElement:
     parameters = MappingProxyType(part.kinds())
-    return TopElement(part.element, part.__doc__ or "", parameters, part=part, many=part.many)
+    return TopElement(part.element, part.description, parameters, part=part, many=part.many)
 
 
 PRINT = _section(Print)

@@ -126,15 +126,18 @@ class Fog(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Shading(Part):
-    """Display mode and surface effects."""
+    """Display mode and surface effects.
+
+    Beside the lit scene, a picture shows the unit normal, the coordinates, the colour without light, the
+    position in a palette (trap), the distance along the view (depth) or from the eye, both in scene units, or
+    the steps of the ray.
+    """
 
     element = "shading"
     mode: str = described(
         Choice(
             "light",
-            "light: lit by the lights; normal: unit normal; position: coordinates; albedo: colour "
-            "without light; trap: position in a palette, by the orbit; depth: distance along the view, and "
-            "distance: from the eye, both in scene units; steps: steps of the ray",
+            "quantity that the picture shows",
             ("light", "normal", "position", "albedo", "trap", "depth", "distance", "steps"),
         )
     )

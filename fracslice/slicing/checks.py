@@ -107,8 +107,18 @@ class PrintReport:
 
 
 @dataclass(frozen=True, eq=False)
-class _LayerFindings:
-    """Results of one layer."""
+class LayerFindings:
+    """Results of one layer.
+
+    Attributes
+    ----------
+    solid, empty : LayerComponents
+        Components.
+    area : float
+        Area, mm^2.
+    walls, gaps : ndarray or None
+        Widths; None in a layer that is not measured.
+    """
 
     solid: LayerComponents
     empty: LayerComponents
@@ -117,8 +127,38 @@ class _LayerFindings:
     gaps: np.ndarray | None
 
 
+def findings_of(slicer: Slicer, layers: range) -> Iterator[LayerFindings]:
+    """Examine some layers, each by itself.
+
+    Parameters
+    ----------
+    slicer : Slicer
+        Slicer of the stack.
+    layers : range
+        Their numbers.
+
+    Returns
+    -------
+    iterator of LayerFindings
+        Results of the layers, in order.
+    """
+    stack = slicer.stack
+    chosen = set(np.linspace(0, len(stack.z) - 1, THICKNESS_LAYERS).astype(int).tolist())
+
+    def make(layer: Layer) -> LayerFindings:
+        runs = layer.runs
+        measured = widths(runs, stack.pixel) if layer.index in chosen else (None, None)
+        return LayerFindings(*layer_components(runs), layer.area, *measured)
+
+    return slicer.map(make, layers)
+
+
 def check_layers(
-    stack: Stack, limits: Limits | None = None, printer: Printer | None = None, work: Work | None = None
+    stack: Stack,
+    limits: Limits | None = None,
+    printer: Printer | None = None,
+    work: Work | None = None,
+    findings: Iterator[LayerFindings] | None = None,
 ) -> PrintReport:
     """Check a planned stack, layer by layer, in memory that grows with the number of components only.
 
@@ -132,6 +172,8 @@ def check_layers(
         Printer that the object is to fit.
     work : Work, optional
         Threads, progress and cancellation.
+    findings : iterator of LayerFindings, optional
+        Results of all layers, in order; they are made here by default.
 
     Returns
     -------
@@ -147,17 +189,12 @@ def check_layers(
     Cancelled
         When the work is cancelled.
     """
-    chosen = set(np.linspace(0, len(stack.z) - 1, THICKNESS_LAYERS).astype(int).tolist())
-
-    def make(layer: Layer) -> _LayerFindings:
-        runs = layer.runs
-        measured = widths(runs, stack.pixel) if layer.index in chosen else (None, None)
-        return _LayerFindings(*layer_components(runs), layer.area, *measured)
-
     limits, work = limits or Limits(), work or Work()
     finest, origin = max(stack.pixel), stack.origin
     solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin, stack.drains)
-    return _Collector(stack, limits, printer, solid).report(Slicer(stack, work).map(make))
+    return _Collector(stack, limits, printer, solid).report(
+        findings or findings_of(Slicer(stack, work), range(len(stack.z)))
+    )
 
 
 @dataclass(eq=False)
@@ -169,7 +206,7 @@ class _Collector:
     printer: Printer | None
     solid: SolidReport
 
-    def report(self, findings: Iterator[_LayerFindings]) -> PrintReport:
+    def report(self, findings: Iterator[LayerFindings]) -> PrintReport:
         """The report of findings in the order of the layers."""
         stack, solid, empty = self.stack, Graph(), Graph()
         square = stack.pixel[0] * stack.pixel[1]

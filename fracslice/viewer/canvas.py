@@ -59,6 +59,7 @@ class Canvas:
         self.interactor = interactor()
         self.interactor.SetRenderWindow(self.window)
         self.interactor.SetInteractorStyle(None)
+        self.shown = False
 
     @property
     def size(self) -> tuple[int, int]:
@@ -86,10 +87,28 @@ class Canvas:
         tick : int
             Interval, milliseconds.
         """
+        self.shown = True
         self.interactor.Initialize()
         self.interactor.CreateRepeatingTimer(tick)
         self.interactor.Start()
         self.window.Finalize()
+
+    def show(self) -> None:
+        """Show the window and return; `handle_events` must be called from time to time, `hide` at the end."""
+        self.shown = True
+        self.on("ExitEvent", self.hide)
+        self.interactor.Initialize()
+
+    def handle_events(self) -> None:
+        """Handle the events of the window, without waiting for any."""
+        if self.shown:
+            self.interactor.ProcessEvents()
+
+    def hide(self) -> None:
+        """Close the window of `show`; nothing is drawn from then on."""
+        if self.shown:
+            self.shown = False
+            self.window.Finalize()
 
     def close(self) -> None:
         """End `open`."""
@@ -105,6 +124,8 @@ class Canvas:
         text : str
             Text at the upper edge.
         """
+        if not self.shown:
+            return
         from vtkmodules.util import numpy_support
 
         to_vtk: Any = numpy_support.numpy_to_vtk

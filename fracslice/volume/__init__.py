@@ -20,10 +20,11 @@ from ..meshjob import RESOLUTION
 from ..store import Arrays, stored
 from ..work import Work
 from .bricks import Bricks, SignBricks
+from .exploration import Evaluate
 from .extent import Extent, extent, reached
 from .lattice import Lattice
 from .pruning import Proofs
-from .sampler import Evaluate, sample, sample_signs
+from .sampler import sample, sample_signs
 
 __all__ = [
     "Bricks",

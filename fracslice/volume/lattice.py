@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..errors import VolumeError
+from ..errors import TooLargeError, VolumeError
 from ..formulas.box import Box, Triple
+from ..memory import available_bytes
 
 BRICK = 8
 """Grid points along the side of a brick."""
@@ -19,8 +20,14 @@ outside.
 BESIDE = 0.1
 """Distance in voxels at which a face counts as next to a plane of grid points."""
 
-MOST_BRICKS = 512**3
-"""Largest number of bricks in a lattice."""
+MOST_BRICKS = 1024**3
+"""Largest number of bricks in a lattice: 8192 voxels along each side."""
+
+LARGE = 1 << 30
+"""Memory that any machine has, bytes."""
+
+BYTES_A_BRICK = 12
+"""Memory of states and index for each brick of a lattice, sampled or not, bytes."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,8 @@ class Lattice:
         Raises
         ------
         VolumeError
-            If `voxel` is no positive length, or the lattice would have too many points.
+            If `voxel` is no positive length, or the lattice would have too many points; `TooLargeError`
+            where memory is too small for it.
         """
         if not (math.isfinite(voxel) and voxel > 0):
             raise VolumeError(f"voxel size {voxel!r}: expected a length > 0")
@@ -73,6 +81,11 @@ class Lattice:
             raise VolumeError(
                 f"a voxel of {voxel:.4g} makes a grid of {_shape(counts)} bricks; "
                 f"the finest that fits is {fits:.4g}"
+            )
+        if (needed := math.prod(counts) * BYTES_A_BRICK) > LARGE and needed > (free := available_bytes()):
+            raise TooLargeError(
+                f"a voxel of {voxel:.4g} makes a grid of {_shape(counts)} bricks, which needs "
+                f"{needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free"
             )
         start = [
             c - voxel * ((n * BRICK - 1) / 2 + (_aside((high - c) / voxel) if solid else 0))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from fracslice.animation import FilmJob, Timeline
 from fracslice.animation.depths import gradual_depths
 from fracslice.formulas import mandelbulb
+from fracslice.rendering import Renderer, develop
 from fracslice.scene.camera import Camera
 from fracslice.scene.reader import reads
 from fracslice.work import Work
@@ -42,3 +44,28 @@ def test_a_frame_is_the_mean_of_its_depths() -> None:
 
 def test_a_given_depth_is_kept() -> None:
     assert {int(scene.root["iterations"]) for scene in film(5).moments(0)} == {5}
+
+
+def test_a_zoom_by_a_million_keeps_its_detail() -> None:
+    """The last frames need float64; at every distance the surface fills the picture, and is no plain."""
+    towards, far, near = np.array([2.0, -2.0, 1.0]) / 3, 2.0406517501933905, 2.0406517501933905e-6
+    target = towards * (3 - far)
+    eyes = [" ".join(map(repr, (target + towards * distance).tolist())) for distance in (far, near)]
+    zoomed = reads(
+        f"""<scene version="1"><solid size="80mm"><mandelbulb iterations="auto"/></solid>
+        <camera eye="{eyes[0]}" target="{" ".join(map(repr, target.tolist()))}"/><animation duration="1s"/>
+        <track of="camera.eye" keys="0s: {eyes[0]}; 1s: {eyes[1]}" curve="zoom"/></scene>"""
+    )
+    of, depths, kinds = FilmJob(Timeline(zoomed), (24, 16), 2, 3.0, device="cpu"), [], []
+    for number, time in enumerate((0.4, 0.7, 1.0)):
+        scene = of.timeline.at(time)
+        renderer = Renderer(scene.root, scene.view, (24, 16), Work(1), "cpu")
+        assert scene.view.camera
+        distance = np.linalg.norm(np.array(scene.view.camera.eye) - target)
+        assert distance == pytest.approx(far * 1e-6**time, rel=0.01)
+        *_, done = renderer.passes(2)
+        shown = develop(done.mean, scene.view)
+        assert np.isfinite(shown).all() and shown.std() > 0.05, number
+        depths.append(renderer.setup.root["iterations"])
+        kinds.append(renderer.setup.precision)
+    assert kinds == ["float32", "float64", "float64"] and depths == sorted(set(depths))

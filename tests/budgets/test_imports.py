@@ -23,7 +23,16 @@ JOBS = {
 }
 UNUSED = {
     "help": ("numpy", "llvmlite", "concurrent", "json", "fracslice.scene", "fracslice.kernel"),
-    "mesh": ("scipy", "email", "importlib.metadata", "subprocess", "PIL", "rich", "json"),
+    "mesh": (
+        "scipy",
+        "email",
+        "importlib.metadata",
+        "subprocess",
+        "PIL",
+        "rich",
+        "json",
+        "fracslice.cli.render",
+    ),
     "slice": ("scipy", "importlib.metadata", "http", "ssl", "rich", "numpy.ma"),
     "render": ("scipy", "email", "importlib.metadata", "numpy.ma", "subprocess", "rich", "fracslice._vdb"),
 }

@@ -5,15 +5,18 @@ from __future__ import annotations
 import os
 import re
 import signal
+import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from fracslice.cli.main import run
 from PIL import Image
 
-from fracslice.rendering import Pass, Renderer
-from fracslice.rendering.accumulator import PassPlan
+from fracslice.rendering import Pass, Renderer, bands, cpu
+from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, PassPlan
+from fracslice.rendering.crops import BYTES
 
 SCENE = """<scene version="1">
   <solid size="80mm"><material colour="0.9 0.3 0.2"><sphere/></material></solid>
@@ -74,6 +77,39 @@ def test_a_part_of_a_picture_is_that_part(
     assert (cut == whole[6:15, 13:29]).all()
     assert run([*common, "-o", str(tmp_path / "b.png"), "--crop", "30,6,16,9"]) == 2
     assert "crop=30,6,16,9: expected a part of 40 x 24 pixels" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", ["png", "exr"])
+def test_a_picture_larger_than_the_memory_is_rendered_in_bands(
+    scene: Path,
+    tmp_path: Path,
+    ending: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    common = ["render", str(scene), "-q", "--device", "cpu", "--samples", "16", "--size", "40x150"]
+    whole, banded = tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"
+    assert run([*common, "-o", str(whole)]) == 0
+    monkeypatch.setattr(bands, "available_bytes", lambda: BYTES * 40 * 149)
+    assert run([*common, "-o", str(banded)]) == 0
+    assert "40 x 150 pixels need 0.0 GB of memory, more than is free: rendered in 3 bands of 64 rows" in (
+        capsys.readouterr().err
+    )
+    assert (picture(banded) == picture(whole)).all()
+    assert run([*common, "-o", str(tmp_path / "b.jpg")]) == 2
+    assert run([*common, "-o", str(banded), "--denoise"]) == 2
+    assert run([*common, "-o", str(tmp_path / "b.png"), "--set", "film.bloom=0.1"]) == 2
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == sorted([f".{ending}"] * 2 + [".xml"])
+
+
+def picture(path: Path) -> np.ndarray:
+    """Pixels of a PNG or an OpenEXR file."""
+    import OpenEXR
+
+    if path.suffix == ".png":
+        return np.asarray(Image.open(path))
+    with OpenEXR.File(str(path)) as file:
+        return np.array(file.channels()["RGB"].pixels)
 
 
 def test_a_seed_changes_the_noise_alone(scene: Path, tmp_path: Path) -> None:
@@ -176,27 +212,38 @@ def test_ctrl_c_before_the_first_sample_writes_nothing(
     assert not (tmp_path / "a.png").exists()
 
 
-def test_a_time_limit_interrupts_a_pass(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_time_limit_interrupts_the_first_pass(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A pass of a large picture takes many times the limit."""
-    options = [
-        "--set",
-        "shading.ambient=0.1",
-        "--size",
-        "1500x1500",
-        "--time",
-        "0.01s",
-        "--device",
-        "cpu",
-        "--threads",
-        "1",
-    ]
+    """No tile is begun after the limit, and all pixels have light."""
+    load, begun = cpu.load_functions, list[np.ndarray]()
+
+    def slow(*of: Any) -> dict[str, Any]:
+        functions = load(*of)
+
+        def tile(*arguments: Any) -> None:
+            begun.append(arguments[6].copy())
+            functions["tile"](*arguments)
+            time.sleep(0.5)
+
+        return functions | {"tile": tile}
+
+    monkeypatch.setattr(cpu, "load_functions", slow)
+    options = ["--size", "800x600", "--time", "0.1s", "--device", "cpu", "--threads", "1"]
+    options += ["--set", "shading.ambient=0.1", "--state", str(tmp_path / "s.npz")]
     assert run(["render", str(scene), "-o", str(tmp_path / "a.png"), *options]) == 0
+    assert len(begun) == 1 and len(begun[0]) < 800 * 600 / COARSE**2
     samples = float(re.search(r"([\d.]+) samples", capsys.readouterr().out)[1])  # type: ignore[index]
-    assert 0 < samples < 1
+    assert samples == pytest.approx(len(begun[0]) / 800 / 600, rel=0.1)
+    with np.load(tmp_path / "s.npz") as state:
+        assert state["sums"].reshape(-1, CHANNELS)[:, COUNT].sum() == len(begun[0])
     with Image.open(tmp_path / "a.png") as image:
         assert np.asarray(image).reshape(-1, 3).max(1).min() > 0, "no pixel is empty"
+
+
+def test_a_time_limit_before_the_first_sample_is_doubled(scene: Path, tmp_path: Path) -> None:
+    options = ["--size", "300x200", "--time", ".000001s", "--device", "cpu", "-q"]
+    assert run(["render", str(scene), "-o", str(tmp_path / "a.png"), *options]) == 0
 
 
 def test_noise_is_removed_from_a_picture_of_light(

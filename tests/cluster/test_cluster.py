@@ -23,25 +23,24 @@ from fracslice.formulas import mandelbulb, sphere
 from fracslice.job import make_mesh
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import Renderer, parts
-from fracslice.scene import scene
+from fracslice.scene import Scene, scene
 from fracslice.scene.reader import reads
 from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
 from fracslice.slicerecipe import SliceRecipe
 from fracslice.slicing import SliceJob
-from fracslice.volume import sampler
+from fracslice.volume import exploration
 from fracslice.work import Work
 
 from .processes import SECONDS, Cluster, wait_until
 
 pytest.importorskip("distributed")
 ROOT = mandelbulb(iterations=4)
-RECIPE = SliceRecipe(
-    to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "a.cli", "cli"
-)
+RECIPE = SliceRecipe(to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "cli")
 MESHED = scene(mandelbulb(iterations=4) | sphere(radius=0.1).translate((-1.5, 0.0, 0.0)), size="20mm")
 VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
 SIZE, SAMPLES = (96, 72), 6
+PICTURED = to_xml(Scene(ROOT, 1.0, view=VIEW))
 FILM = """<scene version="1"><solid size="80mm"><mandelbulb iterations="4"/></solid><camera eye="2 -2 1"/>
 <animation duration="1s" shutter="0.5" times="2"/>
 <track of="camera.eye" keys="0s: 2 -2 1; 1s: 2 -1.5 1"/></scene>"""
@@ -76,7 +75,7 @@ def filmed(work: Work, folder: Path) -> bytes:
     return b"".join(path.read_bytes() for path in paths)
 
 
-JOBS: dict[str, Job] = {"slice": sliced, "render": rendered, "mesh": meshed}
+JOBS: dict[str, Job] = {"slice": sliced, "render": rendered, "mesh": meshed, "film": filmed}
 
 
 @pytest.fixture(scope="module")
@@ -104,38 +103,38 @@ def no_workers_of_other_tests(cluster: Cluster) -> Iterator[None]:
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "PIXELS", 1024)
     monkeypatch.setattr(meshtasks, "LEAST", 1)
-    monkeypatch.setattr(sampler, "MANY", 1)
+    monkeypatch.setattr(exploration, "MANY", 1)
     monkeypatch.setattr(meshsampling, "BRICKS", 32)
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
 
 
-@pytest.mark.parametrize("name", JOBS)
-def test_a_killed_worker_and_a_late_one(
-    name: str, cluster: Cluster, expected: dict[str, bytes], tmp_path: Path
-) -> None:
-    """SIGKILL in the middle of a job, with nobody left; then another worker comes."""
-    first, late, made = cluster.worker(), [], []
-    shares: dict[str, list[float]] = {}
-    pieces = tmp_path / "pieces"
+def test_a_killed_worker_and_a_late_one(cluster: Cluster, expected: dict[str, bytes], tmp_path: Path) -> None:
+    """SIGKILL in the middle of each kind of job, with nobody left; then another worker comes."""
+    worker = cluster.worker()
+    for name, job in JOBS.items():
+        folder, late, made = tmp_path / name, list[subprocess.Popen[bytes]](), []
+        pieces, shares = folder / "pieces", dict[str, list[float]]()
+        folder.mkdir()
 
-    def progress(stage: str, share: float) -> None:
-        shares.setdefault(stage, []).append(share)
-        shared = stage in ("slicing", "rendering", "meshing", "frames")
-        if shared and 0 < share < 1 and not late and first.poll() is None:
-            first.send_signal(signal.SIGKILL)
-            first.wait()
-            made.append(len(list(pieces.glob("*/*-*"))))
-            late.append(cluster.worker())
+        def progress(
+            stage: str, share: float, first=worker, late=late, made=made, pieces=pieces, shares=shares
+        ) -> None:
+            shares.setdefault(stage, []).append(share)
+            shared = stage in ("slicing", "rendering", "meshing", "frames", "checking layers")
+            if shared and 0 < share < 1 and not late:
+                first.send_signal(signal.SIGKILL)
+                first.wait()
+                made.append(len(list(pieces.glob("*/*-*"))))
+                late.append(cluster.worker())
 
-    with connected(cluster.address, str(pieces)) as pool:
-        result = JOBS[name](Work(1, progress=progress, cluster=pool), tmp_path)
-    assert late
-    assert made[0] < 25
-    assert all(
-        of == sorted(of) for stage, of in shares.items() if stage in ("slicing", "rendering", "frames")
-    )
-    assert result == expected[name]
-    assert not any(pieces.iterdir())
+        with connected(cluster.address, str(pieces)) as pool:
+            result = job(Work(1, progress=progress, cluster=pool), folder)
+        (worker,) = late
+        assert made[0] < 25, name
+        ordered = {stage: of == sorted(of) for stage, of in shares.items() if stage != "meshing"}
+        assert name == "mesh" or all(ordered.values()), name
+        assert result == expected[name], name
+        assert not any(pieces.iterdir()), name
 
 
 def test_a_worker_that_hangs(
@@ -158,40 +157,63 @@ def test_a_worker_that_hangs(
 SHARED = {
     "slice": (["--layer", "0.1mm", "--pixel", "0.05mm"], "layers-*", "a.cli"),
     "mesh": (["--resolution", "40", "--dust", "5"], "surface-*", "a.stl"),
+    "render": (["--size", "96x72", "--samples", "3"], "../*.npz", "a.png"),
+    "animate": (["--size", "32x24", "--samples", "4", "--fps", "6"], "frame-*", "frames"),
 }
 """Options, pieces and file of a command."""
+PASSES = 4
+"""Passes of the rendered command."""
+STARTED = """from fracslice import meshtasks; from fracslice.rendering import parts; meshtasks.LEAST = 1
+parts.PIXELS = 1024
+from fracslice.cli.main import main; main()"""
 
 
-@pytest.mark.parametrize("name", SHARED)
 def test_the_client_dies_and_the_same_command_goes_on(
-    name: str, cluster: Cluster, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cluster: Cluster, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    options, piece, file = SHARED[name]
-    (tmp_path / "bulb.xml").write_text(RECIPE.scene if name == "slice" else to_xml(MESHED))
-    output, pieces = tmp_path / file, tmp_path / ".fracslice-pieces"
-    given = [name, str(tmp_path / "bulb.xml"), "-o", str(output), *options, "--quiet"]
-    given += ["--cluster", cluster.address]
-    started = (
-        "from fracslice import meshtasks; meshtasks.LEAST = 1; from fracslice.cli.main import main; main()"
-    )
     cluster.worker()
-    client = subprocess.Popen([sys.executable, "-c", started, *given])
-    wait_until(lambda: len(list(pieces.glob(f"*/{piece}"))) > 2)
-    client.kill()
-    client.wait()
-    assert not output.exists()
-    submitted: list[str] = []
+    made: list[str] = []
     submit = workers._Attempt.submit
     monkeypatch.setattr(
         workers._Attempt,
         "submit",
-        lambda of, numbers: (submitted.extend(of.tasks[n].name for n in numbers), submit(of, numbers)),
+        lambda of, numbers: (
+            made.extend(f"{of.tasks[n].job}/{of.tasks[n].name}" for n in numbers),
+            submit(of, numbers),
+        ),
     )
-    assert command(given) == 0
-    assert output.read_bytes() == expected[name]
-    assert submitted
-    assert not {piece.replace("*", first) for first in ("00000", "000000-000016")} & set(submitted)
-    assert not pieces.exists()
+    scenes = {"slice": RECIPE.scene, "mesh": to_xml(MESHED), "render": PICTURED, "animate": FILM}
+    for name, (options, piece, file) in SHARED.items():
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "bulb.xml").write_text(scenes[name])
+        output, pieces = folder / file, folder / ".fracslice-pieces"
+        given = [name, str(folder / "bulb.xml"), "-o", str(output), *options, "--quiet"]
+        shared = [*given, "--cluster", cluster.address]
+        client = subprocess.Popen([sys.executable, "-c", STARTED, *shared])
+        wait_until(
+            lambda pieces=pieces, piece=piece: len(list(pieces.glob(f"*/{piece}"))) > (piece[0] != ".") * 2
+        )
+        client.kill()
+        client.wait()
+        assert name == "animate" or not output.exists()
+        there = {f"{path.parent.name}/{path.name}" for path in pieces.glob("*/*-*")}
+        made.clear()
+        assert command(shared) == 0
+        assert made and not there & set(made), name
+        assert name != "render" or len({task.split("/")[0] for task in made}) < PASSES
+        assert not pieces.exists()
+        if name in ("slice", "mesh"):
+            assert output.read_bytes() == expected[name]
+        else:
+            alone = folder / f"alone{output.suffix}"
+            assert command([*given[:3], str(alone), *options, "--quiet"]) == 0
+            assert contents(output) == contents(alone)
+
+
+def contents(path: Path) -> list[bytes]:
+    """Bytes of a file, or of the frames of a folder; a killed process leaves an unfinished, hidden one."""
+    return [of.read_bytes() for of in (sorted(path.glob("f*")) if path.is_dir() else [path])]
 
 
 def test_a_worker_of_another_version_is_not_used(

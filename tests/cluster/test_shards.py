@@ -17,7 +17,7 @@ from fracslice.job import MeshResult, make_mesh
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import parts
 from fracslice.scene import scene
-from fracslice.volume import sampler
+from fracslice.volume import exploration
 from fracslice.work import Work
 
 from .test_cluster import RECIPE, rendered, sliced
@@ -103,7 +103,7 @@ def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Chord and simplification are of the whole mesh, so shard 1 makes them of the shared samples."""
-    monkeypatch.setattr(sampler, "MANY", 1)
+    monkeypatch.setattr(exploration, "MANY", 1)
     monkeypatch.setattr(meshsampling, "BRICKS", 8)
     ball, job = scene(sphere(), size="20mm"), MeshJob(resolution=16, chord_mm=0.2, simplify_mm=0.3)
     pieces, made = ResultFolder(str(tmp_path / "pieces")), list[str]()

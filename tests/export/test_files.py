@@ -8,13 +8,14 @@ import signal
 import stat
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
 
 from fracslice.errors import ExportError
-from fracslice.export import check_target, replacing, write
+from fracslice.export import check_target, flushing, replacing, write
 from fracslice.files import put
 from tests.mesh.shapes import cube
 
@@ -48,6 +49,33 @@ def fail_half_way(path: Path, stop: type[BaseException]) -> None:
     with replacing(path) as file:
         file.write(b"half")
         raise stop
+
+
+def test_a_file_is_flushed_while_it_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    flushed = threading.Event()
+    monkeypatch.setattr("os.fsync", lambda _: flushed.set())
+    monkeypatch.setattr("fracslice.files.FLUSH_S", 0.001)
+    with replacing(tmp_path / "large") as file, flushing(file):
+        assert flushed.wait(10)
+
+
+def test_an_error_of_flushing_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    failed = threading.Event()
+
+    def fail(_: int) -> None:
+        failed.set()
+        raise OSError(errno.EIO, "Input/output error")
+
+    def write_slowly() -> None:
+        with replacing(tmp_path / "large") as file, flushing(file):
+            assert failed.wait(10)
+            monkeypatch.setattr("os.fsync", lambda _: None)  # the system reports it once
+
+    monkeypatch.setattr("os.fsync", fail)
+    monkeypatch.setattr("fracslice.files.FLUSH_S", 0.001)
+    with pytest.raises(ExportError, match="large: Input/output error"):
+        write_slowly()
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, ValueError, MemoryError])

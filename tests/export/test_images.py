@@ -9,7 +9,8 @@ import pytest
 from PIL import Image
 
 from fracslice.errors import ExportError
-from fracslice.export.images import png, write_image
+from fracslice.export.images import BANDED, write_bands, write_image
+from fracslice.work import Work
 
 RNG = np.random.default_rng(0)
 SHOWN = RNG.uniform(0, 1, (13, 21, 3)).astype(np.float32)
@@ -88,8 +89,17 @@ def test_an_ending_in_capitals_is_the_same(tmp_path: Path) -> None:
     assert write_image(tmp_path / "a.EXR", SHOWN, SHOWN).stat().st_size > 100
 
 
-def test_smooth_pictures_make_small_files() -> None:
-    assert len(png(SMOOTH, 8, {})) < SMOOTH.size / 8
+def test_smooth_pictures_make_small_files(tmp_path: Path) -> None:
+    assert write_image(tmp_path / "a.png", SMOOTH, SMOOTH).stat().st_size < SMOOTH.size / 8
+
+
+@pytest.mark.parametrize("ending", BANDED)
+def test_a_file_written_in_bands_is_that_of_the_whole_picture(tmp_path: Path, ending: str) -> None:
+    picture, text = RNG.random((150, 21, 4), np.float32), {"Title": "a"}
+    whole = write_image(tmp_path / f"a{ending}", picture, picture, 16, text)
+    bands = ((part, part) for part in (picture[:64], picture[64:128], picture[128:]))
+    write_bands(path := tmp_path / f"b{ending}", (21, 150), bands, 4, 16, text, Work(2))
+    assert path.read_bytes() == whole.read_bytes()
 
 
 def test_unknown_endings_are_refused(tmp_path: Path) -> None:

@@ -11,10 +11,11 @@ from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.components import Removed, Shells, choose
-from fracslice.mesh.extract import Piece
+from fracslice.mesh.contouring import Piece
 from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.reading import joined
-from fracslice.mesh.survey import WholeShells, survey
+from fracslice.mesh.survey import survey
+from fracslice.mesh.whole_shells import WholeShells
 
 from .shapes import cube, inverted, sphere
 

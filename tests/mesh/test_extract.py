@@ -13,7 +13,8 @@ import pytest
 from fracslice._native import Cells, marching_cubes, open_edges
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.extract import extract, minimum_edge_parameter
+from fracslice.mesh.contouring import minimum_edge_parameter
+from fracslice.mesh.extract import extract
 from fracslice.mesh.self_intersections import self_intersecting_triangles
 from fracslice.volume.bricks import INSIDE, OUTSIDE, Bricks
 from tests.fields import blobs, bricks_of, grid_points, noise

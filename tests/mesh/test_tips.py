@@ -10,7 +10,8 @@ from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, cone, menger, octahedron, sphere, transform, union
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
-from fracslice.mesh.extract import Piece, contour
+from fracslice.mesh.contouring import Piece
+from fracslice.mesh.extract import contour
 from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.pointed_vertices import Pointed
 from fracslice.mesh.quantisation import quantised

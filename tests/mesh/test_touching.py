@@ -10,8 +10,8 @@ import pytest
 from fracslice import make_mesh
 from fracslice._native import near_bodies
 from fracslice.formulas import flake, shell, sphere, transform, union
-from fracslice.mesh.survey import WholeShells
 from fracslice.mesh.touching import NearBodies
+from fracslice.mesh.whole_shells import WholeShells
 
 
 def test_a_flake_whose_corners_touch_is_joined_by_the_thickness_that_its_report_names() -> None:
@@ -24,6 +24,15 @@ def test_a_flake_whose_corners_touch_is_joined_by_the_thickness_that_its_report_
     joined = make_mesh(root, size="60mm", resolution=48, thickness=thickness)
     assert joined.report.mesh.components == 1
     assert not any("two voxels" in note for note in joined.report.notes)
+
+
+def test_the_largest_body_alone_has_the_size_and_the_voxels_that_were_asked_for() -> None:
+    """One tetrahedron of the flake, between four corners of a cube of 60 mm."""
+    made = make_mesh(flake(solid="tetrahedron", level=1), size="60mm", resolution=24, keep="largest")
+    assert made.report.mesh.components == 1
+    assert made.volume == pytest.approx(60**3 / 3, rel=0.05)
+    assert made.report.voxel_mm == pytest.approx(60 / 24, rel=1e-3)
+    assert not any("two voxels" in note for note in made.report.notes)
 
 
 def test_distant_bodies_and_cavities_do_not_touch() -> None:

@@ -63,6 +63,12 @@ CASES: dict[str, tuple[Node, View]] = {
         torus(),
         View(film=Film(alpha="yes"), lights=(Light(kind="camera"), SKY), fog=Fog(density=0.2)),
     ),
+    "bodies that glow": (
+        union(
+            *(transform(material(sphere(radius=0.3), glow=3), translate=(x, 0, 0.8)) for x in (-1, 1)), box()
+        ),
+        View(lights=(Light(kind="sun", size=3.0),), shading=Shading(paths="yes", bounces=1)),
+    ),
     "rough metal and glass, paths": (
         union(get("material")(torus(), metallic=0.7, roughness=0.4), _glass()),
         View(lights=SOFT, shading=Shading(paths="yes", bounces=2)),

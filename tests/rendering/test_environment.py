@@ -12,7 +12,7 @@ from fracslice.errors import SceneError
 from fracslice.formulas import Node, material, plane, sphere
 from fracslice.rendering import Pass, Renderer, lighting
 from fracslice.rendering.environments import Environment
-from fracslice.rendering.pictures import Picture, load_picture
+from fracslice.rendering.pictures import LinearImage, load_picture
 from fracslice.rendering.units import environment as units
 from fracslice.rendering.units.glossy import glossy, highlight
 from fracslice.rendering.units.pixel import linear
@@ -76,7 +76,7 @@ def directions(count: int) -> tuple[np.ndarray, ...]:
 
 def tables(light: np.ndarray) -> tuple[Environment, np.ndarray, dict[str, float]]:
     """An environment, its tables as parameters, and where they begin."""
-    made = Environment(Picture(light))
+    made = Environment(LinearImage(light))
     arrays = {"light": light, "rows": made.distribution[0], "columns": made.distribution[1]}
     starts = dict(zip(arrays, np.cumsum([0, *(a.size for a in arrays.values())]), strict=False))
     return made, np.concatenate([a.ravel() for a in arrays.values()]), starts

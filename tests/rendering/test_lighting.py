@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fracslice.errors import RenderError
-from fracslice.formulas import Node, box, material, plane, repeat, sphere, union
+from fracslice.errors import RenderError, SceneError
+from fracslice.formulas import Node, box, difference, material, plane, repeat, sphere, union
 from fracslice.rendering import Pass, Renderer, develop, progressive
+from fracslice.rendering.units.fog import height_fog
+from fracslice.rendering.units.lights import sky
 from fracslice.rendering.units.pixel import linear
-from fracslice.rendering.units.shade import height_fog
+from fracslice.rendering.units.shade import fresnel
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
+from tests.rendering.rays import directions
 
 SIZE = (24, 18)
 CAMERA = Camera(eye=(0, -4, 0), fov=40)
@@ -53,6 +56,40 @@ def test_a_ball_that_refracts_nothing_is_invisible(distance: float) -> None:
     foggy = rendered(ball, replace(view, fog=Fog(colour=(1, 0, 0), density=1))).image
     air = np.exp(1 - distance)
     assert np.allclose(foggy[9, 12], air * behind[9, 12] + (1 - air) * np.array((1, 0, 0)), atol=0.02)
+
+
+def test_a_glass_ball_shows_the_sky_by_the_laws_of_refraction() -> None:
+    """Against the closed form, with two reflections inside: exits are roots, not up to two pixels off."""
+    camera, size, index = CAMERA, (1280, 960), 1.5
+    view = View(camera=camera, lights=(SKY,), shading=Shading(bounces=4))
+    ball = material(sphere(radius=1), clear=1, index=index)
+    *_, last = Renderer(ball, view, size, Work(1), "cpu", crop=(720, 0, 32, 960)).passes(8, tolerance=0.0)
+    d = directions(camera, size)[:, 720:752]
+    b = (d @ np.array(camera.eye))[..., None]
+    distance = -b - np.sqrt(np.maximum(b * b - 15, 0))
+    normal = np.array(camera.eye) + distance * d
+    cosine = np.maximum(-(d * normal).sum(2, keepdims=True), 0)
+    bent = np.sqrt(1 - (1 - cosine**2) / index**2)
+    inside = d / index + (cosine / index - bent) * normal
+    outer, inner = (fresnel(c, ((index - 1) / (index + 1)) ** 2) for c in (cosine, bent))
+    light = outer * seen(d + 2 * cosine * normal)
+    weight = 1 - outer
+    for _ in range(3):
+        normal = normal + 2 * bent * inside  # where the chord ends
+        light += weight * (1 - inner) * seen(index * inside - (index * bent - cosine) * normal)
+        inside, weight = inside - 2 * bent * normal, weight * inner
+    blocks = [
+        np.where(b * b > 15.05, a, 0).reshape(30, 32, 1, 32, 3).sum((1, 3)) for a in (last.image, light)
+    ]
+    ratio = blocks[0][blocks[1] > 30] / blocks[1][blocks[1] > 30]
+    assert ratio.size > 50
+    assert abs(ratio - 1).mean() < 0.01 and abs(ratio.mean() - 1) < 0.005
+
+
+def seen(d: np.ndarray) -> np.ndarray:
+    """Light of the sky."""
+    colours = (linear(c) for c in (SKY.colour, SKY.horizon, SKY.ground))
+    return np.stack(sky(*np.moveaxis(d, -1, 0), *colours), -1)
 
 
 @pytest.mark.parametrize("colour", [(1.0, 1.0, 1.0), (0.2, 0.6, 0.8)])
@@ -112,6 +149,22 @@ def test_a_picture_larger_than_the_memory_is_refused(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(progressive, "available_bytes", lambda: 8 << 30)
     with pytest.raises(RenderError, match="size: 1,074 million pixels need 64 GB of memory, 9 GB are free"):
         Renderer(sphere(), View(), (32768, 32768), Work(1), "cpu")
+
+
+def test_a_clip_plane_opens_the_solid_to_an_eye_inside() -> None:
+    """From within the wall of a hollow ball: the cut at the distance of the plane, the far wall in it."""
+    wall = difference(sphere(radius=2), sphere(radius=1))
+    camera = Camera(eye=(0, -1.5, 0), target=(0, 0, 0), fov=100, clip=1.0)
+    with pytest.raises(SceneError, match="outside the solid"):
+        Renderer(wall, View(camera=replace(camera, clip=0.0)), (9, 9), Work(1), "cpu")
+    view = View(camera=camera, shading=Shading(mode="depth"))
+    *_, last = Renderer(wall, view, (65, 65), Work(1), "cpu").passes(1)
+    depth = last.image[32, :, 0]
+    assert depth[32] == pytest.approx(2.5, abs=0.01), "the far wall"
+    assert depth[:3] == pytest.approx(1.0, abs=0.01) and depth[-3:] == pytest.approx(1.0, abs=0.01)
+    of = Renderer(wall, view, (9, 9), Work(1), "cpu")
+    of.look(camera.moved(right=0.1))
+    assert next(of.passes(1)).image.min() == pytest.approx(1.0, abs=0.01)
 
 
 def test_albedo_is_the_colour_without_light() -> None:

@@ -14,6 +14,7 @@ from fracslice.errors import Cancelled, RenderError
 from fracslice.formulas import material, menger, sphere, union
 from fracslice.rendering import Renderer, cpu, progressive
 from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL
+from fracslice.rendering.units.random import sample
 from fracslice.scene.view import Camera, Film, Light, View
 from fracslice.work import Work
 
@@ -203,5 +204,19 @@ def test_the_last_pixels_take_no_pass_each() -> None:
     """A pass of a few pixels costs as much as one of many, and all threads wait for it."""
     view = View(camera=Camera(eye=(1.9, -2.3, 1.2), fov=50), lights=(Light(size=5), Light(kind="sky")))
     active = [done.active for done in Renderer(menger(level=2), view, (96, 64), Work(1), "cpu").passes(64)]
-    assert min(active[1:]) > 0.1
-    assert len(active) < 20
+    assert len(active) < 16
+
+
+@pytest.mark.parametrize(("samples", "tolerance"), [(8, 0.0), (64, 0.01)])
+def test_a_part_of_a_picture_has_the_pixels_of_the_whole(samples: int, tolerance: float) -> None:
+    """Its own random numbers, rays and goals would be others; the blocks of rays start elsewhere, too."""
+    *_, whole = renderer().passes(samples, tolerance)
+    for x, y, width, height in ((0, 18, 50, 9), (21, 17, 11, 17)):
+        of = Renderer(ROOT, VIEW, SIZE, Work(2), "cpu", crop=(x, y, width, height))
+        *_, part = of.passes(samples, tolerance)
+        assert (part.image == whole.image[y : y + height, x : x + width]).all()
+        assert part.shown.shape == (height, width, 3)
+
+
+def test_rows_far_down_have_random_numbers_of_their_own() -> None:
+    assert len({sample(12345, y << 16, 2) for y in range(0, 32768, 1024)}) == 32

@@ -7,8 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fracslice.formulas import Node, box, difference, mandelbulb, material, sphere
-from fracslice.rendering import Renderer
+from fracslice.formulas import (
+    Node,
+    box,
+    difference,
+    mandelbulb,
+    material,
+    plane,
+    sphere,
+    transform,
+    union,
+)
+from fracslice.rendering import Renderer, colours
+from fracslice.rendering.glow import glowing_bodies
 from fracslice.rendering.units.glossy import glossy, highlight
 from fracslice.rendering.units.pixel import linear
 from fracslice.rendering.units.shade import varied
@@ -101,6 +112,45 @@ def test_a_glowing_surface_lights_the_others_on_paths_only() -> None:
         seen(scene, Shading(paths=paths), 16, camera, lights=lights).mean() for paths in ("no", "yes")
     )
     assert lit > dark + 0.01
+
+
+BULB = material(sphere(radius=0.05), glow=50, colour=WHITE, specular=0) + (0, 0, 1)
+FLOOR = material(box(size=(6, 6, 0.2)), colour=(0.5, 0.5, 0.5), specular=0) + (0, 0, -0.1)
+
+
+def test_a_small_glowing_body_lights_a_floor_with_little_noise() -> None:
+    """Irradiance of a ball: pi L (r / d)^2 cos. Scattered rays alone would hardly ever meet it."""
+    camera = Camera(eye=(0, -1.5, 0.8), target=(0, 0, 0), fov=12)
+    whole = View(camera=camera, shading=Shading(paths="yes", bounces=1), lights=(Light(strength=0),))
+    *_, last = Renderer(BULB | FLOOR, whole, (24, 24), Work(1), "cpu").passes(8, tolerance=0.0)
+    light = last.image[..., 0] / linear((0.5,))[0]
+    expected = 50 * 0.05**2
+    assert light.mean() == pytest.approx(expected, rel=0.02)
+    assert light.std() < 0.3 * expected
+
+
+@pytest.mark.parametrize("rough", [0.0, 0.5])
+def test_rays_to_glowing_bodies_change_no_mean(rough: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a sun and a sky, on a floor that also reflects; bodies in a row, one of them turned."""
+    turned = transform(box(size=(0.6, 0.05, 0.3)), translate=(1, 0.5, 0.6), rotate=(1, 1, 0, 40))
+    lamp = material(turned, glow=3, colour=(1, 0.6, 0.3), specular=0)
+    floor = material(FLOOR, colour=(0.5, 0.5, 0.5), reflect=0.3, roughness=rough, specular=0)
+    lights = (Light(position=(1, -2, 2), size=20), Light(kind="sky", strength=0.5))
+    camera = Camera(eye=(0, -3, 1.5), target=(0.3, 0, 0), fov=25)
+    root = lamp | material(sphere(radius=0.3), glow=2, colour=WHITE) + (-0.6, 0, 0.5) | floor
+    shading, means = Shading(paths="yes", bounces=2), []
+    for bodies in (glowing_bodies, lambda _: []):
+        monkeypatch.setattr(colours, "glowing_bodies", bodies)
+        means.append(seen(root, shading, 512, camera, lights=lights).mean(0))
+    assert means[0] == pytest.approx(means[1], rel=0.01)
+
+
+def test_bodies_have_boxes_where_they_are() -> None:
+    lamp = material(sphere(radius=0.5), glow=2, colour=WHITE)
+    (body,) = glowing_bodies(transform(lamp | box(), translate=(3, 0, 0)) | FLOOR)
+    assert body[:6] == pytest.approx((3, 0, 0, 0.5, 0.5, 0.5))
+    assert len(glowing_bodies(union(*(lamp + (3 * k, 0, 0) for k in range(20))))) == 1
+    assert glowing_bodies(material(plane(), glow=1)) == []
 
 
 @pytest.mark.parametrize("paths", ["no", "yes"])

@@ -7,6 +7,7 @@ import pytest
 
 from fracslice.formulas import Box, Node, bounds, box, mandelbulb, sphere, torus, transform
 from fracslice.rendering import Renderer
+from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Shading, View
 
 BACK = (0.0, 0.0, 1.0)
@@ -19,13 +20,18 @@ SHAPES: dict[str, Node] = {
     "mandelbulb": mandelbulb(),
     "tiny": transform(mandelbulb(), scale=1e-4),
 }
+LIBRARY = ("lattice-cube", "menger-ball", "menger-sponge", "twisted-vase", "menger-tower")
 
 
-@pytest.mark.parametrize("size", [(64, 36), (36, 64)])
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [(name, size) for name in SHAPES for size in ((64, 36), (36, 64))]
+    + [(name, (36, 64)) for name in LIBRARY],
+)
 def test_the_whole_object_is_in_view_and_fills_it(name: str, size: tuple[int, int]) -> None:
     view = View(film=Film(background=BACK), shading=Shading(mode="depth"))
-    *_, picture = Renderer(SHAPES[name], view, size, device="cpu").passes(samples=1)
+    root = SHAPES[name] if name in SHAPES else read(library.path(name)).root
+    *_, picture = Renderer(root, view, size, device="cpu").passes(samples=1)
     seen = (picture.shown != np.array(BACK) * 255).any(axis=2)
     assert seen.any()
     assert not (seen[[0, -1]].any() or seen[:, [0, -1]].any()), "cut off at the border"

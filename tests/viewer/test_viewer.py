@@ -224,3 +224,28 @@ def test_flying_needs_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     if not screen.has_screen():
         with pytest.raises(RenderError, match="no screen"):
             fly("any.xml")
+
+
+@real
+def test_a_picture_is_shown_while_it_is_rendered(tmp_path: Path) -> None:
+    (tmp_path / "ball.xml").write_text(SCENE.replace('<light kind="sun"/>', '<light kind="sun" size="30"/>'))
+    size = "{}x{}".format(*SIZE)
+    command = [sys.executable, "-m", "fracslice.cli", "render", "ball.xml", "--size", size, "--samples", "64"]
+    with xserver(tmp_path) as server:
+        environment = os.environ | {"DISPLAY": server.display}
+        process = subprocess.Popen([*command, "-o", "a.png", "--watch"], cwd=tmp_path, env=environment)
+        seen = 0
+        while process.poll() is None:
+            pixels = server.pixels().astype(int)
+            seen = max(seen, (pixels[..., 0] > 60 + 2 * pixels[..., 1]).sum())
+            time.sleep(0.02)
+    assert process.returncode == 0
+    assert seen > 5000, "the ball"
+    assert subprocess.run([*command, "-o", "b.png"], cwd=tmp_path, check=False).returncode == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    environment = {k: v for k, v in os.environ.items() if k != "DISPLAY"}
+    refused = subprocess.run(
+        [*command, "-o", "c.png", "--watch"], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert refused.returncode != 0 and not (tmp_path / "c.png").exists()
+    assert refused.stderr.count("\n") == 1 and "there is no screen" in refused.stderr

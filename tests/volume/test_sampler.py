@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fracslice.errors import Cancelled, VolumeError
+from fracslice.errors import Cancelled, TooLargeError, VolumeError
 from fracslice.formulas import (
     Node,
     box,
@@ -24,6 +24,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
+from fracslice.formulas.box import Box
 from fracslice.formulas.field import Bounds
 from fracslice.kernel import compile_scene
 from fracslice.volume import Bricks, Lattice, extent, plan, sample, sample_scene
@@ -173,6 +174,14 @@ def test_what_is_too_thin_for_any_sample_says_so() -> None:
 def test_too_fine_a_voxel_is_refused_before_starting() -> None:
     with pytest.raises(VolumeError, match="finest that fits"):
         Lattice.around(sphere().bounds.box, 1e-5)
+
+
+def test_a_grid_that_needs_more_memory_than_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    cube = Box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    monkeypatch.setattr("fracslice.volume.lattice.available_bytes", lambda: 10**10)
+    assert Lattice.around(cube, 1 / 4096).bricks == (513, 513, 513)
+    with pytest.raises(TooLargeError, match=r"1025 x 1025 x 1022 bricks, which needs 12\.9 GB of memory"):
+        Lattice.around(Box((0.0, 0.0, 0.0), (1.0, 1.0, 0.997)), 1 / 8190)
 
 
 def test_cancelled() -> None:

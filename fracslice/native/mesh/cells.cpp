@@ -1,9 +1,12 @@
 #include "cells.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <bit>
+
+#include "blocks.h"
 
 namespace fracslice::mesh {
 namespace {
@@ -30,19 +33,22 @@ size_t find_crossings(const std::array<CornerPlanes, kSide + 1>& corners, BrickC
 
 // The ghosts' places, in order.
 std::vector<BrickPlace> ghosts(const Layout& layout, const std::vector<Signs>& signs) {
-    std::vector<BrickPlace> result;
-    for (size_t row = 0; row < layout.count; ++row) {
-        const int32_t* p = layout.ijk + 3 * row;
-        for (int k : {3, 5, 6, 7}) {
-            BrickPlace q = {p[0] / kSide - (k & 1), p[1] / kSide - (k >> 1 & 1), p[2] / kSide - (k >> 2 & 1)};
-            int32_t at = layout.at(q[0], q[1], q[2]);
-            if (at >= 0) continue;
-            BitPlane seen = (k & 2 ? kFirstY : ~BitPlane(0)) & (k & 4 ? kFirstZ : ~BitPlane(0)), differ = 0;
-            for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) differ |= (signs[row][x] ^ constant(at)) & seen;
-            if (differ) result.push_back(q);
+    auto result = joined(in_blocks<std::vector<BrickPlace>>(layout.count, [&](size_t begin, size_t end) {
+        std::vector<BrickPlace> seen_here;
+        for (size_t row = begin; row < end; ++row) {
+            const int32_t* p = layout.ijk + 3 * row;
+            for (int k : {3, 5, 6, 7}) {
+                BrickPlace q = {p[0] / kSide - (k & 1), p[1] / kSide - (k >> 1 & 1), p[2] / kSide - (k >> 2 & 1)};
+                int32_t at = layout.at(q[0], q[1], q[2]);
+                if (at >= 0) continue;
+                BitPlane seen = (k & 2 ? kFirstY : ~BitPlane(0)) & (k & 4 ? kFirstZ : ~BitPlane(0)), differ = 0;
+                for (int x = 0; x < (k & 1 ? 1 : kSide); ++x) differ |= (signs[row][x] ^ constant(at)) & seen;
+                if (differ) seen_here.push_back(q);
+            }
         }
-    }
-    std::sort(result.begin(), result.end());
+        return seen_here;
+    }));
+    tbb::parallel_sort(result.begin(), result.end());
     result.erase(std::unique(result.begin(), result.end()), result.end());
     return result;
 }
@@ -56,9 +62,11 @@ CellGrid::CellGrid(const Layout& layout, std::vector<Signs> signs)
         throw std::invalid_argument("not closed: " + std::to_string(open) + " sign changes leave the samples");
     }
     places_.resize(layout.count);
-    for (size_t row = 0; row < layout.count; ++row) {
-        for (int k = 0; k < 3; ++k) places_[row][k] = layout.ijk[3 * row + k] / kSide;
-    }
+    for_each_block(layout.count, [&](size_t, size_t begin, size_t end) {
+        for (size_t row = begin; row < end; ++row) {
+            for (size_t k = 0; k < 3; ++k) places_[row][k] = layout.ijk[3 * row + k] / kSide;
+        }
+    });
     if (!std::is_sorted(places_.begin(), places_.end())) throw std::invalid_argument("the bricks are not in order");
     tbb::parallel_for(size_t(0), layout.count, [&](size_t i) {
         crossings_[i].base = find_crossings(corners_of(octant(i), signs_), crossings_[i]);

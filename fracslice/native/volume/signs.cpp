@@ -82,19 +82,22 @@ int64_t sum(size_t n, const Count& count) {
 }  // namespace
 
 void check(const Layout& layout) {
-    size_t cells = size_t(layout.size[0]) * layout.size[1] * layout.size[2], named = 0;
-    for (size_t k = 0; k < cells; ++k) {
-        if (layout.index[k] < kInside) throw std::invalid_argument("index holds a number below -2");
-        named += layout.index[k] >= 0;
+    size_t cells = size_t(layout.size[0]) * layout.size[1] * layout.size[2];
+    if (sum(cells, [&](size_t k) { return layout.index[k] < kInside; })) {
+        throw std::invalid_argument("index holds a number below -2");
     }
-    if (named != layout.count) throw std::invalid_argument("index does not name every brick once");
-    for (size_t row = 0; row < layout.count; ++row) {
+    if (size_t(sum(cells, [&](size_t k) { return layout.index[k] >= 0; })) != layout.count) {
+        throw std::invalid_argument("index does not name every brick once");
+    }
+    auto misplaced = [&](size_t row) {
         const int32_t* p = layout.ijk + 3 * row;
         bool aligned = p[0] >= 0 && p[1] >= 0 && p[2] >= 0 && !((p[0] | p[1] | p[2]) % kSide);
-        if (!aligned || layout.at(p[0] / kSide, p[1] / kSide, p[2] / kSide) != int32_t(row)) {
-            throw std::invalid_argument("brick " + std::to_string(row) + " is not where index says");
-        }
-    }
+        return !aligned || layout.at(p[0] / kSide, p[1] / kSide, p[2] / kSide) != int32_t(row);
+    };
+    if (!sum(layout.count, misplaced)) return;
+    size_t row = 0;
+    while (!misplaced(row)) ++row;
+    throw std::invalid_argument("brick " + std::to_string(row) + " is not where index says");
 }
 
 std::vector<Signs> signs_of(const Bricks& bricks) {

@@ -64,6 +64,24 @@ def scrambled(a, seed):
     return reversed_bits(a)
 
 
+def seeded(pixel, dimension):
+    """Return the seed of a pixel's dimension.
+
+    Parameters
+    ----------
+    pixel : int
+        Pixel, ``y << 16 | x``.
+    dimension : int
+        Dimension of a coordinate, below 64.
+
+    Returns
+    -------
+    int
+        32-bit seed.
+    """
+    return hashed((pixel * 64 + (pixel >> 26) * 0x9E3779B9 + dimension) & 0xFFFFFFFF)
+
+
 def sample(a, pixel, dimension):
     """Return one coordinate of a sequence point, scrambled for a pixel.
 
@@ -81,8 +99,7 @@ def sample(a, pixel, dimension):
     float
         Number in [0, 1).
     """
-    seed = hashed((pixel * 64 + dimension) & 0xFFFFFFFF)
-    return (scrambled(a & 0xFFFFFFFF, seed) >> 8) * 5.9604644775390625e-08
+    return (scrambled(a & 0xFFFFFFFF, seeded(pixel, dimension)) >> 8) * 5.9604644775390625e-08
 
 
 def centred(a, pixel, dimension):
@@ -102,6 +119,6 @@ def centred(a, pixel, dimension):
     float
         Number in [0, 1).
     """
-    seed = hashed((pixel * 64 + dimension) & 0xFFFFFFFF)
+    seed = seeded(pixel, dimension)
     shifted = scrambled(a & 0xFFFFFFFF, seed) ^ scrambled(0, seed) ^ 0x80000000
     return (shifted >> 8) * 5.9604644775390625e-08

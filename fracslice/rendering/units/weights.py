@@ -85,6 +85,29 @@ def weights(dense, diffuse, nx, ny, nz, dx, dy, dz, lx, ly, lz, rough, share, fr
     return where(free > 0.5, 1.0, scattered), where(free > 0.5, 1.0, reflected)
 
 
+def mixed_weights(dense, likely, rough, free):
+    """Return the weights of a light's sample where all rays that continue have one density.
+
+    Parameters
+    ----------
+    dense : float
+        Density of the sample per unit solid angle.
+    likely : float
+        Density of a ray that continues in its direction; see `glowing.mixed_density`.
+    rough : float
+        Roughness; a smooth surface reflects into one direction.
+    free : float
+        1 if no continued ray can meet the light.
+
+    Returns
+    -------
+    scattered, reflected : float
+        Weights.
+    """
+    weight = where(free > 0.5, 1.0, heuristic(dense, likely))
+    return weight, where(rough > 0.0, weight, 1.0)
+
+
 def density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, rough, share):
     """Return the density of a continued ray.
 

@@ -48,6 +48,11 @@ template <int N> struct Tuple {{
     float v[N];
     __host__ __device__ float operator[](int i) const {{ return v[i]; }}
 }};
+template <class A, class B> struct Pair {{
+    A first;
+    B second;
+}};
+template <class A, class B> __device__ __forceinline__ Pair<A, B> pair_of(A a, B b) {{ return {{a, b}}; }}
 using Parameters = Tuple<{count}>;
 """
 
@@ -164,6 +169,10 @@ def _expression(node: ast.expr) -> str:
             return f"({_expression(test)} ? {_expression(yes)} : {_expression(no)})"
         case ast.BinOp(left, ast.Mod(), right):
             return f"({ast.unparse(left)} % {ast.unparse(right)})"
+        case ast.Tuple([]):
+            return "Tuple<1>{{0.0f}}"
+        case ast.Tuple([ast.Tuple() as first, ast.Tuple() as second]):
+            return f"pair_of({_expression(first)}, {_expression(second)})"
         case ast.Tuple(values):
             return f"Tuple<{len(values)}>{{{{{', '.join(map(_expression, values))}}}}}"
         case ast.UnaryOp(op, value):

@@ -13,11 +13,12 @@ import numpy as np
 
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
-from fracslice.rendering.accumulator import CHANNELS, GOAL, PassPlan
-from fracslice.rendering.cpu import BLOCK, CpuTracer
+from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan
+from fracslice.rendering.cpu import BLOCK, STEPS, CpuTracer
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.optics import optics
+from fracslice.rendering.sequence import SampleRange
 from fracslice.rendering.tiles import ordered
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
@@ -27,8 +28,8 @@ from . import native
 from .sampling import best
 
 WIDTH, HEIGHT = 1920, 1080
-ROUNDS = 256
-"""More samples than a pixel gets here."""
+ROUNDS, TIMES = 256, 50
+"""More samples than a pixel gets here, and timed frames."""
 SINGLE = np.dtype(np.float32)
 
 
@@ -42,6 +43,7 @@ def frame(width: int, height: int) -> Frame:
 
 FRAME = r"""
 #include <cstdio>
+#include <cstdlib>
 #include <vector>
 typedef unsigned int u32;
 __device__ u32 hashed(u32 a) {
@@ -58,75 +60,101 @@ __device__ u32 scrambled(u32 a, u32 seed) {
     return __brev(a);
 }
 __device__ float centred(u32 a, u32 pixel, u32 dimension) {
-    u32 seed = hashed(pixel * 64 + dimension);
+    u32 seed = hashed(pixel * 64 + (pixel >> 26) * 0x9E3779B9u + dimension);
     return ((scrambled(a, seed) ^ scrambled(0, seed) ^ 0x80000000u) >> 8) * 5.9604644775390625e-08f;
 }
 __device__ float tamed(float c) { return c == c ? fminf(fmaxf(c, 0.0f), 1e4f) : 0.0f; }
-__global__ void tile(Parameters P, const float *S, const int *pixels, int count, float *A, int width,
-                     float limit, int blocks) {
+__global__ void tile(Parameters P, const int *Q, const float *S, const int *pixels, int count, float *A,
+                     int width, float limit, int blocks) {
     int k = blockIdx.x * blockDim.x + threadIdx.x;
-    if (k >= count) return;
-    int pixel = pixels[k], column = pixel & 65535, row = pixel >> 16;
-    auto ray = camera_ray_(column + centred(0, pixel, 0), row + centred(0, pixel, 1), 0.0f, 0.0f, P);
+    int pixel = pixels[k < count ? k : count - 1], column = pixel & 65535, row = pixel >> 16;
+    float *a = A + CHANNELS * (row * width + column);
+    if (k >= count || !(a[COUNT] < a[GOAL])) return;
+    const int *q = Q + 2 * int(a[COUNT]);
+    auto ray = camera_ray_(column + centred(q[0], pixel, 0), row + centred(q[1], pixel, 1), 0.0f, 0.0f, P);
     float ox = ray[0], oy = ray[1], oz = ray[2], dx = ray[3], dy = ray[4], dz = ray[5];
     auto span = span_box_(ox, oy, oz, dx, dy, dz, P);
-    float start = fmaxf(span[0], S[(row >> 3) * blocks + (column >> 3)]), end = span[1];
+    float start = fmaxf(span[0], S[(row >> SHIFT) * blocks + (column >> SHIFT)]), end = span[1];
     float t = start, steps = 0, before = 0, stride = 0;
     bool missed = start >= end;
     while (!missed) {
-        auto step = step_ray_(ox, oy, oz, dx, dy, dz, t, before, stride, 0.0f, P);
+        auto step = step_ray_(ox, oy, oz, dx, dy, dz, t, before, stride, 1.0f, 0.0f, P);
         t = step[0], before = step[1], stride = step[2];
         steps += 1.0f;
         if (step[3] < 0.0f) break;
-        missed = t > end;
+        missed = (stride > 0.0f ? t - stride + before : t) > end;
         if (steps >= limit) break;
     }
+    __syncwarp();
     float r, g, b;
     if (missed) {
-        auto colour = background_(dx, dy, dz, P);
+        auto colour = background_(dx, dy, dz, 0.0f, P);
         r = colour[0], g = colour[1], b = colour[2];
     } else {
-        auto colour = surface_(ox + t * dx, oy + t * dy, oz + t * dz, dx, dy, dz, t, 0.0f, steps, 1.0f, P);
-        r = colour[0], g = colour[1], b = colour[2];
+        auto light = surface_(ox + t * dx, oy + t * dy, oz + t * dz, dx, dy, dz, t, 0.0f, steps, 1.0f, 1.0f,
+                              Tuple<1>{{0.0f}}, P).first;
+        r = light[0], g = light[1], b = light[2];
     }
     r = tamed(r), g = tamed(g), b = tamed(b);
     float bright = 0.2126f * r + 0.7152f * g + 0.0722f * b;
     bright = bright / (1.0f + bright);
-    float *a = A + 7 * (row * width + column);
-    a[0] += r, a[1] += g, a[2] += b, a[3] += bright, a[4] += bright * bright, a[5] += 1.0f;
+    a[0] += r, a[1] += g, a[2] += b, a[3] += bright, a[4] += bright * bright, a[COUNT] += 1.0f;
+    a[COVER] += missed ? 0.0f : 1.0f;
 }
 int main(int, char **argument) {
-    int width = 1920, height = 1080, count = width * height, blocks = width / 8, *placed;
-    std::vector<int> pixels(count);
+    int width = atoi(argument[2]), height = atoi(argument[3]), count = width * height;
+    int blocks = (width + (1 << SHIFT) - 1) >> SHIFT, rows = (height + (1 << SHIFT) - 1) >> SHIFT;
+    int *placed, *points;
+    std::vector<int> pixels(count), drawn(2 * ROUNDS);
     FILE *file = fopen(argument[1], "rb");
-    if (fread(pixels.data(), 4, count, file) != count) return 1;
+    if (fread(pixels.data(), 4, count, file) != size_t(count)) return 1;
+    if (fread(drawn.data(), 4, 2 * ROUNDS, file) != 2 * ROUNDS) return 1;
+    std::vector<float> sums(size_t(CHANNELS) * count);
+    for (int i = 0; i < count; i++) sums[size_t(CHANNELS) * i + GOAL] = ROUNDS;
     float *A, *S, best = 1e30f;
-    cudaMalloc(&A, count * 28);
-    cudaMalloc(&S, blocks * height / 8 * 4);
+    double mean = 0;
+    cudaMalloc(&A, sums.size() * 4);
+    cudaMalloc(&S, blocks * rows * 4);
     cudaMalloc(&placed, count * 4);
-    cudaMemset(S, 0, blocks * height / 8 * 4);
+    cudaMalloc(&points, drawn.size() * 4);
+    cudaMemset(S, 0, blocks * rows * 4);
     cudaMemcpy(placed, pixels.data(), count * 4, cudaMemcpyHostToDevice);
+    cudaMemcpy(points, drawn.data(), drawn.size() * 4, cudaMemcpyHostToDevice);
+    cudaMemcpy(A, sums.data(), sums.size() * 4, cudaMemcpyHostToDevice);
     cudaEvent_t start, end;
     cudaEventCreate(&start);
     cudaEventCreate(&end);
-    for (int round = 0; round < 50; round++) {
-        cudaMemset(A, 0, count * 28);
+    for (int round = 0; round < TIMES; round++) {
         cudaEventRecord(start);
-        tile<<<(count + 127) / 128, 128>>>(GIVEN, S, placed, count, A, width, 256.0f, blocks);
+        tile<<<(count + 127) / 128, 128>>>(GIVEN, points, S, placed, count, A, width, LIMIT, blocks);
         cudaEventRecord(end);
         cudaEventSynchronize(end);
         float time;
         cudaEventElapsedTime(&time, start, end);
         best = fminf(best, time);
+        if (round == 0) {
+            cudaMemcpy(sums.data(), A, sums.size() * 4, cudaMemcpyDeviceToHost);
+            for (int i = 0; i < count; i++) mean += sums[size_t(CHANNELS) * i + 3];
+        }
     }
-    std::vector<float> sums(7 * count);
-    cudaMemcpy(sums.data(), A, count * 28, cudaMemcpyDeviceToHost);
-    double mean = 0;
-    for (int i = 0; i < count; i++) mean += sums[7 * i + 3];
     printf("%g %.9g %d\n", best, mean / count, int(cudaGetLastError()));
 }
 """
-"""Takes the file of the pixels; prints the best time of fifty in ms, the mean brightness, the error code."""
+"""Takes the file of the pixels and the sample sequence, width and height; prints the best time in ms, the
+mean brightness of the first sample, the error code."""
+
+
+def program(seen: Frame) -> str:
+    """FRAME with the constants of the renderer."""
+    numbers = {"CHANNELS": CHANNELS, "COUNT": COUNT, "GOAL": GOAL, "COVER": COVER, "SHIFT": seen.shift}
+    numbers |= {"ROUNDS": ROUNDS, "TIMES": TIMES}
+    constants = "".join(f"constexpr int {name} = {value};\n" for name, value in numbers.items())
+    return f"{constants}constexpr float LIMIT = {STEPS['float32']};\n{FRAME}"
+
+
+def given(seen: Frame, pixels: np.ndarray) -> np.ndarray:
+    """Pixels and sample sequence, the input of the program."""
+    return np.concatenate([pixels, SampleRange().points(ROUNDS, seen.samples).ravel()])
 
 
 def rows(run: Run) -> Iterator[Row]:
@@ -144,13 +172,16 @@ def rows(run: Run) -> Iterator[Row]:
         "frame after cones": lambda: tracer.add(sums, one, work),
     }
     for name, act in acts.items():
+        sums.copy_to_device(empty())  # else a pixel reaches its goal, and its thread has nothing to do
         mean = float(picture[:, 3].mean()) if name == "frame" else None
-        yield {"": f"fracslice, {name}", "ms": best(act, 50), "mean brightness": mean}
+        yield {"": f"fracslice, {name}", "ms": best(act, TIMES), "mean brightness": mean}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "pixels"
-        pixels.tofile(path)
+        given(seen, pixels).tofile(path)
         for name, flags in native.FLAGS.items():
-            took, mean, error = native.run(seen.linked, FRAME, flags, str(path))
+            took, mean, error = native.run(
+                seen.linked, program(seen), flags, str(path), str(WIDTH), str(HEIGHT)
+            )
             assert error == 0
             yield {"": name, "ms": took, "mean brightness": mean}
     yield {"": "CPU", "mean brightness": float(on_cpu(seen, pixels)[:, 3].mean())}

@@ -1,11 +1,12 @@
 """What a cluster costs: jobs by workers against threads, and the simulated growth to 1000 workers.
 
 Each job is made by two local workers and by as many threads, in turn; the ratio is of CPU time, of
-workers and this process together. Empty tasks give the cost of one in the scheduler and the client,
-which are serial. A run of each job in one process gives the CPU time of its tasks and of the rest, which
-is serial. The simulation makes a larger job of more tasks of these times: every task passes the serial
-part, then a free worker, and its result the serial part again; all tasks of a stage end before the next
-one begins.
+workers and this process together. What the workers compute outside of their tasks is counted, too, and the
+first job of new workers, which import, compile and plan. Empty tasks give the cost of one in all processes,
+and its wall time, which is serial. A run of each job in one process, and of a smaller one, gives the CPU time
+of its tasks and the growth of the rest, which is serial. The simulation makes a larger job of more tasks of
+these times: every task passes the serial part, then a free worker, and its result the serial part again; all
+tasks of a stage end before the next one begins.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fracslice import meshtasks
 from fracslice.animation import FilmJob, Timeline, write_frames
-from fracslice.cluster import Pool, ResultFolder, Task, Workers, connected
+from fracslice.cluster import Contents, Pool, ResultFolder, Task, Workers, connected
 from fracslice.cluster.pieces import run as make_piece
 from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb
@@ -44,6 +46,7 @@ SMALLEST = {
     "voxels": 16,
     "width": 16,
     "frames": 1,
+    "bricks": 1 << 12,
     "empty": 4,
     "tasks": 8,
     "workers": (1,),
@@ -75,6 +78,38 @@ def by_pool(pool: Pool, tasks: Sequence[Task]) -> None:
     pool.finished(tasks[0].job)
 
 
+SECONDS: list[float] = []
+"""CPU seconds of the tasks that this process has made, of measured workers."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Task that measures itself."""
+
+    of: Task
+
+    @property
+    def job(self) -> str:
+        return self.of.job
+
+    @property
+    def name(self) -> str:
+        return self.of.name
+
+    def make(self, work: Work) -> Contents:
+        begun = time.thread_time()
+        data = self.of.make(work)
+        SECONDS.append(time.thread_time() - begun)
+        return data
+
+
+class MeasuredWorkers(Workers):
+    """Workers whose tasks measure themselves."""
+
+    def made(self, tasks: Sequence[Task], work: Work) -> Iterator[int]:
+        return super().made([Measured(task) for task in tasks], work)
+
+
 @dataclass
 class Timed(Pool):
     """Makes all tasks in this process, and measures them; stages by the begin of their names."""
@@ -90,22 +125,22 @@ class Timed(Pool):
             yield index
 
 
-def jobs(pixels: int, layers: int, voxels: int, width: int, frames: int) -> dict[str, Job]:
+def jobs(
+    pixels: int, layers: int, voxels: int, width: int, frames: int, samples: int = SAMPLES
+) -> dict[str, Job]:
     """A job of each kind."""
     size = 80 / pixels
-    recipe = SliceRecipe(
-        to_xml(SCENE), "bulb", SliceJob(80.0, 80 / layers, (size, size)), None, "a.cli", "cli"
-    )
+    recipe = SliceRecipe(to_xml(SCENE), "bulb", SliceJob(80.0, 80 / layers, (size, size)), None, "cli")
     shape = width, width * 9 // 16
 
     def rendered(work: Work, _: Path) -> None:
-        for _ in Renderer(SCENE.root, VIEW, shape, work, "cpu").passes(SAMPLES):
+        for _ in Renderer(SCENE.root, VIEW, shape, work, "cpu").passes(samples):
             pass
 
     def filmed(work: Work, folder: Path) -> None:
         timeline = Timeline(replace(SCENE, view=VIEW, animation=Animation(duration=frames / 24)))
         write_frames(
-            FilmJob(timeline, shape, SAMPLES, 24.0, device="cpu"), range(frames), folder / "film", False, work
+            FilmJob(timeline, shape, samples, 24.0, device="cpu"), range(frames), folder / "film", False, work
         )
 
     return {
@@ -116,16 +151,23 @@ def jobs(pixels: int, layers: int, voxels: int, width: int, frames: int) -> dict
     }
 
 
+def used() -> tuple[float, float, int]:
+    """CPU seconds of this process and of its tasks so far, and their number."""
+    return time.process_time(), sum(SECONDS), len(SECONDS)
+
+
 def cpu_of(act: Callable[[], object], pool: Workers | None) -> Figures:
-    """CPU seconds of this process and of all workers."""
+    """CPU seconds of this process and of all workers, of the workers outside of their tasks, and tasks."""
 
-    def used() -> float:
-        others: dict[str, float] = pool.client.run(time.process_time) if pool else {}
-        return time.process_time() + sum(others.values())
+    def totals() -> tuple[float, ...]:
+        others = pool.client.run(used).values() if pool else [(0.0, 0.0, 0)]
+        return time.process_time(), *map(sum, zip(*others, strict=True))
 
-    begun, wall = used(), time.perf_counter()
+    begun, wall = totals(), time.perf_counter()
     act()
-    return {"cpu_s": used() - begun, "wall_s": time.perf_counter() - wall}
+    wall = time.perf_counter() - wall
+    own, workers, made, count = (now - then for now, then in zip(totals(), begun, strict=True))
+    return {"cpu_s": own + workers, "wall_s": wall, "outside_s": workers - made, "tasks": count}
 
 
 @dataclass(frozen=True)
@@ -136,14 +178,20 @@ class Stages:
     serial: float
 
     @classmethod
-    def of(cls, job: Job, folder: Path) -> Stages:
+    def of(cls, job: Job, smaller: Job, folder: Path) -> Stages:
+        (times, rest), (fewer, less) = cls.timed(job, folder), cls.timed(smaller, folder)
+        stages = tuple((len(of), sum(of) / len(of)) for of in times.values())
+        more = sum(map(len, times.values())) - sum(map(len, fewer.values()))
+        return cls(stages, max(rest - less, 0.0) / max(more, 1))
+
+    @staticmethod
+    def timed(job: Job, folder: Path) -> tuple[dict[str, list[float]], float]:
+        """CPU seconds of the tasks of each stage, and of the rest."""
         pool = Timed(ResultFolder(str(folder / "timed")))
         begun = time.process_time()
         job(Work(1, cluster=pool), folder)
         total = time.process_time() - begun
-        stages = tuple((len(times), sum(times) / len(times)) for times in pool.seconds.values())
-        made = sum(count * mean for count, mean in stages)
-        return cls(stages, (total - made) / sum(count for count, _ in stages))
+        return pool.seconds, total - sum(map(sum, pool.seconds.values()))
 
     @property
     def mean(self) -> float:
@@ -176,40 +224,53 @@ def simulated(workers: int, tasks: int, seconds: float, cost: float) -> float:
 def rows(
     run: Run,
     pixels: int = 16384,
-    layers: int = 80,
+    layers: int = 48,
     voxels: int = 512,
     width: int = 640,
-    frames: int = 8,
+    frames: int = 4,
+    bricks: int = 1 << 14,
     empty: int = 200,
     tasks: int = 10_000,
     workers: tuple[int, ...] = (1, 10, 100, 300, 1000),
     plot: str = "",
 ) -> Iterator[Row]:
-    threads = run.threads[0]
-    kinds, acts = jobs(pixels, layers, voxels, width, frames), dict[str, Callable[[], Any]]()
+    meshtasks.LEAST = bricks
+    threads, sizes = run.threads[0], (pixels, layers, voxels, width, frames)
+    kinds, smaller = jobs(*sizes), jobs(pixels, 8, voxels // 2, width // 2, 1)
     nothing = [Nothing("nothing", number) for number in range(empty)]
+    acts, first = dict[str, Callable[[], Any]](), dict[str, float]()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        with connected(f"local:{threads}", f"{name}/pieces", threads) as pool:
+        with connected(f"local:{threads}", f"{name}/pieces", threads) as plain:
+            pool = MeasuredWorkers(plain.client, plain.pieces)
             for kind, job in kinds.items():
                 shared, alone = Work(threads, cluster=pool), Work(threads)
                 acts[f"{kind} by workers"] = partial(cpu_of, partial(job, shared, folder), pool)
                 acts[f"{kind} by threads"] = partial(cpu_of, partial(job, alone, folder), None)
-            acts["empty"] = partial(by_pool, pool, nothing)
+                first[kind] = acts[f"{kind} by workers"]()["cpu_s"]
+            acts["empty"] = partial(cpu_of, partial(by_pool, pool, nothing), pool)
             measured = run.interleaved(acts)
-        measures = {kind: Stages.of(job, folder) for kind, job in kinds.items()}
-    cost = Spread.of([figures["wall_s"] / empty for figures in measured["empty"]])
-    yield {"": "a task in the scheduler and the client, ms", "slice": 1e3 * cost.median}
+        measures = {kind: Stages.of(job, smaller[kind], folder) for kind, job in kinds.items()}
+    wall, cpu = (
+        Spread.of([figures[key] / empty for figures in measured["empty"]]) for key in ("wall_s", "cpu_s")
+    )
+    yield {"": "an empty task, CPU ms in all processes", "slice": 1e3 * cpu.median}
+    yield {"": "its wall time in the scheduler and the client, ms", "slice": 1e3 * wall.median}
+    by = {kind: measured[f"{kind} by workers"] for kind in kinds}
     ratios = {kind: measured.ratio(f"{kind} by workers", f"{kind} by threads", "cpu_s") for kind in kinds}
     yield {"": f"CPU time, {threads} workers / {threads} threads", **ratios}
+    outside = {kind: Spread.of([1e3 * f["outside_s"] / f["tasks"] for f in of]) for kind, of in by.items()}
+    yield {"": "a worker outside of its tasks, CPU ms a task", **outside}
+    start = {kind: first[kind] - measured.spread(f"{kind} by workers", "cpu_s").median for kind in kinds}
+    yield {"": "first job of new workers, CPU s more", **start}
     yield {"": "tasks", **{kind: sum(n for n, _ in of.stages) for kind, of in measures.items()}}
     yield {"": "a task, CPU s", **{kind: of.mean for kind, of in measures.items()}}
     yield {"": "serial for a task, CPU s", **{kind: of.serial for kind, of in measures.items()}}
     for count in workers:
-        faster = {kind: of.faster(count, tasks, cost.median) for kind, of in measures.items()}
+        faster = {kind: of.faster(count, tasks, wall.median) for kind, of in measures.items()}
         yield {"": f"simulated: {count} workers, {tasks:,} tasks", **faster}
     if plot:
-        draw(Path(plot), measures, tasks, cost.median)
+        draw(Path(plot), measures, tasks, wall.median)
 
 
 def draw(path: Path, measures: dict[str, Stages], tasks: int, cost: float) -> None:

@@ -18,18 +18,23 @@ from ..runner import Figures, Row, Run, Spread
 from .cluster import Job, cpu_of, jobs
 
 RUNS, THREADS = 1, [4]
-SMALLEST = {"voxels": 16, "width": 16, "frames": 1, "workers": 1}
-KINDS = "mesh", "frames"
+SMALLEST = {"voxels": 16, "width": 16, "frames": 1, "samples": 1, "workers": 1}
 
 
 def rows(
-    run: Run, voxels: int = 1024, width: int = 1920, frames: int = 48, workers: int = 8
+    run: Run,
+    voxels: int = 1024,
+    width: int = 1920,
+    frames: int = 64,
+    samples: int = 2,
+    workers: int = 8,
+    kinds: tuple[str, ...] = ("frames", "mesh"),
 ) -> Iterator[Row]:
-    each, sizes = run.threads[0], (64, 8, voxels, width, frames)
-    large, small = jobs(*sizes), jobs(64, 8, 64, 64, 2)
-    pairs = [(large[kind], small[kind]) for kind in KINDS]
+    each, sizes = run.threads[0], (64, 8, voxels, width, frames, samples)
+    large, small = jobs(*sizes), jobs(64, 8, 64, 64, 2, samples)
+    pairs = [(large[kind], small[kind]) for kind in kinds]
     alone, many = ([measured(pairs, count, each) for _ in range(run.runs)] for count in (1, workers))
-    for number, kind in enumerate(KINDS):
+    for number, kind in enumerate(kinds):
         one, all_ = (Spread.of([turn[number]["wall_s"] for turn in turns]) for turns in (alone, many))
         yield {
             "": kind,

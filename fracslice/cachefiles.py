@@ -1,0 +1,130 @@
+"""Cache files, in folders that no other user can write to."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import BinaryIO, TypeVar
+
+from .errors import FracsliceWarning
+from .files import replacing, reported
+from .private import OWNER_ONLY, NotPrivateError, opened, private_folder
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Cache files in a folder that no other user can write to.
+
+    A folder or file that others can write to is ignored, with one warning.
+
+    Attributes
+    ----------
+    folder
+        Cache folder, created at first use for this user alone.
+    """
+
+    folder: Path
+
+    def get(self, name: str, read: Callable[[BinaryIO], T]) -> T | None:
+        """Read a cached file.
+
+        Parameters
+        ----------
+        name
+            File name.
+        read
+            Reads the open file.
+
+        Returns
+        -------
+        object
+            Result of `read`; None if the file is missing or not trusted.
+        """
+        return self._trusted(lambda here: self._read(name, read, here))
+
+    def place(self) -> Path | None:
+        """Return the path of the folder, for code that needs one.
+
+        Returns
+        -------
+        Path
+            Resolved path; None if the folder cannot be opened or is not trusted.
+        """
+        return self._trusted(lambda _: Path(os.path.realpath(self.folder)))
+
+    def put(self, name: str, write: Callable[[BinaryIO], object]) -> None:
+        """Write a cached file atomically; ignore a folder that is not trusted.
+
+        Parameters
+        ----------
+        name
+            File name.
+        write
+            Writes to the open file.
+
+        Raises
+        ------
+        ExportError
+            If writing fails for another reason than that.
+        """
+        target = Path(os.path.realpath(self.folder), name)
+        with (
+            reported(self.folder),
+            suppress(NotPrivateError),
+            private_folder(self.folder),
+            replacing(target, OWNER_ONLY) as file,
+        ):
+            write(file)
+
+    def _read(self, name: str, read: Callable[[BinaryIO], T], here: int | None) -> T:
+        with opened(self.folder / name, "rb", folder=here) as file:
+            return read(file)
+
+    def _trusted(self, use: Callable[[int | None], T]) -> T | None:
+        """Result for the open folder; None if it cannot be opened or is not trusted."""
+        try:
+            with private_folder(self.folder) as here:
+                return use(here)
+        except NotPrivateError as error:
+            warn(f"{error}: what is kept in {self.folder} is not used")
+        except OSError:
+            pass
+        return None
+
+
+@cache
+def warn(text: str) -> None:
+    """Issue a `FracsliceWarning` once.
+
+    Parameters
+    ----------
+    text
+        Message of one line.
+    """
+    warnings.warn(text, FracsliceWarning, stacklevel=2)
+
+
+def users_folder(variable: str, default: str) -> Path:
+    """Return the folder of this program within one of the user's folders.
+
+    Parameters
+    ----------
+    variable
+        Environment variable that names the user's folder.
+    default
+        Folder used if the variable is not set.
+
+    Returns
+    -------
+    Path
+        Folder; a path that cannot exist if the user has no home.
+    """
+    base = os.path.expanduser(os.environ.get(variable) or default)
+    return Path(base if os.path.isabs(base) else os.devnull, "fracslice")

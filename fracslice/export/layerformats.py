@@ -1,0 +1,151 @@
+"""Formats of layers: how a layer is encoded, and how a file or a folder holds the encoded layers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO
+
+from fracslice.errors import ExportError
+from fracslice.export.jobs import SliceRun
+from fracslice.export.ranges import Encode, begin, encoded_layers
+from fracslice.export.resuming import Journal, journal, resumable_folder
+from fracslice.files import put, replacing
+from fracslice.slicing import Layer
+
+
+@dataclass(frozen=True)
+class LayerFormat(ABC):
+    """Format of layers.
+
+    Attributes
+    ----------
+    name : str
+        Name of the format.
+    encode : callable
+        Encodes a layer of a run.
+    """
+
+    name: str
+    encode: Callable[[SliceRun, Layer], bytes]
+
+    def encoder(self, run: SliceRun) -> Encode:
+        """Return the function that encodes the layers of a run.
+
+        Parameters
+        ----------
+        run : SliceRun
+            The run.
+
+        Returns
+        -------
+        callable
+            Function of a layer.
+
+        Raises
+        ------
+        ExportError
+            If the format cannot hold the run.
+        """
+        return partial(self.encode, run)
+
+    @abstractmethod
+    def write(self, run: SliceRun, path: Path) -> None:
+        """Write the layers of a run; an interrupted job resumes.
+
+        Parameters
+        ----------
+        run : SliceRun
+            The layers to write.
+        path : Path
+            The file or folder to write.
+
+        Raises
+        ------
+        ExportError
+            If the format cannot hold the run, or for an error of the file system.
+        """
+
+    def encoder_for(self, run: SliceRun, path: Path) -> Encode:
+        """Return `encoder`, with the file in its errors, once a shard may write this file; see `begin`."""
+        try:
+            encode = self.encoder(run)
+        except ExportError as error:
+            raise ExportError(f"{path}: {error}") from None
+        begin(run, self.name)
+        return encode
+
+    @contextmanager
+    def encoded(self, run: SliceRun, path: Path) -> Iterator[Journal]:
+        """Encode the layers of a file.
+
+        Parameters
+        ----------
+        run : SliceRun
+            The layers to write.
+        path : Path
+            The file that they are for.
+
+        Yields
+        ------
+        Journal
+            The encoded layers, to be written before the block ends.
+
+        Raises
+        ------
+        ExportError
+            As for `write`.
+        """
+        encode = self.encoder_for(run, path)
+        with journal(path, run.key(self.name)) as layers:
+            for data in encoded_layers(run, self.name, encode, layers.count):
+                layers.append(data)
+            yield layers
+
+
+@dataclass(frozen=True)
+class FileFormat(LayerFormat):
+    """Format of one file.
+
+    Attributes
+    ----------
+    assemble : callable
+        Writes the encoded layers of a run, and what is around them, to an open file.
+    """
+
+    assemble: Callable[[SliceRun, Iterable[bytes], BinaryIO], None]
+
+    def write(self, run: SliceRun, path: Path) -> None:
+        with self.encoded(run, path) as layers, replacing(path) as file:
+            self.assemble(run, layers, file)
+
+
+@dataclass(frozen=True)
+class FolderFormat(LayerFormat):
+    """Format of a folder with a file for each layer, 00000.png, ...; the name is their extension.
+
+    The folder must be new, empty, or left by an interrupted job, which resumes after its last complete layer.
+
+    Attributes
+    ----------
+    is_whole : callable
+        True if the bytes are a complete file of a layer.
+    others : callable
+        Further files of a run by name, written last.
+    """
+
+    is_whole: Callable[[bytes], bool]
+    others: Callable[[SliceRun], dict[str, bytes]]
+
+    def write(self, run: SliceRun, path: Path) -> None:
+        encode, name = self.encoder_for(run, path), f"{{:05d}}.{self.name}".format
+        with resumable_folder(path, run.key(self.name), name, self.is_whole) as start:
+            for index, data in enumerate(encoded_layers(run, self.name, encode, start), start):
+                put(f"{path}/{name(index)}", data)
+            for other, data in self.others(run).items():
+                with replacing(path / other) as file:
+                    file.write(data)

@@ -1,0 +1,68 @@
+"""Transmittance of fog."""
+
+from __future__ import annotations
+
+from ...formulas.vocabulary import absolute, exp, maximum, minimum, where
+
+
+def fog(t, density):
+    """Transmittance of fog (Beer-Lambert law).
+
+    Parameters
+    ----------
+    t : float
+        Distance, scene units.
+    density : float
+        Extinction per scene unit.
+
+    Returns
+    -------
+    float
+        Fraction of the light that passes.
+    """
+    return exp(-density * t)
+
+
+def thickness(z, density, level, height):
+    """Extinction of fog that thins with the height.
+
+    Parameters
+    ----------
+    z : float
+        Height.
+    density : float
+        Extinction per scene unit at the level.
+    level : float
+        Height with that density.
+    height : float
+        Height over which it thins to 1/e.
+
+    Returns
+    -------
+    float
+        Extinction per scene unit.
+    """
+    return density * exp(minimum((level - z) / height, 40.0))
+
+
+def height_fog(t, z, dz, density, level, height):
+    """Transmittance of fog that thins with the height: the integral of its extinction along a ray.
+
+    Parameters
+    ----------
+    t : float
+        Distance, scene units.
+    z, dz : float
+        Height of the ray's end, and vertical component of its direction.
+    density, level, height : float
+        See `thickness`.
+
+    Returns
+    -------
+    float
+        Fraction of the light that passes.
+    """
+    drop = minimum(maximum(t * dz / height, -40.0), 40.0)
+    curved = absolute(drop) > 1e-3
+    mean = where(curved, (exp(drop) - 1.0) / where(curved, drop, 1.0), 1.0 + 0.5 * drop)
+    return exp(-minimum(t * mean * thickness(z, density, level, height), 80.0))

@@ -1,0 +1,144 @@
+"""Checks of layers in ranges, as tasks of a cluster; components are joined over the borders of ranges."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .cluster import Contents, Files, Pool, Shard, packed, unpacked
+from .errors import ClusterError, SharedError
+from .export.jobs import SliceRun
+from .export.ranges import range_size
+from .printing.limits import Limits
+from .slicerecipe import SliceRecipe
+from .slicing.checks import LayerFindings, PrintReport, check_layers, findings_of
+from .slicing.runs import LayerComponents, Nodes, Runs
+from .work import Work
+
+
+@dataclass(frozen=True)
+class CheckTask:
+    """Layers `first` to `end` - 1 of a run, each examined by itself.
+
+    Attributes
+    ----------
+    recipe : SliceRecipe
+        The run.
+    job : str
+        Key of the run.
+    first, end : int
+        Range.
+    """
+
+    recipe: SliceRecipe
+    job: str
+    first: int
+    end: int
+
+    @property
+    def name(self) -> str:
+        """Name of the range."""
+        return f"checked-{self.first:06}-{self.end:06}"
+
+    def make(self, work: Work) -> Contents:
+        """Components and widths of the layers; see `Task.make`."""
+        run = _planned(self.recipe)
+        if _key(run) != self.job:
+            raise ClusterError("the layers planned here are others than those of the job")
+        arrays: Files = {}
+        for index, of in enumerate(findings_of(run.slicer_with(work), range(self.first, self.end))):
+            arrays |= {f"{index}-{name}": array for name, array in _arrays(of)}
+        return packed(**arrays)
+
+
+def check_run(run: SliceRun, limits: Limits | None = None) -> PrintReport:
+    """Check the layers of a run, by the pool of its work if there is one.
+
+    Parameters
+    ----------
+    run : SliceRun
+        The run.
+    limits : Limits, optional
+        Limits of the checks.
+
+    Returns
+    -------
+    PrintReport
+        The report, the same for any number of workers.
+
+    Raises
+    ------
+    SharedError
+        For a shard that does not write the report, when its ranges are made.
+    """
+    pool, printer = run.work.cluster, run.screen.printer
+    if pool is None:
+        return check_layers(run.stack, limits, printer, run.work)
+    recipe, job, size = run.recipe, _key(run), range_size(run)
+    assert isinstance(recipe, SliceRecipe)
+    tasks = [
+        CheckTask(recipe, job, first, min(first + size, run.layers)) for first in range(0, run.layers, size)
+    ]
+    if isinstance(pool, Shard) and not pool.first:
+        raise SharedError(f"{pool.share(tasks, run.work)} ranges are checked; shard 1 writes the report")
+    report = check_layers(run.stack, limits, printer, run.work, _findings(pool, tasks, run))
+    pool.finished(job)
+    return report
+
+
+def _findings(pool: Pool, tasks: list[CheckTask], run: SliceRun) -> Iterator[LayerFindings]:
+    """Results of all layers, in order."""
+    for task, data in zip(tasks, pool.results(tasks, run.work, "checking layers"), strict=True):
+        files = unpacked(data)
+        for index in range(task.end - task.first):
+            yield _read(files, f"{index}-", run.stack.shape[1])
+
+
+def _arrays(of: LayerFindings) -> Iterator[tuple[str, np.ndarray]]:
+    """Arrays of the results of a layer, by name."""
+    for kind, components in (("solid", of.solid), ("empty", of.empty)):
+        for part in (components.runs, components.nodes):
+            yield from ((f"{kind}-{n}", v) for n, v in vars(part).items() if isinstance(v, np.ndarray))
+        yield f"{kind}-label", components.label
+    yield "area", np.array(of.area)
+    for name, measured in (("walls", of.walls), ("gaps", of.gaps)):
+        if measured is not None:
+            yield name, measured
+
+
+def _read(files: Files, layer: str, width: int) -> LayerFindings:
+    """Results of a layer from their arrays."""
+
+    def components(kind: str) -> LayerComponents:
+        def read(*names: str) -> dict[str, np.ndarray]:
+            return {name: files[f"{layer}{kind}-{name}"] for name in names}
+
+        runs = Runs(**read("rows", "begin", "end"), width=width)
+        return LayerComponents(runs, **read("label"), nodes=Nodes(**read("area", "middle", "open")))
+
+    widths: list[Any] = [files.get(f"{layer}{name}") for name in ("walls", "gaps")]
+    return LayerFindings(components("solid"), components("empty"), float(files[f"{layer}area"]), *widths)
+
+
+def _key(run: SliceRun) -> str:
+    """Key of the checks of a run."""
+    return run.key("checks")
+
+
+_PLANNING = threading.Lock()
+
+
+def _planned(recipe: SliceRecipe) -> SliceRun:
+    """The run of a recipe, planned once in a process."""
+    with _PLANNING:
+        return _kept(recipe)
+
+
+@lru_cache(maxsize=2)
+def _kept(recipe: SliceRecipe) -> SliceRun:
+    return recipe.run(Work(threads=1))
