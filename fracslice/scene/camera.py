@@ -72,8 +72,7 @@ class Camera(Part):
     clip: float = described(
         Number(
             0.0,
-            "distance of a plane in front of the eye, in scene units: what is nearer is cut away, and the "
-            "eye may be inside the solid; 0: none",
+            "distance from the eye of a plane in front of which all is cut away, in scene units; 0: none",
             least=0,
         )
     )
