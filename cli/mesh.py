@@ -216,7 +216,8 @@ def store_in(folder: str | None) -> Store | None:
 def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> MeshResult:
     """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.export import write
-    from fracslice.job import make_mesh, metadata
+    from fracslice.job import make_mesh
+    from fracslice.meshwriting import metadata
 
     if picture is None and Path(output).suffix.lower() != GRID:
         return make_mesh(scene, job, work, path=output)

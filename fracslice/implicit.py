@@ -73,8 +73,8 @@ def make_implicit(
     """
     from .export import application, check_target
     from .export.implicit import write_implicit
-    from .job import metadata
     from .kernel.graph import graph
+    from .meshwriting import metadata
     from .volume.sizing import sizing
 
     what, clock = what or MeshJob(), Clock(work or Work())

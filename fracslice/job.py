@@ -6,36 +6,31 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from . import surfaces
-from .checking import Check
 from .clock import Clock
 from .errors import SceneError, SharedError, TooLargeError
 from .finishing import Finish
 from .memory import peak_rss_mb
 from .meshjob import MeshJob
 from .meshresult import MeshResult
+from .meshwriting import STL, Writing
 from .planning import Sized, edited, planned
 from .report import Report, SurfaceError, SurfaceToMesh
 from .scene import Scene
 from .version import __version__
-from .work import Work, ahead
+from .work import Work, in_background
 
 if TYPE_CHECKING:
-    from .mesh import Mesh
-    from .mesh.check import MeshReport
-    from .mesh.simplify import Simplified
     from .meshrecipe import MeshRecipe
     from .surfaces import Surface
     from .volume import Plan, SignBricks
     from .volume.sizing import Sizing
 
-STL = ".stl"
 COLOURED = (".ply", ".glb", ".3mf")
 """Formats that hold colours of vertices."""
 
@@ -70,21 +65,18 @@ def make_mesh(
     """
     job = _Job(scene, what or MeshJob(), Clock(work or Work()), None if path is None else Path(path))
     job.refuse()
-    with job.aside() as aside:
+    with job.aside() as aside, in_background(import_ahead, job.clock.work.threads):
         return job.result(*job.surface(aside))
 
 
-class _Made(NamedTuple):
-    """The mesh, if in one piece; its simplification, if any; its checks; and distances between its vertices,
-    or points of the surface, and the other, scene units; area on the plate, mm2.
-    """
+LATER = "halo", "missed", "self_intersections", "tally", "tip_triangles", "tips", "topology", "touching"
+"""Modules of meshes that follow contouring."""
 
-    whole: Mesh | None
-    simplified: Simplified | None
-    report: MeshReport
-    errors: np.ndarray
-    back: np.ndarray
-    contact: float
+
+def import_ahead() -> None:
+    """Import modules of later stages, while native code samples and contours."""
+    for module in ("export", *(f"mesh.{name}" for name in LATER)):
+        import_module(f".{module}", __package__)
 
 
 @dataclass(frozen=True)
@@ -207,9 +199,11 @@ class _Job:
         with clock("finishing"):
             finish = Finish(surface, sized.left, what.dust, size, sized.scale, clock)
         scale = finish.place.scale
-        made = self.joined(surface, finish) or self.alone(surface, finish)
-        with clock("checking"):
-            amount, off = mesh_amount(planned, finish.volume, scale, clock.work)
+        measure = partial(mesh_amount, planned, finish.volume, scale, clock.work)
+        with in_background(measure, clock.work.threads) as measured:
+            made = Writing(self.scene, what, clock, self.path).made(surface, finish)
+            with clock("checking"):
+                amount, off = measured()
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
         report = Report(
             scene=self.scene.name,
@@ -241,120 +235,3 @@ class _Job:
             cavities_mm3=float(f"{finish.cavities:.9g}"),
         )
         return MeshResult(report, finish.place, planned, made.whole, clock.work)
-
-    def alone(self, surface: Surface, finish: Finish) -> _Made:
-        """Write the file while it is checked, by threads of this process."""
-        from .mesh.missed import surface_to_mesh
-
-        planned, work = surface.planned, self.clock.work
-        with self.clock("checking"):
-            back = surface_to_mesh(planned, surface.pieces.meshes, 1.0, work)
-        check = Check(finish, len(surface.signs))
-        whole, simplified = self.written(finish, check, finish.place.mm(surface.tips))
-        return _Made(whole, simplified, check.mesh, check.errors, back, check.contact)
-
-    def joined(self, surface: Surface, finish: Finish) -> _Made | None:
-        """Write the file from the pieces of a pool; None for a surface that was made here."""
-        if self.clock.work.cluster is None:
-            return None
-        from .export import FORMATS
-        from .export.stl import concatenate
-        from .sharedmesh import SharedSurface, finished, whole
-
-        if not isinstance(surface, SharedSurface):
-            return None
-        check, blocks = finished(surface, finish)
-        ending = STL if self.path is None else self.path.suffix.lower()
-        mesh = None
-        if not self.path or ending != STL:
-            mesh = whole(blocks)
-            finish.count_near()
-        if self.path:
-            with self.file(self.path) as (file, about):
-                if mesh is None:
-                    concatenate(blocks, file, about)
-                else:
-                    FORMATS[ending](mesh, file, about)
-        check.end()
-        errors = np.concatenate(check.off)
-        return _Made(mesh, None, finish.report(check.tally), errors, check.back, check.contact)
-
-    @contextmanager
-    def file(self, path: Path) -> Iterator[tuple[BinaryIO, dict[str, str]]]:
-        """Open the file, and return what it says about itself."""
-        from .export import application, flushing, replacing
-
-        with replacing(path) as file, flushing(file):
-            yield file, {"Application": application()} | metadata(self.scene)
-
-    def written(
-        self, finish: Finish, check: Check, tips: np.ndarray
-    ) -> tuple[Mesh | None, Simplified | None]:
-        """Write the file while it is checked. Returns the mesh, if in one piece, and the result of its
-        simplification, if any.
-        """
-        from .export import FORMATS
-        from .export.stl import write_pieces
-        from .mesh.halo import Finished
-        from .mesh.tip_triangles import tips_last
-
-        finished, simplified, mesh = finish.finished(), None, None
-        if self.what.simplify_mm is not None:
-            from .mesh.simplify import simplify
-
-            (piece,) = finished
-            with self.clock("simplifying"):
-                mesh, simplified = simplify(piece.mesh, self.what.simplify_mm, self.clock.work)
-            finished = iter([Finished.whole(mesh)])
-        meshes = ahead(check.passing(finished))
-        if several := len(finish.pieces) > 1:
-            meshes = tips_last(meshes, tips)
-        if self.what.colour is not None:
-            meshes = self.painted(meshes, finish)
-        if self.path is None:
-            (mesh,) = meshes
-            return mesh, simplified
-
-        def timed() -> Iterator[Mesh]:
-            nonlocal mesh
-            for mesh in meshes:
-                with self.clock("writing"):  # the consumer writes during the yield
-                    yield mesh
-
-        with self.file(self.path) as (file, about):
-            if self.path.suffix.lower() == STL:
-                write_pieces(timed(), file, about)
-            else:
-                for whole in timed():
-                    FORMATS[self.path.suffix.lower()](whole, file, about)
-        return None if several else mesh, simplified
-
-    def painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
-        """Colour the vertices. Edits that are no formulas have the colour of the object there."""
-        from .rendering.painting import paint
-
-        assert self.what.colour is not None
-        field: Any = finish.planned.root
-        while field.tree is None:
-            field = field.root
-        for mesh in meshes:
-            with self.clock("colouring"):
-                points = finish.place.units(mesh.vertices)
-                done = paint(field.tree, points, self.what.colour, self.clock.work)
-            yield replace(mesh, colours=done.colours, scalars=done.scalars)
-
-
-def metadata(scene: Scene) -> dict[str, str]:
-    """Metadata of files made from a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-
-    Returns
-    -------
-    dict
-        Title and hash.
-    """
-    return {"Title": scene.name, "scene_hash": scene.hash}

@@ -14,6 +14,7 @@ from .clock import Clock
 from .errors import TooLargeError
 from .memory import available_bytes
 from .volume.lattice import BRICK
+from .volume.states import distinct
 from .work import ahead
 
 if TYPE_CHECKING:
@@ -146,7 +147,7 @@ def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:
     needed, free = len(signs) * crossings_a_brick(signs) * BYTES_A_CROSSING, available_bytes()
     if len(signs) <= BRICKS or needed <= free:
         return
-    boxes = len(np.unique(signs.ijk >> 4, axis=0))
+    boxes = len(distinct(np.ravel_multi_index((signs.ijk // (2 * BRICK)).T, signs.index.shape)))
     dimension = min(max(math.log2(len(signs) / boxes), 2.0), 3.0)
     fits = voxel * (needed / free) ** (1 / dimension)
     raise TooLargeError(

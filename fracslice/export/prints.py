@@ -21,7 +21,7 @@ from fracslice.export.layerformats import LayerFormat
 from fracslice.export.ranges import Encode
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal
-from fracslice.files import replacing
+from fracslice.files import flushing, replacing
 from fracslice.slicing import Layer
 from fracslice.slicing.printers import Printer
 from fracslice.work import in_background
@@ -64,8 +64,8 @@ class PrintData:
     @cached_property
     def _read(self) -> tuple[NDArray[np.float64], list[int]]:
         """Areas of all layers and sizes of their pictures."""
-        records = [(_AREA.unpack_from(record)[0], len(record) - _AREA.size) for record in self.journal]
-        return np.array([area for area, _ in records]), [size for _, size in records]
+        areas, sizes = zip(*self.journal.heads(_AREA.size), strict=True)
+        return np.frombuffer(b"".join(areas), "<f8"), [size - _AREA.size for size in sizes]
 
     @property
     def areas(self) -> NDArray[np.float64]:
@@ -173,7 +173,12 @@ class PrintFormat(LayerFormat):
 
     def write(self, run: SliceRun, path: Path) -> None:
         drawn = nullcontext(None) if run.picture is None else in_background(run.picture, run.work.threads)
-        with drawn as picture, self.encoded(run, path) as journal, replacing(path) as file:
+        with (
+            drawn as picture,
+            self.encoded(run, path) as journal,
+            replacing(path) as file,
+            flushing(file),
+        ):
             assert run.screen.printer and run.resin
             self.assemble(PrintData(run, path.stem, run.screen.printer, run.resin, journal, picture), file)
 

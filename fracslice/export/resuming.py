@@ -26,6 +26,8 @@ OURS = b'{"application": "fracslice", '
 LAYER = re.compile(r"\d{5,}\.(png|svg)")
 """Names of layer files in a folder."""
 
+UNREADABLE = "the finished layers cannot be read back"
+
 _HEAD = struct.Struct("<II")
 """Header of a record: length and CRC-32 of the data."""
 
@@ -62,8 +64,36 @@ class Journal:
         for _ in range(self.count):
             layer = self.next()
             if layer is None:
-                raise ExportError("the finished layers cannot be read back")
+                raise ExportError(UNREADABLE)
             yield layer
+
+    def heads(self, size: int) -> Iterator[tuple[bytes, int]]:
+        """Iterate over the begins of all layers, without reading the rest.
+
+        Parameters
+        ----------
+        size : int
+            Bytes of a begin.
+
+        Yields
+        ------
+        tuple of bytes and int
+            The first bytes of a layer, and its length.
+
+        Raises
+        ------
+        ExportError
+            If a record cannot be read back.
+        """
+        at = 0
+        for _ in range(self.count):
+            self.file.seek(at)
+            head = self.file.read(_HEAD.size + size)
+            if len(head) < _HEAD.size:
+                raise ExportError(UNREADABLE)
+            length, _ = _HEAD.unpack_from(head)
+            yield head[_HEAD.size :], length
+            at += _HEAD.size + length
 
     def next(self) -> bytes | None:
         """Read the next record.

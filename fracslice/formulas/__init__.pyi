@@ -541,7 +541,7 @@ def julia(c: Sequence[float] = (-0.2, 0.8, 0.0, 0.0), iterations: Union[int, Lit
     """
 
 def kifs_dodecahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
-    """The dodecahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
+    """The dodecahedron in a kaleidoscope (Knighty 2010). L = 1.
 
     Parameters
     ----------
@@ -562,7 +562,7 @@ def kifs_dodecahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[
     """
 
 def kifs_icosahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
-    """The icosahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
+    """The icosahedron in a kaleidoscope (Knighty 2010). L = 1.
 
     Parameters
     ----------
@@ -583,7 +583,7 @@ def kifs_icosahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[i
     """
 
 def kifs_octahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
-    """The octahedron in a kaleidoscope (Knighty 2010). L = 2 is measured.
+    """The octahedron in a kaleidoscope (Knighty 2010). L = 1.
 
     Parameters
     ----------
@@ -604,7 +604,7 @@ def kifs_octahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[in
     """
 
 def kifs_tetrahedron(scale: float = 2.0, angle: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
-    """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 2 is measured.
+    """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 1.
 
     Parameters
     ----------
@@ -646,11 +646,12 @@ def koch(radius: float = 1.0, height: float = 0.5, level: int = 4) -> Node:
 
 def lambda_bulb(power: float = 4.0, factor: float = 1.1, angle: float = 30.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """The filled Julia set of lambda (w - w^n) in the triplex numbers, after the logistic map (May 1976,
-    "Simple mathematical models with very complicated dynamics"). L = 2 is measured.
+    "Simple mathematical models with very complicated dynamics"). L = 2 is measured for powers up to 12, L = 3
+    beyond.
 
     Parameters
     ----------
-    power : a number >= 2 and <= 8, default 4.0
+    power : a number >= 2 and <= 16, default 4.0
         the exponent
     factor : a number > 0 and <= 4, default 1.1
         size of lambda

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .orbits import orbit
 from .parameters import Count, Number
+from .registry import Node
 from .verbs import positive, turn
 from .verbs import power as raised
 from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, sin, sqrt, where
@@ -83,15 +84,21 @@ def cosine_bulb(w, c, power):  # type: ignore[no-untyped-def]
 
 
 @orbit(
-    power=Number(4.0, "the exponent", least=2, most=8),
+    power=Number(4.0, "the exponent", least=2, most=16),
     factor=Number(1.1, "size of lambda", above=0, most=4),
     angle=Number(30.0, "angle of lambda, about the z axis, degrees"),
 )
 def lambda_bulb(w, c, power, factor, angle):  # type: ignore[no-untyped-def]
     """The filled Julia set of lambda (w - w^n) in the triplex numbers, after the logistic map (May 1976,
-    "Simple mathematical models with very complicated dynamics"). L = 2 is measured.
+    "Simple mathematical models with very complicated dynamics"). L = 2 is measured for powers up to 12, L = 3
+    beyond.
     """
     return factor * turn(w - raised(w, power), (0.0, 0.0, 1.0), angle)
+
+
+@lambda_bulb.slope  # type: ignore[untyped-decorator]
+def lambda_slope(node: Node) -> float:
+    return 2.0 if node["power"] <= 12 else 3.0
 
 
 @orbit(

@@ -41,23 +41,23 @@ def kaleidoscope(w, mirrors, axis, scale, angle):  # type: ignore[no-untyped-def
 
 @orbit(**turned(2.0))
 def kifs_tetrahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
-    """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 2 is measured."""
+    """The tetrahedron in a kaleidoscope (Knighty 2010); a scale of 2 is Sierpinski's. L = 1."""
     return kaleidoscope(w, TETRAHEDRON, TETRAHEDRON_AXIS, scale, angle)
 
 
 @orbit(**turned(2.0))
 def kifs_octahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
-    """The octahedron in a kaleidoscope (Knighty 2010). L = 2 is measured."""
+    """The octahedron in a kaleidoscope (Knighty 2010). L = 1."""
     return kaleidoscope(w, OCTAHEDRON, OCTAHEDRON_AXIS, scale, angle)
 
 
 @orbit(**turned(2.0))
 def kifs_dodecahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
-    """The dodecahedron in a kaleidoscope (Knighty 2010). L = 2 is measured."""
+    """The dodecahedron in a kaleidoscope (Knighty 2010). L = 1."""
     return kaleidoscope(w, DODECAHEDRON, DODECAHEDRON_AXIS, scale, angle)
 
 
 @orbit(**turned(2.0))
 def kifs_icosahedron(w, c, scale, angle):  # type: ignore[no-untyped-def]
-    """The icosahedron in a kaleidoscope (Knighty 2010). L = 2 is measured."""
+    """The icosahedron in a kaleidoscope (Knighty 2010). L = 1."""
     return kaleidoscope(w, ICOSAHEDRON, ICOSAHEDRON_AXIS, scale, angle)

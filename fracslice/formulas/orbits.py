@@ -161,6 +161,11 @@ def orbit_select(node: Node) -> Callable[..., Any]:
     return function
 
 
+def orbit_slope(node: Node) -> float:
+    """Lipschitz bound: that of a constant stretch if it is proved, else a measured one."""
+    return float(grown(node).lipschitz or node.formula.lipschitz)
+
+
 def orbit_steepening(node: Node) -> float:
     return max(2.0, float(grown(node).power))
 
@@ -193,6 +198,7 @@ HOOKS: dict[str, Callable[..., Any]] = {
     "select": orbit_select,
     "sign": orbit_sign,
     "proved_bounds": orbit_proved_bounds,
+    "slope": orbit_slope,
     "steepening": orbit_steepening,
     "potential": orbit_potential,
     "check": orbit_check,

@@ -162,9 +162,8 @@ class Body(Expressions):
             case ast.While(test):
                 return self.loop(node, (), lambda: self.condition(test))
             case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), limits), body):
-                return self.counted(
-                    node, counter, [number(self.builder, self.value(v), WHOLE) for v in limits]
-                )
+                ends = [number(self.builder, self.value(v), WHOLE) for v in limits]
+                return self.counted(node, counter, ends)
             case ast.Pass():
                 pass
             case _:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..formulas.field import Loops
-from .intervals import TINY
+from .interval_numbers import TINY
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,11 @@
-"""Growth of orbits by sampling: power, radius of escape and box of the solid."""
+"""Growth of orbits: power, radius of escape and box of the solid, from samples and by proofs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache, reduce
-from itertools import product
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,16 +14,29 @@ from ..formulas.box import Box
 from ..formulas.escape import CORE
 from . import functions
 from .cells import possible_cells
-from .orbits import Round, field, written
-
-DIRECTIONS, RADII, FARTHEST = 64, np.geomspace(1e-2, 1e4, 56).round(4), 1e6
-"""Samples of the search for the radius of escape."""
+from .escape_radius import constant_stretch, escape_radius, least_size
+from .orbit_samples import (
+    FARTHEST,
+    POWER,
+    RADII,
+    composed,
+    directions,
+    image,
+    norm,
+    sampled_escape,
+    sampled_radius,
+    step_power,
+)
+from .orbits import Round, field
 
 LIPSCHITZ, CELLS = 3.0, 1 << 15
 """Lipschitz bound of the fields of hybrids, and the most cells of the search for the box."""
 
 ROUNDS = 60
 """Rounds after which an orbit counts as bounded."""
+
+LEAST = 1.1
+"""Least scaled radius of escape of an orbit that grows by a power."""
 
 FEW = 8
 """Rounds of a solid that has no thin tips."""
@@ -34,21 +46,22 @@ STOP = {False: 4.0, True: 300.0}
 depends little on the number of steps.
 """
 
-POWER, LARGEST, FLAT = 1.2, 27.0, 0.2
-"""Least growth that counts as a power; largest log |w| one step past the radius where an orbit stops; largest
-logarithm of a factor that counts as 1, for it changes the potential of an escaped orbit by a thirtieth.
-"""
+LARGEST = 27.0
+"""Largest log |w| one step past the radius where an orbit stops."""
 
-Image = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Image of points [3, n] with constants [3, n]."""
+TRIES, LARGER = 3, 1.65
+"""Radii that are tried to be proved, each where the search before left no doubt; most that the first is
+enlarged by.
+"""
 
 
 @dataclass(frozen=True)
 class Growth:
     """Growth of an orbit for given parameters.
 
-    The solid is by definition what has not left for good after its rounds, so an error of the radius moves no
-    surface by more than one step.
+    The solid is by definition what has not left for good after its rounds, so a radius that is too large
+    moves no surface by more than one step. One that is too small makes another solid of each number of
+    rounds, for orbits come back.
 
     Attributes
     ----------
@@ -60,12 +73,18 @@ class Growth:
         Of each step: radius after it beyond which |w| grows with every round.
     half
         Half sizes of a box around the solid.
+    proved
+        True if it is proved that no orbit comes back from beyond the radii (`escape_radius`).
+    stretch
+        Stretch of a round if it is the same at all points, else None.
     """
 
     powers: tuple[float, ...]
     factors: tuple[float, ...]
     escapes: tuple[float, ...]
-    half: tuple[float, float, float]
+    half: tuple[float, float, float] = (math.inf,) * 3
+    proved: bool = False
+    stretch: float | None = None
 
     @property
     def power(self) -> float:
@@ -81,6 +100,25 @@ class Growth:
     def escape(self) -> float:
         """Radius of escape at the end of a round."""
         return self.escapes[-1]
+
+    @property
+    def surface(self) -> float:
+        """The last |w| on the surface: the radius of escape, or more, for the potential of 1 is 0."""
+        scale = self.scales[-1] if self.scaled else 1.0
+        return max(self.escape, LEAST / scale) if self.by_power else self.escape
+
+    @property
+    def lipschitz(self) -> float | None:
+        """Proved Lipschitz bound outside of the solid, or None.
+
+        With a constant stretch s, ``|w(p)| - |w(q)| <= s |p - q|`` for all points. An orbit that stops after
+        a step, at `STOP` times the larger of its radius and R, must be out of its radius for all q as near
+        as ``(|w(p)| - R) / (L s)``; L is 1 if no radius within a round exceeds R.
+        """
+        if not self.proved or self.stretch is None or self.by_power:
+            return None
+        largest = STOP[False] * max(self.escapes) / self.escape
+        return (largest - 1) / (largest * (1 - 1 / STOP[False]))
 
     @property
     def following(self) -> tuple[float, ...]:
@@ -134,23 +172,49 @@ def growth(steps: Round, values: tuple[tuple[str, Any], ...], iterations: int) -
     """
     known = dict(values)
     images = [image(steps, place, known) for place in range(len(steps))]
-    whole = _composed(images)
-    rays, origin = _rays(), np.zeros(3)
-    if not _norm(whole(rays * 1e4, origin)).min() > 1.02e4:
+    whole = composed(images)
+    rays, origin = directions(), np.zeros(3)
+    if not norm(whole(rays * 1e4, origin)).min() > 1.02e4:
         return None
-    rates = [_power(step, rays, origin) for step in images]
+    rates = [step_power(step, rays, origin) for step in images]
     points = (rays[:, :, None] * RADII).reshape(3, -1)
-    fixed = all(code.julia for code in steps)
-    radius = bounded = _radius(whole, points, ROUNDS, FARTHEST)
+    fixed = all(code.is_fixed(k) for k, code in enumerate(steps))
+    radius = bounded = sampled_radius(whole, points, ROUNDS, FARTHEST)
     for _ in range(2):  # thin tips of the solid fall between samples; that of a few rounds has thicker ones
-        radius = max(_escape(whole, points, 0.0 if fixed else bounded), 0.0 if fixed else bounded)
-        bounded = max(bounded, _radius(whole, points, FEW, radius))
+        radius = max(sampled_escape(whole, points, 0.0 if fixed else bounded), 0.0 if fixed else bounded)
+        bounded = max(bounded, sampled_radius(whole, points, FEW, radius))
     size = 0.0 if fixed else bounded
-    escapes = [_escape(_composed([*images[k:], *images[:k]]), points, size) for k in range(1, len(steps))]
-    sampled = 1.5 * _radius(whole, points, iterations, radius)
+    escapes = [
+        sampled_escape(composed([*images[k:], *images[:k]]), points, size) for k in range(1, len(steps))
+    ]
     powers, factors = zip(*rates, strict=True)
-    bound = Growth(powers, factors, (*escapes, radius), (sampled, sampled, sampled))
+    bound = Growth(powers, factors, (*escapes, radius), stretch=constant_stretch(steps, 0, known))
+    bound = _proved(steps, bound, known, size) if bound.fits else bound
+    sampled = 1.5 * sampled_radius(whole, points, iterations, bound.escape)
+    bound = replace(bound, half=(sampled, sampled, sampled))
     return replace(bound, half=_half(steps, bound, known, iterations)) if bound.fits else bound
+
+
+def _proved(steps: Round, bound: Growth, values: Mapping[str, Any], size: float) -> Growth:
+    """Growth with radii of escape that are proved; the same if they cannot be."""
+    tried, constants = bound, None if size and bound.by_power else size
+    for _ in range(TRIES):
+        own = {**values, **arguments(steps, tried, 1)}
+        radii = [
+            escape_radius(
+                least_size(steps, first, own, constants),
+                tried.escapes[first - 1],
+                math.sqrt(own[f"stop{(first - 1) % len(steps)}"]),
+                None if constants is None and first == 0 else tried.surface,
+            )
+            for first in range(len(steps))
+        ]
+        if (*radii[1:], radii[0]) == tried.escapes:
+            return replace(tried, proved=True)
+        tried = replace(tried, escapes=(*radii[1:], radii[0]))
+        if any(new > LARGER * old for new, old in zip(tried.escapes, bound.escapes, strict=True)):
+            break
+    return bound
 
 
 def _half(
@@ -170,91 +234,6 @@ def _half(
     centres, _, size = possible_cells(evaluate, LIPSCHITZ, Box.centred(*bound.half), CELLS)
     x, y, z = (np.ceil((abs(centres).max(axis=1, initial=0) + size / 2) * 256) / 256).tolist()
     return x, y, z
-
-
-def _power(step: Image, rays: np.ndarray, origin: np.ndarray) -> tuple[float, float]:
-    """Power by which a step grows far out, and the logarithm of its factor."""
-    near, far = (np.log(np.maximum(_norm(step(rays * r, origin)), 1e-300)) for r in (1e4, 1e5))
-    rate = round(float(np.median(far - near)) / math.log(10), 3)
-    rate = rate if rate > POWER else 1.0
-    factor = float(np.median(near)) - rate * math.log(1e4)
-    return rate, factor if abs(factor) > FLAT else 0.0
-
-
-def _escape(whole: Image, points: np.ndarray, size: float) -> float:
-    """Radius beyond which a round leads farther out, for constants of a given size that point against the
-    image, against the point or along it.
-    """
-    grows, radii = np.ones(points.shape[1], bool), _norm(points)
-    for against in (whole(points, np.zeros(3)), points, -points) if size else (points,):
-        constant = against * (-size / np.maximum(_norm(against), 1e-300))
-        grows &= _norm(whole(points, constant)) > 1.02 * radii
-    stays = np.flatnonzero(~grows.reshape(-1, len(RADII)).all(axis=0))
-    return float(RADII[min(stays.max(initial=0) + 1, len(RADII) - 1)])
-
-
-def _radius(whole: Image, points: np.ndarray, rounds: int, radius: float) -> float:
-    """Radius that encloses the points whose orbit is within a radius after some rounds."""
-    w = start = points
-    for _ in range(rounds):
-        w = whole(w, start)
-        kept = _norm(w) < max(radius, FARTHEST)
-        w, start = w[:, kept], start[:, kept]
-    inside = _norm(start[:, _norm(w) <= radius])
-    return float(inside.max(initial=RADII[0]) * (RADII[1] / RADII[0]) * 1.02)
-
-
-def _rays() -> np.ndarray:
-    """Unit vectors [3, n]: to the corners, edges and faces of a cube, and at random."""
-    lattice = np.array([v for v in product((-1, 0, 1), repeat=3) if any(v)], float).T
-    rays = np.hstack([lattice, np.random.default_rng(0).normal(size=(3, DIRECTIONS))])
-    unit: np.ndarray = rays / np.linalg.norm(rays, axis=0)
-    return unit
-
-
-def _norm(w: np.ndarray) -> np.ndarray:
-    """Lengths of vectors [3, n], of any size."""
-    length: np.ndarray = np.hypot(np.hypot(w[0], w[1]), w[2])
-    return length
-
-
-def image(steps: Round, place: int, values: Mapping[str, Any]) -> Image:
-    """Return a step on arrays.
-
-    Parameters
-    ----------
-    steps
-        Steps of a round.
-    place
-        Place of the step in the round.
-    values
-        Values of the arguments of the steps.
-
-    Returns
-    -------
-    callable
-        Function of points [3, n] and constants, [3, n] or [3], that returns their images [3, n].
-    """
-    code = steps[place]
-    names = code.arguments(place)
-    lines, assigned = code.image(place)
-    body = [*code.before(place, ("px", "py", "pz")), *lines, *assigned]
-    function = written(steps, ["x", "y", "z", "px", "py", "pz", *names], [*body, "return x, y, z"])
-    given = [values[name] for name in names]
-
-    def taken(w: np.ndarray, c: np.ndarray) -> np.ndarray:
-        constant = c if c.ndim == 2 else c[:, None]
-        with np.errstate(all="ignore"):
-            values = np.array(np.broadcast_arrays(*function(*w, *constant, *given), w[0])[:3])
-        finite: np.ndarray = np.nan_to_num(values, nan=1e300, posinf=1e300, neginf=-1e300)
-        return finite.clip(-1e170, 1e170)
-
-    return taken
-
-
-def _composed(images: Sequence[Image]) -> Image:
-    """Steps one after the other."""
-    return lambda w, c: reduce(lambda v, step: step(v, c), images, w)
 
 
 def arguments(steps: Round, bound: Growth, iterations: int) -> dict[str, object]:
@@ -280,16 +259,16 @@ def arguments(steps: Round, bound: Growth, iterations: int) -> dict[str, object]
         return {**own, **stops, "bailout": bound.escape}
     counted = min(iterations, int(30 / math.log10(bound.power)))
     scales = bound.scales if bound.scaled else (1.0,) * len(steps)
-    radius = max(bound.escape * scales[-1], 1.1)
+    radius = bound.surface * scales[-1]
     last = 2 * math.log(radius)
     least = radius**2 * math.exp(-max(0.2 / radius, 1e-4))
     own["levels"] = (last / bound.power**counted, last, least)
-    escapes = (*bound.escapes[:-1], radius / scales[-1])
+    escapes = (*bound.escapes[:-1], bound.surface)
     for k, (escape, following, scale) in enumerate(zip(escapes, bound.following, scales, strict=True)):
         own[f"stop{k}"] = max(escape, STOP[True] ** (1 / following) / scale) ** 2
         own[f"rate{k}"] = power = bound.powers[k]
         if bound.scaled:
             own[f"scale{k}"] = scale
-        if steps[k].julia:
+        if steps[k].is_fixed(k):
             own[f"least{k}"] = power * CORE ** ((power - 1) / 2) if power > POWER else 0.0
     return own

@@ -12,45 +12,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import FunctionType
 from typing import Any
 
-import numpy as np
-
-from ..formulas import vocabulary
-
-Bound = Any
-"""Lanes or NumPy array."""
-
-
-TINY = {32: 1e-36, 64: 1e-290}
-"""Smallest magnitude that has a sign, by the width of floats."""
-
-
-@dataclass(frozen=True)
-class Numbers:
-    """Kind of the bounds.
-
-    Attributes
-    ----------
-    functions
-        Module with the functions of the vocabulary.
-    unit
-        Distance from 1 to the next number.
-    huge, tiny
-        Largest magnitude, and the smallest that has a sign.
-    constant
-        Function of a bound and a number that returns the number in the form of the bound.
-    """
-
-    functions: Any
-    unit: float
-    huge: float
-    tiny: float
-    constant: Callable[[Bound, float], Bound]
-
-
-ARRAYS = Numbers(vocabulary, 2.0**-52, 1e300, TINY[64], np.full_like)
+from .interval_numbers import Bound, Numbers
 
 ROUNDED = 16
 """Errors of the elementary functions, units in the last place; the tests hold them to less."""
@@ -318,54 +282,3 @@ class Interval:
         high = m.where(all_of | (some & top), one, m.minimum(image.hi, one))
         low = m.where(all_of | (some & ~top), -one, m.maximum(image.lo, -one))
         return Interval(low, high, self.of)
-
-
-def on_cells(name: str) -> Callable[..., Any]:
-    """Return a function of the vocabulary for NumPy that takes intervals, too.
-
-    Parameters
-    ----------
-    name
-        Name in the vocabulary.
-
-    Returns
-    -------
-    callable
-        Function of intervals, conditions on cells and numbers.
-    """
-    plain = getattr(vocabulary, name)
-
-    def function(first: Any, *others: Any) -> Any:
-        if name == "any_of" and isinstance(first, Possible):
-            return bool(first.may.any())
-        given = (first, *others)
-        if not any(isinstance(v, (Interval, Possible)) for v in given):
-            return plain(*given)
-        if name == "where":
-            yes, no = map(_on_arrays, others)
-            return (first if isinstance(first, Possible) else Possible(first, first)).where(yes, no)
-        return getattr(_on_arrays(first), name)(*others)
-
-    return function
-
-
-def _on_arrays(value: Any) -> Interval:
-    """Interval of numbers; an interval unchanged."""
-    return value if isinstance(value, Interval) else Interval.at(np.asarray(value, np.float64), ARRAYS)
-
-
-def on_intervals(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function in the language of formulas that takes intervals.
-
-    Parameters
-    ----------
-    function
-        Function that uses the vocabulary and nothing else from outside.
-
-    Returns
-    -------
-    callable
-        The same code with functions of intervals.
-    """
-    assert isinstance(function, FunctionType)
-    return FunctionType(function.__code__, {name: on_cells(name) for name in vocabulary.NAMES})

@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .intervals import ARRAYS, Interval
+from .interval_numbers import ARRAYS
+from .intervals import Interval
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

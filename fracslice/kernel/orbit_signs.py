@@ -12,7 +12,8 @@ from ..formulas.box import Box
 from . import functions
 from .enclosing_box import proved_half
 from .growth import Growth, arguments, growth
-from .intervals import Interval, on_intervals
+from .interval_arrays import on_intervals
+from .intervals import Interval
 from .orbits import Round, sign
 
 
@@ -36,7 +37,7 @@ def sign_arguments(steps: Round, grown: Growth, iterations: int) -> dict[str, ob
     own = arguments(steps, grown, iterations)
     stops = {name: value for name, value in own.items() if name.startswith("stop")}
     scales = grown.scales if grown.scaled else (1.0,) * len(steps)
-    radius = max(grown.escape * scales[-1], 1.1) if grown.by_power else grown.escape
+    radius = grown.surface * scales[-1]
     if any(scale**2 * stop < radius**2 for scale, stop in zip(scales, stops.values(), strict=True)):  # type: ignore[operator]
         return None
     scale = {"scale": scales[-1]} if grown.scaled else {}

@@ -17,7 +17,8 @@ from typing import Any
 from ..formulas import vocabulary
 from ..formulas.escape import potential_distance
 from . import functions
-from .steps import Step, traced
+from .steps import traced
+from .straight_line import Step
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,10 @@ class Code:
         """Straight-line code of the step at a place in the round."""
         return _traced(self, place, functions.fingerprint(self.step))
 
+    def is_fixed(self, place: int) -> bool:
+        """True if the step is the same map for all start points, as in a Julia set."""
+        return self.julia or not self.traced(place).constants
+
     def arguments(self, place: int) -> list[str]:
         """Names of the values that the step needs at a place in the round."""
         names = [f"v{place}_{name}" for name, _ in self.sizes]
@@ -68,13 +73,17 @@ class Code:
         constant = f"cx{place}, cy{place}, cz{place} = {f'c{place}' if self.julia else given}"
         return [*lines, constant, *self.traced(place).before]
 
-    def image(self, place: int) -> tuple[list[str], list[str]]:
-        """Lines that take the point x, y, z to its image: those of the calculation, then the assignments."""
-        step, xyz = self.traced(place), ("x", "y", "z")
-        lines, assigned = list(step.lines), [f"x, y, z = {', '.join(step.point)}"]
+    def image(self, place: int) -> list[str]:
+        """Lines that take the point x, y, z to its image."""
+        lines, assigned = self.around(place, self.traced(place).image)
+        return [*lines, *assigned]
+
+    def around(self, place: int, lines: Sequence[str]) -> tuple[list[str], list[str]]:
+        """Lines of the step's calculation in its own coordinates, and those that assign its image."""
+        xyz, assigned = ("x", "y", "z"), [f"x, y, z = {', '.join(self.traced(place).point)}"]
         if not self.moved:
-            return lines, assigned
-        there, back = (f"x, y, z = {', '.join(_mapped(f'{way}{place}', xyz))}" for way in ("back", "forth"))
+            return [*lines], assigned
+        there, back = (f"x, y, z = {', '.join(_mapped(f'{name}{place}', xyz))}" for name in ("back", "forth"))
         return [there, *lines], [*assigned, back]
 
     def _flagged(self, place: int, **names: list[str]) -> list[str]:
@@ -127,7 +136,7 @@ def _field(steps: Round, by_power: bool, scaled: bool, _: object) -> Callable[..
     for place, code in enumerate(steps):
         given += [*code.arguments(place), f"stop{place}", *([f"scale{place}"] if scaled else [])]
         given += [f"rate{place}"] if by_power else []
-        given += [f"least{place}"] if by_power and code.julia else []
+        given += [f"least{place}"] if by_power and code.is_fixed(place) else []
         setup += code.before(place, ("x", "y", "z"))
         loop += _taken(code, place, by_power, f"scale{place}" if scaled else "")
     last = len(steps) - 1
@@ -177,10 +186,9 @@ def sign(steps: Round, scaled: bool) -> Callable[..., Any]:
 def _sign(steps: Round, scaled: bool, _: object) -> Callable[..., Any]:
     given, setup, loop = [], [], []
     for place, code in enumerate(steps):
-        lines, assigned = code.image(place)
         given += [*code.arguments(place), f"stop{place}"]
         setup += code.before(place, ("x", "y", "z"))
-        loop += [*lines, *assigned, "r2 = x * x + y * y + z * z"]
+        loop += [*code.image(place), "r2 = x * x + y * y + z * z"]
         loop += [f"alive = alive & (r2 < stop{place})"]
     body = [
         *setup,
@@ -197,10 +205,10 @@ def _sign(steps: Round, scaled: bool, _: object) -> Callable[..., Any]:
 def _taken(code: Code, place: int, by_power: bool, scale: str) -> list[str]:
     """Lines of the loop that take a step."""
     by_w, by_c = code.traced(place).stretch
-    if code.julia and by_power:  # preimages of critical points outside the set, see `escape.CORE`
+    if code.is_fixed(place) and by_power:  # preimages of critical points outside the set, see `escape.CORE`
         by_w = f"maximum({by_w}, least{place})"
     grown = f"{by_w} * dr" if code.julia or by_c == "0.0" else f"{by_w} * dr + {by_c}"
-    lines, assigned = code.image(place)
+    lines, assigned = code.around(place, code.traced(place).lines)
     return [
         *lines,
         f"dr = spread{place} * ({grown})" if code.moved else f"dr = {grown}",

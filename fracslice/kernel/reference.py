@@ -9,7 +9,8 @@ import numpy as np
 
 from ..formulas import vocabulary
 from ..formulas.registry import Node
-from .intervals import Interval, on_cells
+from .interval_arrays import on_cells
+from .intervals import Interval
 from .linker import CALLED, FIELD, link
 
 

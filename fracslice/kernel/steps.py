@@ -9,40 +9,19 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FunctionType
 from typing import Any, NoReturn
 
 from ..errors import KernelError
 from . import functions, language
-from .parsing import parse, parse_expression
+from .parsing import parse_expression
 from .source import specialised
+from .straight_line import Step, named
 from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector3, as_number
 
 Value = Any
 """Scalar, Vector or tuple of these."""
-
-
-@dataclass
-class Step:
-    """Code of a step.
-
-    Attributes
-    ----------
-    before
-        Assignments that do not depend on the last point.
-    lines
-        The other assignments.
-    point
-        Expressions of the next point.
-    stretch
-        Expressions of the stretch by w and by c.
-    """
-
-    before: list[str]
-    lines: list[str]
-    point: tuple[str, str, str]
-    stretch: tuple[str, str]
 
 
 def traced(
@@ -87,8 +66,9 @@ def traced(
     if declared is not None:
         stretch = declared.atom, stretch[1]
     point = tuple(part.atom for part in vector.parts)
-    before, lines = _divided(_used(tape.lines, {*point, *filter(None, stretch)}))
-    return Step(before, lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
+    made = Step([], tape.lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
+    before, lines = _divided(made.needed(*made.point, *made.stretch))
+    return replace(made, before=before, lines=lines)
 
 
 def _argument(name: str, size: int) -> Value:
@@ -99,17 +79,6 @@ def _argument(name: str, size: int) -> Value:
     return Vector3(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
 
 
-def _used(lines: Sequence[str], wanted: set[str]) -> list[str]:
-    """Assignments that the wanted names depend on."""
-    kept, live = [], {atom.removeprefix("-") for atom in wanted}
-    for line in reversed(lines):
-        target, value = line.split(" = ", 1)
-        if target in live:
-            live |= _named(value)
-            kept.append(line)
-    return kept[::-1]
-
-
 def _divided(lines: Sequence[str]) -> tuple[list[str], list[str]]:
     """Assignments that do not depend on the point x, y, z, and the others."""
     before: list[str] = []
@@ -117,15 +86,10 @@ def _divided(lines: Sequence[str]) -> tuple[list[str], list[str]]:
     changing = {"x", "y", "z"}
     for line in lines:
         target, value = line.split(" = ", 1)
-        changes = not changing.isdisjoint(_named(value))
+        changes = not changing.isdisjoint(named(value))
         (others if changes else before).append(line)
         changing |= {target} if changes else set()
     return before, others
-
-
-def _named(value: str) -> set[str]:
-    """Names in an expression."""
-    return {n.id for n in ast.walk(parse(value)) if isinstance(n, ast.Name)}
 
 
 def _followed(

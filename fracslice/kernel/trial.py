@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
+from ..formulas.orbits import grown, orbit_select
 from ..formulas.parameters import AUTO, REQUIRED
 from ..formulas.registry import Formula, Node, get
 from ..formulas.rounds import steps
@@ -77,6 +78,8 @@ def trial(formula: Formula) -> Trial:
     results = [_parity(root, points, expected, "float64"), _parity(root, points, expected, "float32")]
     if "step" in formula.hooks:
         results.append(_derivative(root, points))
+    if formula.hooks.get("select") is orbit_select:
+        results.append((True, _proofs(root)))
     field = compile_scene(root, "float64").points
     values = field(*points)
     step = rng.normal(size=points.shape)
@@ -114,6 +117,13 @@ def _parity(root: Node, points: np.ndarray, expected: np.ndarray, precision: str
     typical = float(np.quantile(error, 0.99))
     good = bool(np.isfinite(values).all()) and typical < TOLERANCE[precision]
     return good, f"{precision}: 99% of the values within {typical:.1e} of the reference"
+
+
+def _proofs(root: Node) -> str:
+    """Radius of escape and bound of an orbit, and whether they are proved."""
+    bound = grown(root)
+    radius, slope = ("proved" if proved else "measured" for proved in (bound.proved, bound.lipschitz))
+    return f"radius of escape {bound.escape:.4g}: {radius}; L = {root.bounds.lipschitz:g}: {slope}"
 
 
 def _derivative(root: Node, points: np.ndarray) -> tuple[bool, str]:

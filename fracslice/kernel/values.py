@@ -15,7 +15,8 @@ import numpy as np
 from llvmlite import ir
 
 from . import lanes_math
-from .intervals import TINY, Interval, Numbers, Possible
+from .interval_numbers import TINY, Numbers
+from .intervals import Interval, Possible
 from .registers import Vec, splat
 from .scalars import BOOL, DOUBLE, FLOAT, MismatchError, number, truth
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .._native import pointed, touching
 from .contouring import Piece
 from .model import Mesh
-from .pieces import NOTHING, joined
+from .pieces import NOTHING, joined, near_plane
 
 POINTED = 0.15
 """Minimum sine of the angle by which all edges descend from a pointed vertex."""
@@ -59,15 +59,18 @@ def pointed_in(mesh: Mesh, start: float, end: float, voxel: float, threads: int 
     PointedPiece
         The vertices, and the triangles by which the neighbours find those at the seams.
     """
-    x = mesh.vertices[:, 0]
     points = _pointed(mesh, start + NEAR_SEAM * voxel, end - NEAR_SEAM * voxel, threads)
-    head, tail = (
-        Mesh(mesh.vertices, mesh.triangles[touching(mesh.triangles, near, threads)]).compact()
-        if near.any()
-        else NOTHING
-        for near in (x < start + AT_SEAM * voxel, x > end - AT_SEAM * voxel)
-    )
+    head, tail = _at_seam(mesh, start, voxel, threads), _at_seam(mesh, end, voxel, threads)
     return PointedPiece(points, head, tail)
+
+
+def _at_seam(mesh: Mesh, seam: float, voxel: float, threads: int) -> Mesh:
+    """Triangles at a seam; none at an end of the surface."""
+    near = np.zeros(len(mesh.vertices), bool)
+    near[near_plane(mesh.vertices, seam, AT_SEAM * voxel)] = True
+    if not near.any():
+        return NOTHING
+    return Mesh(mesh.vertices, mesh.triangles[touching(mesh.triangles, near, threads)]).compact()
 
 
 def _pointed(mesh: Mesh, low: float, high: float, threads: int) -> NDArray[np.float64]:

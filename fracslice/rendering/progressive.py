@@ -27,7 +27,7 @@ from .optics import optics
 from .parts import PoolTracer
 from .passes import Pass
 from .sequence import SampleRange
-from .setup import prepare
+from .setup import clipped, prepare
 from .state import load_state, save_state
 
 TOLERANCE = 0.002
@@ -239,7 +239,8 @@ class Renderer:
 
     def _linked(self) -> Frame:
         setup = self.setup
-        return link_frame(setup.root, setup.view, setup.camera, setup.optics, BLOCK)
+        root = clipped(setup.root, setup.camera)
+        return link_frame(root, setup.view, setup.camera, setup.optics, BLOCK)
 
     def seen(self) -> Pass:
         """Return the current picture without another pass.

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import SceneError
+from ..formulas.csg import intersection
+from ..formulas.primitives import plane
 from ..formulas.registry import Node
 from ..kernel.cells import possible_cells
 from ..kernel.depth import resolve_depths
@@ -94,6 +96,29 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     resolved, _ = _around_eye(root, camera, DETAIL * pixel)
     seen = optics(camera, size, root, ROUNDING[precision] * scale)
     return RenderSetup(resolved, replace(view, lights=lights), camera, seen, precision)
+
+
+def clipped(root: Node, camera: Camera) -> Node:
+    """Return what the clip plane of a camera leaves of a scene.
+
+    Parameters
+    ----------
+    root : Node
+        Root of the formula tree.
+    camera : Camera
+        The camera.
+
+    Returns
+    -------
+    Node
+        The tree itself without a clip plane.
+    """
+    if not camera.clip:
+        return root
+    towards = camera.forward
+    place = sum(e * f for e, f in zip(camera.eye, towards, strict=True)) + camera.clip
+    half = plane(normal=tuple(-f for f in towards), offset=-place)
+    return intersection(root, half)
 
 
 def default_lights(root: Node) -> tuple[Light, ...]:
@@ -193,6 +218,7 @@ def clearance(root: Node, camera: Camera) -> float:
     SceneError
         If the eye is inside the solid.
     """
+    root = clipped(root, camera)
     f = float(root.kernel("cpu", "float64").points(*(np.array([c]) for c in camera.eye))[0])
     if not f > 0:
         raise camera.fail("eye: expected a place outside the solid")

@@ -69,6 +69,15 @@ class Camera(Part):
         )
     )
 
+    clip: float = described(
+        Number(
+            0.0,
+            "distance of a plane in front of the eye, in scene units: what is nearer is cut away, and the "
+            "eye may be inside the solid; 0: none",
+            least=0,
+        )
+    )
+
     def validate(self) -> None:
         """Raise `SceneError` if `eye`, `target` and `up` do not define a view, or an effect is not of the
         kind.

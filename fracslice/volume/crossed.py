@@ -9,7 +9,7 @@ from .bricks import INSIDE, OUTSIDE
 from .faces import FACES, SignFaces
 from .states import EMPTY, RANGE, States
 
-ROWS = 1 << 12
+ROWS = 1 << 15
 """Bricks per task."""
 
 IN, OUT = 12, 13

@@ -39,7 +39,7 @@ MANY = 1 << 17
 AUDITS = 8
 """Largest number of audits."""
 
-ROWS = 1 << 12
+ROWS = 1 << 15
 """Bricks per task."""
 
 LEAVES = "the solid reaches the border of what is sampled; give it finite <bounds>"

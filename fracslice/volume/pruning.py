@@ -16,7 +16,7 @@ from ..formulas.field import Bounds, Cells
 from ..kernel import Kernel
 from ..work import Work, chunks
 from .lattice import BRICK, Lattice
-from .states import CANDIDATE, EMPTY, FULL, QUEUED, States
+from .states import CANDIDATE, EMPTY, FULL, QUEUED, States, where
 
 COARSEST = 16
 """Bricks along a cell of the first level: 128 voxels, as in OpenVDB's tree."""
@@ -24,8 +24,8 @@ COARSEST = 16
 ENCLOSURE = 4
 """Evaluations that an enclosure counts as; it costs 1.5 to 8."""
 
-BATCH = 1 << 12
-"""Cells per task."""
+BATCH = 1 << 15
+"""Cells per task: in smaller ones threads wait for the interpreter."""
 
 LOOKED_AT = 1 << 12
 """Unsampled bricks whose proofs are looked for where a measured bound discarded them."""
@@ -136,14 +136,29 @@ class Pruning:
         size = COARSEST
         grid = np.full([-(-n // size) for n in self.lattice.bricks], CANDIDATE, np.uint8)
         while True:
-            cells = np.flatnonzero(grid == CANDIDATE)
+            cells = self._candidates(grid)
             outside = np.empty(len(cells), bool)
             self._run(partial(self._examine, grid, cells, outside, size), len(cells))
             if size == 1:
-                return States.within(grid), outside[grid.reshape(-1)[cells] == CANDIDATE]
+                return States.within(grid, self.work), outside[grid.reshape(-1)[cells] == CANDIDATE]
             size //= 2
-            shape = tuple(slice(-(-n // size)) for n in self.lattice.bricks)
-            grid = np.ascontiguousarray(grid.repeat(2, 0).repeat(2, 1).repeat(2, 2)[shape])
+            grid = self._halved(grid, size)
+
+    def _candidates(self, grid: np.ndarray) -> np.ndarray:
+        """Flat indices of the cells that are not discarded."""
+        flat = grid.reshape(-1)
+        return where(lambda part: flat[part] == CANDIDATE, 0, len(flat), self.work)
+
+    def _halved(self, grid: np.ndarray, size: int) -> np.ndarray:
+        """States of cells of `size` bricks, from those of cells twice as large."""
+        x, y, z = (-(-n // size) for n in self.lattice.bricks)
+        result = np.empty((x, y, z), np.uint8)
+
+        def task(layer: int) -> None:
+            result[2 * layer : 2 * layer + 2] = grid[layer].repeat(2, 0).repeat(2, 1)[:y, :z]
+
+        self.work.map(task, range(len(grid)))
+        return result
 
     def _run(self, task: Callable[[slice], int], count: int) -> None:
         """Run a task on ranges of things. It returns its evaluations."""

@@ -33,20 +33,27 @@ class States:
     shape: tuple[int, ...]
 
     @classmethod
-    def within(cls, grid: np.ndarray) -> States:
+    def within(cls, grid: np.ndarray, work: Work) -> States:
         """Pad the states of a lattice's bricks by a border.
 
         Parameters
         ----------
         grid
             States, uint8 [bx, by, bz].
+        work
+            Execution settings.
 
         Returns
         -------
         States
             Padded states.
         """
-        padded = np.pad(grid, 1, constant_values=BORDER)
+        padded = np.full([n + 2 for n in grid.shape], BORDER, np.uint8)
+
+        def task(layer: int) -> None:
+            padded[layer + 1, 1:-1, 1:-1] = grid[layer]
+
+        work.map(task, range(len(grid)))
         return cls(padded.reshape(-1), padded.shape)
 
     def step(self, axis: int, step: int) -> int:
@@ -94,10 +101,8 @@ class States:
         ndarray
             Their flat indices, ascending, int [n].
         """
-        first = self.step(0, 1)
-        parts = [slice(p.start + first, p.stop + first) for p in chunks(self.flat.size - 2 * first, RANGE)]
-        masks = work.collect(lambda part: part.start + np.flatnonzero(test(part)), parts)
-        return np.concatenate([np.empty(0, np.intp), *masks])
+        layer = self.step(0, 1)
+        return where(test, layer, self.flat.size - layer, work)
 
     def beside(self, part: slice, kinds: Sequence[int]) -> np.ndarray:
         """Test whether a face of bricks borders on a brick of some states.
@@ -144,6 +149,28 @@ class States:
 
         work.map(task, range(len(grid)))
         return result
+
+
+def where(test: Callable[[slice], np.ndarray], first: int, end: int, work: Work) -> np.ndarray:
+    """Find the numbers of a range that pass a test.
+
+    Parameters
+    ----------
+    test
+        Mask of the numbers of a part of the range.
+    first, end
+        The range; its end is excluded.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    ndarray
+        The numbers, ascending, int [n].
+    """
+    parts = [slice(first + part.start, first + part.stop) for part in chunks(end - first, RANGE)]
+    numbers = work.collect(lambda part: part.start + np.flatnonzero(test(part)), parts)
+    return np.concatenate([np.empty(0, np.intp), *numbers])
 
 
 def distinct(numbers: np.ndarray) -> np.ndarray:

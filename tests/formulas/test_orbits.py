@@ -13,7 +13,7 @@ from fracslice.formulas.rounds import steps
 from fracslice.formulas.verbs import ball, fold, positive, power, turn
 from fracslice.kernel import compile_scene, link, reference
 from fracslice.kernel.depth import resolve_depths
-from fracslice.kernel.growth import image
+from fracslice.kernel.orbit_samples import image
 from fracslice.kernel.steps import traced
 from tests.benchmarks.formulas.steps import SCENES
 from tests.budgets.instructions import assembly, sizes

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fracslice.errors import RenderError
-from fracslice.formulas import Node, box, material, plane, repeat, sphere, union
+from fracslice.errors import RenderError, SceneError
+from fracslice.formulas import Node, box, difference, material, plane, repeat, sphere, union
 from fracslice.rendering import Pass, Renderer, develop, progressive
 from fracslice.rendering.units.fog import height_fog
 from fracslice.rendering.units.lights import sky
@@ -149,6 +149,22 @@ def test_a_picture_larger_than_the_memory_is_refused(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(progressive, "available_bytes", lambda: 8 << 30)
     with pytest.raises(RenderError, match="size: 1,074 million pixels need 64 GB of memory, 9 GB are free"):
         Renderer(sphere(), View(), (32768, 32768), Work(1), "cpu")
+
+
+def test_a_clip_plane_opens_the_solid_to_an_eye_inside() -> None:
+    """From within the wall of a hollow ball: the cut at the distance of the plane, the far wall in it."""
+    wall = difference(sphere(radius=2), sphere(radius=1))
+    camera = Camera(eye=(0, -1.5, 0), target=(0, 0, 0), fov=100, clip=1.0)
+    with pytest.raises(SceneError, match="outside the solid"):
+        Renderer(wall, View(camera=replace(camera, clip=0.0)), (9, 9), Work(1), "cpu")
+    view = View(camera=camera, shading=Shading(mode="depth"))
+    *_, last = Renderer(wall, view, (65, 65), Work(1), "cpu").passes(1)
+    depth = last.image[32, :, 0]
+    assert depth[32] == pytest.approx(2.5, abs=0.01), "the far wall"
+    assert depth[:3] == pytest.approx(1.0, abs=0.01) and depth[-3:] == pytest.approx(1.0, abs=0.01)
+    of = Renderer(wall, view, (9, 9), Work(1), "cpu")
+    of.look(camera.moved(right=0.1))
+    assert next(of.passes(1)).image.min() == pytest.approx(1.0, abs=0.01)
 
 
 def test_albedo_is_the_colour_without_light() -> None:

@@ -12,7 +12,7 @@ SHAPE = (3, 4, 5)
 
 
 def states() -> States:
-    return States.within(np.random.default_rng(2).integers(0, 4, SHAPE).astype(np.uint8))
+    return States.within(np.random.default_rng(2).integers(0, 4, SHAPE).astype(np.uint8), Work(2))
 
 
 def inner(result: States) -> np.ndarray:

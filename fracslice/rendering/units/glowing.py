@@ -13,7 +13,7 @@ from .normal import normalised
 from .weights import HALF_TURN, facet_density
 
 SENT = 0.5
-"""Share of the rays that are sent to bodies where one is above the horizon."""
+"""Largest share of the rays that are sent to bodies, where one is above the horizon."""
 
 
 def prominence(x, y, z, nx, ny, nz, body):
@@ -39,6 +39,27 @@ def prominence(x, y, z, nx, ny, nz, body):
     return where((height > 0.0) & (outside > 0.0), power / squared, 0.0)
 
 
+def smallness(x, y, z, body):
+    """Return the part of `SENT` for a body: rays of the surface meet a large one anyhow.
+
+    Parameters
+    ----------
+    x, y, z : float
+        Surface point.
+    body : tuple of float
+        See `prominence`.
+
+    Returns
+    -------
+    float
+        Near 1 for a small or distant body, near 0 for one that is larger than its distance.
+    """
+    cx, cy, cz, hx, hy, hz, power = body
+    px, py, pz = cx - x, cy - y, cz - z
+    ratio = (hx * hx + hy * hy + hz * hz) / (px * px + py * py + pz * pz)
+    return 1.0 / (1.0 + ratio * ratio)
+
+
 def sent_share(x, y, z, nx, ny, nz, P, bodies, count):
     """Return the share of the rays that are sent to bodies.
 
@@ -59,9 +80,12 @@ def sent_share(x, y, z, nx, ny, nz, P, bodies, count):
         0 if no body is above the horizon.
     """
     total = 0.0 * x
+    small = 0.0 * x
     for k in range(count):
-        total = total + prominence(x, y, z, nx, ny, nz, bodies[k])
-    return where(total > 0.0, SENT, 0.0)
+        weight = prominence(x, y, z, nx, ny, nz, bodies[k])
+        total = total + weight
+        small = small + weight * smallness(x, y, z, bodies[k])
+    return where(total > 0.0, SENT * small / maximum(total, 1e-30), 0.0)
 
 
 def towards_body(x, y, z, nx, ny, nz, u, v, w, choice, P, bodies, count):

@@ -1,0 +1,200 @@
+"""Finished meshes: written to a file while they are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+
+import numpy as np
+
+from .checking import Check
+from .clock import Clock
+from .finishing import Finish
+from .meshjob import MeshJob
+from .scene import Scene
+from .work import ahead
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
+    from .mesh.check import MeshReport
+    from .mesh.simplify import Simplified
+    from .surfaces import Surface
+
+STL = ".stl"
+
+
+class Made(NamedTuple):
+    """The mesh, if in one piece; its simplification, if any; its checks; and distances between its vertices,
+    or points of the surface, and the other, scene units; area on the plate, mm2.
+    """
+
+    whole: Mesh | None
+    simplified: Simplified | None
+    report: MeshReport
+    errors: np.ndarray
+    back: np.ndarray
+    contact: float
+
+
+@dataclass(frozen=True)
+class Writing:
+    """Last stages of a mesh job.
+
+    Attributes
+    ----------
+    scene : Scene
+        Scene of the mesh.
+    what : MeshJob
+        The job.
+    clock : Clock
+        Threads, progress, cancellation and timing.
+    path : Path or None
+        File to write.
+    """
+
+    scene: Scene
+    what: MeshJob
+    clock: Clock
+    path: Path | None
+
+    def made(self, surface: Surface, finish: Finish) -> Made:
+        """Finish, write and check a mesh.
+
+        Parameters
+        ----------
+        surface : Surface
+            The surface.
+        finish : Finish
+            Selection and placement.
+
+        Returns
+        -------
+        Made
+            The mesh.
+
+        Raises
+        ------
+        MeshError, ExportError, Cancelled
+            As `make_mesh`.
+        """
+        return self._joined(surface, finish) or self._alone(surface, finish)
+
+    def _alone(self, surface: Surface, finish: Finish) -> Made:
+        """Write the file while it is checked, by threads of this process."""
+        from .mesh.missed import surface_to_mesh
+
+        planned, work = surface.planned, self.clock.work
+        with self.clock("checking"):
+            back = surface_to_mesh(planned, surface.pieces.meshes, 1.0, work)
+        check = Check(finish, len(surface.signs))
+        whole, simplified = self._written(finish, check, finish.place.mm(surface.tips))
+        return Made(whole, simplified, check.mesh, check.errors, back, check.contact)
+
+    def _joined(self, surface: Surface, finish: Finish) -> Made | None:
+        """Write the file from the pieces of a pool; None for a surface that was made here."""
+        if self.clock.work.cluster is None:
+            return None
+        from .export import FORMATS
+        from .export.stl import concatenate
+        from .sharedmesh import SharedSurface, finished, whole
+
+        if not isinstance(surface, SharedSurface):
+            return None
+        check, blocks = finished(surface, finish)
+        ending = STL if self.path is None else self.path.suffix.lower()
+        mesh = None
+        if not self.path or ending != STL:
+            mesh = whole(blocks)
+            finish.count_near()
+        if self.path:
+            with self._file(self.path) as (file, about):
+                if mesh is None:
+                    concatenate(blocks, file, about)
+                else:
+                    FORMATS[ending](mesh, file, about)
+        check.end()
+        errors = np.concatenate(check.off)
+        return Made(mesh, None, finish.report(check.tally), errors, check.back, check.contact)
+
+    @contextmanager
+    def _file(self, path: Path) -> Iterator[tuple[BinaryIO, dict[str, str]]]:
+        """Open the file, and return what it says about itself."""
+        from .export import application, flushing, replacing
+
+        with replacing(path) as file, flushing(file):
+            yield file, {"Application": application()} | metadata(self.scene)
+
+    def _written(
+        self, finish: Finish, check: Check, tips: np.ndarray
+    ) -> tuple[Mesh | None, Simplified | None]:
+        """Write the file while it is checked. Returns the mesh, if in one piece, and the result of its
+        simplification, if any.
+        """
+        from .export import FORMATS
+        from .export.stl import write_pieces
+        from .mesh.halo import Finished
+        from .mesh.tip_triangles import tips_last
+
+        finished, simplified, mesh = finish.finished(), None, None
+        if self.what.simplify_mm is not None:
+            from .mesh.simplify import simplify
+
+            (piece,) = finished
+            with self.clock("simplifying"):
+                mesh, simplified = simplify(piece.mesh, self.what.simplify_mm, self.clock.work)
+            finished = iter([Finished.whole(mesh)])
+        meshes = ahead(check.passing(finished))
+        if several := len(finish.pieces) > 1:
+            meshes = tips_last(meshes, tips)
+        if self.what.colour is not None:
+            meshes = self._painted(meshes, finish)
+        if self.path is None:
+            (mesh,) = meshes
+            return mesh, simplified
+
+        def timed() -> Iterator[Mesh]:
+            nonlocal mesh
+            for mesh in meshes:
+                with self.clock("writing"):  # the consumer writes during the yield
+                    yield mesh
+
+        with self._file(self.path) as (file, about):
+            if self.path.suffix.lower() == STL:
+                write_pieces(timed(), file, about)
+            else:
+                for whole in timed():
+                    FORMATS[self.path.suffix.lower()](whole, file, about)
+        return None if several else mesh, simplified
+
+    def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
+        """Colour the vertices. Edits that are no formulas have the colour of the object there."""
+        from .rendering.painting import paint
+
+        assert self.what.colour is not None
+        field: Any = finish.planned.root
+        while field.tree is None:
+            field = field.root
+        for mesh in meshes:
+            with self.clock("colouring"):
+                points = finish.place.units(mesh.vertices)
+                done = paint(field.tree, points, self.what.colour, self.clock.work)
+            yield replace(mesh, colours=done.colours, scalars=done.scalars)
+
+
+def metadata(scene: Scene) -> dict[str, str]:
+    """Metadata of files made from a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        Title and hash.
+    """
+    return {"Title": scene.name, "scene_hash": scene.hash}

@@ -1,0 +1,118 @@
+"""Radii of escape: proved by intervals, enlarged until they are, and the bound that follows from them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fracslice.formulas import (
+    Node,
+    abox,
+    benesi,
+    cosine_bulb,
+    kifs_octahedron,
+    kifs_tetrahedron,
+    lambda_bulb,
+    mandelbox,
+    orbit,
+    quaternion_mandelbrot,
+    quaternion_power,
+    transform,
+)
+from fracslice.formulas.orbits import grown, orbit_select, steps
+from fracslice.formulas.verbs import modulo
+from fracslice.kernel.escape_radius import constant_stretch, least_size
+from fracslice.kernel.growth import _proved, arguments
+from fracslice.kernel.orbit_samples import composed, image
+from fracslice.kernel.orbits import Code
+from fracslice.scene.layout import formulas
+from tests.stability.bounds import verdict
+
+ORBITS = [f for f in formulas() if f.hooks.get("select") is orbit_select and f.name != "orbit"]
+TURNED = transform(abox(angle=20), rotate=(1, 2, 3, 40), scale=0.9, translate=(0.1, 0.2, 0))
+RNG = np.random.default_rng(5)
+
+
+@pytest.mark.parametrize("formula", ORBITS, ids=lambda f: f.name)
+def test_the_radius_of_every_orbit_is_proved(formula: Any) -> None:
+    assert grown(formula()).proved
+
+
+@pytest.mark.parametrize(
+    ("root", "radius"),
+    [
+        (quaternion_mandelbrot(), 2.0),
+        (quaternion_power(power=3), 2**0.5),
+        (lambda_bulb(power=12), (1 + 1 / 1.1) ** (1 / 11)),
+        (lambda_bulb(power=5, factor=3.0), (1 + 1 / 3) ** (1 / 4)),
+    ],
+)
+def test_a_radius_that_is_too_small_grows(root: Node, radius: float) -> None:
+    """Known radii: |w|^n - |w| = |w|, and factor (|w|^n - |w|) = |w|."""
+    code, values = steps(root)
+    bound = replace(grown(root), escapes=(0.9 * radius,), proved=False)
+    fixed = code[0].is_fixed(0)
+    result = _proved(code, bound, values, 0.0 if fixed else bound.escape)
+    assert result.proved and radius < result.escape < 1.5 * radius
+
+
+def test_a_radius_that_cannot_be_proved_is_the_sampled_one() -> None:
+    """A constant of the size of the solid leads back: 1.2 |w| - |c| < |w|."""
+    assert not grown(mandelbox(scale=1.2)).proved
+
+
+@pytest.mark.parametrize(
+    "root",
+    [
+        orbit(mandelbox(scale=-1.5)),
+        orbit(cosine_bulb(power=5)),
+        orbit(lambda_bulb(power=4.5)),
+        orbit(benesi(), TURNED),
+        orbit(quaternion_mandelbrot(julia=(0.1, 0.2, 0.3)), TURNED, kifs_octahedron()),
+    ],
+)
+def test_the_least_size_is_a_lower_bound(root: Node) -> None:
+    """Of |w| at the end of a round, for points of cells and constants of a size."""
+    code, values = steps(root)
+    known = {**values, **arguments(code, grown(root), 1)}
+    stops = [known[f"stop{k}"] for k in range(len(code) - 1)]
+    half, size, tight = 0.02, 1.5, 0
+    centres = RNG.uniform(-2, 2, (3, 300))
+    centres[:, :40] = half * np.round(centres[:, :40])
+    lo, hi = centres - half, centres + half
+    bound = least_size(code, 0, known, size)(lo, hi, np.linalg.norm(np.maximum(-lo, hi), axis=0))
+    for _ in range(20):
+        w, c = RNG.uniform(lo, hi), RNG.normal(size=centres.shape)
+        c *= size / np.linalg.norm(c, axis=0)
+        stopped = np.zeros(300, bool)
+        for k, stop in enumerate(stops):
+            between = composed([image(code, i, known) for i in range(k + 1)])(w, c)
+            stopped |= (between**2).sum(0) >= stop
+        last = np.linalg.norm(composed([image(code, k, known) for k in range(len(code))])(w, c), axis=0)
+        assert (stopped | (last >= bound * (1 - 1e-9))).all()
+        tight += int((last < 2 * bound).sum())
+    assert tight > 100
+
+
+def test_a_constant_stretch_makes_the_bound_a_theorem() -> None:
+    """L = 1 for a step, at most 4 / 3 for several; other steps, and tears, have a measured bound."""
+    assert kifs_tetrahedron(iterations=3).bounds.lipschitz == 1
+    hybrid = orbit(
+        transform(kifs_octahedron(scale=1.5), scale=0.5, translate=(0.3, 0, 0)),
+        kifs_tetrahedron(),
+        iterations=3,
+    )
+    assert 1 <= hybrid.bounds.lipschitz <= 4 / 3
+    assert verdict(hybrid, 1 << 13).violations == 0
+    assert (
+        mandelbox(iterations=3).bounds.lipschitz == 2
+        and orbit(mandelbox()).changed(iterations=3).bounds.lipschitz == 3
+    )
+
+    def torn(w, c):  # type: ignore[no-untyped-def]
+        return 2.0 * modulo(w, 1.0)
+
+    assert constant_stretch((Code(torn, ()),), 0, {}) is None
