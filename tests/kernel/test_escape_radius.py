@@ -22,7 +22,8 @@ from fracslice.formulas import (
     quaternion_power,
     transform,
 )
-from fracslice.formulas.orbits import grown, orbit_select, steps
+from fracslice.formulas.orbits import grown, orbit_select
+from fracslice.formulas.rounds import steps
 from fracslice.formulas.verbs import modulo
 from fracslice.kernel.escape_radius import constant_stretch, least_size
 from fracslice.kernel.growth import _proved, arguments
