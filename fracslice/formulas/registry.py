@@ -296,11 +296,5 @@ def get(name: str) -> Formula:
 
 
 def names() -> list[str]:
-    """Names of all formulas.
-
-    Returns
-    -------
-    list of str
-        Sorted.
-    """
+    """Names of all formulas, sorted; see `get`."""
     return sorted(_REGISTRY)

@@ -427,6 +427,14 @@ def test_a_full_disk_leaves_the_remainder_and_no_archive(
     write_slices(run(), tmp_path / "part.sl1")
 
 
+def test_the_heads_of_layers_are_their_first_bytes_and_lengths() -> None:
+    layers = Journal(io.BytesIO())
+    for layer in (b"area and pixels", b"8 bytes.", b"area" * 9):
+        layers.append(layer)
+    assert list(layers.heads(8)) == [(b"area and", 15), (b"8 bytes.", 8), (b"areaarea", 36)]
+    assert list(layers) == [b"area and pixels", b"8 bytes.", b"area" * 9]
+
+
 @pytest.mark.parametrize(
     ("path", "name", "message"),
     [

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from fracslice.errors import FracsliceError
-from fracslice.formulas import Formula, Node, bounds
+from fracslice.formulas import Formula, Node, bounds, orbit
 from fracslice.formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
 from fracslice.kernel import reference
 from fracslice.scene.layout import formulas
 
 from .draws import number
-from .scaling import WALLS
+from .random_hybrids import hybrid
 
 DEPTH = 4
 DEEPEST = {"iterations": 20, "level": 4}
@@ -26,18 +26,11 @@ SHALLOW = 6
 """For a first look, where a depth is automatic."""
 
 ORBITS = {f.name for f in formulas() if "step" in f.hooks} - {"mandelbulb", "julia"}
-FAMILIES = {
-    *("flake", "cells", "prism", "superquadric", "jerusalem", "koch", "hilbert", "tree", "gear", "thread"),
-    *("apollonian", "honeycomb", "pseudo_kleinian", "tetrabrot", "noise"),
-    *WALLS,
-    *ORBITS,
-}
-"""Families with a suite of their own, `tests.formulas.test_families`."""
 
 LOOKED = 4000
 TREES, TRIES = 100, 10
-LEAVES = [f for f in formulas() if f.children[1] == 0 and f.name not in FAMILIES]
-OTHERS = [f for f in formulas() if f.kind != "shape" and f.name not in FAMILIES | {"material"}]
+LEAVES = [f for f in formulas() if f.kind == "shape"]
+OTHERS = [f for f in formulas() if f.kind != "shape" and f.name != "material"]
 Draw = Callable[[np.random.Generator, float], Any]
 
 
@@ -66,6 +59,14 @@ def random_scene(tree: int, numbers: int) -> Node:
     raise AssertionError(f"tree {tree}: no scene is possible")
 
 
+def leaf(formula: Formula, rng: np.random.Generator) -> Node | None:
+    """A shape with something in it; None if the values drawn are not possible together."""
+    with suppress(FracsliceError):
+        root = _ended(_leaf(formula, _Dice(rng, rng)))
+        return root if _inside(root) else None
+    return None
+
+
 def _ended(root: Node) -> Node:
     """The scene, cut off where it has no end."""
     return root if root.bounds.box.finite else bounds(root, min=(-1.1, -1.0, -0.9), max=(1.0, 1.2, 0.8))
@@ -80,18 +81,24 @@ def _inside(root: Node) -> bool:
 
 
 def _shallow(node: Node) -> Node:
+    if node.formula is orbit:  # its depth is drawn
+        return node
     values = {name: SHALLOW for name, value in node.values.items() if value == AUTO}
     return node.changed(tuple(map(_shallow, node.children)), **values)
 
 
 def _tree(dice: _Dice, depth: int) -> Node:
     if depth == 1:
-        return _made(LEAVES[dice.tree.integers(len(LEAVES))], (), dice)
+        return _leaf(LEAVES[dice.tree.integers(len(LEAVES))], dice)
     formula = OTHERS[dice.tree.integers(len(OTHERS))]
     most = formula.children[1] or 3
     count = int(dice.tree.integers(min(2, most), most + 1))
     depths = [depth - 1, *dice.tree.integers(1, depth, count - 1).tolist()]
     return _made(formula, tuple(_tree(dice, d) for d in depths), dice)
+
+
+def _leaf(formula: Formula, dice: _Dice) -> Node:
+    return _made(formula, (), dice) if formula is not orbit else hybrid(dice.tree)
 
 
 def _made(formula: Formula, children: tuple[Node, ...], dice: _Dice) -> Node:
@@ -108,7 +115,8 @@ def _made(formula: Formula, children: tuple[Node, ...], dice: _Dice) -> Node:
 def _value(name: str, kind: Any, dice: _Dice) -> Any:
     """A value near a parameter's default or anywhere in its range; None where there is no default."""
     if isinstance(kind, Count):
-        fixed = int(dice.numbers.integers(max(kind.least, 1), min(kind.most, DEEPEST.get(name, 4)) + 1))
+        least = max(kind.least, 1)
+        fixed = int(dice.numbers.integers(least, max(least, min(kind.most, DEEPEST.get(name, 4))) + 1))
         return AUTO if kind.auto and dice.tree.uniform() < 0.5 else fixed
     if isinstance(kind, Axis):
         return "xyz"[dice.tree.integers(3)]

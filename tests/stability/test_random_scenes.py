@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from fracslice.formulas import Node, names
+from fracslice.formulas import Formula, Node
 from fracslice.kernel.depth import AUTO
 
-from .random_scenes import FAMILIES, random_scene
+from .random_scenes import LEAVES, OTHERS, leaf, random_scene
 from .volumes import volumes
 
-TREES, EACH = (0, 2, 9, 15, 16, 21, 22, 29, 36, 38), 4
+TREES, EACH = (2, 10, 16, 19, 25, 29, 50, 57, 69), 4
 """Trees with every kind of element that need little to be compiled, and four times other numbers."""
 
 RESOLUTION = 48
@@ -27,7 +28,14 @@ def test_the_same_seeds_make_the_same_scene() -> None:
     assert len({random_scene(3, k) for k in range(EACH)}) == EACH
 
 
-def test_every_formula_is_in_some_scene_and_automatic_depths_too() -> None:
-    nodes: list[Node] = [node for tree in range(60) for node in random_scene(tree, 0).walk()]
-    assert {node.formula.name for node in nodes} >= set(names()) - {"material", "orbit", *FAMILIES}
+@pytest.mark.parametrize("formula", LEAVES, ids=lambda formula: formula.name)
+def test_every_shape_can_be_drawn(formula: Formula) -> None:
+    """The trees draw from all shapes with equal chances; here one of each that is a solid."""
+    drawn = (leaf(formula, np.random.default_rng(seed)) for seed in range(20))
+    assert any(node is not None and formula in {n.formula for n in node.walk()} for node in drawn)
+
+
+def test_every_operator_is_in_some_scene_and_automatic_depths_too() -> None:
+    nodes: list[Node] = [node for tree in TREES for node in random_scene(tree, 0).walk()]
+    assert {node.formula for node in nodes} >= set(OTHERS)
     assert {node["iterations"] == AUTO for node in nodes if "iterations" in node.values} == {True, False}
