@@ -59,7 +59,7 @@ class Canvas:
         self.interactor = interactor()
         self.interactor.SetRenderWindow(self.window)
         self.interactor.SetInteractorStyle(None)
-        self.shown = False
+        self.hidden = False
 
     @property
     def size(self) -> tuple[int, int]:
@@ -87,7 +87,6 @@ class Canvas:
         tick : int
             Interval, milliseconds.
         """
-        self.shown = True
         self.interactor.Initialize()
         self.interactor.CreateRepeatingTimer(tick)
         self.interactor.Start()
@@ -95,19 +94,18 @@ class Canvas:
 
     def show(self) -> None:
         """Show the window and return; `handle_events` must be called from time to time, `hide` at the end."""
-        self.shown = True
         self.on("ExitEvent", self.hide)
         self.interactor.Initialize()
 
     def handle_events(self) -> None:
         """Handle the events of the window, without waiting for any."""
-        if self.shown:
+        if not self.hidden:
             self.interactor.ProcessEvents()
 
     def hide(self) -> None:
         """Close the window of `show`; nothing is drawn from then on."""
-        if self.shown:
-            self.shown = False
+        if not self.hidden:
+            self.hidden = True
             self.window.Finalize()
 
     def close(self) -> None:
@@ -124,7 +122,7 @@ class Canvas:
         text : str
             Text at the upper edge.
         """
-        if not self.shown:
+        if self.hidden:
             return
         from vtkmodules.util import numpy_support
 
