@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clock import Clock
+from .mesh.gathering import gathered
 from .placement import Placement
-from .rows import gathered
 from .scene import Print
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rows import gathered
 from ..work import ahead
+from .gathering import gathered
 from .model import Mesh
 from .pieces import Pieces, near_plane, rows
 from .whole_shells import WholeShells

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshError
-from ..rows import gathered
 from .components import PIECES, Shells
+from .gathering import gathered
 from .model import Mesh
 from .pieces import Pieces
 
