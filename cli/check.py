@@ -123,7 +123,7 @@ Checked = tuple[dict[str, Any], list[str], Sequence[object]]
 
 def of_mesh(source: str, options: dict[str, Any], work: Work) -> Checked:
     """Check the mesh of a scene."""
-    from fracslice.job import make_mesh
+    from fracslice.jobs.mesh import make_mesh
     from fracslice.printing.checks import check_solid
 
     scene = load_scene(source, options["settings"])

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from fracslice.export.jobs import SliceRun
-    from fracslice.meshresult import MeshResult
+    from fracslice.jobs.mesh_result import MeshResult
     from fracslice.volume import Drain
 
 DENSITIES = {"resin": 1.1, "pla": 1.24, "petg": 1.27, "abs": 1.04, "asa": 1.07, "tpu": 1.22}

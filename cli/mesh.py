@@ -30,9 +30,9 @@ from .summary import summary
 from .working import working
 
 if TYPE_CHECKING:
+    from fracslice.jobs.mesh_result import MeshResult
+    from fracslice.jobs.report import Report
     from fracslice.meshjob import MeshJob
-    from fracslice.meshresult import MeshResult
-    from fracslice.report import Report
     from fracslice.scene import Scene
     from fracslice.store import Store
     from fracslice.work import Work
@@ -191,7 +191,7 @@ def refuse_what_needs_triangles(context: click.Context, output: str) -> None:
 
 def write_formula(scene: Scene, job: MeshJob, output: str, work: Work, quiet: bool) -> None:
     """Write the formula of a scene, and print its size."""
-    from fracslice.implicit import make_implicit
+    from fracslice.jobs.implicit import make_implicit
 
     made = make_implicit(scene, job, output, work)
     for note in made.notes:
@@ -216,8 +216,8 @@ def store_in(folder: str | None) -> Store | None:
 def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> MeshResult:
     """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.export import write
-    from fracslice.job import make_mesh
-    from fracslice.meshwriting import metadata
+    from fracslice.jobs.mesh import make_mesh
+    from fracslice.jobs.mesh_writing import metadata
 
     if picture is None and Path(output).suffix.lower() != GRID:
         return make_mesh(scene, job, work, path=output)

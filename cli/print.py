@@ -63,7 +63,7 @@ def print_(
 
     from fracslice.export.sending import printer_address, send
     from fracslice.export.slicers import SECONDS, SLICERS
-    from fracslice.job import make_mesh
+    from fracslice.jobs.mesh import make_mesh
 
     chosen = SLICERS[slicer]
     if Path(output).suffix.lower() != chosen.output:

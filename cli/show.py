@@ -36,7 +36,7 @@ def show(
         refuse_scene_options(context)
         viewer.show(load_model(source))
         return
-    from fracslice.job import make_mesh
+    from fracslice.jobs.mesh import make_mesh
 
     scene = load_scene(source, settings)
     viewer.need_screen()  # before the mesh, which may take minutes

@@ -144,9 +144,9 @@ def slice_(
     An interrupted job resumes when it is started again.
     """
     from fracslice.export.slices import PICTURES, PRINTS, printers_file, slice_format, write_slices
+    from fracslice.jobs.completeness import layers_amount
+    from fracslice.jobs.slice_recipe import SliceRecipe
     from fracslice.scene.writer import to_xml
-    from fracslice.shown import layers_amount
-    from fracslice.slicerecipe import SliceRecipe
     from fracslice.work import Work
 
     kind, resin = slice_format(output, form), resin_of(options)
@@ -186,7 +186,7 @@ def slice_(
             off = layers_amount(run.slicer, work)[1]
             last = list(of_layers(run, options["price"]).lines())
         if options["html"]:
-            from fracslice.slicechecks import check_run
+            from fracslice.jobs.slice_checks import check_run
 
             report = check_run(run)
             write_page(stack, report, last, output, options["html"], work)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from fracslice.jobs.report import Report
     from fracslice.mesh.check import MeshReport
-    from fracslice.report import Report
 
 
 def summary(path: str, report: Report) -> str:

@@ -75,7 +75,7 @@ _WHERE = {
     "Node": "formulas",
     "Picture": "api.pictures",
     "Print": "scene",
-    "Report": "report",
+    "Report": "jobs.report",
     "Result": "api.meshing",
     "Scene": "scene",
     "Slices": "api.slices",

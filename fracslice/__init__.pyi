@@ -72,9 +72,9 @@ from .formulas import tree as tree
 from .formulas import twist as twist
 from .formulas import union as union
 from .formulas import voronoi as voronoi
+from .jobs.report import Report as Report
 from .mesh import Mesh as Mesh
 from .meshjob import MeshJob as MeshJob
-from .report import Report as Report
 from .scene import Print as Print
 from .scene import Scene as Scene
 from .scene import read as read

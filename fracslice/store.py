@@ -12,11 +12,11 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .cachefiles import Kept
+from .common.cache_files import Kept
+from .common.keys import key, program
 from .errors import ExportError, VolumeError
 from .kernel import Field
 from .kernel.objects import toolchain
-from .keys import key, program
 
 Arrays = Mapping[str, np.ndarray]
 
@@ -26,7 +26,7 @@ class Store:
     """Cache of arrays in files named by the hash of everything that they depend on.
 
     An unreadable or incomplete file is recomputed. A folder that other users can write to is not used
-    (`cachefiles.Kept`).
+    (`common.cache_files.Kept`).
 
     Attributes
     ----------

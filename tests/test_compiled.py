@@ -8,7 +8,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from fracslice import compiled
+from fracslice.common import compiled
 from fracslice.errors import FracsliceWarning
 from fracslice.printing import samples
 

@@ -9,7 +9,8 @@ import threading
 import numpy as np
 import pytest
 
-from fracslice import MeshJob, Work, make_mesh, memory, surfaces
+from fracslice import MeshJob, Work, make_mesh
+from fracslice.common import memory
 from fracslice.errors import Cancelled, SceneError, VolumeError
 from fracslice.formulas import (
     box,
@@ -24,6 +25,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
+from fracslice.jobs import surfaces
 from fracslice.scene import Print, scene
 
 BALL = scene(sphere(radius=3), size="40mm", name="ball")
@@ -163,7 +165,7 @@ def test_scenes_without_a_finite_surface_are_refused(node, message):
 
 
 def test_what_does_not_fit_in_memory_is_refused_before_it_is_meshed(monkeypatch):
-    monkeypatch.setattr("fracslice.surfaces.available_bytes", lambda: 1 << 27)
+    monkeypatch.setattr("fracslice.jobs.surfaces.available_bytes", lambda: 1 << 27)
     with pytest.raises(
         VolumeError, match=r"a voxel of .*mm needs about .* GB .* a voxel of ([0-9.]+)mm fits"
     ) as caught:

@@ -24,7 +24,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
         "fracslice.api.slices",
         "fracslice.formulas.operators",
         "fracslice.mesh.model",
-        "fracslice.nearest",
+        "fracslice.common.suggestions",
         "fracslice.scene.lengths",
         "fracslice.scene.model",
     ],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.quantiles import quantile
+from fracslice.common.quantiles import quantile
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 1000])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fracslice import seals
+from fracslice.common import seals
 from fracslice.errors import FracsliceWarning
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fracslice import MeshJob, Work, keys, make_mesh
+from fracslice import MeshJob, Work, make_mesh
+from fracslice.common import keys
 from fracslice.errors import FracsliceWarning, VolumeError
 from fracslice.formulas import Box, Node, mandelbulb, offset, sphere
 from fracslice.kernel import Field, compile_scene
@@ -77,7 +78,7 @@ def test_samples_follow_from_the_guard(tmp_path: Path, monkeypatch: pytest.Monke
     assert sampled(work, sphere())[0] > 0
 
 
-@pytest.mark.parametrize("changed", ["formulas/primitives.py", "kernel/linker.py", "rows.py", "_native"])
+@pytest.mark.parametrize("changed", ["formulas/primitives.py", "kernel/linker.py", "common/rows.py", "_native"])
 def test_what_is_kept_follows_from_the_program(
     changed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fracslice import MeshJob, make_mesh, surfaces
+from fracslice import MeshJob, make_mesh
 from fracslice.errors import Cancelled, ExportError, SceneError, TooLargeError
 from fracslice.formulas import (
     box,
@@ -23,6 +23,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
+from fracslice.jobs import surfaces
 from fracslice.mesh.reading import read_mesh
 from fracslice.scene import Print, scene
 from fracslice.work import Work

@@ -9,9 +9,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from ..common.extras import lacking
 from ..errors import ExportError
 from ..export import replacing
-from ..extras import lacking
 
 CODECS = {
     ".mp4": ("libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"),

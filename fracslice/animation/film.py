@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..common.keys import key, program
 from ..errors import RenderError
 from ..export import application
 from ..export.images import encoded_image
 from ..formulas.parameters import Number, validated
 from ..formulas.registry import Node
-from ..keys import key, program
 from ..rendering import Renderer, develop, picture
 from ..rendering.layers import layers
 from ..rendering.sequence import SampleRange

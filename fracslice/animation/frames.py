@@ -9,10 +9,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..cluster import Shard
+from ..common.files import replacing, reported
+from ..common.keys import key
 from ..errors import RenderError, SharedError
-from ..files import replacing, reported
 from ..kernel.objects import toolchain
-from ..keys import key
 from ..scene.reader import reads
 from ..scene.writer import to_xml
 from ..work import Work

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
-from ..job import make_mesh as make_mesh_job
+from ..jobs.mesh import make_mesh as make_mesh_job
+from ..jobs.mesh_result import MeshResult
 from ..mesh import Mesh
 from ..meshjob import MeshJob
-from ..meshresult import MeshResult
 from ..scene import parse_length
 from ..work import Work
 from .options import Length, Options, Scale, keywords, print_of, work_of
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..formulas.field import Field
-    from ..placement import Placement
-    from ..report import Report
+    from ..jobs.placement import Placement
+    from ..jobs.report import Report
     from ..volume import Bricks
 
 

@@ -9,8 +9,8 @@ from functools import wraps
 from inspect import Parameter, signature
 from typing import Any, Literal, ParamSpec, TypedDict, TypeVar, get_type_hints
 
+from ..common.suggestions import hint
 from ..kernel.devices import chosen
-from ..nearest import hint
 from ..scene import Print, Scene
 from ..work import Work
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Generic, TypeVar, Unpack, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.extras import lacking
 from ..errors import SliceError
-from ..extras import lacking
 from ..scene import parse_length
 from ..slicing import Contours, Layer, SliceJob, Slicer, Stack, adapted, plan_stack
 from ..volume.sizing import sizing

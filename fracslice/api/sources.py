@@ -6,12 +6,12 @@ import os
 from pathlib import Path
 from typing import TypeAlias
 
+from ..common.suggestions import hint
 from ..errors import SceneError
 from ..formulas import Formula, Node, get
 from ..formulas import names as formula_names
 from ..formulas.conversion import shown
 from ..formulas.parameters import REQUIRED
-from ..nearest import hint
 from ..scene import Scene, library, read, scene
 from .options import Length
 

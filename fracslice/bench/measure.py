@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..memory import peak_rss_mb
+from ..common.memory import peak_rss_mb
 from ..mesh import Mesh
 from ..volume.accuracy import surface_error
 from ..work import Work

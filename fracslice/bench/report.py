@@ -10,9 +10,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..common.extras import lacking
 from ..errors import BenchError
 from ..export import replacing
-from ..extras import lacking
 from ..version import __version__
 from .runs import Measurement
 

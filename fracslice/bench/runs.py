@@ -17,9 +17,9 @@ from statistics import median
 from typing import Any
 
 from ..cluster import Shard
+from ..common.keys import key, program
 from ..errors import BenchError, FracsliceError, SharedError
 from ..formulas.parameters import Count, Number, validate, validated
-from ..keys import key, program
 from ..work import Work
 from .methods import METHODS
 from .peers import Peer

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from dataclasses import dataclass
 
-from ..keys import program
+from ..common.keys import program
 from ..version import __version__
 
 

@@ -12,9 +12,9 @@ from functools import cached_property
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
+from ..common.extras import lacking
+from ..common.files import appended
 from ..errors import ClusterError
-from ..extras import lacking
-from ..files import appended
 
 if TYPE_CHECKING:
     from ..work import Work

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
-from ..cachefiles import warn
+from ..common.cache_files import warn
+from ..common.extras import lacking
 from ..errors import ClusterError
-from ..extras import lacking
 from .identity import Identity
 from .pieces import Pool, ResultFolder, Task, run
 

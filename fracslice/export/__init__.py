@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
+from fracslice.common.files import check_target, flushing, replacing
 from fracslice.errors import ExportError
 from fracslice.export import glb, obj, ply, stl, threemf
-from fracslice.files import check_target, flushing, replacing
 from fracslice.mesh.model import Mesh
 from fracslice.version import __version__
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fracslice.common.files import replacing
 from fracslice.errors import ExportError
-from fracslice.files import replacing
 from fracslice.work import Work
 
 from .colour_png import levels, write_png

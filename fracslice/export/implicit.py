@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fracslice.common.files import replacing
 from fracslice.export.threemf import CORE_NAMES, HEAD, mesh_element, package
-from fracslice.files import replacing
 from fracslice.mesh.model import Mesh
 
 if TYPE_CHECKING:

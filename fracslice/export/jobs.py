@@ -11,11 +11,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice.common.keys import key, program
 from fracslice.errors import SliceError
 from fracslice.export.ranges import Recipe
 from fracslice.export.resins import Resin
 from fracslice.kernel.objects import toolchain
-from fracslice.keys import key, program
 from fracslice.mesh.model import Mesh
 from fracslice.slicing import Slicer, Stack
 from fracslice.slicing.raster import Screen

@@ -10,11 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
+from fracslice.common.files import put, replacing
 from fracslice.errors import ExportError
 from fracslice.export.jobs import SliceRun
 from fracslice.export.ranges import Encode, begin, encoded_layers
 from fracslice.export.resuming import Journal, journal, resumable_folder
-from fracslice.files import put, replacing
 from fracslice.slicing import Layer
 
 

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
 from fracslice._slices import Encoding
+from fracslice.common.files import flushing, replacing
 from fracslice.errors import ExportError
 from fracslice.export.jobs import SliceRun
 from fracslice.export.layerformats import LayerFormat
 from fracslice.export.ranges import Encode
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal
-from fracslice.files import flushing, replacing
 from fracslice.slicing import Layer
 from fracslice.slicing.printers import Printer
 from fracslice.work import in_background

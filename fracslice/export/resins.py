@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fracslice.common.files import reported
 from fracslice.errors import ExportError
-from fracslice.files import reported
 from fracslice.formulas.parameters import REQUIRED, Count, Number, validate
 from fracslice.slicing.printers import Printer
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from fracslice.common.files import check_target, replacing, reported
+from fracslice.common.private import OWNER_ONLY, opened
+from fracslice.common.seals import seal
 from fracslice.errors import ExportError, FracsliceWarning
-from fracslice.files import check_target, replacing, reported
-from fracslice.private import OWNER_ONLY, opened
-from fracslice.seals import seal
 
 JOB = "job.json"
 """Name of the file that identifies the job of an unfinished folder."""

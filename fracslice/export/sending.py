@@ -18,8 +18,8 @@ from io import BufferedReader
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
+from fracslice.common.files import reported
 from fracslice.errors import ExportError
-from fracslice.files import reported
 from fracslice.work import Work
 
 PACKET = 1 << 20

@@ -17,8 +17,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from fracslice.common.files import check_target
 from fracslice.errors import ExportError
-from fracslice.files import check_target
 from fracslice.work import Work
 
 Command = Callable[[str, Sequence[str], Path, Path], list[str]]

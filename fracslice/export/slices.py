@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fracslice.common.files import check_target
 from fracslice.errors import ExportError
 from fracslice.export import anycubic, archives, chitu, goo, outlines, png, slices3mf
 from fracslice.export.jobs import SliceRun
 from fracslice.export.layerformats import FolderFormat, LayerFormat
-from fracslice.files import check_target
 from fracslice.slicing.printers import Printer
 
 PRINTS = {form.name: form for form in (*archives.FORMATS, goo.FORMAT, *chitu.FORMATS, anycubic.FORMAT)}

@@ -11,8 +11,8 @@ from keyword import iskeyword
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ..common.suggestions import hint
 from ..errors import SceneError
-from ..nearest import hint
 from . import vocabulary
 from .parameters import REQUIRED, Choice, Count, Vector
 

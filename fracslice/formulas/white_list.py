@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from keyword import iskeyword
 from typing import NoReturn
 
-from ..nearest import hint
+from ..common.suggestions import hint
 from ..providers import provider
 from .verbs import NAMES as VERBS
 from .vocabulary import NAMES

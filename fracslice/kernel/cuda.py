@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from ..common.keys import key
 from ..formulas.field import Kernel, Loops, Precision
 from ..formulas.registry import Node
-from ..keys import key
 from . import cuda_source
 from .cuda_driver import available as available
 from .cuda_driver import missing as missing

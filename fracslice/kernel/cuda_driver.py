@@ -9,9 +9,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from ..common.extras import lacking
+from ..common.keys import key, texts
 from ..errors import KernelError
-from ..extras import lacking
-from ..keys import key, texts
 
 NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
 """Message for a missing GPU or driver."""

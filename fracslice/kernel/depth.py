@@ -7,11 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..common.quantiles import quantile
 from ..formulas.algebra import stretches
 from ..formulas.parameters import AUTO
 from ..formulas.registry import Node
 from ..formulas.transforms import affine
-from ..quantiles import quantile
 from .cells import possible_cells
 from .cpu import compile_scene
 from .kept_texts import keep_text, kept_text

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import BinaryIO
 
-from ..cachefiles import Kept
+from ..common.cache_files import Kept
+from ..common.keys import key
 from ..errors import ExportError
-from ..keys import key
 
 DIGEST = hashlib.sha256().digest_size
 
@@ -47,7 +47,8 @@ def keep_text(kind: str, made_of: tuple[object, ...], text: str) -> None:
 
 
 def _place(kind: str, made_of: tuple[object, ...]) -> tuple[Kept, str]:
-    from .objects import cache_folder, toolchain
+    from ..common.cache_files import cache_folder
+    from .objects import toolchain
 
     return Kept(cache_folder() / kind), f"{key(kind, *made_of, toolchain())}.txt"
 

@@ -19,9 +19,9 @@ from functools import lru_cache, reduce
 from types import FunctionType, ModuleType
 from typing import Any, NoReturn
 
+from ..common.suggestions import hint
 from ..errors import KernelError
 from ..formulas import vocabulary
-from ..nearest import hint
 from .functions import fingerprint, is_number, parameters, scope
 from .parsing import parse, parse_expression
 from .syntax import Naming, depends_on_points, point_names, stored_names

@@ -14,9 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import BinaryIO
 
-from ..cachefiles import Kept
+from ..common.cache_files import Kept, cache_folder
 from ..errors import ExportError
-from .objects import cache_folder
 
 
 def imported(name: str, text: str) -> ModuleType:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
@@ -12,10 +11,10 @@ from typing import BinaryIO
 
 import llvmlite
 
-from ..cachefiles import Kept, users_folder
+from ..common.cache_files import Kept, cache_folder
+from ..common.keys import key, texts
 from ..errors import ExportError
 from ..formulas import vocabulary
-from ..keys import key, texts
 from .host import REGISTERS, host
 from .linker import Linked
 from .loop_linker import loop_source
@@ -62,12 +61,6 @@ def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) ->
         with suppress(ExportError):
             kept.put(name, lambda file: file.write(sealed))
     return code
-
-
-def cache_folder() -> Path:
-    """Return the cache folder of kernels: $FRACSLICE_CACHE, else one in the user's cache folder."""
-    given = os.environ.get("FRACSLICE_CACHE")
-    return Path(given).expanduser() if given else users_folder("XDG_CACHE_HOME", "~/.cache") / "kernels"
 
 
 @lru_cache(maxsize=1)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..common.keys import key as hashed
 from ..formulas.field import Cells, Device, Kernel, Loops, Precision
 from ..formulas.registry import Node
-from ..keys import key as hashed
 from . import cpu
 from .enclosures import Enclosures
 from .linker import link

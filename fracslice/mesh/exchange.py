@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from fracslice.common.extras import lacking
 from fracslice.errors import MeshError
-from fracslice.extras import lacking
 from fracslice.providers import provider
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fracslice.common.extras import lacking
 from fracslice.errors import MeshError
-from fracslice.extras import lacking
 from fracslice.mesh.model import Mesh
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..compiled import compiled
+from ..common.compiled import compiled
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
 from .components import Components

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compiled import compiled
+from ..common.compiled import compiled
 from ..volume import Bricks
 from ..volume.bricks import OUTSIDE
 from .samples import Samples

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..compiled import compiled
-from ..disjoint import grouped, numbered, unite, unite_all
+from ..common.compiled import compiled
+from ..common.disjoint import grouped, numbered, unite, unite_all
 from ..volume import Bricks, SignBricks
 from ..volume.bricks import INSIDE, OUTSIDE
 from .samples import positions

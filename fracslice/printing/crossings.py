@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compiled import compiled
+from ..common.compiled import compiled
 from ..kernel import Kernel
 from ..volume.values import values_at
 from ..work import Work

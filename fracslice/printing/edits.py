@@ -8,12 +8,12 @@ from typing import Literal
 
 import numpy as np
 
+from ..common.keys import key
 from ..formulas import difference, intersection, union
 from ..formulas.box import Box
 from ..formulas.field import Bounds, Cells, Device, Precision
 from ..kernel import Field, Kernel
 from ..kernel.arrays import ArrayField
-from ..keys import key
 
 Does = Literal["cut", "add", "keep"]
 _FOLDED = {"cut": difference, "add": union, "keep": intersection}

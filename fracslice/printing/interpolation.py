@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled import compiled
+from ..common.compiled import compiled
 from ..volume.lattice import BRICK
 
 STRIDE = 0.5

@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from ..common.keys import key
 from ..formulas.box import Box
 from ..formulas.confining import moved_slope
 from ..formulas.field import Bounds, Device, Precision
 from ..kernel import Field, Kernel
 from ..kernel.arrays import ArrayField
-from ..keys import key
 
 
 @dataclass(frozen=True, eq=False)

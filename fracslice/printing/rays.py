@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import compiled
-from ..rows import Rows
+from ..common.compiled import compiled
+from ..common.rows import Rows
 
 ROUNDS = 400
 """Maximum number of steps along a ray."""

@@ -6,12 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..compiled import compiled
+from ..common.compiled import compiled
+from ..common.keys import key
 from ..formulas.box import Box
 from ..formulas.field import Bounds, Device, Precision
 from ..kernel import Kernel
 from ..kernel.arrays import ArrayField
-from ..keys import key
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
 from ..volume.lattice import BRICK

@@ -15,8 +15,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..compiled import compiled
-from ..rows import Rows
+from ..common.compiled import compiled
+from ..common.rows import Rows
 from ..work import Work, chunks
 from .crossings import crossed, slopes
 from .interpolation import STRIDE, between, is_beside

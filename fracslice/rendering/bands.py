@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..common.memory import available_bytes
 from ..errors import RenderError
 from ..formulas.registry import Node
-from ..memory import available_bytes
 from ..scene.view import View
 from ..work import Work, chunks
 from .crops import BYTES, MARGIN, Crop

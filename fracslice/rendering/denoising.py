@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from ..extras import lacking
+from ..common.extras import lacking
 from .accumulator import COUNT, COVER, GOAL
 from .crops import Crop
 from .host_accumulator import HostAccumulator

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..common.keys import key
 from ..errors import ClusterError
 from ..formulas.registry import Node
-from ..keys import key
 from ..scene import Scene
 from ..scene.reader import reads
 from ..scene.view import View

@@ -10,12 +10,12 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from ..common.keys import key, program
+from ..common.memory import available_bytes
 from ..errors import RenderError
 from ..formulas.parameters import Number, Vector, validated
 from ..formulas.registry import Node
 from ..kernel.devices import chosen
-from ..keys import key, program
-from ..memory import available_bytes
 from ..scene.view import Camera, Film, View
 from ..work import Work
 from .accumulator import Accumulator, PassPlan, grids

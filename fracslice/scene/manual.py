@@ -6,11 +6,11 @@ import inspect
 from collections.abc import Iterator
 from typing import Any
 
+from ..common.suggestions import hint
 from ..errors import SceneError
 from ..formulas.parameters import REQUIRED
 from ..formulas.plugins import origin
 from ..formulas.registry import Formula
-from ..nearest import hint
 from .layout import PARAMETER, SCENE, SECTIONS, Element, formulas
 
 _GROUPS = {

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
+from ..common.suggestions import hint
 from ..errors import SceneError
 from ..formulas import Node
 from ..formulas.parameters import REQUIRED, File, Parameter
 from ..formulas.registry import DEEPEST, TOO_DEEP
-from ..nearest import hint
 from .animation import Animation, Track
 from .definitions import defined, parameter
 from .element import Part

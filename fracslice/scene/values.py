@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..common.suggestions import hint
 from ..errors import SceneError
 from ..formulas import Node
-from ..nearest import hint
 from .element import Part
 from .layout import PICTURE, PRINT, SECTIONS, SOLID, Element
 from .model import Scene

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..common.quantiles import quantile
 from ..errors import SliceError
 from ..formulas.parameters import validated
-from ..quantiles import quantile
 from ..scene.lengths import Length
 from ..work import Work
 from .layers import Layer, Slicer

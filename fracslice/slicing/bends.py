@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..rows import Rows
+from ..common.rows import Rows
 from .section import CrossSection, Vertices, alone, free
 
 SAGITTA = 2e-3

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..compiled import compiled
+from ..common.compiled import compiled
 
 
 def compensated(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.ndarray:

@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..compiled import compiled
-from ..disjoint import find, grouped, unite
+from ..common.compiled import compiled
+from ..common.disjoint import find, grouped, unite
 from .runs import LayerComponents, Nodes, overlaps
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import compiled
-from ..disjoint import find
+from ..common.compiled import compiled
+from ..common.disjoint import find
 from .graph import Graph
 
 

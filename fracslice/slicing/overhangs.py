@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import compiled
+from ..common.compiled import compiled
 from .runs import Runs
 from .thickness import count_pixels
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import compiled
-from ..disjoint import grouped
-from ..rows import Rows
+from ..common.compiled import compiled
+from ..common.disjoint import grouped
+from ..common.rows import Rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..common.rows import Rows
 from ..kernel import Kernel
-from ..rows import Rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..compiled import compiled
+from ..common.compiled import compiled
 from ..printing.widths import BINS
 from .runs import Runs
 

@@ -11,9 +11,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fracslice.common.extras import lacking
 from fracslice.errors import RenderError
 from fracslice.export import replacing
-from fracslice.extras import lacking
 from fracslice.formulas.parameters import Choice, Vector, validated
 from fracslice.mesh.model import Mesh
 from fracslice.viewer import lighting

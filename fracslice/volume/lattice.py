@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..common.memory import available_bytes
 from ..errors import TooLargeError, VolumeError
 from ..formulas.box import Box, Triple
-from ..memory import available_bytes
 
 BRICK = 8
 """Grid points along the side of a brick."""

@@ -14,7 +14,7 @@ import trimesh
 from fracslice import Mesh, MeshJob, Result, Work, box, make_mesh, read, sphere, to_xml, torus
 from fracslice.api.options import PrintOptions, WorkOptions
 from fracslice.errors import Cancelled, ExportError, SceneError
-from fracslice.job import make_mesh as make_mesh_job
+from fracslice.jobs.mesh import make_mesh as make_mesh_job
 from fracslice.mesh.reading import read_mesh
 from fracslice.scene import Print, scene
 

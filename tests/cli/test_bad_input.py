@@ -132,7 +132,7 @@ def test_command_lines(arguments, message, folder, capfd):
 
 
 def test_a_voxel_count_that_does_not_fit_in_memory(folder, capfd, monkeypatch):
-    monkeypatch.setattr("fracslice.surfaces.available_bytes", lambda: 1 << 28)
+    monkeypatch.setattr("fracslice.jobs.surfaces.available_bytes", lambda: 1 << 28)
     line = refused(capfd, folder, "mesh", "ball.xml", "-o", "out/x.3mf", "--resolution", "800")
     assert "GB of memory" in line
     assert line.endswith("mm fits, and an .stl file is written piece after piece")

@@ -40,7 +40,7 @@ def test_no_mesh_is_made_where_no_window_can_be(
     ball: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("fracslice.viewer.screen.has_screen", lambda: False)
-    monkeypatch.setattr("fracslice.job.make_mesh", None)
+    monkeypatch.setattr("fracslice.jobs.mesh.make_mesh", None)
     assert run(["show", str(ball)]) == 2
     assert "there is no screen" in capsys.readouterr().err
 

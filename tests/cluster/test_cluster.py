@@ -13,21 +13,22 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run as command
 
-from fracslice import meshsampling, meshtasks
 from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import ResultFolder, Workers, connected, workers
 from fracslice.cluster.identity import Identity
 from fracslice.errors import Cancelled, ClusterError
 from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb, sphere
-from fracslice.job import make_mesh
+from fracslice.jobs import mesh_sampling as meshsampling
+from fracslice.jobs import mesh_tasks as meshtasks
+from fracslice.jobs.mesh import make_mesh
+from fracslice.jobs.slice_recipe import SliceRecipe
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import Renderer, parts
 from fracslice.scene import Scene, scene
 from fracslice.scene.reader import reads
 from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
-from fracslice.slicerecipe import SliceRecipe
 from fracslice.slicing import SliceJob
 from fracslice.volume import exploration
 from fracslice.work import Work

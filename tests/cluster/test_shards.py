@@ -8,12 +8,13 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run as command
 
-from fracslice import meshsampling, meshtasks
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import ClusterError, SharedError
 from fracslice.export.slices import write_slices
 from fracslice.formulas import box, cone, flake, sphere
-from fracslice.job import MeshResult, make_mesh
+from fracslice.jobs import mesh_sampling as meshsampling
+from fracslice.jobs import mesh_tasks as meshtasks
+from fracslice.jobs.mesh import MeshResult, make_mesh
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import parts
 from fracslice.scene import scene

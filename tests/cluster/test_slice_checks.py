@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 from fracslice.cli.main import run as command
 
-from fracslice import slicechecks
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import SharedError
 from fracslice.formulas import box, cylinder, sphere
+from fracslice.jobs import slice_checks as slicechecks
+from fracslice.jobs.slice_checks import CheckTask, check_run
+from fracslice.jobs.slice_recipe import SliceRecipe
 from fracslice.scene import scene
 from fracslice.scene.writer import to_xml
-from fracslice.slicechecks import CheckTask, check_run
-from fracslice.slicerecipe import SliceRecipe
 from fracslice.slicing import SliceJob
 from fracslice.slicing.checks import check_layers, findings_of
 from fracslice.work import Work

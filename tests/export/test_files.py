@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from fracslice.common.files import put
 from fracslice.errors import ExportError
 from fracslice.export import check_target, flushing, replacing, write
-from fracslice.files import put
 from tests.mesh.shapes import cube
 
 
@@ -54,7 +54,7 @@ def fail_half_way(path: Path, stop: type[BaseException]) -> None:
 def test_a_file_is_flushed_while_it_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     flushed = threading.Event()
     monkeypatch.setattr("os.fsync", lambda _: flushed.set())
-    monkeypatch.setattr("fracslice.files.FLUSH_S", 0.001)
+    monkeypatch.setattr("fracslice.common.files.FLUSH_S", 0.001)
     with replacing(tmp_path / "large") as file, flushing(file):
         assert flushed.wait(10)
 
@@ -72,7 +72,7 @@ def test_an_error_of_flushing_leaves_no_file(tmp_path: Path, monkeypatch: pytest
             monkeypatch.setattr("os.fsync", lambda _: None)  # the system reports it once
 
     monkeypatch.setattr("os.fsync", fail)
-    monkeypatch.setattr("fracslice.files.FLUSH_S", 0.001)
+    monkeypatch.setattr("fracslice.common.files.FLUSH_S", 0.001)
     with pytest.raises(ExportError, match="large: Input/output error"):
         write_slowly()
     assert not list(tmp_path.iterdir())

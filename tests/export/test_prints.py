@@ -19,11 +19,11 @@ from fracslice.export.jobs import SliceRun
 from fracslice.export.resins import Resin
 from fracslice.export.slices import ENDINGS, PRINTS, printers_file, slice_format, write_slices
 from fracslice.formulas import difference, menger, sphere
+from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
 from fracslice.slicing.printers import PRINTERS, Printer
 from fracslice.slicing.raster import Screen
-from fracslice.stackmodel import StackModel
 from fracslice.work import Work
 from tests.export import decoders, readers
 

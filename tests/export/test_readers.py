@@ -17,10 +17,10 @@ from PIL import Image
 from fracslice.export.jobs import SliceRun
 from fracslice.export.slices import write_slices
 from fracslice.formulas import difference, menger, sphere
+from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.raster import Screen
-from fracslice.stackmodel import StackModel
 from fracslice.work import Work
 
 SVG = "{http://www.w3.org/2000/svg}svg"

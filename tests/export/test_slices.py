@@ -27,11 +27,11 @@ from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal
 from fracslice.export.slices import FORMATS, slice_format, write_slices
 from fracslice.formulas import Node, difference, menger, sphere
+from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.printers import Printer
 from fracslice.slicing.raster import Screen
-from fracslice.stackmodel import StackModel
 from fracslice.work import Work
 
 MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)

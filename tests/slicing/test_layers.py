@@ -28,8 +28,8 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.formulas.field import Bounds
+from fracslice.jobs.completeness import layers_amount
 from fracslice.scene import scene
-from fracslice.shown import layers_amount
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.slab import Sampler
 from fracslice.work import Work

@@ -9,9 +9,9 @@ import numpy as np
 from fracslice import MeshJob, make_mesh
 from fracslice.errors import VolumeError
 from fracslice.formulas import Box, Node
+from fracslice.jobs.completeness import layers_amount
 from fracslice.kernel import compile_scene
 from fracslice.scene import scene
-from fracslice.shown import layers_amount
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.work import Work
 

@@ -8,7 +8,7 @@ import pytest
 from fracslice import make_mesh, slice_layers
 from fracslice.errors import SceneError
 from fracslice.formulas import Node, box, cylinder, difference, menger, transform, union
-from fracslice.job import make_mesh as mesh_of
+from fracslice.jobs.mesh import make_mesh as mesh_of
 from fracslice.meshjob import MeshJob
 from fracslice.scene import Print, Scene, scene
 from fracslice.scene.reader import reads

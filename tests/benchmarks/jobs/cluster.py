@@ -20,20 +20,20 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from fracslice import meshtasks
 from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import Contents, Pool, ResultFolder, Task, Workers, connected
 from fracslice.cluster.pieces import run as make_piece
 from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb
-from fracslice.job import make_mesh
+from fracslice.jobs import mesh_tasks as meshtasks
+from fracslice.jobs.mesh import make_mesh
+from fracslice.jobs.slice_recipe import SliceRecipe
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import Renderer
 from fracslice.scene import scene
 from fracslice.scene.animation import Animation
 from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
-from fracslice.slicerecipe import SliceRecipe
 from fracslice.slicing import SliceJob
 from fracslice.work import Work
 

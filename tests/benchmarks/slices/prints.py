@@ -15,11 +15,11 @@ from fracslice.export.jobs import SliceRun
 from fracslice.export.resins import Resin
 from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb
+from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.printers import Printer
 from fracslice.slicing.raster import Screen
-from fracslice.stackmodel import StackModel
 from fracslice.work import Work
 
 from ..runner import Figures, Row, Run, timed

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-from . import slicing
-from .export.jobs import EPOCH, SliceRun
-from .export.ranges import Encode
-from .export.resins import Resin
-from .export.slices import FORMATS
-from .scene.reader import reads
-from .slicing.printers import Printer
-from .slicing.raster import Screen
-from .stackmodel import StackModel
-from .work import Work
+from .. import slicing
+from ..export.jobs import EPOCH, SliceRun
+from ..export.ranges import Encode
+from ..export.resins import Resin
+from ..export.slices import FORMATS
+from ..scene.reader import reads
+from ..slicing.printers import Printer
+from ..slicing.raster import Screen
+from ..work import Work
+from .stack_model import StackModel
 
 
 @dataclass(frozen=True)

@@ -9,22 +9,22 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cluster import Contents, ResultFolder, packed, unpacked
+from ..mesh.contouring import layers
+from ..mesh.halo import WAITS, SelectedPiece, finished_piece
+from ..mesh.missed import NEARBY, nearest
+from ..mesh.pointed_vertices import pointed_in
+from ..mesh.survey import components
+from ..mesh.tally import Tally
+from ..mesh.tip_triangles import at_tips
+from ..mesh.whole_shells import WholeShells
+from ..volume import SignBricks
+from ..volume.lattice import BRICK
+from ..work import Work
 from .checking import off_surface, on_the_plate
-from .cluster import Contents, ResultFolder, packed, unpacked
 from .finishing import placing
-from .mesh.contouring import layers
-from .mesh.halo import WAITS, SelectedPiece, finished_piece
-from .mesh.missed import NEARBY, nearest
-from .mesh.pointed_vertices import pointed_in
-from .mesh.survey import components
-from .mesh.tally import Tally
-from .mesh.tip_triangles import at_tips
-from .mesh.whole_shells import WholeShells
-from .meshfiles import Selection, StoredPieces, read_choice
-from .meshrecipe import MeshRecipe, sampled
-from .volume import SignBricks
-from .volume.lattice import BRICK
-from .work import Work
+from .mesh_files import Selection, StoredPieces, read_choice
+from .mesh_recipe import MeshRecipe, sampled
 
 MOST, LEAST, COUNT = 1 << 15, 1 << 12, 256
 """Bricks of a task: of a gigabyte at most, of 0.7 seconds at least; about `COUNT` tasks between."""
@@ -134,7 +134,7 @@ class FinishTask(MeshTask):
 
     def make(self, work: Work) -> Contents:
         """Measures; the triangles are a file of their own, as an STL file holds them. See `Task.make`."""
-        from ._native import stl
+        from .._native import stl
 
         of = sampled(self.recipe, self.pieces, self.job)
         choice = read_choice(self.pieces, self.job)

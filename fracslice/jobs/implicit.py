@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import SceneError
+from ..formulas import Node
+from ..formulas.box import Box
+from ..meshjob import MeshJob
+from ..scene import Print, Scene
+from ..work import Work
 from .clock import Clock
-from .errors import SceneError
-from .formulas import Node
-from .formulas.box import Box
-from .meshjob import MeshJob
 from .placement import Placement
 from .planning import planned
-from .scene import Print, Scene
-from .work import Work
 
 
 @dataclass(frozen=True)
@@ -71,11 +71,11 @@ def make_implicit(
     SceneError, KernelError, VolumeError, ExportError, Cancelled
         For a scene that is no formula or too large a one, or a file that cannot be written.
     """
-    from .export import application, check_target
-    from .export.implicit import write_implicit
-    from .kernel.graph import graph
-    from .meshwriting import metadata
-    from .volume.sizing import sizing
+    from ..export import application, check_target
+    from ..export.implicit import write_implicit
+    from ..kernel.graph import graph
+    from ..volume.sizing import sizing
+    from .mesh_writing import metadata
 
     what, clock = what or MeshJob(), Clock(work or Work())
     _refuse(what.how(scene))

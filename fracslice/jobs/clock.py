@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from .work import Work
+from ..work import Work
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-HERE = Path(__file__).parent
+PACKAGE = Path(__file__).parents[1]
 
 
 def key(*parts: object) -> str:
@@ -66,9 +66,9 @@ def program() -> str:
     str
         Key of this installation.
     """
-    native = (find_spec(f"{__package__}.{name}") for name in ("_native", "_slices", "_vdb"))
+    native = (find_spec(f"fracslice.{name}") for name in ("_native", "_slices", "_vdb"))
     compiled = (Path(module.origin) for module in native if module and module.origin)
     scipy = find_spec("scipy")  # importing it for its version takes longer than hashing the program
     assert scipy and scipy.origin
     version = Path(scipy.origin).with_name("version.py")
-    return key(texts(*sorted(HERE.rglob("*.py")), *compiled, version), np.__version__)
+    return key(texts(*sorted(PACKAGE.rglob("*.py")), *compiled, version), np.__version__)

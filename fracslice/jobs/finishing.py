@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mesh.gathering import gathered
+from ..scene import Print
 from .clock import Clock
-from .mesh.gathering import gathered
 from .placement import Placement
-from .scene import Print
 
 if TYPE_CHECKING:
-    from .mesh.check import MeshReport
-    from .mesh.components import Removed
-    from .mesh.halo import Finished, SelectedPiece
-    from .mesh.quantisation import Frame
-    from .mesh.tally import Tally
+    from ..mesh.check import MeshReport
+    from ..mesh.components import Removed
+    from ..mesh.halo import Finished, SelectedPiece
+    from ..mesh.quantisation import Frame
+    from ..mesh.tally import Tally
+    from ..volume import Plan, SignBricks
+    from ..volume.sizing import Sizing
     from .surfaces import Surface
-    from .volume import Plan, SignBricks
-    from .volume.sizing import Sizing
 
 FLAT = 0.1
 """Fraction of the minimum distance between vertices. Vertices within this height of the bed are moved to the
@@ -49,8 +49,8 @@ def placing(planned: Plan, signs: SignBricks, place: Placement) -> tuple[NDArray
     Frame
         Scale, translation and height of the bed.
     """
-    from .mesh.contouring import minimum_edge_parameter
-    from .mesh.quantisation import grid_planes
+    from ..mesh.contouring import minimum_edge_parameter
+    from ..mesh.quantisation import grid_planes
 
     bed = FLAT * minimum_edge_parameter(signs) * planned.voxel * place.scale
     return place.mm(grid_planes(signs)), (place.scale, place.offset, bed)
@@ -89,9 +89,9 @@ class Finish:
         scale: float | None,
         clock: Clock,
     ) -> None:
-        from .mesh.components import choose
-        from .mesh.touching import NearBodies
-        from .volume.rest import box_of_the_rest
+        from ..mesh.components import choose
+        from ..mesh.touching import NearBodies
+        from ..volume.rest import box_of_the_rest
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
         self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
@@ -147,7 +147,7 @@ class Finish:
         Finished
             Triangles that are finished with each piece.
         """
-        from .mesh.halo import finished_piece
+        from ..mesh.halo import finished_piece
 
         work, voxel, count = self.clock.work, self.planned.voxel, len(self.pieces)
         ends, before, own = [-np.inf, *self.pieces.ends], None, self._kept(0)
@@ -167,7 +167,7 @@ class Finish:
 
     def _kept(self, number: int) -> SelectedPiece:
         """The next piece, with the choice of its bodies."""
-        from .mesh.halo import SelectedPiece
+        from ..mesh.halo import SelectedPiece
 
         mesh, labels = self.pieces.mesh(number), self.pieces.labels(number)
         self.near.add(mesh.vertices, labels, self.pieces.ends[number])

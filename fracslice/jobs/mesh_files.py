@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .cluster import Files, ResultFolder, packed, unpacked
-from .mesh.contouring import Piece
-from .mesh.halo import Strip, strip
-from .mesh.model import Mesh
-from .mesh.pieces import Pieces as MeshPieces
-from .mesh.survey import PieceComponents
+from ..cluster import Files, ResultFolder, packed, unpacked
+from ..mesh.contouring import Piece
+from ..mesh.halo import Strip, strip
+from ..mesh.model import Mesh
+from ..mesh.pieces import Pieces as MeshPieces
+from ..mesh.survey import PieceComponents
+from ..store import Arrays
 from .placement import Placement
-from .store import Arrays
 
 SIDES = "head", "tail"
 """Names of the strips at the begin and at the end of a piece."""

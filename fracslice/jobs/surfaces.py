@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.memory import available_bytes
+from ..errors import TooLargeError
+from ..volume.lattice import BRICK
+from ..volume.states import distinct
+from ..work import ahead
 from .clock import Clock
-from .errors import TooLargeError
-from .memory import available_bytes
-from .volume.lattice import BRICK
-from .volume.states import distinct
-from .work import ahead
 
 if TYPE_CHECKING:
-    from .mesh.components import Shells
-    from .mesh.pieces import Pieces
-    from .mesh.refine import Refined
-    from .mesh.whole_shells import WholeShells
-    from .volume import Plan, SignBricks
-    from .volume.exploration import Evaluate
+    from ..mesh.components import Shells
+    from ..mesh.pieces import Pieces
+    from ..mesh.refine import Refined
+    from ..mesh.whole_shells import WholeShells
+    from ..volume import Plan, SignBricks
+    from ..volume.exploration import Evaluate
 
 BYTES_A_CROSSING = 140
 """Peak memory by grid edges that the surface crosses, bytes: 125 to 150 measured, on meshes of 66 and 375
@@ -101,7 +101,7 @@ def sampled(planned: Plan, clock: Clock, evaluate: Evaluate | None = None) -> Si
     SignBricks
         Signs.
     """
-    from .volume import sample_scene_signs
+    from ..volume import sample_scene_signs
 
     with clock("sampling"):
         return sample_scene_signs(planned, clock.work, evaluate)
@@ -120,8 +120,8 @@ def has_thin_walls(signs: SignBricks) -> bool:
     bool
         True from the share on that `WholeShells.thin_walls` notes.
     """
-    from .mesh.components import PIECES
-    from .printing.components import thin_share
+    from ..mesh.components import PIECES
+    from ..printing.components import thin_share
 
     return thin_share(signs) >= PIECES
 
@@ -196,12 +196,12 @@ def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None,
     Surface
         The surface with tips, labelled.
     """
-    from .mesh.contouring import Piece
-    from .mesh.extract import contour, contour_pieces
-    from .mesh.pieces import Pieces
-    from .mesh.pointed_vertices import Pointed
-    from .mesh.survey import survey
-    from .mesh.tips import with_tips
+    from ..mesh.contouring import Piece
+    from ..mesh.extract import contour, contour_pieces
+    from ..mesh.pieces import Pieces
+    from ..mesh.pointed_vertices import Pointed
+    from ..mesh.survey import survey
+    from ..mesh.tips import with_tips
 
     work, pieces = clock.work, Pieces(folder)
     pointed = Pointed(planned.voxel, work.threads)
@@ -237,10 +237,10 @@ def refined(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refi
     Refined
         Result, with lengths in scene units.
     """
-    from .mesh.contouring import Piece
-    from .mesh.pieces import Pieces
-    from .mesh.refine import refine
-    from .mesh.survey import survey
+    from ..mesh.contouring import Piece
+    from ..mesh.pieces import Pieces
+    from ..mesh.refine import refine
+    from ..mesh.survey import survey
 
     planned, pieces = surface.planned, Pieces()
     with clock("refining"):

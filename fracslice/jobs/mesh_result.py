@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import TooLargeError
+from ..errors import TooLargeError
+from ..work import Work
 from .placement import Placement
 from .report import Report
-from .work import Work
 
 if TYPE_CHECKING:
-    from .kernel import Field
-    from .mesh import Mesh
-    from .volume import Bricks, Plan
+    from ..kernel import Field
+    from ..mesh import Mesh
+    from ..volume import Bricks, Plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class MeshResult:
     @cached_property
     def bricks(self) -> Bricks:
         """Samples of the field around the surface, scene units; computed on first access."""
-        from .volume import sample_scene
+        from ..volume import sample_scene
 
         return sample_scene(self.planned, self.work)
 

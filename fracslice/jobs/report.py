@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .quantiles import quantile
+from ..common.quantiles import quantile
 
 if TYPE_CHECKING:
-    from .mesh.check import MeshReport
-    from .mesh.components import Removed
-    from .mesh.refine import Refined
-    from .mesh.simplify import Simplified
+    from ..mesh.check import MeshReport
+    from ..mesh.components import Removed
+    from ..mesh.refine import Refined
+    from ..mesh.simplify import Simplified
 
 
 @dataclass(frozen=True)

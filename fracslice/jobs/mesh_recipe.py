@@ -6,17 +6,17 @@ import threading
 from dataclasses import dataclass
 from functools import lru_cache
 
+from ..cluster import ResultFolder, unpacked
+from ..common.keys import key, program
+from ..errors import ClusterError
+from ..mesh.contouring import SurfaceContours
+from ..meshjob import MeshJob
+from ..scene.reader import reads
+from ..volume import Plan, SignBricks
+from ..volume.sizing import sizing
+from ..work import Work
 from .clock import Clock
-from .cluster import ResultFolder, unpacked
-from .errors import ClusterError
-from .keys import key, program
-from .mesh.contouring import SurfaceContours
-from .meshjob import MeshJob
 from .planning import edited, planned
-from .scene.reader import reads
-from .volume import Plan, SignBricks
-from .volume.sizing import sizing
-from .work import Work
 
 SAMPLES = "samples"
 """File of a job with its samples."""

@@ -9,16 +9,16 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .formulas import Node
-from .job import make_mesh
-from .mesh import Mesh
-from .meshjob import COARSEST, RESOLUTION, MeshJob
-from .rendering import Renderer
-from .scene import Scene
-from .scene.view import Film, View
-from .slicing import SliceJob
-from .volume.sizing import oriented
-from .work import Work
+from ..formulas import Node
+from ..mesh import Mesh
+from ..meshjob import COARSEST, RESOLUTION, MeshJob
+from ..rendering import Renderer
+from ..scene import Scene
+from ..scene.view import Film, View
+from ..slicing import SliceJob
+from ..volume.sizing import oriented
+from ..work import Work
+from .mesh import make_mesh
 
 LARGEST = 800, 480
 """Width and height of the largest preview of a format, pixels."""

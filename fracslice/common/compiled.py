@@ -9,9 +9,8 @@ from typing import Any
 
 import numba
 
-from .cachefiles import Kept
-from .kernel.objects import cache_folder
-from .keys import HERE, texts
+from .cache_files import Kept, cache_folder
+from .keys import PACKAGE, texts
 
 CONFIG: Any = numba.config
 
@@ -47,5 +46,5 @@ def _folder() -> Path | None:
     """Cache folder of all compiled loops, keyed by their joint text: they call each other, and Numba checks
     only the file of the function itself. None if the folder cannot be trusted.
     """
-    own = [path for path in sorted(HERE.rglob("*.py")) if b"@compiled\n" in path.read_bytes()]
+    own = [path for path in sorted(PACKAGE.rglob("*.py")) if b"@compiled\n" in path.read_bytes()]
     return Kept(cache_folder() / "loops" / texts(*own)).place()

@@ -13,24 +13,25 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cluster import Files, Pool, Shard, packed, unpacked
+from ..common.keys import key
+from ..errors import SharedError
+from ..mesh.components import Shells
+from ..mesh.missed import distances, surface_samples
+from ..mesh.model import Mesh
+from ..mesh.nesting import Nesting
+from ..mesh.pointed_vertices import Pointed, PointedPiece
+from ..mesh.survey import Survey, survey
+from ..mesh.tally import Tally
+from ..mesh.tip_triangles import by_tip
+from ..mesh.tips import with_tips
+from ..volume import Plan, SignBricks
 from .checking import stride
 from .clock import Clock
-from .cluster import Files, Pool, Shard, packed, unpacked
-from .errors import SharedError
 from .finishing import Finish
-from .keys import key
-from .mesh.components import Shells
-from .mesh.missed import distances, surface_samples
-from .mesh.model import Mesh
-from .mesh.nesting import Nesting
-from .mesh.pointed_vertices import Pointed, PointedPiece
-from .mesh.survey import Survey, survey
-from .mesh.tally import Tally
-from .mesh.tip_triangles import by_tip
-from .mesh.tips import with_tips
-from .meshfiles import CHOICE, StoredPieces, read_components, read_seam
-from .meshrecipe import SAMPLES, MeshRecipe, samples_key
-from .meshtasks import (
+from .mesh_files import CHOICE, StoredPieces, read_components, read_seam
+from .mesh_recipe import SAMPLES, MeshRecipe, samples_key
+from .mesh_tasks import (
     HALO,
     SHELLS,
     ContourTask,
@@ -43,7 +44,6 @@ from .meshtasks import (
     triangles_file,
 )
 from .surfaces import Surface
-from .volume import Plan, SignBricks
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +265,7 @@ def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Itera
 
 
 def _blocks(surface: SharedSurface, check: SharedCheck) -> Iterator[Append]:
-    from ._native import stl
+    from .._native import stl
 
     late: list[tuple[int, NDArray[np.float64]]] = []
     for number, files in enumerate(surface.results(FinishTask, range(len(surface.pieces)), "finishing")):
@@ -291,7 +291,7 @@ def whole(blocks: Iterable[Append]) -> Mesh:
     Mesh
         The mesh, mm.
     """
-    from ._native import weld
+    from .._native import weld
 
     kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
     file = io.BytesIO()

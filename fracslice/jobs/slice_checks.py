@@ -10,15 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from .cluster import Contents, Files, Pool, Shard, packed, unpacked
-from .errors import ClusterError, SharedError
-from .export.jobs import SliceRun
-from .export.ranges import range_size
-from .printing.limits import Limits
-from .slicerecipe import SliceRecipe
-from .slicing.checks import LayerFindings, PrintReport, check_layers, findings_of
-from .slicing.runs import LayerComponents, Nodes, Runs
-from .work import Work
+from ..cluster import (
+    Contents,
+    Files,
+    Pool,
+    Shard,
+    packed,
+    unpacked,
+)
+from ..errors import ClusterError, SharedError
+from ..export.jobs import SliceRun
+from ..export.ranges import range_size
+from ..printing.limits import Limits
+from ..slicing.checks import LayerFindings, PrintReport, check_layers, findings_of
+from ..slicing.runs import LayerComponents, Nodes, Runs
+from ..work import Work
+from .slice_recipe import SliceRecipe
 
 
 @dataclass(frozen=True)

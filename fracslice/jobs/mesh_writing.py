@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
+from ..meshjob import MeshJob
+from ..scene import Scene
+from ..work import ahead
 from .checking import Check
 from .clock import Clock
 from .finishing import Finish
-from .meshjob import MeshJob
-from .scene import Scene
-from .work import ahead
 
 if TYPE_CHECKING:
-    from .mesh import Mesh
-    from .mesh.check import MeshReport
-    from .mesh.simplify import Simplified
+    from ..mesh import Mesh
+    from ..mesh.check import MeshReport
+    from ..mesh.simplify import Simplified
     from .surfaces import Surface
 
 STL = ".stl"
@@ -84,7 +84,7 @@ class Writing:
 
     def _alone(self, surface: Surface, finish: Finish) -> Made:
         """Write the file while it is checked, by threads of this process."""
-        from .mesh.missed import surface_to_mesh
+        from ..mesh.missed import surface_to_mesh
 
         planned, work = surface.planned, self.clock.work
         with self.clock("checking"):
@@ -97,9 +97,9 @@ class Writing:
         """Write the file from the pieces of a pool; None for a surface that was made here."""
         if self.clock.work.cluster is None:
             return None
-        from .export import FORMATS
-        from .export.stl import concatenate
-        from .sharedmesh import SharedSurface, finished, whole
+        from ..export import FORMATS
+        from ..export.stl import concatenate
+        from .shared_mesh import SharedSurface, finished, whole
 
         if not isinstance(surface, SharedSurface):
             return None
@@ -122,7 +122,7 @@ class Writing:
     @contextmanager
     def _file(self, path: Path) -> Iterator[tuple[BinaryIO, dict[str, str]]]:
         """Open the file, and return what it says about itself."""
-        from .export import application, flushing, replacing
+        from ..export import application, flushing, replacing
 
         with replacing(path) as file, flushing(file):
             yield file, {"Application": application()} | metadata(self.scene)
@@ -133,14 +133,14 @@ class Writing:
         """Write the file while it is checked. Returns the mesh, if in one piece, and the result of its
         simplification, if any.
         """
-        from .export import FORMATS
-        from .export.stl import write_pieces
-        from .mesh.halo import Finished
-        from .mesh.tip_triangles import tips_last
+        from ..export import FORMATS
+        from ..export.stl import write_pieces
+        from ..mesh.halo import Finished
+        from ..mesh.tip_triangles import tips_last
 
         finished, simplified, mesh = finish.finished(), None, None
         if self.what.simplify_mm is not None:
-            from .mesh.simplify import simplify
+            from ..mesh.simplify import simplify
 
             (piece,) = finished
             with self.clock("simplifying"):
@@ -171,7 +171,7 @@ class Writing:
 
     def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
         """Colour the vertices. Edits that are no formulas have the colour of the object there."""
-        from .rendering.painting import paint
+        from ..rendering.painting import paint
 
         assert self.what.colour is not None
         field: Any = finish.planned.root

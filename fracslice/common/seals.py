@@ -6,8 +6,8 @@ import hashlib
 import secrets
 from functools import cache
 
-from .cachefiles import Kept, users_folder, warn
-from .errors import ExportError
+from ..errors import ExportError
+from .cache_files import Kept, users_folder, warn
 
 SIZE = 32
 """Length of the secret, bytes."""

@@ -8,14 +8,14 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
-from .cluster import Pool, ResultFolder
-from .errors import ClusterError
-from .keys import key, program
-from .meshrecipe import MeshRecipe, plan_of
-from .volume import Plan
-from .volume.exploration import Evaluate, brick_signs
-from .volume.lattice import BRICK
-from .work import Work, chunks
+from ..cluster import Pool, ResultFolder
+from ..common.keys import key, program
+from ..errors import ClusterError
+from ..volume import Plan
+from ..volume.exploration import Evaluate, brick_signs
+from ..volume.lattice import BRICK
+from ..work import Work, chunks
+from .mesh_recipe import MeshRecipe, plan_of
 
 BRICKS = 1 << 17
 """Bricks of a task, about a second."""

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from .errors import ExportError
+from ..errors import ExportError
 from .private import NO_LINK
 
 FLUSH_S = 0.05

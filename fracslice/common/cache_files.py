@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-from .errors import FracsliceWarning
+from ..errors import FracsliceWarning
 from .files import replacing, reported
 from .private import OWNER_ONLY, NotPrivateError, opened, private_folder
 
@@ -128,3 +128,9 @@ def users_folder(variable: str, default: str) -> Path:
     """
     base = os.path.expanduser(os.environ.get(variable) or default)
     return Path(base if os.path.isabs(base) else os.devnull, "fracslice")
+
+
+def cache_folder() -> Path:
+    """Return the cache folder of kernels: $FRACSLICE_CACHE, else one in the user's cache folder."""
+    given = os.environ.get("FRACSLICE_CACHE")
+    return Path(given).expanduser() if given else users_folder("XDG_CACHE_HOME", "~/.cache") / "kernels"

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .formulas import Box
-from .formulas.algebra import dot
-from .formulas.box import Triple
+from ..formulas import Box
+from ..formulas.algebra import dot
+from ..formulas.box import Triple
+from ..volume import Lattice, Plan
+from ..volume.amount import FINER, amount, finer
+from ..work import Work
 from .report import Amount
-from .volume import Lattice, Plan
-from .volume.amount import FINER, amount, finer
-from .work import Work
 
 if TYPE_CHECKING:
-    from .kernel import Field
-    from .slicing import Slicer
+    from ..kernel import Field
+    from ..slicing import Slicer
 
 Grid = tuple[Triple, Triple, Callable[[float], str]]
 """Origin and spacing of the samples, scene units, and a function that names samples of a fraction of the
@@ -85,7 +85,7 @@ def layers_amount(slicer: Slicer, work: Work) -> tuple[Amount, tuple[str, ...]]:
     SliceError, Cancelled
         If a layer cannot be sampled, or the work is cancelled.
     """
-    from .slicing import SLAB
+    from ..slicing import SLAB
 
     stack = slicer.stack
     starts = np.arange(0, len(stack.z), SLAB)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..meshjob import MeshJob
+from ..scene import Print, Scene
 from .clock import Clock
-from .meshjob import MeshJob
-from .scene import Print, Scene
 
 if TYPE_CHECKING:
-    from .volume import Plan
-    from .volume.sizing import Sizing
+    from ..volume import Plan
+    from ..volume.sizing import Sizing
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ def planned(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
     SceneError, VolumeError, Cancelled
         For a scene that cannot be meshed.
     """
-    from .volume import plan
-    from .volume.sizing import oriented
+    from ..volume import plan
+    from ..volume.sizing import oriented
 
     how = what.how(scene)
     with clock("planning"):
@@ -89,7 +89,7 @@ def edited(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Clock) 
     SceneError, VolumeError, Cancelled
         For edits that cannot be made.
     """
-    from .printing import printable
+    from ..printing import printable
 
     how = what.how(scene)
     with clock("changing"):

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..work import Work
 from .finishing import Finish
 from .placement import Placement
-from .work import Work
 
 if TYPE_CHECKING:
-    from .mesh import Mesh
-    from .mesh.check import MeshReport
-    from .mesh.halo import Finished
-    from .volume import Plan
+    from ..mesh import Mesh
+    from ..mesh.check import MeshReport
+    from ..mesh.halo import Finished
+    from ..volume import Plan
 
 MOST_ERRORS = 1 << 20
 """Approximate maximum of vertices whose distance from the surface is measured, evenly distributed over it."""
@@ -61,7 +61,7 @@ def off_surface(
     ndarray of float64, shape (n,)
         Distances, scene units.
     """
-    from .volume.accuracy import surface_error
+    from ..volume.accuracy import surface_error
 
     return surface_error(planned.root, place.units(vertices), planned.voxel, work)
 
@@ -78,7 +78,7 @@ class Check:
     """
 
     def __init__(self, finish: Finish, bricks: int) -> None:
-        from .mesh.tally import Tally
+        from ..mesh.tally import Tally
 
         self._finish, self._tally = finish, Tally(finish.clock.work.threads)
         self._stride = stride(bricks)
@@ -134,7 +134,7 @@ def on_the_plate(mesh: Mesh, threads: int = 0) -> float:
     float
         Area, mm2.
     """
-    from ._native import touching
+    from .._native import touching
 
     low = mesh.vertices[:, 2] == 0
     near = mesh.triangles[touching(mesh.triangles, low, threads)]

@@ -11,25 +11,25 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..common.memory import peak_rss_mb
+from ..errors import SceneError, SharedError, TooLargeError
+from ..meshjob import MeshJob
+from ..scene import Scene
+from ..version import __version__
+from ..work import Work, in_background
 from . import surfaces
 from .clock import Clock
-from .errors import SceneError, SharedError, TooLargeError
 from .finishing import Finish
-from .memory import peak_rss_mb
-from .meshjob import MeshJob
-from .meshresult import MeshResult
-from .meshwriting import STL, Writing
+from .mesh_result import MeshResult
+from .mesh_writing import STL, Writing
 from .planning import Sized, edited, planned
 from .report import Report, SurfaceError, SurfaceToMesh
-from .scene import Scene
-from .version import __version__
-from .work import Work, in_background
 
 if TYPE_CHECKING:
-    from .meshrecipe import MeshRecipe
+    from ..volume import Plan, SignBricks
+    from ..volume.sizing import Sizing
+    from .mesh_recipe import MeshRecipe
     from .surfaces import Surface
-    from .volume import Plan, SignBricks
-    from .volume.sizing import Sizing
 
 COLOURED = (".ply", ".glb", ".3mf")
 """Formats that hold colours of vertices."""
@@ -91,7 +91,7 @@ class _Job:
     @cached_property
     def size(self) -> Sizing:
         """Size of the object."""
-        from .volume.sizing import sizing
+        from ..volume.sizing import sizing
 
         return sizing(self.scene, self.what.size_mm, self.what.scale, self.clock.work)
 
@@ -99,7 +99,7 @@ class _Job:
         """Raise the errors of invalid arguments before any work is done."""
         self.what.voxels(self.size.longest)
         if self.path is not None:
-            from .export import check_format, check_target
+            from ..export import check_format, check_target
 
             ending = check_format(self.path)
             check_target(self.path)
@@ -116,7 +116,7 @@ class _Job:
         if self.path is None or self.path.suffix.lower() != STL:
             yield None
             return
-        from .export import check_target
+        from ..export import check_target
 
         beside = check_target(self.path).parent
         with ExitStack() as stack:
@@ -146,8 +146,8 @@ class _Job:
 
     def recipe(self, again: bool) -> MeshRecipe:
         """Recipe of the field, for other processes; `again` if the field chose the bodies."""
-        from .meshrecipe import MeshRecipe
-        from .scene.writer import to_xml
+        from ..scene.writer import to_xml
+        from .mesh_recipe import MeshRecipe
 
         return MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
 
@@ -156,7 +156,7 @@ class _Job:
         work = self.clock.work
         if work.cluster is None or work.device != "cpu":
             return surfaces.sampled(planned, self.clock)
-        from .meshsampling import by_pool
+        from .mesh_sampling import by_pool
 
         job, evaluate = by_pool(self.recipe(again), planned, work.cluster, work)
         signs = surfaces.sampled(planned, self.clock, evaluate)
@@ -168,7 +168,7 @@ class _Job:
         sized, signs, again = self.sampled()
         if (pool := self.clock.work.cluster) is not None:
             if not any(self.needing_all()):
-                from .sharedmesh import shared_surface
+                from .shared_mesh import shared_surface
 
                 return sized, shared_surface(self.recipe(again), sized.planned, signs, pool, self.clock)
             if not pool.first:
@@ -187,8 +187,8 @@ class _Job:
 
     def result(self, sized: Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""
-        from .mesh.touching import touching_note
-        from .shown import mesh_amount
+        from ..mesh.touching import touching_note
+        from .completeness import mesh_amount
 
         what, clock, size, refined = self.what, self.clock, self.size, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin

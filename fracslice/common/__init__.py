@@ -1,0 +1,1 @@
+"""What every layer uses: files, keys, compiled loops, records of arrays."""

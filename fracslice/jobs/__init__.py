@@ -1,0 +1,1 @@
+"""Jobs: from a scene to a finished file, stage after stage."""
