@@ -78,7 +78,10 @@ def test_samples_follow_from_the_guard(tmp_path: Path, monkeypatch: pytest.Monke
     assert sampled(work, sphere())[0] > 0
 
 
-@pytest.mark.parametrize("changed", ["formulas/primitives.py", "kernel/linker.py", "common/rows.py", "_native"])
+CHANGED = ["formulas/primitives.py", "kernel/linker.py", "common/rows.py", "_native"]
+
+
+@pytest.mark.parametrize("changed", CHANGED)
 def test_what_is_kept_follows_from_the_program(
     changed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
