@@ -17,7 +17,7 @@ from fracslice.export import write
 
 from .mesh import shapes
 
-for name in ("animation.film", "slicerecipe", "stackmodel"):
+for name in ("animation.film", "jobs.slice_recipe", "jobs.stack_model"):
     import_module(f"fracslice.{name}")  # before a test replaces what they import
 
 ROOT = Path(__file__).parents[1]
@@ -134,8 +134,8 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         assert run(words) == 0
         return
     for work in (
-        "job.make_mesh",
-        "implicit.make_implicit",
+        "jobs.mesh.make_mesh",
+        "jobs.implicit.make_implicit",
         "slicing.plan_stack",
         "rendering.Renderer",
         "animation.Timeline",

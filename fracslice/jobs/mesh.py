@@ -76,7 +76,7 @@ LATER = "halo", "missed", "self_intersections", "tally", "tip_triangles", "tips"
 def import_ahead() -> None:
     """Import modules of later stages, while native code samples and contours."""
     for module in ("export", *(f"mesh.{name}" for name in LATER)):
-        import_module(f".{module}", __package__)
+        import_module(f"fracslice.{module}")
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,12 @@ def typed(source: str) -> str:
     return ast.unparse(ast.fix_missing_locations(_Typed(tree).visit(tree))) + "\n"
 
 
+def _uses(name: str, body: Sequence[ast.stmt]) -> list[ast.Name]:
+    """All uses of a name in statements."""
+    nodes = (node for statement in body for node in ast.walk(statement))
+    return [node for node in nodes if isinstance(node, ast.Name) and node.id == name]
+
+
 class _Typed(ast.NodeTransformer):
     """Converts integers to ``real`` where they meet a real; among themselves, and in subscripts, they stay.
 
@@ -194,15 +200,20 @@ class _Typed(ast.NodeTransformer):
         return node
 
     def visit_For(self, node: ast.For) -> Any:
-        """Rewrite as a loop over a 32-bit counter.
+        """Rewrite as a loop over a 32-bit counter, which no statement of the loop can change.
 
         Numba's own iterator costs several instructions per iteration.
         """
         match node:
-            case ast.For(ast.Name(i), ast.Call(ast.Name("range"), [end])):
+            case ast.For(ast.Name(name), ast.Call(ast.Name("range"), [end])):
+                uses = [type(n.ctx) for n in _uses(name, node.body)]
+                changed = ast.Store in uses
+                i = f"{name}_count" if changed else name
                 first, after = parse(f"{i} = whole(0)\n{i} = whole({i} + 1)").body
                 end = self.visit(end) if isinstance(end, ast.Call) else _call("whole", end)
                 body = [part for s in node.body for part in _listed(self.visit(s))]
+                if changed and ast.Load in uses:
+                    body = [*parse(f"{name} = {i}").body, *body]
                 return [first, ast.While(ast.Compare(ast.Name(i), [ast.Lt()], [end]), [*body, after], [])]
         raise KernelError(f"a formula cannot be compiled: a loop over {ast.unparse(node.iter)}")
 

@@ -118,6 +118,17 @@ class TestTyping:
         text = cuda_source.typed(f"def f(x, P):\n    {formula}")
         assert text == f"@device\ndef f(x, P):\n    {thread}\n"
 
+    def test_of_loops_whose_counter_is_assigned(self) -> None:
+        loop = "def f(x, P):\n    for _ in range(3):\n        x, _ = (x, 1.0)"
+        assert cuda_source.typed(loop) == (
+            "@device\ndef f(x, P):\n    __count = whole(0)\n    while __count < whole(3):\n"
+            "        x, _ = (x, real(1.0))\n        __count = whole(__count + 1)\n"
+        )
+        read = loop.replace("_", "i").replace("1.0", "i")
+        assert "\n        i = i_count\n        x, i = (x, i)\n" in cuda_source.typed(read).replace(
+            "real(i)", "i"
+        )
+
     def test_of_loops(self) -> None:
         loop = "def f(x, P):\n    for i in range(int(P[1])):\n        x = 2.0 if i % 2 == 1 else x + (i - 1)"
         assert cuda_source.typed(loop) == (
