@@ -26,6 +26,7 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.jobs import surfaces
+from fracslice.jobs.mesh import import_ahead
 from fracslice.scene import Print, scene
 
 BALL = scene(sphere(radius=3), size="40mm", name="ball")
@@ -226,3 +227,7 @@ def test_what_is_all_there_is_not_reported():
 def test_small_triangles_around_a_lowest_vertex_are_not_folded_onto_the_bed() -> None:
     report = make_mesh(scene(mandelbulb(iterations=10), size="80mm"), MeshJob(resolution=256)).report
     assert report.mesh.self_intersections == 0
+
+
+def test_modules_of_later_stages_are_there() -> None:
+    import_ahead()
