@@ -166,6 +166,12 @@ class _Typed(ast.NodeTransformer):
         """Visit an expression in a place that requires a real."""
         return _call("real", node) if self.whole(node) else self.visit(node)
 
+    def passed(self, node: ast.expr) -> Any:
+        """Visit an argument: a number or a tuple of numbers."""
+        if isinstance(node, ast.Tuple):
+            return ast.Tuple([self.passed(e) for e in node.elts], ast.Load())
+        return self.real(node)
+
     def operand(self, node: ast.BinOp, side: ast.expr) -> Any:
         """Visit an operand: in arithmetic, a comparison is 1 or 0."""
         mask = isinstance(side, ast.Compare) and isinstance(node.op, (ast.Add, ast.Sub, ast.Mult))
@@ -223,7 +229,7 @@ class _Typed(ast.NodeTransformer):
             return _call("whole", *node.args)
         if called not in self.shifting:
             places = after_parameters(node.args)
-            node.args = [*(self.real(a) for a in node.args[: len(node.args) - len(places)]), *places]
+            node.args = [*map(self.passed, node.args[: len(node.args) - len(places)]), *places]
         return node
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:

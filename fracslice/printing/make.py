@@ -127,10 +127,7 @@ class _Preparation:
             before = self.root
             yield "keeping the largest", self.largest
             if self.root is not before:
-                voxel_mm = self.planned.voxel * self.sizing.scale(self.planned.box)
                 self.bound()
-                voxel = voxel_mm / self.sizing.scale(self.planned.box)
-                self.planned = replace(self.planned, voxel=voxel)
         self.scale = self.sizing.scale(self.planned.box)
         if how.gap:
             yield "closing gaps", self.closed

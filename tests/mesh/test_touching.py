@@ -26,15 +26,6 @@ def test_a_flake_whose_corners_touch_is_joined_by_the_thickness_that_its_report_
     assert not any("two voxels" in note for note in joined.report.notes)
 
 
-def test_the_largest_body_alone_has_the_size_and_the_voxels_that_were_asked_for() -> None:
-    """One tetrahedron of the flake, between four corners of a cube of 60 mm."""
-    made = make_mesh(flake(solid="tetrahedron", level=1), size="60mm", resolution=24, keep="largest")
-    assert made.report.mesh.components == 1
-    assert made.volume == pytest.approx(60**3 / 3, rel=0.05)
-    assert made.report.voxel_mm == pytest.approx(60 / 24, rel=1e-3)
-    assert not any("two voxels" in note for note in made.report.notes)
-
-
 def test_distant_bodies_and_cavities_do_not_touch() -> None:
     distant = make_mesh(union(*(transform(sphere(0.3), translate=(x, 0, 0)) for x in (-1, 1))), resolution=32)
     assert distant.report.mesh.components == 2

@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 from fracslice.export import png
+from fracslice.export.jobs import SliceRun
 from fracslice.formulas import julia, mandelbulb, menger, torus
 from fracslice.slicing import Layer, SliceJob, Slicer, plan_stack
 from fracslice.slicing.raster import Screen
@@ -31,10 +32,10 @@ SMALLEST = {"scenes": ("torus",), "pixels": (32, 64)}
 def cost(name: str, pixels: int) -> Figures:
     """Cut pixels, evaluations and CPU seconds of a whole stack."""
     stack = plan_stack(SCENES[name], SliceJob(size=0.05 * pixels, layer=0.1, pixel=(0.05, 0.05)))
-    screen, totals = Screen(stack), []
+    layers, totals = SliceRun(stack, Screen(stack)), []
 
     def make(layer: Layer) -> tuple[float, float]:
-        png.encode_layer(screen, layer)
+        png.encode_layer(layers, layer)
         return layer.boundary, layer.evaluations
 
     figures = timed(lambda: totals.extend(Slicer(stack).map(make)))

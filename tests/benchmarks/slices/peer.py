@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fracslice.export import png
+from fracslice.export.jobs import SliceRun
 from fracslice.formulas import mandelbulb
 from fracslice.formulas.box import Box
 from fracslice.slicing import Layer, Slicer, Stack
@@ -35,10 +36,10 @@ def stack(side: int, layers: int) -> Stack:
 
 
 def ours(job: Stack, folder: Path, work: Work) -> Figures:
-    screen, totals = Screen(job), []
+    layers, totals = SliceRun(job, Screen(job)), []
 
     def make(layer: Layer) -> tuple[float, int, int]:
-        data = png.encode_layer(screen, layer)
+        data = png.encode_layer(layers, layer)
         (folder / f"{layer.index:04d}.png").write_bytes(data)
         return layer.evaluations, layer.boundary, len(data)
 
