@@ -164,7 +164,9 @@ SHARED = {
 """Options, pieces and file of a command."""
 PASSES = 4
 """Passes of the rendered command."""
-STARTED = """from fracslice.jobs import mesh_tasks; from fracslice.rendering import parts; mesh_tasks.LEAST = 1
+STARTED = """from fracslice.jobs import mesh_tasks
+from fracslice.rendering import parts
+mesh_tasks.LEAST = 1
 parts.PIXELS = 1024
 from fracslice.cli.main import main; main()"""
 
